@@ -23,7 +23,7 @@ from flocsim.integrators.parts import (
 
 @attrs.frozen
 class SemiImplicitEuler(FixedStep):
-    """The velocity first, then the place with the new velocity: of order 1, in ``step`` [s]."""
+    """First the velocity, then the position with the new velocity: order 1, fixed ``step`` [s]."""
 
     @staticmethod
     def attempt(scene, work, clock, step):

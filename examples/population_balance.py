@@ -74,7 +74,7 @@ def main():
     args = parser.parse_args()
     kernel = flocsim.open(args.results).kernel
     if kernel is None:
-        raise SystemExit(f"{args.results} is of no kernel study")
+        raise SystemExit(f"{args.results} is not from a kernel study")
     volume = 4.0 / 3.0 * np.pi * kernel.radii**3
     start = np.zeros(len(volume))
     start[0] = args.fraction / volume[0]

@@ -25,8 +25,8 @@ STUDIES = {"ensemble", "kernel", "swarm", "strength"}
 """Commands that run studies, also under mpirun."""
 
 ALONE = (
-    "flocsim: {} runs on one rank; the others of this job have ended: start it without a "
-    "launcher, and with --jobs where it has that"
+    "flocsim: {} runs on one rank only, and the other ranks of this job have ended: start it "
+    "without a launcher, with --jobs where it takes that"
 )
 
 

@@ -77,10 +77,10 @@ class Fluid:
     u(x) = velocity + gradient · x, Ω = ½ (∂u_y/∂x − ∂u_x/∂y); still by default.
     ``gradient`` = (∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y) [1/s].
 
-    With a ``temperature``, a ``salinity`` or an ``ionic_strength``, what is not given of viscosity
-    and density is that of such water (flocsim.water), and so are ``permittivity`` and
-    ``debye_length``. Of a salt that is given by its ionic strength, viscosity and density are those
-    of fresh water: 0.1 mol/l of NaCl adds 0.9 and 0.4 % to them.
+    With a ``temperature``, a ``salinity`` or an ``ionic_strength``, viscosity and density follow
+    from it unless they are given (flocsim.water), and so do ``permittivity`` and
+    ``debye_length``. With a salt given by its ionic strength, viscosity and density are those
+    of fresh water: 0.1 mol/l of NaCl would add 0.9 and 0.4 % to them.
     """
 
     temperature: float | None = quantity(

@@ -33,8 +33,8 @@ from flocsim.plausibility.reynolds import all_settled, settled
 from flocsim.plausibility.settling import lone_view
 
 LAWLESS = (
-    ("centre_force", "forces along lines of centres", "none is given"),
-    ("surface_force", "forces between outlines", "none is given, no gap is sought"),
+    ("centre_force", "forces along lines of centres", "none are given"),
+    ("surface_force", "forces between outlines", "none are given, so no gap is computed"),
     ("slip_limit", "sliding", "no contact force limits its slip"),
     ("contact_event", "search for kinks of the contact law", "it has none with these parameters"),
 )
@@ -68,7 +68,7 @@ def explain(system: Any) -> str:
             *force_lines(system),
             *machinery_lines(system),
             "in:  recording: every accepted step; run(record=False) keeps start and end only",
-            "out: events and observer: a plain run awaits none; an ensemble puts its own",
+            "out: events and observer: a plain run has none; an ensemble adds its own",
             *settling_lines(system),
             *scale_lines(system),
             *(f"warning: {line}" for line in doubts_of([system])),
@@ -98,7 +98,7 @@ def force_lines(system):
         if not force.absent
     ]
     lines += [f"out: {name}: {force.absent}" for name, force in named if force.absent]
-    return lines or ["out: forces: none is given, bodies fly free"]
+    return lines or ["out: forces: none are given, bodies move freely"]
 
 
 def about(system, force, implicit):
@@ -109,7 +109,7 @@ def about(system, force, implicit):
         return [f"never called, {no_partner(system)}"]
     elif isinstance(force, PairResistance):
         parts = [f"between the two, up to {force.cut:g} (r_i + r_j) apart"]
-        derivative = "derivatives analytic, of its growth in the gap alone by place"
+        derivative = "analytic derivatives, by position only through the gap"
     elif isinstance(force, ContactForce):
         parts = ["at every overlapping pair", sliding(system, force)]
         derivative = "derivatives from differences of its kernel"
@@ -133,7 +133,8 @@ def no_partner(system):
 
 def body_derivative(system, force):
     reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
-    by = [name for name, fields in (("velocity", VELOCITIES), ("place", PLACES)) if reads & fields]
+    known = (("velocity", VELOCITIES), ("position", PLACES))
+    by = [name for name, fields in known if reads & fields]
     if not by:
         return "constant, nothing to differentiate"
     return f"derivative by {' and '.join(by)} from differences of its kernel"
@@ -153,7 +154,7 @@ def reach_words(system, force):
     """How far a pair force reaches, and whether it does so at the start."""
     if not force.reach < math.inf:
         return "at every gap"
-    words = f"not called at gaps from {force.reach:.3g} m on"
+    words = f"not called at gaps above {force.reach:.3g} m"
     nearest = least_gap(system.bodies, force)
     if nearest >= force.reach:
         words += f" (out of range at the start, where gaps are at least {nearest:.3g} m)"
@@ -181,7 +182,7 @@ def sliding(system, force):
     if force.slip_limit is None:
         return "no sliding"
     limits = tried(system, force, force.slip_limit, SAMPLE_CONTACTS)
-    return "slides at its limit" if min(limits) < math.inf else "no sliding, its limit is infinite"
+    return "slides at its limit" if min(limits) < math.inf else "no sliding: its limit is infinite"
 
 
 def machinery_lines(system):
@@ -208,7 +209,7 @@ def search_line(system, touching):
     far = [gap_between(a, b, "bounding_radius") for a, b in counting(system.bodies)]
     if not far:
         return f"out: contact search: {no_partner(system)}"
-    words = "in:  contact search, left out for every two bodies whose bounding circles are apart"
+    words = "in:  contact search, skipped for bodies whose bounding circles do not overlap"
     return f"{words} (at the start {sum(gap > 0.0 for gap in far)} of {len(far)} pairs)"
 
 
@@ -291,18 +292,19 @@ def scale_lines(system):
     """The lines of the report: scales, how many are stiff, what an explicit method would need."""
     scales = [scale for scale in all_scales(system) if 0.0 < scale.time < math.inf]
     if not scales:
-        return ["time scales: none, nothing pulls back or slows down"]
+        return ["time scales: none, as nothing restores or damps the motion"]
     slowest = max(scale.time for scale in scales)
     stiff = sum(slowest > STIFF * scale.time for scale in scales)
     words = ", ".join(f"{scale.name} {scale.time:.2g} s" for scale in scales)
-    head = f"time scales: {words}; {stiff} of {len(scales)} stiff (over 100 x below the slowest)"
+    most = "over 100 times shorter than the slowest"
+    head = f"time scales: {words}; {stiff} of {len(scales)} stiff ({most})"
     limits = [scale.time for scale in scales if scale.limits_steps]
     if not limits:
         return [head]
     step = STABLE * min(limits)
     return [
         head,
-        f"an explicit method: unstable from steps of about {step:.2g} s on, "
+        f"an explicit method: unstable with steps of more than about {step:.2g} s, "
         f"{slowest / step:.2g} steps for the slowest scale",
     ]
 

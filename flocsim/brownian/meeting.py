@@ -88,12 +88,12 @@ def brownian_meetings(
     if not thermal_in(forces):
         raise UsageError("a brownian meeting needs a Thermal force of a temperature above 0 K")
     if not is_whole(replicates) or replicates < 1:
-        raise UsageError(f"replicates must be a whole number from 1, found {replicates!r}")
+        raise UsageError(f"replicates must be a whole number of at least 1, found {replicates!r}")
     near, far = length("release", release), length("escape", escape)
     touch = sum(body.shape.bounding_radius for body in bodies)
     if not touch < near < far:
         raise UsageError(
-            f"release must lie between {touch:g} m, where the bodies may touch, and escape = "
+            f"release must be between {touch:g} m, where the bodies may touch, and escape = "
             f"{far:g} m, found {near:g} m"
         )
     one, other = bodies

@@ -7,9 +7,9 @@ has a line in SUMMARIES.
 
 SUMMARIES = {
     "init": "write an example config file",
-    "fit": "fit spheropolygons to the flocs of pictures",
+    "fit": "fit spheropolygons to the flocs in pictures",
     "shapes": "list, select and merge the flocs of shape libraries",
-    "check": "run a study's scene at the ends of its sizes, stiffness and tolerance",
+    "check": "check a study's scene at the extremes of its sizes, stiffness and tolerance",
     "ensemble": "run the ensemble of a config file",
     "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
     "kernels and efficiencies for population balances",
@@ -17,10 +17,10 @@ SUMMARIES = {
     "sweep": "run a study at several values of a key",
     "trajectory": "run one replicate of a config and draw it as a strip of frames",
     "plot": "draw the figures of a results file or a shape library",
-    "report": "write one HTML page of a file",
-    "export": "write motion, or rates of encounters, in a format of another program",
+    "report": "write one HTML page about a file",
+    "export": "write motion, or rates of encounters, in the format of another program",
     "compare": "compare two results files: differences of probabilities with 95 %% intervals",
-    "strength": "at what rate a flow opens the bonds of a study",
+    "strength": "find the rate at which a flow opens the bonds of a study",
     "work-precision": "flips and errors against CPU time, for the methods and tolerances of a "
     "config",
     "info": "describe a results file, a running study, a library, a trajectory or a sweep",
@@ -28,9 +28,9 @@ SUMMARIES = {
 """{command: what it does}, in the order of the help, which needs no more of them than this."""
 
 FOLDER_HELP = (
-    "folder of the config of the results, its shape library and its own modules, which are run "
-    "then whatever they are (default: where the results lie, and modules only as the results keep "
-    "them)"
+    "folder of the study's config, shape library and own modules; modules found there are run "
+    "whatever they contain (default: the folder of the results, and modules only if they are "
+    "those kept in the results)"
 )
 
 ENSEMBLES = "ensemble", "kernel", "swarm"

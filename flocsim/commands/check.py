@@ -51,27 +51,27 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "check",
         help=SUMMARIES["check"],
-        description="Run some replicates of a study at the ends of its sizes, numbers of vertices, "
-        "contact stiffness and tolerance, hold them against a much tighter tolerance, and print "
-        "what came of each. Exit code 0 where all are right or within their stated error, 1 where "
-        "any is not.",
+        description="Run some replicates of a study at the extremes of its sizes, numbers of "
+        "vertices, contact stiffness and tolerance, compare them with runs at a much tighter "
+        "tolerance, and print each result. Exit code 0 if all are right or within their "
+        "stated error, 1 otherwise.",
     )
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add("--stiffness", nargs=2, metavar=("LOW", "HIGH"),
-        help="ends of forces.contact.k_n, e.g. '1 N/m' '1e3 N/m' (default: a decade under and over "
-        "that of the config)")  # fmt: skip
+        help="extremes of forces.contact.k_n, e.g. '1 N/m' '1e3 N/m' (default: a decade below and "
+        "above that of the config)")  # fmt: skip
     add("--size", nargs=2, metavar=("LOW", "HIGH"),
-        help="ends of the approaching body's radius, e.g. '1 um' '50 um', in pairs as "
-        "unequal as the config's first (default: its smallest and its largest pair); of measured "
-        "flocs: those between these radii")  # fmt: skip
+        help="extremes of the approaching body's radius, e.g. '1 um' '50 um', in pairs of the "
+        "same size ratio as the first of the config (default: its smallest and its largest "
+        "pair); for measured flocs: only those between these radii")  # fmt: skip
     add("--tolerance", nargs=2, metavar=("LOW", "HIGH"),
-        help="ends of the tolerance, e.g. '1e-11 m' '1e-7 m' (default: the study's and that of its "
-        'second runs; with accuracy = "auto": all that may be chosen)')  # fmt: skip
+        help="extremes of the tolerance, e.g. '1e-11 m' '1e-7 m' (default: that of the study and "
+        'of its second runs; with accuracy = "auto": all that may be chosen)')  # fmt: skip
     add("--count", type=int, default=COUNT, metavar="K",
         help=f"replicates of each combination (default: {COUNT})")  # fmt: skip
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's, as in flocsim ensemble; may be "
+        help="override any value of the config, as in flocsim ensemble; may be "
         "repeated")  # fmt: skip
     parser.set_defaults(run=run)
 
@@ -113,7 +113,7 @@ def stiffnesses(config: Config, given: tuple[float, float] | None) -> list[float
     if law is None:
         if given is not None:
             raise UsageError(
-                "--stiffness is for forces.contact, which the config does not have: leave it out"
+                "--stiffness needs forces.contact, which the config does not have: leave it out"
             )
         return [math.nan]
     if given is not None:
@@ -174,9 +174,10 @@ def run(args: Namespace) -> int:
     settings = [each.method.tolerance for each in cases if math.isfinite(each.method.tolerance)]
     reference = max(TIGHTER * min(settings, default=1e-9), TIGHTEST)
     tell(
-        f"{len(cases)} runs at the ends of sizes, N, stiffness and tolerance, against Implicit at "
-        f"{reference:.0e} m\nerror: of any point of an outline, where the first of both is "
-        f"decided\n\n{HEADER}"
+        f"{len(cases)} runs at the extremes of sizes, N, stiffness and tolerance, compared with "
+        "Implicit at "
+        f"{reference:.0e} m\nerror: largest of any point of an outline, at the time when the first "
+        f"of the two is decided\n\n{HEADER}"
     )
     checker = Checker(config)
     kinds = []

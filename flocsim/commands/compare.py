@@ -13,12 +13,12 @@ def add_parser(subparsers: Any) -> None:
         "compare",
         help=SUMMARIES["compare"],
         description="Print the differences between two results files, at every condition, or time, "
-        "that both have, with 95 % intervals: of replicates paired where both have drawn the same "
-        "ones (studies of one seed), of independent samples else. What the studies differ in comes "
-        "first.",
+        "that both have, with 95 % intervals: of paired replicates where both have drawn the same "
+        "ones (the same seed), otherwise of independent samples. What the studies differ in is "
+        "printed first.",
     )
-    parser.add_argument("first", help="results file that flocsim ensemble wrote")
-    parser.add_argument("second", help="another one")
+    parser.add_argument("first", help="results file written by flocsim ensemble")
+    parser.add_argument("second", help="results file to compare with it")
     known = "; ".join(
         f"of {kind.title} "
         + ", ".join(f"{name} ({words})" for name, words in kind.compared.items())
@@ -26,7 +26,7 @@ def add_parser(subparsers: Any) -> None:
     ).replace("%", "%%")  # fmt: skip
     parser.add_argument(
         "--quantity", "--probability", metavar="NAME",
-        help=f"what is compared: {known} (default: the first)",
+        help=f"what to compare: {known} (default: the first)",
     )  # fmt: skip
     parser.set_defaults(run=run)
 

@@ -30,28 +30,28 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "export",
         help=SUMMARIES["export"],
-        description="gsd: the motion that flocsim trajectory --save or Trajectory.save put into a "
-        "file, or that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in "
-        "um. (ParaView and xarray open the file itself.) Of the results of a kernel study, csv: a "
-        "table of all pairs of size classes; matrix: a square matrix for each mechanism and N, "
-        "which says what it multiplies.",
+        description="gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or "
+        "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um. "
+        "(ParaView and xarray open the file directly.) For results of a kernel study, csv: a "
+        "table of all pairs of size classes; matrix: a square matrix for each mechanism and "
+        "N, whose header says what it multiplies.",
     )
     add = parser.add_argument
     add("format", choices=tuple(SUFFIXES))
-    add("source", help="file that flocsim trajectory --save, or flocsim kernel, wrote")
+    add("source", help="file written by flocsim trajectory --save or flocsim kernel")
     add("-o", "--output", metavar="FILE",
-        help="file to write (default: run.gsd for run.h5, in the current folder); of matrices "
+        help="file to write (default: run.gsd for run.h5, in the current folder); for matrices, "
         "the start of their names")  # fmt: skip
     add("--what", choices=QUANTITIES, default="efficiency",
-        help="of matrices: what they hold (default: %(default)s)")  # fmt: skip
+        help="for matrices: the quantity to write (default: %(default)s)")  # fmt: skip
     add("--model", choices=MODELS, default="spheres",
-        help="of matrices of efficiencies: whose kernels they multiply (default: %(default)s); "
-        "flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
+        help="for matrices of efficiencies: the model whose kernels they multiply (default: "
+        "%(default)s); flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
     add("--curvilinear", choices=(SPHERES, *CORRECTIONS),
-        help="of matrices of efficiencies: times this factor of solid spheres, for the water that "
-        "they push aside: spheres, those of the study with its forces, computed here, a second or "
-        "two for each pair; or a formula of the literature. Not known for flocs (default: none, an "
-        "upper bound)")  # fmt: skip
+        help="for matrices of efficiencies: multiply by this factor of solid spheres, for the "
+        "water that they push aside. spheres: computed for the study's spheres and forces, a "
+        "second or two for each pair; others: formulas from the literature. Not known for "
+        "flocs (default: none, an upper bound)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -92,7 +92,8 @@ def kernel_in(path):
     kernel = kind.rates(kind.read(source))
     if kernel is None:
         raise UsageError(
-            f"{path} is of no kernel study and has no rates: run flocsim kernel with a config of "
+            f"{path} is not from a kernel study and has no rates: run flocsim kernel with a config "
+            "of "
             'scene.kind = "kernel"'
         )
     return kernel

@@ -29,9 +29,9 @@ from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.ranges import PIXEL_SIZE
 
 DESCRIPTION = """\
-Find the flocs of pictures, fit a spheropolygon to each at every number of vertices asked for, and
-write them to a shape library.  The circle of equal area (N = 1) is always stored too.  Every
-region, also those left out and why, goes to a table beside the library.
+Find the flocs in pictures, fit a spheropolygon to each at every requested number of vertices, and
+write them to a shape library.  The circle of equal area (N = 1) is always stored too.  A table
+beside the library lists every region, with the reason for those left out.
 
   flocsim fit frames/ --pixel-size 0.95e-6 --vertices 4,8,16,64 --radius 1 -o shapes.h5
   flocsim plot shapes.h5          # sizes, and errors against N: the paper's Figs 2 and 3"""
@@ -48,83 +48,88 @@ def add_parser(subparsers: Any) -> None:
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
     add("--pixel-size", metavar="LENGTH",
-        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default: that which "
-        "an OME-TIFF or ImageJ file gives)")  # fmt: skip
+        help="length of a pixel's side, e.g. '0.95 um', or in metres: 0.95e-6 (default: as given "
+        "in an OME-TIFF or ImageJ file)")  # fmt: skip
     add("--page", metavar="LIST",
-        help="of a stack, use these pages, from 1, with commas between them, or all")  # fmt: skip
+        help="pages of a stack to use, counted from 1, separated by commas, or all")  # fmt: skip
     add("--channel", metavar="K",
-        help="of several channels or colours, use this one: number from 1, or name")  # fmt: skip
+        help="channel or colour to use: a number from 1, or a name")  # fmt: skip
     add("--crop", metavar="X,Y,W,H",
-        help="use this part of every picture: left, top, width, height in pixels")  # fmt: skip
+        help="part of every picture to use: left, top, width, height in pixels")  # fmt: skip
     add("--vertices", default="4,8,16,64", metavar="LIST",
-        help="numbers of vertices with commas between them (default: %(default)s)")  # fmt: skip
+        help="numbers of vertices, separated by commas (default: %(default)s)")  # fmt: skip
     add("--radius", default="1", metavar="LIST",
-        help="spheroradius in pixels, or several with commas (default: %(default)s)")  # fmt: skip
+        help="spheroradius in pixels, or several, separated by commas (default: "
+        "%(default)s)")  # fmt: skip
     add("--method", default="pattern", choices=("pattern", "paper", "even"),
-        help="pattern: the least error; paper: the paper's damped dynamics; even: points evenly on "
-        "the outline, the plain baseline (default: %(default)s)")  # fmt: skip
-    add("--preserve-area", action="store_true", help="give every shape exactly its floc's area")
+        help="pattern: smallest error; paper: the paper's damped dynamics; even: points evenly "
+        "spaced on the outline, as a baseline (default: %(default)s)")  # fmt: skip
+    add(
+        "--preserve-area", action="store_true", help="give every shape exactly the area of its floc"
+    )
     add("--inscribed", action="store_true", help="keep every shape inside its floc")
     add("--holes", action="store_true",
-        help="keep the holes of flocs, the largest ones: the vertices are shared among the outline "
-        "and them, and area and centroid are those of what is left")  # fmt: skip
+        help="keep the largest holes of flocs: the vertices are shared between the outline and "
+        "the holes, and area and centroid are those without the holes")  # fmt: skip
     add("--band", action="store_true",
         help="fit every floc three times, as it is cut and at both ends of its band, for "
-        '[shapes] outlines = "band": what the cut does to a probability')  # fmt: skip
-    add("--jobs", default="1", metavar="K", help="processes to work in (default: %(default)s)")
+        '[shapes] outlines = "band": the error of a probability by the cut')  # fmt: skip
+    add("--jobs", default="1", metavar="K", help="number of processes (default: %(default)s)")
     add("--masks", action="store_true",
-        help="the files are masks or labels (PNG, TIFF, .npy, .npz), not pictures")  # fmt: skip
+        help="treat the files as masks or labels (PNG, TIFF, .npy, .npz), not "
+        "pictures")  # fmt: skip
     add("-o", "--output", default="shapes.h5", metavar="FILE",
         help="shape library to write (default: %(default)s)")  # fmt: skip
     add("--summary", metavar="FILE",
-        help="table of all regions, rejected ones with the reason (default: beside the library, "
-        "ending .csv)")  # fmt: skip
+        help="table of all regions, with the reason for rejected ones (default: beside the "
+        "library, ending in .csv)")  # fmt: skip
     add("--overlay", metavar="FILE",
-        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and dashed "
-        "what is left out, with the reason; with several pictures, one file each: "
+        help="draw the outlines at the largest N over the picture (.png, .pdf, .svg), and "
+        "rejected regions dashed, with the reason; with several pictures, one file each: "
         "FILE-picture.png")  # fmt: skip
     add("--fits", metavar="FOLDER",
-        help="draw every fit at the largest N: mask, core, the outline that the disk sweeps, and "
-        "the pixels that differ")  # fmt: skip
+        help="draw every fit at the largest N: mask, core, the outline swept by the disk, and the "
+        "pixels that differ")  # fmt: skip
     add("--pictures", metavar="FOLDER",
-        help="with --masks: where the pictures of the same names are, for the overlay to be drawn "
-        "over them and not over the masks")  # fmt: skip
+        help="with --masks: folder of the pictures of the same names, so that the overlay is "
+        "drawn over them and not over the masks")  # fmt: skip
     add("--masks-out", metavar="FOLDER",
-        help="write a label image of every picture, 0 outside and in each floc its number (PNG of "
-        "16 bits), to be edited and read back by --masks")  # fmt: skip
+        help="write a label image of every picture, 0 outside and the number of each floc inside "
+        "it (16-bit PNG), which can be edited and read back by --masks")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    add = parser.add_argument_group("finding the flocs").add_argument
+    add = parser.add_argument_group("finding flocs").add_argument
     add("--flocs", default="auto", choices=("auto", "bright", "dark"),
-        help="how flocs stand out from the background (default: %(default)s)")  # fmt: skip
+        help="whether flocs are brighter or darker than the background (default: "
+        "%(default)s)")  # fmt: skip
     add("--background", default="surface", choices=("surface", "median"),
-        help="surface: fitted to each picture; median: of all pictures, of one fixed camera "
+        help="surface: fitted to each picture; median: of all pictures, which a fixed camera took "
         "(default: %(default)s)")  # fmt: skip
     add("--threshold", metavar="CONTRAST",
-        help="contrast from which a pixel belongs to a floc, above 0 to 1: of dark flocs the share "
-        "of the light that they take, of bright ones the grey above the background, white being 1 "
-        "(default: found for each floc, and their median printed)")  # fmt: skip
+        help="contrast from which a pixel belongs to a floc, above 0 to 1: for dark flocs the "
+        "share of the light that they absorb, for bright ones the grey above the background, "
+        "white being 1 (default: found for each floc; the median is printed)")  # fmt: skip
     add("--noise-scale", default="1", metavar="PX",
         help="detail finer than this is noise (default: %(default)s)")  # fmt: skip
     add("--saturated", default="0.001", metavar="SHARE",
         help="share of a floc's pixels whose contrast is too high to count for its level "
         "(default: %(default)s)")  # fmt: skip
     add("--min-radius", default="4", metavar="PX",
-        help="r_eq below which a region is no floc (default: %(default)s)")  # fmt: skip
-    add("--max-radius", metavar="PX", help="r_eq above which a region is no floc")
+        help="smallest r_eq of a floc (default: %(default)s)")  # fmt: skip
+    add("--max-radius", metavar="PX", help="largest r_eq of a floc")
     add("--max-blur", default="0.25", metavar="SHARE",
-        help="softness, as a share of r_eq, that half of an outline has to stay below, or the "
-        "region is out of focus, unless it is below 3.5 px; inf: keep all "
-        "(default: %(default)s)")  # fmt: skip
+        help="a region is out of focus where the softness of half of its outline exceeds this "
+        "share of r_eq, unless it is below 3.5 px; inf: keep all (default: "
+        "%(default)s)")  # fmt: skip
     add("--neck", metavar="SHARE",
-        help="part touching flocs at necks of up to this share of the smaller one's width; 0: "
-        "never (default: 0.5, where the parts are so compact that they are surely two flocs, and "
-        "never in a picture of fractal aggregates)")  # fmt: skip
-    add("--max-flocs", metavar="K", help="fit the K largest flocs of every picture only")
+        help="separate touching flocs at necks of up to this share of the smaller one's width; 0: "
+        "never (default: 0.5, only where the parts are so compact that they are surely two "
+        "flocs, and never in a picture of fractal aggregates)")  # fmt: skip
+    add("--max-flocs", metavar="K", help="fit only the K largest flocs of every picture")
     add("--drop", metavar="LIST",
-        help="flocs to leave out, by the numbers of the overlay and the table: 3,5 with one "
+        help="flocs to leave out, by their numbers in the overlay and the table: 3,5 with one "
         "picture, 023.png#3,5 with several")  # fmt: skip
-    add("--keep", metavar="LIST", help="fit these regions only, named as for --drop")
-    add("--add", metavar="LIST", help="fit these as well, though they would be left out")
+    add("--keep", metavar="LIST", help="fit only these regions, named as for --drop")
+    add("--add", metavar="LIST", help="also fit these regions, which would otherwise be left out")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -136,8 +141,8 @@ def run(args: argparse.Namespace) -> int:
     paths = list_pictures(args.images, options.masks)
     if options.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):
         raise UsageError(
-            "--pixel-size is missing: of pictures only OME-TIFF and ImageJ files tell how large a "
-            "pixel is; give the length of its side, for example --pixel-size '0.95 um'"
+            "--pixel-size is missing, and only OME-TIFF and ImageJ files give the size of a "
+            "pixel; give the length of its side, for example --pixel-size '0.95 um'"
         )
     beneath = pictures_beneath(args.pictures, paths, args.masks and args.overlay is not None)
     rule, drawn = data_rule(args.overwrite), figure_rule(args.overwrite)
@@ -209,18 +214,17 @@ def run(args: argparse.Namespace) -> int:
 def read_options(args):
     """Options from argparse's; UsageError for a number that does not make sense."""
     if args.masks and (args.page or args.channel or args.crop):
-        raise UsageError("--page, --channel and --crop are of pictures, not of --masks")
+        raise UsageError("--page, --channel and --crop apply to pictures, not to --masks")
     if args.page not in (None, "all"):
         page_numbers(args.page)
     if args.inscribed and (args.preserve_area or args.method != "pattern"):
         raise UsageError(
-            "--inscribed goes with --method pattern and without --preserve-area: a shape inside "
-            "its floc has less than its area"
+            "--inscribed needs --method pattern and excludes --preserve-area: a shape inside its "
+            "floc has less than its area"
         )
     if args.band and (args.masks or args.holes):
         raise UsageError(
-            "--band goes without --masks, which do not show where else an outline might lie, "
-            "and without --holes"
+            "--band excludes --masks, which do not show where else an outline might be, and --holes"
         )
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
     endless = args.max_blur.strip() == "inf"

@@ -16,11 +16,11 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info",
         help=SUMMARIES["info"],
-        description="Print what a file holds: conditions, counts, probabilities with 95 % "
-        "intervals, and where it came from. Of a study that still runs or was interrupted, its "
-        "replicates so far, without touching it.",
+        description="Print the contents of a file: conditions, counts, probabilities with 95 % "
+        "intervals, and its origin; of a study that is running or was interrupted, the replicates "
+        "so far, without touching it.",
     )
-    parser.add_argument("results", help="file that flocsim wrote, or is writing")
+    parser.add_argument("results", help="file written, or being written, by flocsim")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
     )
@@ -30,9 +30,9 @@ def add_parser(subparsers: Any) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--water", action="store_true",
-        help="print only how often the equivalent spheres of a study of pairs or rates touch, with "
-        "the water that they push at each other and without, a second or two for each pair; of a "
-        "shape library how fast its flocs sink and turn",
+        help="print only how often the equivalent spheres of a study of pairs or rates touch, "
+        "with and without the water that they push at each other (a second or two for each pair); "
+        "of a shape library, how fast its flocs settle and turn",
     )  # fmt: skip
     parser.set_defaults(run=run)
 
@@ -41,7 +41,7 @@ def run(args: Namespace) -> int:
     journal = journal_of(args.results)
     if journal is not None:
         if args.config or args.modules or args.water:
-            raise FileError(f"{journal} holds no config: it is of a run that has not ended")
+            raise FileError(f"{journal} has no config: it belongs to a run that has not ended")
         # All kinds of studies, and the engine with them, are wanted here alone.
         from flocsim.ensembles.storage.unfinished import read_unfinished
 
@@ -62,17 +62,15 @@ def print_kept(args, run):
     """Print the config, the modules, or both, that a file keeps; FileError where it has none."""
     if args.config:
         if not run.get("config"):
-            raise FileError(
-                f"{args.results} holds no config: it was not written by flocsim ensemble"
-            )
+            raise FileError(f"{args.results} has no config: it was not written by flocsim ensemble")
         sys.stdout.write(str(run["config"]))
     if args.modules:
         try:
             modules = read_sources(run)
         except ValueError as error:
-            raise FileError(f"{args.results} holds no readable results: {error}") from error
+            raise FileError(f"{args.results} has no readable results: {error}") from error
         if not modules:
-            raise FileError(f"{args.results} holds no modules: it was run without, or by a flocsim "
-                            "that kept none")  # fmt: skip
+            raise FileError(f"{args.results} has no modules: its study used none, or was run by a "
+                "version of flocsim that kept none")  # fmt: skip
         for place, each in modules.items():
             sys.stdout.write(f"# {visible(place, '')}\n{each['source'].rstrip()}\n")

@@ -20,11 +20,11 @@ KINDS = {
     "paper": "the conditions of Tang et al. (2014)",
     "measured": "flocs at their measured sizes",
     "pictures": "flocs fitted to pictures",
-    "force": "a force of your own, its module too",
+    "force": "a force of your own, with its module",
     "sweep": "several values of a key",
     "swarm": "many bodies in a box",
     "kernel": "rates for population balances",
-    "brownian": "two bodies that meet by thermal motion",
+    "brownian": "two bodies brought together by thermal motion",
 }
 """What there is to begin with: {name: help}."""
 

@@ -33,23 +33,23 @@ def add_parser(subparsers: Any) -> None:
         help=SUMMARIES["plot"],
         description="\n".join(
             [
-                "Draw the figures of a file, each into a file of its own.",
+                "Draw the figures of a file, each to its own file.",
                 *(f"Of {kind}:\n{listed(figures)}" for kind, figures in drawn().items()),
-                "Of a study that still runs, its figures so far are drawn, marked as unfinished.",
+                "Of a running study, the figures of the replicates so far are drawn, marked as "
+                "unfinished.",
                 "Figures are numbered as in Tang et al. (2014).",
             ]
         ),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("results", help="file that flocsim ensemble or flocsim fit wrote")
+    parser.add_argument("results", help="file written by flocsim ensemble or flocsim fit")
     parser.add_argument("--output-dir", default=".", metavar="DIR",
-        help="folder for the figures, made if it is missing (default: the current "
-        "one)")  # fmt: skip
+        help="folder for the figures, created if missing (default: the current one)")  # fmt: skip
     parser.add_argument("--format", default="png", choices=FORMATS, help="default: %(default)s")
     parser.add_argument("--figures", metavar="LIST",
-        help="figures with commas between them (default: all that the file has)")  # fmt: skip
+        help="figures, separated by commas (default: all that the file has)")  # fmt: skip
     parser.add_argument("--animation", metavar="FILE.gif",
-        help="of a swarm study: also write its first swarm as an animation")  # fmt: skip
+        help="for a swarm study: also write its first swarm as an animation")  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
 
@@ -89,7 +89,7 @@ def animation_of(args, kind):
         return []
     if kind.animate is None:
         raise UsageError(
-            "--animation is of swarm studies; of one collision: flocsim trajectory --animation"
+            "--animation is for swarm studies; for one collision use flocsim trajectory --animation"
         )
     if Path(args.animation).suffix.lower() != ".gif":
         raise UsageError(f"--animation {args.animation} must end in .gif")

@@ -24,7 +24,11 @@ def add_parser(subparsers: Any) -> None:
     add("results", help="file that flocsim wrote")
     add("-o", "--output", metavar="FILE.html",
         help="page to write (default: r.html for r.h5, in the current folder)")  # fmt: skip
-    add("--no-motion", action="store_true", help="run no replicate again: a page without motion")
+    add(
+        "--no-motion",
+        action="store_true",
+        help="do not run replicates again: a page without motion",
+    )
     add("--folder", metavar="DIR", help=FOLDER_HELP)
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
@@ -45,6 +49,6 @@ def run(args: argparse.Namespace) -> int:
     write_file(path, marked(page.encode(), ".html"), rule)
     for example in examples:
         if example.reason:
-            print(f"class {example.outcome} is not shown in motion: {example.reason}")
+            print(f"class {example.outcome} is not animated: {example.reason}")
     print(path)
     return 0

@@ -39,18 +39,18 @@ def add_parser(subparsers: Any) -> None:
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     listed = actions.add_parser("list", help="print sizes, shape measures and errors of every floc")
-    chosen = actions.add_parser("select", help="write the flocs that are asked for to a library")
-    merged = actions.add_parser("merge", help="write the flocs of several libraries to one")
+    chosen = actions.add_parser("select", help="write the selected flocs to a library")
+    merged = actions.add_parser("merge", help="merge several libraries into one")
     for action, run in ((listed, run_list), (chosen, run_write), (merged, run_write)):
         action.add_argument("libraries", nargs="+", metavar="LIBRARY",
-            help="shape library that flocsim fit wrote")  # fmt: skip
+            help="shape library written by flocsim fit")  # fmt: skip
         action.set_defaults(run=run)
     for action in (listed, chosen):
         add = action.add_argument
-        add("--keep", metavar="LIST", help="these flocs only, by name, with commas between them")
+        add("--keep", metavar="LIST", help="these flocs only, by name, separated by commas")
         add("--drop", metavar="LIST", help="all but these flocs")
         add("--picture", metavar="NAME",
-            help="flocs of this picture only; * stands for any letters")  # fmt: skip
+            help="flocs of this picture only; * stands for any characters")  # fmt: skip
         add("--min-radius", metavar="METRES", help="flocs of at least this r_eq")
         add("--max-radius", metavar="METRES", help="flocs of at most this r_eq")
     for action in (chosen, merged):
@@ -102,8 +102,8 @@ def run_write(args: argparse.Namespace) -> int:
     entries = selected(every, args, ", ".join(args.libraries)) if selects else every
     if not entries:
         raise UsageError(
-            f"{', '.join(args.libraries)}: none of {plural(len(every), 'floc')} is what was asked "
-            "for, nothing was written; flocsim shapes list names them"
+            f"{', '.join(args.libraries)}: none of {plural(len(every), 'floc')} matches, nothing "
+            "was written; flocsim shapes list names them"
         )
     write_library(args.output, entries, settings, rule)
     of = len(every) if selects else f"{len(libraries)} libraries"

@@ -1,4 +1,4 @@
-"""`flocsim strength results.h5 --flow shear`: at what rate a flow opens the bonds of a study."""
+"""`flocsim strength results.h5 --flow shear`: the rate at which a flow opens bonds of a study."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -13,7 +13,7 @@ from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule,
 from flocsim.io.terminal import tell
 
 DESCRIPTION = """\
-Put every doublet that a finished study has found bound into a flow of rising rate G, without
+Put every doublet that a finished study found bound into a flow of rising rate G, without
 weight or inertia, and find the first rate at which it opens: on a ladder of factors of two, then by
 halving in log G. Prints the distribution of every condition, and writes it and every single doublet
 to one HDF5 file, with a figure beside it. Runs on ranks and processes, stops and goes on as a study
@@ -27,7 +27,9 @@ def add_parser(subparsers: Any) -> None:
     add("--flow", default="shear", metavar="FLOW",
         help="shear, u = (G y, 0), or extension, u = (G x, -G y)/2 "
         "(default: %(default)s)")  # fmt: skip
-    add("--count", type=int, metavar="K", help="doublets of each condition (default: all)")
+    add(
+        "--count", type=int, metavar="K", help="number of doublets of each condition (default: all)"
+    )
     add("--precision", type=float, default=5e-3, metavar="P",
         help="relative precision of a rate (default: %(default)g)")  # fmt: skip
     add("--jobs", type=int, default=1, metavar="N",
@@ -64,7 +66,9 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
     if first:
         checked_format(figure, "--figure")
         if figure.suffix == output.suffix:
-            raise UsageError(f"--output {output} must not end in {figure.suffix}: .h5 does")
+            raise UsageError(
+                f"--output {output} must not end in {figure.suffix}, as the figure does: use .h5"
+            )
         rules = data_rule(args.overwrite or args.mode == "resume"), figure_rule(args.overwrite)
         check_outputs([Output(output, rules[0], SUFFIX, WAYS), Output(figure, rules[1])],
                       [args.results])  # fmt: skip

@@ -35,13 +35,13 @@ def add_parser(subparsers: Any) -> None:
         help="a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be repeated",
     )  # fmt: skip
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's; may be repeated")  # fmt: skip
+        help="override any value of the config; may be repeated")  # fmt: skip
     add("--elasticities", metavar="KEY,KEY…",
-        help="instead of --over: which parameter matters. Each by itself is multiplied and "
-        "divided by the root of --ratio, on the same draws: a table and a figure (-o, "
+        help="instead of --over: find which parameters matter. Each in turn is multiplied and "
+        "divided by the root of --ratio, on the same draws, for a table and a figure (-o, "
         "NAME-elasticities.png) of d Pr[A]/d ln p")  # fmt: skip
     add("--ratio", type=float, metavar="R",
-        help="of elasticities: the larger value over the smaller (default: 2)")  # fmt: skip
+        help="for elasticities: the larger value over the smaller (default: 2)")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
     add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
     add("--resume", action="store_true", help="continue a sweep, extend it, or join its parts")
@@ -77,7 +77,7 @@ def run(args: Namespace) -> int:
     pairs = [values_of(text) for text in args.over]
     over = dict(pairs)
     if len(over) < len(pairs):
-        raise UsageError("--over names one key twice: give all its values at once")
+        raise UsageError("--over names the same key twice: give all its values at once")
     output = args.output or f"{Path(args.config).stem}-sweep.h5"
     if args.dry_run:
         for path, part in planned(study, over, Path(output)).items():
@@ -91,7 +91,7 @@ def run(args: Namespace) -> int:
             overwrite=args.overwrite, tell=tell, ways=WAYS,
         )  # fmt: skip
     except KeyboardInterrupt:
-        tell("flocsim: stopped; what is finished is kept: continue with --resume")
+        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
         return STOPPED
     tell(os.fspath(output))
     return 0
@@ -120,7 +120,7 @@ def run_elasticities(args: Namespace, study: Any) -> int:
             tell=tell, ways=WAYS,
         )  # fmt: skip
     except KeyboardInterrupt:
-        tell("flocsim: stopped; what is finished is kept: continue with --resume")
+        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
         return STOPPED
     tell(found.table())
     save(figure_of(found), picture, rule)

@@ -25,10 +25,10 @@ def add_parser(subparsers: Any) -> None:
     add = parser.add_argument
     add("--scene", metavar="TYPE,N,F",
         help="collision type, vertices and displacement in one word")  # fmt: skip
-    add("--seed", type=int, help="seed, instead of the config's")
+    add("--seed", type=int, help="seed, overriding the config's")
     add("--frames", type=int, default=6, metavar="K", help="default: 6")
     add("-o", "--output", nargs="+", default=[], metavar="FILE",
-        help="strip of frames: .png, .pdf or .svg, or several of them (default: a .png named after "
+        help="strip of frames: .png, .pdf or .svg, or several files (default: a .png named after "
         "the config and the replicate)")  # fmt: skip
     add("--distance", nargs="+", default=[], metavar="FILE",
         help="also draw the centre distance against time")  # fmt: skip
@@ -36,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
         help="also draw the forces against time")  # fmt: skip
     add("--animation", metavar="FILE.gif", help="also write an animation")
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's, as in flocsim ensemble; may be "
+        help="override any value of the config, as in flocsim ensemble; may be "
         "repeated")  # fmt: skip
     add("--save", metavar="FILE.h5", help="also write the motion to HDF5")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
@@ -58,7 +58,7 @@ def take_scene(args):
     if args.scene is None:
         return
     if (args.type, args.vertices, args.delta) != (None, None, None):
-        raise UsageError("--scene stands for --type, --vertices and --delta: leave those out")
+        raise UsageError("--scene replaces --type, --vertices and --delta: leave those out")
     try:
         args.type, vertices, delta = args.scene.rsplit(",", 2)
         args.vertices, args.delta = int(vertices), float(delta)

@@ -38,9 +38,10 @@ def add_parser(subparsers: Any) -> None:
         "work-precision",
         help=SUMMARIES["work-precision"],
         description="Run some replicates of a study by every method and tolerance that "
-        'accuracy = "auto" may choose, and print how many outcomes flip, how far d_c is off, and '
-        "what it takes. With --replicate: one replicate by every integrator over six decades of "
-        "tolerance, and how far it is from the reference where the first of both is decided.",
+        'accuracy = "auto" may choose, and print how many outcomes flip, the error of d_c, and '
+        "the CPU time. With "
+        "--replicate: run one replicate by every integrator over six decades of tolerance, and "
+        "print its error against the reference at the time when the first of the two is decided.",
     )
     add_replicate(parser)
     ladder.add_arguments(parser)
@@ -69,8 +70,8 @@ def run(args: Namespace) -> int:
     print(
         f"type {config.scene.names[place[0]]}, N = {place[1]}, delta = {place[2]:g}, replicate "
         f"{args.replicate}: {OUTCOMES[found['outcome']]} after {1e3 * found['t_end']:.4g} ms\n"
-        f"error: of any point of an outline, where it or Implicit at {TIGHTEST:.0e} m is decided "
-        f"first, against that\n\n{HEADER}"
+        "error: largest of any point of an outline, at the time when it or Implicit at "
+        f"{TIGHTEST:.0e} m is decided first, compared with the latter\n\n{HEADER}"
     )
     most = attrs.evolve(config.integrator, max_steps=MOST_STEPS)
     checker = Checker(attrs.evolve(with_one_count(config, place[1]), integrator=most))

@@ -31,25 +31,25 @@ UNSHARED = ("quiet", "run", "read", "command")
 def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument(
         "config",
-        help="config file (TOML), - for the standard input; `flocsim init` writes an example",
+        help="config file (TOML), - for standard input; `flocsim init` writes an example",
     )
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="any value instead of the config's, e.g. --set 'scene.delta=[0.0, 0.5]' or --set "
+        help="override any value of the config, e.g. --set 'scene.delta=[0.0, 0.5]' or --set "
         "forces.contact.k_n='10 N/m'; may be repeated",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, help="seed, instead of the config's")
-    parser.add_argument("--replicates", type=int, help="replicates, instead of the config's")
+    parser.add_argument("--seed", type=int, help="seed, overriding the config's")
+    parser.add_argument("--replicates", type=int, help="replicates, overriding the config's")
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help="results file, instead of the config's"
+        "-o", "--output", metavar="FILE", help="results file, overriding the config's"
     )
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
     )
     parser.add_argument(
         "--heartbeat", type=float, default=SECONDS, metavar="SECONDS",
-        help="end the job where a rank has been silent for this time, stopped or on a machine "
-        f"that is gone (default {SECONDS:g}; 0: wait without end)",
+        help="end the job when a rank has been silent for this time, because it is stopped or its "
+        f"machine is gone (default {SECONDS:g}; 0: wait forever)",
     )  # fmt: skip
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument(
@@ -64,12 +64,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.add_argument(
         "--dry-run", action="store_true",
-        help="say what would be run, and what is doubtful; then stop: nothing is compiled or run",
+        help="show what would be run, and what is doubtful, and stop: nothing is compiled or run",
     )  # fmt: skip
     parser.add_argument(
         "--pilot", action=argparse.BooleanOptionalAction, default=False,
-        help="with --dry-run: run some replicates for some seconds, for what the study takes in "
-        "core-hours, how large its file is, and which forces matter",
+        help="with --dry-run: run some replicates for some seconds, to estimate the core-hours of "
+        "the study and the size of its file, and to find which forces matter",
     )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
     parser.set_defaults(read=read_config)
@@ -106,7 +106,7 @@ def read_config(arguments, sources, first):
     if getattr(arguments, "command", "") == "kernel" and not config.is_kernel:
         raise UsageError(
             f'{arguments.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
-            'kind = "kernel" with sizes, as examples/kernel.toml has'
+            'kind = "kernel" with sizes, as in examples/kernel.toml'
         )
     kind_of(config).check(config)
     if not arguments.dry_run:
@@ -184,7 +184,7 @@ def study(config, comm, arguments):
     if ended.code == STOPPED:
         if comm.rank == 0:
             who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
-            what = "none of its replicates was finished; begin again with --resume"
+            what = "no replicate was finished; start again with --resume"
             if ended.kept or ended.begun:
                 begun = f" and the states of {ended.begun} others" if ended.begun else ""
                 there = f"{ended.kept} finished replicates{begun} are in {ended.journal}"
@@ -246,7 +246,7 @@ def guarded(comm, arguments):
         return end_all(comm, "interrupted; continue with --resume", INTERRUPTED)
     except MemoryError:
         return end_all(
-            comm, "out of memory: ask for fewer ranks on a machine", FlocsimError.exit_code
+            comm, "out of memory: use fewer ranks on each machine", FlocsimError.exit_code
         )
     except Exception:
         text = f"internal error, please report it:\n{traceback.format_exc()}"
@@ -262,7 +262,7 @@ def what_is_wrong(arguments, comm):
     if arguments.pilot and not arguments.dry_run:
         return "--pilot is for --dry-run: leave it out"
     if arguments.jobs > 1 and comm.size > 1 and not arguments.dry_run:
-        return "--jobs is for runs without an MPI launcher: leave out one of the two"
+        return "--jobs is for runs without an MPI launcher: leave out one or the other"
     return ""
 
 
@@ -304,8 +304,8 @@ def refused_anywhere(comm: Communicator, code: int | None = None) -> int | None:
     which = [rank for rank, each in enumerate(codes) if each is not None]
     if which and len(which) < len(codes):
         tell(
-            f"flocsim: rank {which[0]} was started with invalid arguments: start all "
-            "ranks with the same",
+            f"flocsim: rank {which[0]} was started with invalid arguments: start all ranks with "
+            "the same ones",
             sys.stderr,
         )
         return comm.broadcast(UsageError.exit_code)

@@ -73,7 +73,7 @@ def identity_in(results: Any) -> dict[str, Any]:
         return found
     except ValueError as error:
         where = getattr(results, "path", "a file")
-        raise FileError(f"{where} holds no readable results: {error}") from error
+        raise FileError(f"{where} has no readable results: {error}") from error
 
 
 def changes_between(first: Any, second: Any) -> tuple[str, ...]:

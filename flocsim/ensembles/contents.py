@@ -175,7 +175,7 @@ def summary_of(path: object, kind: Contents, found: Any) -> Summary:
     try:
         return kind.summary(found)
     except ValueError as error:
-        raise FileError(f"{path} holds no readable {kind.title}: {error}") from error
+        raise FileError(f"{path} has no readable {kind.title}: {error}") from error
 
 
 def text_of(path: str | os.PathLike) -> str:

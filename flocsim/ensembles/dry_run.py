@@ -46,8 +46,8 @@ from flocsim.io.shapes.fit_report import coarse_line
 from flocsim.io.terminal import duration
 
 NOTHING_RUN = (
-    "nothing was run (--dry-run); with --pilot some replicates are, for core-hours, the size of "
-    "the file, and which forces matter"
+    "nothing was run (--dry-run); --pilot runs some replicates, to estimate core-hours and file "
+    "size and to find which forces matter"
 )
 
 MOST_CHOOSING = 60.0
@@ -80,7 +80,7 @@ def condition_lines(config, flocs):
         if config.shapes.size == "own":
             (low_i, high_i), (low_j, high_j) = (np.array(each) * 1e6 for each in spans[name])
             yield (
-                f"    of measured sizes, r_i {low_i:.4g} to {high_i:.4g} um, r_j {low_j:.4g} to "
+                f"    measured sizes, r_i {low_i:.4g} to {high_i:.4g} um, r_j {low_j:.4g} to "
                 f"{high_j:.4g} um; delta_max and D_0 are those of each pair"
             )
         numbers = [
@@ -110,11 +110,11 @@ def checked_words(config):
     exact = exact_method(method)
     count = count_checks(config.seed, config.replicates, share)
     if config.integrator.is_chosen and count:
-        return checks_of(config, count, "a hundredth of the tolerance that the pilot chooses")
+        return checks_of(config, count, "a hundredth of the tolerance chosen by the pilot")
     if exact is None:
-        return f"none, {config.integrator.label} has no tolerance or step to be made smaller"
+        return f"none, {config.integrator.label} has no tolerance or step to reduce"
     if not count:
-        return "none, the numerical error stays unknown (integrator.check_share)"
+        return "none, so the numerical error stays unknown (integrator.check_share)"
     how = (
         f"a tolerance of {exact.tolerance:g} m"
         if exact.tolerance < inf
@@ -142,7 +142,7 @@ def chosen_words(config):
     return 'accuracy = "auto", ' + (
         f"a pilot of {size} replicates of each type chooses method and tolerance"
         if size
-        else "too few replicates for a pilot: as in studies at large"
+        else "too few replicates for a pilot: chosen by the flips of other studies"
     )
 
 
@@ -160,8 +160,8 @@ def chosen_study(study, tasks):
     choosing = LADDER * pilot_size(config) * types * sum(first) / len(first)
     if choosing > MOST_CHOOSING:
         return study, [
-            f'accuracy = "auto" tries settings for some {duration(choosing)}, and does so in the '
-            f"run alone: what follows is at {config.integrator.method}"
+            f'accuracy = "auto" tries settings for about {duration(choosing)}, and only in the run '
+            f"itself: what follows is for {config.integrator.method}"
         ], choosing  # fmt: skip
 
     def share(study, jobs):
@@ -199,7 +199,7 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
         *lines,
         *forecast_lines(config, found, ranks, compiled),
         *(f"without {words_of(each, found.runs)}" for each in find(study, found.runs, go_on)),
-        "nothing is left out that the config does not leave out",
+        "nothing is left out beyond what the config leaves out",
     ]
 
 
@@ -219,10 +219,10 @@ def forecast_lines(config: Config, found: Forecast, ranks: int, compiled: float)
         f"{100.0 * found.again:.0f} % of them for second runs; on {ranks} rank{'s' * (ranks != 1)} "
         f"{duration(3600.0 * hours.value / ranks)} ({duration(3600.0 * hours.low / ranks)} to "
         f"{duration(3600.0 * hours.high / ranks)})",
-        f"  besides compiling, once for each machine: took or loaded in {compiled:.0f} s here",
+        f"  not counting compilation, once for each machine: {compiled:.0f} s here",
         f"results file{most}: {megabytes(size.value)} ({megabytes(size.low)} to "
         f"{megabytes(size.high)}), {size.value / (conditions * found.replicates):.0f} B for each "
-        "replicate; its journal takes as much beside it until the study is done",
+        "replicate; its journal takes as much again until the study is done",
     ]
 
 
@@ -248,7 +248,7 @@ def piloted(config, ranks):
 
 
 BAND_WORDS = {
-    BAND: "every replicate run three times, with outlines as cut, and cut closer and wider",
+    BAND: "every replicate run three times, with outlines as cut, cut closer and cut wider",
     "closer": "outlines cut closer",
     "wider": "outlines cut wider",
 }
@@ -280,7 +280,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
     flocs = f"{shapes.label}{f' {shapes.file}' if shapes.file else ''}"
     measured = measured_flocs(config)
     if shapes.size == "own":
-        flocs += ", at the sizes and spheroradii that were measured"
+        flocs += ", at their measured sizes and spheroradii"
         flocs += f", drawn by {scene.weight}" if scene.is_measured else ""
     elif shapes.own is None:
         flocs += f", spheroradius {1e6 * shapes.radius:.4g} um"
@@ -303,8 +303,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         "forces and code:",
         *code_lines(config, measured),
         "  out: trajectories: an ensemble records none (see `flocsim trajectory`)",
-        "  out: plots: none is drawn (see `flocsim plot`)",
-        *(["  out: MPI: one rank needs none"] if ranks == 1 else []),
+        "  out: plots: none are drawn (see `flocsim plot`)",
+        *(["  out: MPI: not needed for one rank"] if ranks == 1 else []),
         "stiffness:",
         *(
             f"  {name}: {line}"
@@ -315,6 +315,6 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *([f"note: {IMPLIED}"] if paper_weight(config) else []),
         *(f"warning: {line}" for line in said_doubts(config, study_doubts(config, measured))),
         *(["pilot:", *(f"  {line}" for line in piloted(config, ranks))] if pilot else []),
-        "nothing was run but the pilot (--dry-run)" if pilot else NOTHING_RUN,
+        "only the pilot was run (--dry-run)" if pilot else NOTHING_RUN,
     ]
     return "\n".join(lines)

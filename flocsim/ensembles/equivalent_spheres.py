@@ -35,7 +35,7 @@ def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[di
     types of a brownian study, nothing of others.
 
     ``free`` and ``touch``: probabilities to touch without and with the forces between the spheres;
-    what is no number, as for a potential beyond all bounds, is None.
+    what is not a number, as for a potential beyond all bounds, is None.
     """
     return [
         {"type": name, **facts_of(pair)}
@@ -83,7 +83,7 @@ def share_in(pair: Encounter, water: bool) -> float:
     """Of one pair, with the water between the two or without."""
     system = pair.system
     if words := unknown_in_water(pair):
-        raise UsageError(f"how often spheres touch in water is not known {words}")
+        raise UsageError(f"how often spheres touch in water cannot be computed {words}")
     first, second = (shape.equivalent_radius for shape in pair.shapes)
     spheres = SpherePair((first, second), system.fluid.viscosity)
     force = repulsion(system.forces, (first, second), system.fluid)
@@ -100,9 +100,9 @@ def share_in(pair: Encounter, water: bool) -> float:
 def unknown_in_water(pair: Encounter) -> str:
     """Why what water does to two spheres cannot be said of a pair; "" where it can."""
     if thermal_in(pair.system.forces):
-        return "where they are kicked: leave [forces.thermal] out"
+        return "with thermal kicks: leave [forces.thermal] out"
     if any(body.fixed for body in pair.system.bodies):
-        return "where one is held: choose scene.receiver = 'free'"
+        return "with a fixed receiver: choose scene.receiver = 'free'"
     if pair.meeting == SETTLING and any(pair.system.fluid.flow):
-        return "where they settle in a flow: leave fluid.velocity and fluid.gradient out"
+        return "when they settle in a flow: leave fluid.velocity and fluid.gradient out"
     return ""

@@ -156,7 +156,7 @@ class StudyKind:
 
     def check_part(self, description: dict, data: bytes) -> None:
         """ValueError for what cannot have been kept of a replicate."""
-        raise ValueError("nothing is kept of unfinished replicates")
+        raise ValueError("unfinished replicates cannot be saved")
 
     def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
         """ValueError where what is kept of the replicates of rows is not all there."""

@@ -141,7 +141,7 @@ def too_deep(
     )
     return wanted / law[0], (
         f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * depth(speed, mass, *law):.3g} um "
-        f"deep, more than the {1e6 * deepest:.3g} um that the contact law covers (half of "
+        f"deep, more than the {1e6 * deepest:.3g} um for which the contact law is valid (half of "
         f"r_i + r_j of {what}): {cure}, or lighter bodies"
     )
 
@@ -263,8 +263,8 @@ def check_numbers(system: System) -> None:
         pieces = laws_of([force], system.fluid)
         if words := wrong_answer(force, pieces, views, system.fluid):
             raise KernelError(
-                f"{name}: {words}, where every collision comes: bound what it divides by, or takes "
-                "a root, power or logarithm of, as in max(pair.gap, 1e-10)"
+                f"{name}: {words}, which every collision reaches: bound whatever it divides by or "
+                "takes a root, power or logarithm of, as in max(pair.gap, 1e-10)"
             )
 
 
@@ -343,9 +343,9 @@ def names_in(config: Config, acting: Sequence[Force]) -> Names:
 
 
 IMPLIED = (
-    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as much "
-    "as water at its sizes: they settle faster than Stokes's drag holds for, and shape decides. At "
-    'real weight (preset = "si") whatever touches stays together: docs/presets.md'
+    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as dense "
+    "as water at its sizes: they settle too fast for Stokes's drag, and shape decides the outcome. "
+    'At real weight (preset = "si") whatever touches stays together: see docs/presets.md'
 )
 
 

@@ -117,12 +117,12 @@ def efficiency_lines(results: Results) -> list[str]:
 
 
 RECTILINEAR = (
-    "upper bounds: bodies approach along straight paths, or those of the flow, as the water that "
-    "one displaces moves no other (no hydrodynamic interaction)"
+    "upper bounds: bodies approach along straight paths, or along those of the flow, because the "
+    "water displaced by one does not move the other (no hydrodynamic interaction)"
 )
 """What is to be known of all widths and kernels."""
 
-IN_WATER = "what water does to the equivalent spheres: flocsim info FILE --water"
+IN_WATER = "for the effect of the water on equivalent spheres: flocsim info FILE --water"
 """Where that is to be had."""
 
 KERNEL_HEADER = (
@@ -136,7 +136,7 @@ def kernel_lines(kernel: Kernel) -> list[str]:
     """The rates of a kernel study as tables of text: one for each mechanism and N."""
     lines = [f"capture widths and kernels, {RECTILINEAR}", IN_WATER]
     if kernel.water:
-        lines = ["capture widths and kernels, with the water that bodies push at each other"]
+        lines = ["capture widths and kernels, with hydrodynamic interaction"]
     for m, mechanism in enumerate(kernel.mechanisms):
         for v, count in enumerate(kernel.vertices):
             rows = [
@@ -153,7 +153,7 @@ def kernel_lines(kernel: Kernel) -> list[str]:
     if edge > 0.0:
         lines.append(
             f"warning: up to {100.0 * edge:.2g} % of what aggregates came from the outermost "
-            "offsets, so that attraction may reach farther than was sampled"
+            "offsets: attraction may reach farther than was sampled"
         )
     return lines
 
@@ -189,7 +189,7 @@ def signed(change):
 
 
 def touch_lines(results: Results) -> list[str]:
-    """What share of the decided pairs of a brownian study touched before they had escaped, for each
+    """What share of the decided pairs of a brownian study touched before they escaped, for each
     type and N; none of other studies. Those that are held apart did not."""
     if not stored(results.run, "equivalent_spheres"):
         return []
@@ -203,7 +203,7 @@ def touch_lines(results: Results) -> list[str]:
         if decided:
             low, high = (float(end) for end in wilson(touched, decided))
             told = f"{touched / decided:.4f} [{low:.4f}, {high:.4f}]"
-            lines.append(f"{where}: {told} touched before they had escaped")
+            lines.append(f"{where}: {told} touched before they escaped")
     return lines
 
 
@@ -258,7 +258,7 @@ def undecided_line(results: Results) -> str:
     )
     ends = f"{failed} failed and {undecided} are undecided"
     if failed + undecided == total:
-        return f"no replicate has come to an outcome, {ends}{advice}{first}"
+        return f"no replicate has reached an outcome, {ends}{advice}{first}"
     share = np.nanmax(shares_undecided(results), initial=0.0)
     what, of_what = ("points", "a pair's encounters") if results.kernel is not None else (
         "replicates", "those of a condition"
@@ -267,7 +267,7 @@ def undecided_line(results: Results) -> str:
     open_ = ", so that rates have no estimate" if too_many and results.kernel is not None else ""
     return (
         f"of {total} {what} {ends}, up to {100.0 * share:.2g} % of {of_what}{limit}: intervals "
-        f"hold whatever they could have come to{open_}{advice}{first}"
+        f"include every outcome that they could have had{open_}{advice}{first}"
     )
 
 
@@ -279,9 +279,9 @@ def checked_line(results: Results) -> str:
         return ""
     low, high = (100.0 * float(end) for end in wilson(flipped, checked))
     thrice, late = (int(table[name].sum()) for name in ("n_third", "n_third_flipped"))
-    third = f"; {thrice} of them were run a third time, {late} of which ended otherwise than in the"
+    third = f"; {thrice} of them were run a third time, {late} of which ended differently from the"
     return (
-        f"{checked} replicates were run again more exactly, {flipped} of them flipped: "
+        f"{checked} replicates were run again more accurately, {flipped} of them flipped: "
         f"{100.0 * flipped / checked:.2g} % [{low:.2g}, {high:.2g}]"
         f"{f'{third} second' if thrice else ''}"
     )
@@ -297,7 +297,7 @@ def change_lines(results: Results) -> list[str]:
     return [
         f"{what} Pr[A] would change by {worst} at most, 95 %"
         for what, group, name in (
-            ("run exactly,", results.numerics, "pr_a_change"),
+            ("if all replicates were exact,", results.numerics, "pr_a_change"),
             (shape, results.outlines, "pr_a_shape"),
         )
         if (worst := worst_changes(results, group, name))

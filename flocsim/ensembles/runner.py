@@ -136,8 +136,8 @@ def run_to_file(
         ended = lead(study, start, comm, progress, output)
         if ended.code == 0 and start.has_more(ended.count):
             progress.warn(
-                f"{journal.path} has rows beyond what was asked for, and stays: --resume takes "
-                "them up where more is asked for"
+                f"{journal.path} has more rows than were asked for, and is kept: --resume uses "
+                "them when more are asked for"
             )
         elif ended.code == 0:
             journal.remove()

@@ -84,25 +84,25 @@ class StokesDrag(BodyForce):
 
     ``law`` "stokes": f = 1, for Reynolds numbers up to about 1. "schiller_naumann":
     f = 1 + 0.15 Re^0.687 for Re up to 800, with Re = 2 r_eq ρ_f |v − u|/γ of the equivalent sphere
-    (its diameter and its own speed against the flow); the torque stays Stokes's. Viscosity γ,
+    (its diameter and its speed relative to the flow); the torque remains Stokes's. Viscosity γ,
     density ρ_f and the background flow u, Ω are the fluid's.
 
-    "shape": −γ R (v − u, ω − Ω) + γ Γ (E_xx, E_xy), force and torque in one, slow flow around the
+    "shape": −γ R (v − u, ω − Ω) + γ Γ (E_xx, E_xy), force and torque, for slow flow around the
     body's own outline. The symmetric R (3 × 3) and Γ (3 × 2), in the frame of the shape, are those
     of a prism of the outline and the body's depth, a rigid multiblob
     (flocsim.hydrodynamics.prism_drag), computed once for a shape; a body of one core point is a
-    sphere unless its depth is given. Such a body falls aslant, and turns as it falls.
+    sphere unless its depth is given. Such a body drifts sideways and turns as it falls.
 
-    ``strain``: the flow turns a long body by its strain E, too ("shape" has that anyway), with the
-    torque
+    ``strain``: the strain E of the flow also turns an elongated body ("shape" includes that), with
+    the torque
     −8πγ r_eq³ [ω − Ω − B(−E_xx sin 2ψ + E_xy cos 2ψ)], ψ being the angle of the long axis and
     B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area. An ellipse with the half axes
     a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
-    simple shear G; another shape is taken for the ellipse of its moments.
+    simple shear G; any other shape is treated as the ellipse of its moments.
 
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
-    an addition, without it nothing would stop a spin.
+    an addition; without it nothing would stop a spin.
     """
 
     rotational: bool = flag(default=True, help="drag torque on spinning bodies")

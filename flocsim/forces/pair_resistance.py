@@ -30,11 +30,11 @@ the centres alone; from FADES_FROM of it on outlines count less and less."""
 class Lubrication(SurfaceForce):
     """Resistance F = −6πγ r*² ḣ/h against a change of the gap h, r* = r_i r_j/(r_i + r_j).
 
-    Of two spheres that are close, h ≪ r*, and of other outlines at the smooth gap between them.
-    Below ``h_min`` [m], where surfaces are rough and the fluid is none any more, the resistance
-    stays what it is at h_min, so that bodies touch; ``cut`` [m]: the force ends there, and fades
-    from half of it on. Viscosity γ is the fluid's. A constant push F on the pair
-    makes h = h₀ exp(−F t/(6πγ r*²)), and van der Waals attraction at the surface gap
+    For two spheres that are close, h ≪ r*, and for other outlines at the smooth gap between them.
+    Below ``h_min`` [m], where surfaces are rough and the fluid is no longer a continuum, the
+    resistance keeps its value at h_min, so that bodies touch; ``cut`` [m]: the force ends there,
+    and fades from half of it on. Viscosity γ is the fluid's. A constant push F on the pair gives
+    h = h₀ exp(−F t/(6πγ r*²)), and van der Waals attraction at the surface gap gives
     h² = h₀² − H_A t/(18πγ r*).
 
     Source: Kim and Karrila (1991), Microhydrodynamics, ch. 9; the leading term of two spheres.
@@ -81,24 +81,24 @@ class Lubrication(SurfaceForce):
 
 @attrs.frozen
 class PairResistance(Force):
-    """What two bodies' motion, and a flow's strain, put on both through the water between them.
+    """Forces and torques that two bodies exert on each other through the water between them.
 
-    The resistance of two spheres to slow flow, exactly, less the Stokes drag that each has alone,
-    which StokesDrag gives. Spheres of the drag of the bodies: of their equivalent radii, and where
-    drag has the law "shape" of radii that are larger by some 8 %. It is symmetric and, with that,
-    positive: no work is got back. The motion that the two have in common counts at the distance of
-    their centres; that against each other, along and across their line, at a gap between that of
-    the outlines, as at touch, and that of the spheres, as where outlines are a mean radius apart.
-    Of real flocs .25 r_eq apart and more with the drag of their shape, the motion in common is
-    right to 3 % (rms), along and across, and that of settling pairs to 6 % (rms, 12 % at most);
-    that against each other to 4 and 2 % (rms) at a gap of r_eq, 11 and 4 % at half of it, 31 and
-    5 % at a quarter (docs/kernels.md). Below the gap ``h_min`` [m], where surfaces are rough,
-    the resistance stays what it is there, so that bodies touch. ``cut``: gap over r_i + r_j
-    at which all of it ends; it fades from half of that on, where it moves two settling bodies by
-    less than a tenth of their speed, in proportion to 1/gap.
+    They follow from the motion of both and from the strain of a flow: the exact resistance of two
+    spheres in slow flow, less the Stokes drag of each alone, which StokesDrag gives. The spheres
+    have the drag of the bodies: their equivalent radii, or, where drag has the law "shape", radii
+    larger by about 8 %. With that drag the resistance is symmetric and positive: no work is gained.
+    The common motion of the two uses the distance of their centres; their relative motion, along
+    and across their line, uses a gap that changes from that of the outlines at contact to that of
+    the spheres where outlines are a mean radius apart. For real flocs at least 0.25 r_eq apart
+    with the drag of their shape, the common motion is right to 3 % (rms), along and across, and
+    that of settling pairs to 6 % (rms, 12 % at most); the relative motion to 4 and 2 % (rms) at a
+    gap of r_eq, 11 and 4 % at half of it, 31 and 5 % at a quarter (docs/kernels.md). Below the gap
+    ``h_min`` [m], where surfaces are rough, the resistance keeps its value at h_min, so that bodies
+    touch. ``cut``: gap over r_i + r_j at which all of it ends; it fades from half of that on, where
+    it changes the speed of two settling bodies by less than a tenth, in proportion to 1/gap.
 
-    Two free bodies, radii up to 50 times each other, gaps from 1e-7 mean radii on. Sources: Jeffrey
-    and Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
+    For two free bodies, ratios of radii up to 50, gaps from 1e-7 mean radii. Sources: Jeffrey and
+    Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
     """
 
     h_min: float = quantity(

@@ -24,20 +24,20 @@ MOST_HALVINGS = 40
 
 @attrs.frozen
 class Thermal(BodyForce):
-    """Random force √(2 k_B T ζ/τ) ξ_k, constant over each kick [kτ, (k + 1)τ), and torque alike.
+    """Random force √(2 k_B T ζ/τ) ξ_k, constant over each kick [kτ, (k + 1)τ), and such a torque.
 
-    ζ = 6πγ r_eq, 8πγ r_eq³ for the torque, as in Stokes's drag, which has to be there, too; each ξ
-    is a standard normal number for each body, kick and coordinate. A free body diffuses
-    with D = k_B T/ζ at any τ; its velocity where kicks end has
+    ζ = 6πγ r_eq, 8πγ r_eq³ for the torque, as in Stokes's drag, which is needed as well; ξ is a
+    standard normal number for each body, kick and coordinate. A free body diffuses
+    with D = k_B T/ζ at any τ; its velocity at the end of kicks has
     ⟨v²⟩ = (k_B T/m) tanh(x/2)/(x/2), x = ζτ/m.
 
-    Parameters: ``temperature`` T [K]; ``kick`` τ [s], "auto": as long as it takes two bodies to
-    diffuse a tenth of the smaller radius against each other; ``finest`` [m]: where bodies are
+    Parameters: ``temperature`` T [K]; ``kick`` τ [s], "auto": the time in which two bodies
+    diffuse a tenth of the smaller radius relative to each other; ``finest`` [m]: where bodies are
     near each other kicks are halved (a Brownian bridge) until one moves them by no more than a
     quarter of the gap, or by ``finest``; "auto": 1 nm where the kick is automatic, and no halving
-    where it is given. ``rotational``: the torque, to be switched off with that of the drag.
+    where it is given. ``rotational``: the torque; switch it off together with that of the drag.
 
-    The numbers follow from the seed, the replicate, the body and the kick alone.
+    The random numbers depend only on the seed, the replicate, the body and the kick.
 
     Source: Ermak and McCammon (1978), J. Chem. Phys. 69, 1352, without hydrodynamic interaction.
     """

@@ -50,12 +50,12 @@ class VanDerWaals(PairForce):
     Parameters: ``hamaker`` H_A [J]; ``d_min`` [m], below which the diverging law is cut off;
     ``gap``: d = d_c − r_i − r_j ("equivalent_spheres", along the line of centres) or the distance
     of the outlines ("surface", at all nearly closest points); ``cut`` [m], the gap beyond which the
-    force is left out, where it is not negligible by then.  Source: Tang et al. (2014), eq. 5.
+    force is left out even if it is not negligible there.  Source: Tang et al. (2014), eq. 5.
 
     ``law = "outline"``: the sum of −C/r⁶ over both bodies, H_A = π² C, along their ``depth`` [m]
     ("sphere": 4/3 r_eq of the smaller); outlines nearer than d_min count as d_min apart.
-    ``wavelength`` λ [m] of the retardation, by which the energy of plates is that over
-    1 + 5.32 d/λ; none unless given.  Source: Hamaker (1937); Gregory (1981).
+    ``wavelength`` λ [m] of the retardation, which divides the energy of plates by 1 + 5.32 d/λ;
+    no retardation unless given.  Source: Hamaker (1937); Gregory (1981).
     """
 
     hamaker: float = quantity("J", at_least=0.0, default=1e-18)

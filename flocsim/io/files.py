@@ -83,7 +83,7 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinishe
     """
     target = ordinary_target(path)
     if target.exists() and rule(target) is Old.KEPT:
-        raise FileError(f"{path} exists already and is left as it is: name another place")
+        raise FileError(f"{path} already exists and is left as it is: name another place")
     try:
         remove_left_over(target)
         temporary, descriptor = fresh_beside(target)
@@ -192,7 +192,7 @@ def place(path, temporary, target, rule):
             return
         except FileExistsError:
             found = rule(target)
-        reason = "is there by now, written by another program, and is left as it is"
+        reason = "has meanwhile been written by another program, and is left as it is"
         try:
             if found is Old.REPLACED:
                 os.replace(temporary, target)
@@ -420,7 +420,7 @@ def checked_sealed(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, int]]:
 def check_seal(path, file):
     """The size of the data before the seal; FileError where either is wrong."""
     if not file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
-        raise FileError(f"{path} is not an HDF5 file: name a file that flocsim wrote")
+        raise FileError(f"{path} is not an HDF5 file: name a file written by flocsim")
     if is_in_pieces(file):
         if (size := size_of_pieces(file)) is None:
             raise FileError(f"{path} {DAMAGED}")
@@ -430,7 +430,7 @@ def check_seal(path, file):
     tail = file.read()
     if not tail.startswith(SEAL_MARK):
         raise FileError(
-            f"{path} does not end in flocsim's checksum: it is of another kind, was cut short or "
+            f"{path} does not end in flocsim's checksum: it is not from flocsim, was truncated or "
             "was changed by another program; use the original file"
         )
     if seal_of(digest_at(file, 0, size)[0]) != tail:

@@ -24,19 +24,19 @@ def read_json(text: str | bytes, pattern: Any = object) -> Any:
     So for text beyond the limits above, and for numbers or letters that cannot be.
     """
     if not isinstance(text, str | bytes) or len(text) > LONGEST:
-        raise ValueError(f"it is no text of up to {LONGEST} letters")
+        raise ValueError(f"it is not a text of up to {LONGEST} letters")
     try:
         value = json.loads(text, parse_constant=no_number, parse_float=finite)
     except RecursionError:
         raise ValueError(f"it is nested more than {DEEPEST} deep") from None
     check_inside(value)
     if not matches(value, pattern):
-        raise ValueError("it is of another form")
+        raise ValueError("its form is unknown")
     return value
 
 
 def no_number(word):
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")
 
 
 def finite(text):

@@ -121,7 +121,7 @@ def fingerprint(path):
 WAYS = "add --overwrite, which keeps the old one under another name"
 """What a user can do where a file is in the way, besides naming another place."""
 
-SCRIPT_WAYS = "say overwrite=True, which keeps the old one under another name"
+SCRIPT_WAYS = "give overwrite=True, which keeps the old one under another name"
 """The same in Python."""
 
 
@@ -148,13 +148,13 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]
         for name in (target, target.with_name(target.name + output.suffix)):
             for source in (sources[mark] for mark in marks_of(name) if mark in sources):
                 raise UsageError(
-                    f"writing {output.path} would replace {source}, which is read: name another"
+                    f"writing {output.path} would replace {source}, which is an input: name another"
                 )
         marks = marks_of(target)
         for other in (seen[mark].path for mark in marks if mark in seen):
             raise UsageError(
-                f"{output.path} and {other} are one file, but two things are to be written: "
-                "name another for one of them"
+                f"{output.path} and {other} are the same file, but two outputs are to be written: "
+                "name another file for one of them"
             )
         seen |= dict.fromkeys(marks, output)
         if os.path.lexists(target) and output.rule(target) is Old.KEPT:
@@ -164,7 +164,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]
 
 def in_the_way(path: str | os.PathLike, ways: str = WAYS) -> UsageError:
     """The UsageError for a file that exists where another is to be written."""
-    return UsageError(f"{path} exists already and is left as it is: name another output, or {ways}")
+    return UsageError(f"{path} already exists and is left as it is: name another output, or {ways}")
 
 
 def marks_of(path):

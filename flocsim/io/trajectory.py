@@ -117,7 +117,7 @@ class StoredTrajectory:
 def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
     """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
     with opened_file(
-        path, lambda reason: f"{path} holds no readable trajectory: {reason}; write it again"
+        path, lambda reason: f"{path} has no readable trajectory: {reason}; write it again"
     ) as (file, _):
         return stored_trajectory(file)
 
@@ -126,7 +126,7 @@ def stored_trajectory(file):
     """The StoredTrajectory of an open file; ValueError where it is none."""
     facts = {name: plain_fact(value) for name, value in file.attrs.items()}
     if facts.pop("kind", "") != KIND or facts.pop("schema_version", 0) != SCHEMA_VERSION:
-        raise ValueError(f"it is no {KIND} of version {SCHEMA_VERSION}")
+        raise ValueError(f"it is not a {KIND} of version {SCHEMA_VERSION}")
     time, *arrays = (file[name][()] for name in ("time", "position", "velocity"))
     bodies = len(file["body"])
     if time.ndim != 1 or not len(time) or not bodies:
@@ -134,7 +134,7 @@ def stored_trajectory(file):
     for array in (time, *arrays):
         shape = (len(time), bodies, 3) if array.ndim > 1 else (len(time),)
         if array.shape != shape or not np.isfinite(array).all():
-            raise ValueError("its arrays are not as long as its times and bodies, or no numbers")
+            raise ValueError("its arrays do not match its times and bodies, or are not numbers")
     shapes = []
     for body in range(bodies):
         vertices = file[f"vertices_{body}"]
@@ -142,7 +142,7 @@ def stored_trajectory(file):
         if f"part_{body}" in file:
             columns = [file[f"{name}_{body}"][()] for name in ("part", "ring", "point_radius")]
             if any(column.shape != (len(points),) for column in columns):
-                raise ValueError("the columns of its core points are not as long as these")
+                raise ValueError("the columns of its core points do not match the points")
             shapes.append(shape_of_parts(parts_in(PointTable(points, *columns))))
         else:
             shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))

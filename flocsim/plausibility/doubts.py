@@ -79,7 +79,7 @@ def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cur
         return ""
     density = min(known)
     what = (
-        "in the fluid it would float"
+        "in this fluid it would float"
         if density <= fluid.density
         else f"it weighs {density / (density - fluid.density):.3g} times as much as in the fluid"
     )
@@ -98,20 +98,20 @@ def about_kicks(forces: dict[str, Any]) -> str:
         drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
         if not drags:
             return (
-                f"{name} kicks the bodies without end, but no StokesDrag takes its energy up: they "
-                "are no longer at its temperature: add the drag"
+                f"{name} kicks the bodies continually, but no StokesDrag takes up the energy, so "
+                "they do not stay at its temperature: add the drag"
             )
         if thermal.rotational != drags[0].rotational:
             return (
-                f"{name} and the drag do not agree about rotation, so that spins are not at the "
+                f"{name} and the drag treat rotation differently, so spins are not at the "
                 "temperature: give both the same rotational"
             )
         for other, each in forces.items():
             if isinstance(each, Lubrication):
                 return (
-                    f"{other} resists the motion that {name} makes and is not kicked in turn: near "
-                    "contact bodies move as if it were colder; leave one of them out, or read "
-                    "rates of meeting as lower bounds"
+                    f"{other} resists the motion that {name} causes but adds no kicks of its own: "
+                    "near contact, bodies move as if it were colder; leave one of them out, or "
+                    "read meeting rates as lower bounds"
                 )
     return ""
 
@@ -126,15 +126,15 @@ def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:
     contacts = {name: each for name, each in forces.items() if isinstance(each, ContactForce)}
     if count > 1 and not contacts:
         return (
-            f"{count} bodies and no contact force: where they meet they pass through each other: "
-            "add flocsim.forces.Contact(), or a ContactForce of your own"
+            f"{count} bodies and no contact force: they will pass through each other: add "
+            "flocsim.forces.Contact(), or a ContactForce of your own"
         )
     plain = [name for name, each in contacts.items() if type(each) is Contact]
     if count < 2 or not plain or len(contacts) < 2:
         return ""
     return (
         f"{' and '.join(contacts)} both act at every contact, and their forces add up: if one of "
-        f"them is to stand for the other, {drop.format(plain[0])}"
+        f"them is to replace the other, {drop.format(plain[0])}"
     )
 
 

@@ -28,7 +28,7 @@ class Usual:
     def doubt(self, place: str, value: object) -> str:
         """A line on a value that stands at a place, e.g. "fluid.viscosity"; "" where it is usual.
 
-        A value that is no number has no range. The sign does not count.
+        A value that is not a number has no range. The sign does not count.
         """
         if isinstance(value, tuple):
             return next(filter(None, (self.doubt(place, each) for each in value)), "")
@@ -45,7 +45,7 @@ class Usual:
 
 
 VISCOSITY = Usual(
-    "the viscosity of water, from 100 C to brines and suspensions thick as oil,",
+    "the viscosity of water, from 100 C to brines and suspensions as thick as oil,",
     2e-4, 1e-1, "Pa s",
     "pure water has 2.8e-4 to 1.8e-3: Huber et al. 2009, J. Phys. Chem. Ref. Data 38, 101",
 )  # fmt: skip
@@ -95,7 +95,7 @@ RADIUS = Usual(
     "the equivalent radius of a settling body", 5e-7, 1e-2, "m",
     "below, Brownian motion, which is left out here, moves bodies as fast as they settle: Russel, "
     "Saville and Schowalter 1989, Colloidal Dispersions, ch. 3",
-    "take larger bodies, or results as those of bodies that do not diffuse",
+    "use larger bodies, or read the results as those of bodies that do not diffuse",
 )  # fmt: skip
 
 ROUNDING = Usual(

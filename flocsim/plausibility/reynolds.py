@@ -11,9 +11,9 @@ from flocsim.forces.shape_drag import follows_shape
 from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
 HOLDS = {
-    "stokes": "Stokes's drag holds within 15 %",
-    "shape": "slow flow around a shape holds within 15 %",
-    "schiller_naumann": "the drag of Schiller and Naumann holds within 5 %",
+    "stokes": "Stokes's drag is accurate to 15 %",
+    "shape": "slow flow around a shape is accurate to 15 %",
+    "schiller_naumann": "the drag of Schiller and Naumann is accurate to 5 %",
 }
 
 
@@ -85,11 +85,11 @@ def beyond_the_law(bodies: Sequence[Settled], forces: dict[str, Any]) -> str:
     if worst.reynolds <= drag.serves_up_to:
         return ""
     advice = (
-        f'{name} takes law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
+        f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
         if drag.law == "stokes"
-        else "take smaller or lighter bodies, or a drag of your own"
+        else "use smaller or lighter bodies, or a drag of your own"
     )
     return (
-        f"a body of {worst.words}, but {HOLDS[drag.law]} up to Re = {drag.serves_up_to:g} only "
+        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.serves_up_to:g} "
         f"(Clift, Grace and Weber 1978, Bubbles, Drops and Particles, ch. 5): {advice}"
     )

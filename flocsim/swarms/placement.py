@@ -124,7 +124,7 @@ def place_at_random(
     for side, again, name in zip(area, repeats, ("wide", "high"), strict=True):
         if side < (2.0 if again else 1.0) * widest:
             raise UsageError(
-                f"the area is {side:.3g} m {name}, too little for bodies of up to {widest:.3g} m"
+                f"the area is {side:.3g} m {name}, too small for bodies of up to {widest:.3g} m"
             )
     # Cells smaller than bodies reach would miss neighbours; one of a whole axis is all of it.
     cells = Cells.of(widest, area)
@@ -139,9 +139,9 @@ def place_at_random(
         else:
             total = sum(shape.area for shape in shapes) / whole
             raise UsageError(
-                f"{count} of {len(shapes)} bodies, {filled / whole:.3f} of the area, found a place "
-                f"at random, and {MOST_TRIALS} trials none for the next: they would fill "
-                f"{total:.3f}; ask for a smaller fraction"
+                f"{count} of {len(shapes)} bodies, {filled / whole:.3f} of the area, were placed "
+                f"at random, and {MOST_TRIALS} trials found no room for the next: together they "
+                f"would fill {total:.3f}; ask for a smaller fraction"
             )
         placement.places[body] = place
         cells.add(body, place)
@@ -161,7 +161,7 @@ def wall(start: Any, end: Any, radius: float | str | None = None) -> Body:
     ends = np.array([read_position(start), read_position(end)])
     length = float(np.hypot(*(ends[1] - ends[0])))
     if length == 0.0:
-        raise UsageError(f"a wall leads from one point to another, found {ends[0].tolist()} twice")
+        raise UsageError(f"a wall needs two different points, found {ends[0].tolist()} twice")
     thickness = THIN * length if radius is None else float(in_unit(radius, "m", "radius"))
     middle = ends.mean(axis=0)
     shape = wall_between(ends[0] - middle, ends[1] - middle, thickness)

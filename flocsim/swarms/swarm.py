@@ -108,7 +108,8 @@ def read_box(box: Any) -> tuple[float, float]:
         width, height = box
     except (TypeError, ValueError):
         raise UsageError(
-            f"box must be (width, height), either one None where nothing repeats, found {box!r}"
+            "box must be (width, height), with None for a side along which it is not periodic, "
+            f"found {box!r}"
         ) from None
     sides = []
     for side, name in ((width, "width"), (height, "height")):
@@ -128,8 +129,8 @@ class Swarm:
 
     Each island has its own steps, its own lists and its own switches, from one common time to the
     next, and pair forces end at their reach. UsageError for forces without a reach among more than
-    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that changes along
-    an axis along which it repeats itself.
+    200 bodies, unless ``all_pairs``, for a box that is too small, or with a flow that varies along
+    an axis along which it is periodic.
     """
 
     bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
@@ -152,7 +153,7 @@ class Swarm:
         self.check_box()
         if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
-                "a swarm takes kicks of one length, the same in all of its islands: give the "
+                "a swarm needs kicks of the same length in all of its islands: give the "
                 'thermal force a kick, as "1 ms", and leave finest out'
             )
 
@@ -179,9 +180,9 @@ class Swarm:
                 if getattr(force, "reach", 0.0) == math.inf:
                     size = np.mean([body.shape.equivalent_radius for body in self.bodies])
                     raise UsageError(
-                        f"{name} has no reach, so that each of {len(self.bodies)} bodies would act "
-                        f"on all others: give it one (its property `reach`, of some {size:.1g} m), "
-                        "or ask for all_pairs=True"
+                        f"{name} has no finite reach, so each of {len(self.bodies)} bodies would "
+                        f"act on all others: give it one (its property `reach`, of some {size:.1g} "
+                        "m), or set all_pairs=True"
                     )
 
     def check_box(self) -> None:
@@ -247,7 +248,7 @@ class Swarm:
         check_limits(end, max_steps)
         stops = stops_of(end, every, times)
         if not is_whole(threads) or threads < 1:
-            raise UsageError(f"threads must be a whole number from 1, found {threads!r}")
+            raise UsageError(f"threads must be a whole number of at least 1, found {threads!r}")
         began = time.perf_counter()
         gauge = self.gauge()
         self.check_overlaps(gauge)
@@ -273,10 +274,10 @@ class Swarm:
 
 
 FLOW_ADVICE = (
-    "the flow changes along {axis}, along which the box repeats itself: images of a body would be "
-    "carried at another speed than it. Let the box repeat itself along the other axis alone, as in "
-    'a shear flow u_x = g y with periodic = "x", or not at all, periodic = "none" (leaving = '
-    '"reenter" brings back what the flow carries out)'
+    "the flow varies along {axis}, along which the box is periodic: images of a body would be "
+    "carried at a different speed. Make the box periodic along the other axis only, as in a shear "
+    'flow u_x = g y with periodic = "x", or not at all, periodic = "none" (leaving = "reenter" '
+    "brings back what the flow carries out)"
 )
 
 
@@ -289,7 +290,8 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
     if side < least:
         raise UsageError(
             f"the box is {side:.3g} m wide, and forces reach {reach:.3g} m between bodies of up to "
-            f"{2.0 * largest:.3g} m: it must be {least:.3g} m at least, or the forces cut nearer"
+            f"{2.0 * largest:.3g} m: it must be at least {least:.3g} m, or the forces must be cut "
+            "at a smaller gap"
         )
 
 
@@ -298,11 +300,13 @@ def stops_of(end: float, every: float | str | None, times: Sequence[float] | Non
     if not is_number(end) or not end > 0.0:
         raise UsageError(f"until must be a time above 0 s, found {end!r}")
     if times is not None and every is not None:
-        raise UsageError("give the times to keep by times or by every, not by both")
+        raise UsageError("give the times to keep with times or with every, not both")
     if times is not None:
         listed = [float(in_unit(each, "s", "times")) for each in times]
         if sorted(set(listed)) != listed or not all(0.0 < each <= end for each in listed):
-            raise UsageError(f"times must rise from above 0 s to {end:g} s at most, found {times}")
+            raise UsageError(
+                f"times must increase from above 0 s to at most {end:g} s, found {times}"
+            )
         return listed if listed and listed[-1] == end else [*listed, end]
     if every is None:
         return [end]

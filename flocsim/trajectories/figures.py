@@ -182,6 +182,6 @@ def distances(trajectory: Any) -> tuple[list[float], list[float]]:
 def check_pair(trajectory):
     if len(trajectory.shapes) != 2:
         raise UsageError(
-            f'this figure is of two bodies, and the run has {len(trajectory.shapes)}: draw "strip" '
-            'or "energies"'
+            f"this figure is for two bodies, but the run has {len(trajectory.shapes)}: draw "
+            '"strip" or "energies"'
         )

@@ -52,8 +52,8 @@ class Trajectory:
     at the start and after every accepted step; ``status``, a Status whose ``reason`` says in words
     how the run ended; ``steps`` taken, ``rejected`` and force ``evaluations``; ``error`` [m], what
     the errors of steps and of switches have led to by the end (nan where the method estimates
-    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a nudge (None
-    where that was not asked for): above MOST_AMPLIFIED, 10, the error is no promise, and
+    none); ``wall_time`` [s]; ``amplification``, by how much the motion amplifies a perturbation
+    (None where that was not asked for): above MOST_AMPLIFIED, 10, the error is no guarantee, and
     ``error_text`` says so; ``row``, of a replicate of a study, what its table of replicates holds
     of it, in words (None of other runs).
     """
@@ -82,16 +82,16 @@ class Trajectory:
     def error_text(self) -> str:
         """What can be said of the error at the end, in words."""
         if not np.isfinite(self.error):
-            return "the method states no error"
+            return "the method does not estimate its error"
         stated = f"stated error {self.error:.2g} m"
         if self.amplification is None:
             return stated
         if self.amplification > MOST_AMPLIFIED:
             return (
-                f"{stated}, which is no promise: the motion amplifies a nudge "
+                f"{stated}, which is not a guarantee: the motion amplifies a perturbation "
                 f"{self.amplification:.2g} times"
             )
-        return f"{stated}; the motion amplifies a nudge {self.amplification:.2g} times"
+        return f"{stated}; the motion amplifies a perturbation {self.amplification:.2g} times"
 
     @classmethod
     def of(
@@ -110,7 +110,7 @@ class Trajectory:
         """Where this came from; UsageError for one that was read from a file."""
         if self.origin is None:
             raise UsageError(
-                "this Trajectory has its motion alone: run it again with System.run for more"
+                "this Trajectory has only its motion: run it again with System.run for more"
             )
         return self.origin
 
@@ -145,7 +145,7 @@ class Trajectory:
         if found.ndim != 1 or outside.any():
             wrong = found[outside][0] if outside.any() else times
             raise UsageError(
-                f"the run has the times from {self.t[0]:g} to {self.t[-1]:g} s, found {wrong}"
+                f"the run covers times from {self.t[0]:g} to {self.t[-1]:g} s, found {wrong}"
             )
         return found
 
@@ -182,7 +182,7 @@ class Trajectory:
         """
         wanted = self.checked_times(t)
         if len(wanted) != 1:
-            raise UsageError("contacts are those of one time: ask for one time after another")
+            raise UsageError("contacts are given for one time: ask for one time after another")
         return next(Replay(self.known()).instants(wanted, self.all_steps[0])).contacts()
 
     def forces(self, t: Any = None) -> dict[str, np.ndarray]:
@@ -223,10 +223,10 @@ class Trajectory:
         if not is_number(end) or not end > self.t[-1]:
             raise UsageError(f"until must be a time above {self.t[-1]:g} s, found {until!r}")
         if not is_whole(max_steps) or max_steps < 0:
-            raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
+            raise UsageError(f"max_steps must be a whole number of at least 0, found {max_steps!r}")
         if self.status in ENDED_FOR_GOOD or self.row is not None:
             reason = self.status.reason if self.row is None else "its study has decided it"
-            raise UsageError(f"this run cannot go on: {reason}")
+            raise UsageError(f"this run cannot continue: {reason}")
         began, run = time.perf_counter(), origin.ended.copy()
         run.clock[at.UNTIL] = end
         run.counts[at.MAX_STEPS] += max_steps
@@ -290,7 +290,9 @@ class Trajectory:
 
         path, rule = Path(file), data_rule(overwrite)
         if path.suffix.lower() != ".gsd":
-            raise UsageError(f"{path}: what is exported must end in .gsd; ParaView reads `save`'s")
+            raise UsageError(
+                f"{path}: an exported file must end in .gsd; ParaView reads files of `save`"
+            )
         check_outputs([Output(path, rule, ways=SCRIPT_WAYS)], [])
         write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
 

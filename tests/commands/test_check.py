@@ -129,7 +129,7 @@ def test_a_motion_that_amplifies_a_nudge_says_so(folder, monkeypatch):
     monkeypatch.setattr(judged, "MOST_AMPLIFIED", 0.0)
     monkeypatch.setattr(judged.Run, "error", property(lambda run: 1e-20))
     words = judge().why
-    assert "; the motion amplifies a nudge " in words
+    assert "; the motion amplifies a perturbation " in words
     # Spheres that fall head on forget what they were moved by along their way, and no more grows.
     assert 0.0 < float(words.split()[-2]) < 10.0
 
@@ -174,7 +174,7 @@ def test_a_law_without_k_n_is_run_as_it_is(folder):
     bare = attrs.evolve(config, forces=others)
     assert all(map(math.isnan, check.stiffnesses(bare, None)))
     assert judged.stiff(bare, math.nan) is bare
-    with pytest.raises(check.UsageError, match=r"--stiffness is for forces\.contact"):
+    with pytest.raises(check.UsageError, match=r"--stiffness needs forces\.contact"):
         check.stiffnesses(bare, (1.0, 2.0))
 
 

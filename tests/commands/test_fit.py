@@ -60,7 +60,7 @@ def test_a_pixel_size_with_its_unit(tmp_path, frame):
 
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
     options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
-    with pytest.raises(UsageError, match=r"reaches .* m far"):
+    with pytest.raises(UsageError, match=r"reaches .* m, "):
         run(frame, "--pixel-size", "8.6", *options)
     capsys.readouterr()
     assert run(frame, "--pixel-size", "8.6 mm", *options) == 0
@@ -225,9 +225,9 @@ def test_label_images_are_read_back_as_the_same_flocs(tmp_path, frame):
     assert flocs_of(tmp_path / "s.h5") == flocs_of(tmp_path / "again.h5")
     with Image.open(tmp_path / "labels/a.png") as picture:
         assert picture.mode == "I;16" and set(np.unique(picture)) == {0, 1, 2, 3}
-    with pytest.raises(UsageError, match=r"labels/a\.png exists already"):
+    with pytest.raises(UsageError, match=r"labels/a\.png already exists"):
         run(frame, *QUICK, "-o", tmp_path / "more.h5", *out)
-    with pytest.raises(UsageError, match="which is read: name another"):
+    with pytest.raises(UsageError, match="which is an input: name another"):
         run(frame, *QUICK, "-o", tmp_path / "more.h5", "--masks-out", frame, "--overwrite")
 
 
@@ -268,7 +268,7 @@ def test_regions_are_dropped_kept_and_added_by_their_numbers(tmp_path, frame, ca
     assert rows["b.png", "3"] == "too small"
     for words, told in {
         "--drop 1": "there are 2 pictures", "--keep c.png#1": "no picture is called 'c.png'",
-        "--add a.png#9": "no such region, its last is 3", "--drop a.png": "takes flocs by",
+        "--add a.png#9": "no such region; its last is 3", "--drop a.png": "takes numbers or names",
     }.items():  # fmt: skip
         with pytest.raises(UsageError, match=told):
             run(frame, *QUICK, *words.split(), "--overwrite", "-o", tmp_path / "s.h5")
@@ -327,7 +327,7 @@ def test_shapes_lie_inside_their_flocs_on_request(tmp_path, frame, capsys):
         areas.append([entry.fits[4].shape.area for entry in read_library(tmp_path / "s.h5")])
     assert sum(areas[1]) < sum(areas[0])
     for more in (["--preserve-area"], ["--method", "paper"]):
-        with pytest.raises(UsageError, match="--inscribed goes with"):
+        with pytest.raises(UsageError, match="--inscribed needs"):
             run(frame, *options, "--inscribed", *more)
 
 
@@ -485,7 +485,10 @@ def test_masks_without_a_picture_are_told_and_drawn_by_themselves(tmp_path, fram
         (("--masks", "--pictures", "frames"), "give --masks and --overlay"),
         (("--overlay", "o.png", "--pictures", "frames"), "give --masks and --overlay"),
         (("--masks", "--overlay", "o.png", "--pictures", "none"), "takes a folder, found 'none'"),
-        (("--masks", "--overlay", "o.png", "--pictures", "frames"), "a.bmp and a.png, so that"),
+        (
+            ("--masks", "--overlay", "o.png", "--pictures", "frames"),
+            "a.bmp and a.png, so the picture",
+        ),
     ],
 )
 def test_pictures_beneath_that_cannot_be_used_are_refused(
@@ -510,7 +513,9 @@ def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, caps
                      metadata={"axes": "ZYX", "unit": "um"})  # fmt: skip
     options = ("--vertices", "4", "-o", tmp_path / "s.h5", "--overwrite")
     assert run(path, *options) == 2
-    assert "holds 3 pages; choose by --page 1, --page 1,3 or --page all" in capsys.readouterr().err
+    assert (
+        "holds 3 pages; choose with --page 1, --page 1,3 or --page all" in capsys.readouterr().err
+    )
     assert run(path, *options, "--page", "all", "--overlay", tmp_path / "o.png") == 0
     assert "pixel size 0.5 um, as s.tif:1 says" in capsys.readouterr().out
     entries = read_library(tmp_path / "s.h5")
@@ -530,7 +535,7 @@ def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, caps
         (("--crop", "1,2,3"), "--crop takes X,Y,WIDTH,HEIGHT in pixels"),
         (("--crop", "0,0,0,5"), "--crop takes a width and a height above 0"),
         (("--page", "x"), "--page takes numbers from 1"),
-        (("--masks", "--page", "1"), "--page, --channel and --crop are of pictures"),
+        (("--masks", "--page", "1"), "--page, --channel and --crop apply to pictures"),
     ],
 )
 def test_what_names_no_part_of_a_picture_is_refused(tmp_path, frame, words, said):
@@ -569,5 +574,5 @@ def test_both_ends_of_bands_are_fitted_on_request(tmp_path, frame, capsys):
         assert sizes == sorted(sizes)
         assert sizes[0] / 1e-6 == pytest.approx(banded.radius_low, rel=0.05)
     capsys.readouterr()
-    with pytest.raises(UsageError, match="--band goes without --masks"):
+    with pytest.raises(UsageError, match="--band excludes --masks"):
         run(frame, *options, "--band", "--masks", "-o", tmp_path / "c.h5")

@@ -75,7 +75,7 @@ def test_a_picture_that_kills_its_process_is_lost_and_no_other(
     assert fit(2) == 70
     assert ids() == ["a.png#1", "c.png#1"]
     errors = capsys.readouterr().err.splitlines()
-    assert len(errors) == 2 and "b.png is lost: its process was killed" in errors[0]
+    assert len(errors) == 2 and "b.png was not fitted: its process was killed" in errors[0]
     assert errors[1] == "flocsim: lost: b.png; all else was written"
     assert "b.png" not in (folder / "s.csv").read_text()
     assert multiprocessing.active_children() == []
@@ -102,7 +102,7 @@ def test_a_picture_too_large_for_the_memory_is_lost_and_no_other(
     spoiled(monkeypatch, "b.png", use_up_memory, function)
     assert fit(jobs) == 70
     assert ids() == ["a.png#1", "c.png#1"]
-    assert "b.png is lost: there was not enough memory" in capsys.readouterr().err
+    assert "b.png was not fitted: not enough memory" in capsys.readouterr().err
 
 
 def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):

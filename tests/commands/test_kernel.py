@@ -54,7 +54,7 @@ def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
     assert "--curvilinear is for matrices, not csv" in capsys.readouterr().err
     words = ["export", "matrix", "kernel.h5", "--what", "beta3", "--curvilinear", "burd"]
     assert main(words) == 2
-    assert "not beta3: take efficiency" in capsys.readouterr().err
+    assert "not beta3: use efficiency" in capsys.readouterr().err
     kernel = flocsim.open("kernel.h5").kernel
     assert kernel.arrays["width_c"][0, 0, 0, 1] == pytest.approx(6e-5, rel=1e-12)
 
@@ -151,7 +151,7 @@ def test_a_file_without_rates_has_no_tables(folder, capsys):
     (folder / "two.toml").write_text(text + "[shapes]\nvertices = [1]\n", "utf-8")
     assert main(["ensemble", "two.toml", "--quiet"]) == 0
     assert main(["export", "csv", "two.h5"]) == 2
-    assert "two.h5 is of no kernel study" in capsys.readouterr().err
+    assert "two.h5 is not from a kernel study" in capsys.readouterr().err
 
 
 def test_a_dry_run_says_what_would_be_run(folder, capsys):
@@ -181,7 +181,10 @@ def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch
     assert main(["info", "kernel.h5"]) == 0 and line[17:80] in capsys.readouterr().out
     assert main(["plot", "kernel.h5"]) == 0
     assert main(["export", "matrix", "kernel.h5"]) == 0
-    assert "it is not known" in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+    assert (
+        "an empty cell is unknown"
+        in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+    )
     with pytest.warns(flocsim.errors.PlausibilityWarning, match="rates have no estimate"):
         again = flocsim.Study("kernel.toml").run(output="again.h5")
     assert np.isnan(again.kernel.arrays["beta2"]).all()

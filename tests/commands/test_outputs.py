@@ -82,7 +82,7 @@ def test_inputs_of_a_study_are_never_its_output(folder, capsys, name, more):
     (folder / "link").symlink_to("lib.h5")
     os.link(folder / "small.toml", folder / "hard")
     line = refused(folder, capsys, "ensemble", "small.toml", "-o", name, *more)
-    assert f"writing {name} would replace " in line and "which is read: name another" in line
+    assert f"writing {name} would replace " in line and "which is an input: name another" in line
 
 
 def test_a_config_with_the_name_of_the_journal_is_not_written_to(folder, capsys):
@@ -115,15 +115,15 @@ def test_nothing_at_the_outputs_of_a_trajectory_is_replaced(folder, capsys, opti
     ending = {"--animation": "gif", "--save": "h5"}.get(option, "png")
     (folder / f"mine.{ending}").write_bytes(b"precious")
     words = ["trajectory", "small.toml", *ONE, option, f"mine.{ending}"]
-    assert f"mine.{ending} exists already" in refused(folder, capsys, *words)
+    assert f"mine.{ending} already exists" in refused(folder, capsys, *words)
 
 
 def test_inputs_of_a_trajectory_are_never_its_output(folder, capsys):
     words = ["trajectory", "small.toml", *ONE, "--overwrite"]
     for name in ("lib.h5", "small.toml", "spring_of_mine.py"):
-        assert "which is read" in refused(folder, capsys, *words, "--save", name)
+        assert "which is an input" in refused(folder, capsys, *words, "--save", name)
     line = refused(folder, capsys, *words, "-o", "a.png", "b.png", "--distance", "./a.png")
-    assert "./a.png and a.png are one file, but two things" in line
+    assert "./a.png and a.png are the same file, but two outputs" in line
 
 
 def test_a_trajectory_has_the_name_of_its_config_and_is_drawn_again(folder, capsys):
@@ -143,18 +143,18 @@ def test_a_picture_is_never_replaced_by_what_is_fitted_to_it(folder, capsys, opt
     words = ["fit", "frame.png", "photo.png", *PIXEL, option, "frame.png", *more]
     if option == "--overlay":  # one file for each picture: frame-frame.png, frame-photo.png
         words.remove("photo.png")
-    assert "frame.png would replace frame.png, which is read" in refused(folder, capsys, *words)
+    assert "frame.png would replace frame.png, which is an input" in refused(folder, capsys, *words)
 
 
 def test_overlays_of_several_pictures_spare_what_is_there(folder, capsys):
     (folder / "over-photo.png").write_bytes((folder / "photo.png").read_bytes())
     words = ["fit", "frame.png", "photo.png", *PIXEL, "--overlay", "over.png"]
-    assert "over-photo.png exists already" in refused(folder, capsys, *words)
+    assert "over-photo.png already exists" in refused(folder, capsys, *words)
 
 
 def test_the_table_never_takes_the_place_of_the_library(folder, capsys):
     for words in (["-o", "shapes.csv"], ["-o", "shapes.h5", "--summary", "shapes.h5"]):
-        assert "are one file, but two" in refused(
+        assert "are the same file, but two" in refused(
             folder, capsys, "fit", "frame.png", *PIXEL, *words
         )
 
@@ -162,13 +162,13 @@ def test_the_table_never_takes_the_place_of_the_library(folder, capsys):
 def test_a_library_or_its_table_is_replaced_on_request_and_kept(folder, capsys):
     words = ["fit", "frame.png", *PIXEL, "-o", "lib.h5", "--summary", "table.csv"]
     library = (folder / "lib.h5").read_bytes()
-    assert "lib.h5 exists already" in refused(folder, capsys, *words)
+    assert "lib.h5 already exists" in refused(folder, capsys, *words)
     assert main([*words, "--overwrite"]) == 0
     assert (folder / "lib.1.h5").read_bytes() == library
     assert not (folder / "table.1.csv").exists()
     words[words.index("lib.h5")] = "new.h5"
     capsys.readouterr()
-    assert "table.csv exists already" in refused(folder, capsys, *words)
+    assert "table.csv already exists" in refused(folder, capsys, *words)
 
 
 def test_plots_are_drawn_again_and_photographs_spared(folder, capsys):
@@ -182,7 +182,7 @@ def test_plots_are_drawn_again_and_photographs_spared(folder, capsys):
     photo = (folder / "photo.png").read_bytes()
     (folder / "study-figure-4.png").write_bytes(photo)
     capsys.readouterr()
-    assert "study-figure-4.png exists already" in refused(folder, capsys, *words)
+    assert "study-figure-4.png already exists" in refused(folder, capsys, *words)
     assert main([*words, "--overwrite"]) == 0
     assert (folder / "study-figure-4.1.png").read_bytes() == photo
 
@@ -191,7 +191,7 @@ def test_what_is_plotted_is_not_replaced_by_its_plot(folder, capsys):
     write_results(folder / "study.h5", make_results(types=("I",), count=4))
     (folder / "study-overview.png").symlink_to("study.h5")
     line = refused(folder, capsys, "plot", "study.h5", "--figures", "overview", "--overwrite")
-    assert "which is read" in line
+    assert "which is an input" in line
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

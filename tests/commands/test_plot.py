@@ -110,7 +110,7 @@ def test_info_counts_outcomes_reasons_and_steps(study, capsys):
     assert facts["outcomes"].startswith(f"{np.sum(outcome == 0)} A, {np.sum(outcome == 1)} B, ")
     failed, undecided = np.sum(outcome == 6), np.sum(outcome == 5)
     assert facts["reasons"] == f"{failed} overlap_too_deep, {undecided} step_budget"
-    assert f"{steps.mean():.4g} in the mean" in facts["steps"]
+    assert f"{steps.mean():.4g} on average" in facts["steps"]
     assert f"{steps.max()} at most" in facts["steps"]
 
 
@@ -126,7 +126,9 @@ def test_info_tells_how_many_were_run_again_and_flipped(study, tmp_path, capsys)
     checked, flipped = table["n_checked"].sum(), table["n_flipped"].sum()
     call(info, study)
     fact = facts_printed(capsys.readouterr().out)["numerical error"]
-    assert fact.startswith(f"{checked} replicates were run again more exactly, {flipped} of them")
+    assert fact.startswith(
+        f"{checked} replicates were run again more accurately, {flipped} of them"
+    )
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

@@ -143,7 +143,7 @@ def test_a_page_is_written_anew_unless_somebody_changed_it(made_up, capsys):
     call("r.h5", "--no-motion")
     assert (made_up / "r.html").read_bytes() == first
     (made_up / "r.html").write_bytes(first.replace(b"<h1>", b"<h1>My "))
-    with pytest.raises(UsageError, match="exists already and is left as it is"):
+    with pytest.raises(UsageError, match="already exists and is left as it is"):
         call("r.h5", "--no-motion")
     call("r.h5", "--no-motion", "--overwrite")
     assert b"My " in (made_up / "r.1.html").read_bytes()
@@ -172,7 +172,7 @@ def test_the_first_of_each_outcome_has_the_most_vertices(made_up):
 def test_what_cannot_be_run_again_is_said(made_up, capsys):
     assert call("r.h5") == 0
     said = capsys.readouterr().out
-    assert "class A is not shown in motion: " in said and said.endswith("r.html\n")
+    assert "class A is not animated: " in said and said.endswith("r.html\n")
     assert "Not shown in motion: " in (made_up / "r.html").read_text("utf-8")
 
 

@@ -133,9 +133,9 @@ def test_what_cannot_be_is_said_in_one_line(libraries, capsys):
     assert "no floc 'z#1'" in refused(capsys, "select", "one.h5", "--keep", "z#1", "-o", "x.h5")
     small = ("--max-radius", "1e-9", "-o", "x.h5")
     assert "none of 3 flocs" in refused(capsys, "select", "one.h5", *small)
-    for output, told in (("one.h5", "which is read"), ("two.h5", "exists already")):
+    for output, told in (("one.h5", "which is an input"), ("two.h5", "already exists")):
         assert told in refused(capsys, "select", "one.h5", "-o", output)
-    assert "which is read" in refused(
+    assert "which is an input" in refused(
         capsys, "merge", "one.h5", "two.h5", "-o", "two.h5", "--overwrite"
     )
     assert "--min-radius takes" in refused(

@@ -90,12 +90,12 @@ def folder(tmp_path, monkeypatch):
         ({"forces": "[forces.thermal]\ntemperature = 0.0"}, '"brownian" needs kicks'),
         ({"scene": "release = 4.0\nescape = 4.0"}, "release = 4 must be below escape = 4"),
         ({"scene": "release = 1.0"}, "release"),
-        ({"scene": "delta = [0.5]"}, "scene.delta: goes with meeting"),
-        ({"scene": 'start_gap = "3 um"'}, "scene.start_gap: goes with meeting"),
-        ({"scene": 'escape_gap = "3 um"'}, "scene.escape_gap: goes with meeting"),
-        ({"scene": 'rest_time = "3 s"'}, "scene.rest_time: goes with meeting"),
-        ({"scene": 'rate = "3 1/s"'}, 'goes with meeting = "shear" or meeting = "extension"'),
-        ({"scene": 'receiver = "fixed"'}, 'goes with meeting = "settling": remove'),
+        ({"scene": "delta = [0.5]"}, "scene.delta: applies only with meeting"),
+        ({"scene": 'start_gap = "3 um"'}, "scene.start_gap: applies only with meeting"),
+        ({"scene": 'escape_gap = "3 um"'}, "scene.escape_gap: applies only with meeting"),
+        ({"scene": 'rest_time = "3 s"'}, "scene.rest_time: applies only with meeting"),
+        ({"scene": 'rate = "3 1/s"'}, 'only with meeting = "shear" or meeting = "extension"'),
+        ({"scene": 'receiver = "fixed"'}, 'applies only with meeting = "settling": remove'),
         (
             {"scene": "release = 1.1",
              "shapes": 'source = "library"\nfile = "synthetic"\nvertices = [16]\nradius = "50 nm"'},
@@ -111,15 +111,15 @@ def test_other_meetings_have_no_release(tmp_path):
     for scene in ("release = 2.0", "escape = 3.0"):
         path = tmp_path / "study.toml"
         path.write_text(f'preset = "si"\n[scene]\n{scene}\n', "utf-8")
-        with pytest.raises(ConfigError, match='goes with meeting = "brownian": remove it'):
+        with pytest.raises(ConfigError, match='applies only with meeting = "brownian": remove it'):
             load_config(path)
 
 
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        ('meeting = "shear"\nrate = "1 1/s"', '"shear" has no end with [forces.thermal]'),
-        ('kind = "kernel"\nsizes = ["5 um", "9 um"]', "would cut its widths off"),
+        ('meeting = "shear"\nrate = "1 1/s"', '"shear" never ends with [forces.thermal]'),
+        ('kind = "kernel"\nsizes = ["5 um", "9 um"]', "the rates would miss them"),
     ],
 )
 def test_thermal_motion_is_refused_where_no_proof_holds(tmp_path, scene, words, capsys):
@@ -162,11 +162,11 @@ def test_a_study_is_run_reported_resumed_and_dealt_to_processes(folder, capsys):
     told = capsys.readouterr().out
     assert "brownian: from 2 to 4 (r_i + r_j) apart" in told and "W = " in told
     assert main(["ensemble", "study.toml"]) == 0
-    assert "touched before they had escaped" in capsys.readouterr().out
+    assert "touched before they escaped" in capsys.readouterr().out
     assert main(["info", "study.h5"]) == 0
     told = capsys.readouterr().out
     assert "equivalent spheres touch with probability 0.5 " in told
-    assert "touched before they had escaped" in told
+    assert "touched before they escaped" in told
     found = read_results("study.h5")
     rows = {name: values[0, 0, 0] for name, values in found.replicates.items()}
     assert {OUTCOMES[each] for each in rows["outcome"]} == {"A", "missed"}
@@ -187,7 +187,7 @@ def test_a_pair_that_a_secondary_minimum_holds_never_touches(folder, capsys):
     text = text.replace("double_layer = false", layer).replace('cut = "2 nm"', "")
     (folder / "held.toml").write_text(text, "utf-8")
     assert main(["ensemble", "held.toml"]) == 0
-    assert "0.0000 [0.0000, 0.4899] touched before they had escaped" in capsys.readouterr().out
+    assert "0.0000 [0.0000, 0.4899] touched before they escaped" in capsys.readouterr().out
     table = read_results("held.h5").probabilities
     assert table["n_held"].sum() >= 2
     assert table["n_held"].sum() + table["n_missed"].sum() == 4

@@ -163,7 +163,7 @@ def test_a_library_that_is_none(folder, capsys):
 def test_no_config_is_not_a_traceback(folder, capsys):
     assert failure(capsys, "other.toml") == (
         2,
-        "other.toml: there is no such file; `flocsim init other.toml` writes one",
+        "other.toml: no such file; `flocsim init other.toml` writes one",
     )
     code, line = failure(capsys, ".")
     assert code == 2
@@ -189,7 +189,7 @@ def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypat
     ("error", "code", "said"),
     [
         (KeyboardInterrupt, 130, "flocsim: interrupted; continue with --resume\n"),
-        (MemoryError, 70, "flocsim: out of memory: ask for fewer ranks on a machine\n"),
+        (MemoryError, 70, "flocsim: out of memory: use fewer ranks on each machine\n"),
     ],
 )
 def test_other_ends(folder, capsys, monkeypatch, error, code, said):

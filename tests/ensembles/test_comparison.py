@@ -165,4 +165,4 @@ def test_what_no_flocsim_wrote_is_refused_in_one_line(tmp_path, monkeypatch, cap
     write_results(tmp_path / "b.h5", made)
     assert main(["compare", "a.h5", "b.h5"]) == 74
     [line] = capsys.readouterr().err.splitlines()
-    assert "a.h5 holds no readable results: run/identity cannot be read" in line
+    assert "a.h5 has no readable results: run/identity cannot be read" in line

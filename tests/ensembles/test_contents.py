@@ -79,7 +79,7 @@ def test_wrong_words_are_refused(synthetic, tmp_path):
         opened.labelled("tables")
     with pytest.raises(UsageError, match="figure must be one of"):
         opened.plot("99")
-    with pytest.raises(FileError, match="holds no config"):
+    with pytest.raises(FileError, match="has no config"):
         opened.replicate(0)
     with pytest.raises(FileError, match="could not be read"):
         flocsim.open(tmp_path / "nothing.h5")

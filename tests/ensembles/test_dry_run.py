@@ -38,14 +38,14 @@ def test_the_pilot_says_what_the_study_takes_and_what_matters(tmp_path, brief):
     assert re.search(r"results file: \d+ kB \(\d+ kB to \d+ kB\), \d+ B for each replicate", text)
     for name in ("gravity: stays", "contact: stays", "inertia: stays", "van_der_waals: "):
         assert f"without {name}" in text
-    assert text.endswith("nothing was run but the pilot (--dry-run)")
+    assert text.endswith("only the pilot was run (--dry-run)")
 
 
 def test_without_a_pilot_nothing_is_run(tmp_path, monkeypatch):
     monkeypatch.setattr(dry_run, "pilot_lines", None)
     text = dry_run.dry_run(spheres(tmp_path), 1)
     assert "pilot:" not in text
-    assert "nothing was run (--dry-run); with --pilot some replicates are" in text
+    assert "nothing was run (--dry-run); --pilot runs some replicates" in text
 
 
 def test_auto_is_forecast_at_what_it_chooses(tmp_path, brief):
@@ -60,7 +60,7 @@ def test_auto_is_not_waited_for_where_it_takes_long(tmp_path, brief, monkeypatch
     auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
     monkeypatch.setattr(dry_run, "choose", None)
     text = dry_run.dry_run(spheres(tmp_path, **auto), 1, pilot=True)
-    assert re.search(r"what follows is at Implicit\(tolerance=1e-09", text)
+    assert re.search(r"what follows is for Implicit\(tolerance=1e-09", text)
     assert "core-hours: " in text
 
 

@@ -69,7 +69,7 @@ REFUSED = {
         "strengths",
     ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
     ("dry run", "strengths"): "unrecognized arguments: --dry-run",
-    ("export", "pairs"): "is of no kernel study and has no rates",
+    ("export", "pairs"): "is not from a kernel study and has no rates",
     ("export", "swarms"): "holds a flocsim swarm",
     ("export", "strengths"): "holds a flocsim strength",
 }

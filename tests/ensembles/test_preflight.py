@@ -187,7 +187,7 @@ def test_doubts_have_the_names_of_the_config(tmp_path):
 def test_the_fastest_body_of_all_types_is_held_to_the_drag_law(tmp_path):
     [line] = study_doubts(small_config(tmp_path))
     assert "r_eq = 23.02 um settles at 84.58 mm/s: Re = 4.4" in line
-    assert "forces.drag takes law =" in line
+    assert "give forces.drag law =" in line
     law = {"forces": {"drag": {"law": "schiller_naumann"}}}
     assert study_doubts(small_config(tmp_path, law)) == []
 

@@ -46,8 +46,8 @@ def test_a_study_is_another_than_one_of_independent_replicates_and_can_be_extend
     ("changes", "said"),
     [
         ({"replicates": 100}, "must be 16 scrambles times a power of 2"),
-        ({"replicates": 8}, "take 16 or 32"),
-        ({"stop": {"half_width": 0.1}}, "Sobol's points are all run"),
+        ({"replicates": 8}, "give 16 or 32"),
+        ({"stop": {"half_width": 0.1}}, "Sobol's points have to be run"),
         ({"sampling": "halton"}, "sampling must be .random. or .sobol., found .halton."),
     ],
 )

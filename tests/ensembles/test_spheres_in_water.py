@@ -41,9 +41,9 @@ def test_more_attraction_lets_more_touch(tmp_path):
 
 
 @pytest.mark.parametrize(("scene", "more", "words"), [
-    ('receiver = "fixed"', "", "where one is held: choose scene.receiver = 'free'"),
-    ("", '[forces.thermal]\ntemperature = "293 K"', "where they are kicked"),
-    ("", '[fluid]\ngradient = [0.0, 10.0, 0.0, 0.0]', "where they settle in a flow"),
+    ('receiver = "fixed"', "", "with a fixed receiver: choose scene.receiver = 'free'"),
+    ("", '[forces.thermal]\ntemperature = "293 K"', "with thermal kicks"),
+    ("", '[fluid]\ngradient = [0.0, 10.0, 0.0, 0.0]', "when they settle in a flow"),
 ])  # fmt: skip
 def test_where_it_is_not_known(tmp_path, scene, more, words):
     with pytest.raises(UsageError, match=words):

@@ -79,7 +79,7 @@ def test_those_left_out_are_known_by_their_places_too():
 def test_any_force_without_a_reach_is_refused_among_many(places):
     many = [Body(Sphere(R), (3.0 * R * k, 0.0), density=2650.0) for k in range(201)]
     forces = [Pull(far=math.inf if k in places else R) for k in range(3)]
-    with pytest.raises(UsageError, match=r"Pull.* has no reach"):
+    with pytest.raises(UsageError, match=r"Pull.* has no finite reach"):
         Swarm(many, forces)
     Swarm(many, [Pull(far=R) for _ in range(3)])
 

@@ -37,10 +37,10 @@ def test_a_saddle_amplifies_a_nudge_by_its_cosh(integrator):
     assert found.amplification > MOST_AMPLIFIED
     if math.isfinite(found.error):
         assert found.error_text.endswith(
-            "which is no promise: the motion amplifies a nudge 27 times"
+            "which is not a guarantee: the motion amplifies a perturbation 27 times"
         )
     else:
-        assert found.error_text == "the method states no error"
+        assert found.error_text == "the method does not estimate its error"
 
 
 def test_settling_amplifies_nothing_and_says_the_same_each_time():
@@ -49,7 +49,7 @@ def test_settling_amplifies_nothing_and_says_the_same_each_time():
     assert first.amplification == again.amplification == pytest.approx(1.0, rel=1e-6)
     assert (
         first.error_text
-        == f"stated error {first.error:.2g} m; the motion amplifies a nudge 1 times"
+        == f"stated error {first.error:.2g} m; the motion amplifies a perturbation 1 times"
     )
 
 

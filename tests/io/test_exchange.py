@@ -185,7 +185,7 @@ def test_the_command_writes_what_a_file_of_motion_holds(tmp_path, monkeypatch, c
         found = frames[3].particles.position[:, :2]
     np.testing.assert_allclose(found, 1e6 * position[3, :, :2], rtol=1e-6)
     assert main(["export", "gsd", "m.h5"]) == 2
-    assert "exists already and is left as it is" in capsys.readouterr().err
+    assert "already exists and is left as it is" in capsys.readouterr().err
     assert main(["export", "gsd", "m.h5", "-o", "m.xyz"]) == 2
     assert main(["export", "gsd", "absent.h5"]) == 74
 

@@ -47,7 +47,7 @@ def test_a_new_file_is_all_that_is_there(tmp_path):
 
 def test_a_file_that_exists_is_kept_unless_a_rule_says_otherwise(tmp_path):
     (tmp_path / "a.h5").write_bytes(b"old")
-    with pytest.raises(FileError, match=r"a\.h5 exists already and is left as it is"):
+    with pytest.raises(FileError, match=r"a\.h5 already exists and is left as it is"):
         write_file(tmp_path / "a.h5", b"new")
     assert content(tmp_path) == {"a.h5": b"old"}
     write_file(tmp_path / "a.h5", b"second", aside)
@@ -58,7 +58,7 @@ def test_a_file_that_exists_is_kept_unless_a_rule_says_otherwise(tmp_path):
 
 
 def test_what_appears_while_a_file_is_written_is_kept_and_so_is_the_work(tmp_path):
-    said = r"a\.h5 is there by now.* computed is in .*a\.2\.h5"
+    said = r"a\.h5 has meanwhile been written.* computed is in .*a\.2\.h5"
     with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as new:
         new.file.write(b"work")
         (tmp_path / "a.h5").write_bytes(b"other")

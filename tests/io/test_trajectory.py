@@ -96,7 +96,7 @@ def test_a_file_with_other_numbers_is_refused(tmp_path):
     times, position, velocity = motion()
     position[2, 1, 0] = np.nan
     write_trajectory(tmp_path / "m.h5", times, position, velocity, SHAPES, {})
-    with pytest.raises(FileError, match="holds no readable trajectory: its arrays"):
+    with pytest.raises(FileError, match="has no readable trajectory: its arrays"):
         read_trajectory(tmp_path / "m.h5")
 
 
@@ -128,5 +128,5 @@ def test_rings_that_cannot_be_are_refused(tmp_path, change):
     with h5py.File(image, "r+") as file:
         change(file)
     (tmp_path / "m.h5").write_bytes(seal(image.getvalue()))
-    with pytest.raises(FileError, match="holds no readable trajectory"):
+    with pytest.raises(FileError, match="has no readable trajectory"):
         read_trajectory(tmp_path / "m.h5")

@@ -70,9 +70,9 @@ def test_places_are_spread_evenly():
 
 def test_what_cannot_be_placed_is_said():
     side = math.sqrt(100 * math.pi / 0.6)
-    with pytest.raises(UsageError, match=r"of 100 bodies, 0\.\d+ of the area, found a place"):
+    with pytest.raises(UsageError, match=r"of 100 bodies, 0\.\d+ of the area, were placed"):
         place_at_random([Sphere(1.0)] * 100, (side, side), np.random.default_rng(4))
-    with pytest.raises(UsageError, match="too little for bodies of up to 2 m"):
+    with pytest.raises(UsageError, match="too small for bodies of up to 2 m"):
         place_at_random([Sphere(1.0)], (3.0, 100.0), np.random.default_rng(4))
 
 

@@ -155,13 +155,15 @@ class Everywhere(CentreForce):
 def test_what_a_swarm_cannot_do_is_said():
     few, _ = crowd(3, 0)
     many = [Body(Sphere(R), (3.0 * R * k, 0.0), density=1e3) for k in range(201)]
-    with pytest.raises(UsageError, match="Everywhere has no reach"):
+    with pytest.raises(UsageError, match="Everywhere has no finite reach"):
         Swarm(many, [Everywhere()])
     Swarm(many, [Everywhere()], all_pairs=True)
     Swarm(few, [Everywhere()])
     with pytest.raises(UsageError, match="the box is 2e-05 m wide"):
         Swarm(few, forces(), box=(2e-5, None))
-    with pytest.raises(UsageError, match="the flow changes along y, along which the box repeats"):
+    with pytest.raises(
+        UsageError, match="the flow varies along y, along which the box is periodic"
+    ):
         Swarm(few, forces(), fluid=Fluid(gradient=(0.0, 1.0, 0.0, 0.0)), box=(SIDE, SIDE))
     with pytest.raises(UsageError, match="at least one body that moves"):
         Swarm([floor(SIDE)], forces())

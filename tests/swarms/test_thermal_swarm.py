@@ -73,5 +73,5 @@ def test_replicates_are_kicked_otherwise():
 
 @pytest.mark.parametrize("thermal", [Thermal(), Thermal(kick="1 ms", finest="2 nm")])
 def test_kicks_that_would_be_halved_are_refused(thermal):
-    with pytest.raises(UsageError, match="a swarm takes kicks of one length"):
+    with pytest.raises(UsageError, match="a swarm needs kicks of the same length"):
         Swarm(bodies(0.0, 50.0), [StokesDrag(), thermal, Contact()], METHOD, WATER)

@@ -148,7 +148,7 @@ def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
 @pytest.mark.parametrize(
     ("answer", "allowed", "words", "said", "kept"),
     rest_slow([
-        (LATE, 1, (), "no replicate has come to an outcome, 3 failed and 0 are und", True),
+        (LATE, 1, (), "no replicate has reached an outcome, 3 failed and 0 are und", True),
         (LATE, 0.1, (), "1 replicate failed, more than stop.failed allows", False),
         ("0.0", 1, ("--set", "integrator.max_steps=5"), "0 failed and 3 are undecided: raise int",
          True),

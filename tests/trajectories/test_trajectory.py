@@ -47,7 +47,7 @@ def test_states_between_steps_are_those_of_the_motion(method, allowed):
     np.testing.assert_allclose(single.position, found.position[17], rtol=1e-12, atol=1e-30)
     at_steps = run.at(run.t)
     assert np.array_equal(at_steps.position, run.position)
-    with pytest.raises(UsageError, match="the run has the times from 0 to 5e-05 s"):
+    with pytest.raises(UsageError, match="the run covers times from 0 to 5e-05 s"):
         run.at(6e-5)
 
 
@@ -176,7 +176,7 @@ def test_a_saved_motion_opens_in_xarray(resting, tmp_path):
         np.testing.assert_array_equal(data["position"].sel(body=1, component="y"),
                                       run.position[:, 1, 1])  # fmt: skip
         np.testing.assert_array_equal(data["time"], run.t)
-    with pytest.raises(UsageError, match=r"exists already .* say overwrite=True"):
+    with pytest.raises(UsageError, match=r"already exists .* give overwrite=True"):
         run.save(tmp_path / "m.h5")
 
 
@@ -188,7 +188,7 @@ def test_an_exported_motion_opens_in_gsd(resting, tmp_path):
         assert len(frames) == len(run.t)
         places = frames[-1].particles.position[:, :2]
     np.testing.assert_allclose(places, 1e6 * run.position[-1, :, :2], rtol=1e-6, atol=1e-9)
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(UsageError, match="already exists"):
         run.export(tmp_path / "m.gsd")
     with pytest.raises(UsageError, match=r"must end in \.gsd"):
         run.export(tmp_path / "m.vtk")

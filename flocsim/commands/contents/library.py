@@ -59,8 +59,8 @@ def water(path: str | os.PathLike) -> list[str]:
             f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
         ))  # fmt: skip
     heading = (
-        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: how fast they sink, at most and at "
-        "least, and turn, over their equivalent spheres; B, by which a strain turns them, over "
+        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: largest and least settling speed, and "
+        "rate of turning, over those of the equivalent spheres; B, the response to strain, over "
         "that of a line"
     )
     return [heading, *aligned(rows)]
@@ -79,6 +79,6 @@ CONTENTS = Contents(
     summary=summary,
     table=lambda found: format_errors(found.entries),
     figures=lambda found: FIGURES,
-    drawn={"a shape library that flocsim fit wrote": FIGURES},
+    drawn={"a shape library written by flocsim fit": FIGURES},
     water=water,
 )

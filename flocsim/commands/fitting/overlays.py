@@ -18,9 +18,7 @@ def pictures_beneath(name, paths, drawn):
     if name is None:
         return {}
     if not drawn:
-        raise UsageError(
-            "--pictures says what the overlay of masks is drawn over; give --masks and --overlay"
-        )
+        raise UsageError("--pictures is for overlays of masks: give --masks and --overlay too")
     folder = Path(name)
     if not folder.is_dir():
         raise UsageError(f"--pictures takes a folder, found {name!r}")
@@ -32,8 +30,8 @@ def pictures_beneath(name, paths, drawn):
     for mask, several in found.items():
         if len(several) > 1:
             raise UsageError(
-                f"--pictures {name} has {several[0].name} and {several[1].name}, so that "
-                f"it is not known which is the picture of {mask.name}; move one away"
+                f"--pictures {name} has {several[0].name} and {several[1].name}, so the picture of "
+                f"{mask.name} is ambiguous; move one of them away"
             )
     missing = [path.name for path in paths if path not in found]
     if missing:
@@ -109,7 +107,7 @@ def draw(overlay, pictures, fits, options, rule, several, beneath):
         try:
             grey = grey_beneath(picture, beneath, options)
         except (ImageError, MemoryError) as error:
-            report(str(error) or f"{picture.name}: there was not enough memory for its overlay")
+            report(str(error) or f"{picture.name}: not enough memory to draw its overlay")
             lost.append(str(path))
             continue
         figure = draw_overlay(grey, flocs, title, picture.found.rejected)

@@ -100,7 +100,7 @@ def fit_pictures(
 
     def lose(name, result):
         if name not in lost:
-            report(f"{name} is lost: {result.reason}; the other pictures are not")
+            report(f"{name} was not fitted: {result.reason}; the other pictures were")
         lost[name] = None
 
     with workers(options.jobs, compile_fit) as mapped:
@@ -242,7 +242,7 @@ def known_size(path, options):
         return options.pixel_size
     if (found := pixel_size_in(path, stack_of(path))) is None:
         raise ImageError(
-            f"{path}: does not say how large a pixel is, as OME-TIFF and ImageJ files do; give the "
+            f"{path}: does not give the size of a pixel, as OME-TIFF and ImageJ files do; give the "
             "length of its side, for example --pixel-size '0.95 um'"
         )
     return found
@@ -308,7 +308,9 @@ def fit_region(task):
                 for mask in masks
             ]  # fmt: skip
         except ShapeError as error:
-            raise ShapeError(f"{name}: {error}, or leave small flocs out by --min-radius") from None
+            raise ShapeError(
+                f"{name}: {error}, or leave out small flocs with --min-radius"
+            ) from None
 
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:
@@ -347,7 +349,7 @@ def find_background(paths, options):
     if len(frames) < FEWEST_FRAMES or len(shapes) > 1:
         sizes = ", ".join(f"{width} × {height}" for height, width in sorted(shapes))
         raise UsageError(
-            f"--background median needs at least {FEWEST_FRAMES} frames of one size, found "
+            f"--background median needs at least {FEWEST_FRAMES} frames of the same size, found "
             f"{len(frames)} ({sizes}); use --background surface"
         )
     return median_frame(frames)

@@ -59,7 +59,7 @@ def attempt(function, task):
     except FlocsimError:
         raise
     except MemoryError:
-        return Lost("there was not enough memory: use fewer --jobs, or a smaller picture")
+        return Lost("not enough memory: use fewer --jobs, or a smaller picture")
     except Exception as error:
         return Lost(f"internal error, please report it: {type(error).__name__}: {error}")
 
@@ -108,7 +108,7 @@ class Processes:
                     if future.done() and not future.cancelled() and not future.exception():
                         results[number] = future.result()
                     elif alone:
-                        results[number] = Lost("its process was killed: was there enough memory?")
+                        results[number] = Lost("its process was killed, perhaps for lack of memory")
                     else:
                         suspects.append((number, task))
                 running.clear()
@@ -143,7 +143,7 @@ def result_of(future):
     except (FlocsimError, BrokenProcessPool):
         raise
     except Exception as error:
-        return Lost(f"its result could not be handed over: {type(error).__name__}: {error}")
+        return Lost(f"its result could not be passed on: {type(error).__name__}: {error}")
 
 
 def begin_process():

@@ -170,7 +170,8 @@ def judged(scene: Scene, exact: Integrator) -> Verdict:
     if (row["outcome"], row["inside"]) != (other["outcome"], other["inside"]):
         most = max(allowed(scene), stated) + reference.error
         if error <= most and is_close_call(row, other, most):
-            why = f"{ending(row)}, and the reference {ending(other)}: closer than that"
+            both = f"{ending(row)}, and the reference {ending(other)}"
+            why = f"{both}: the difference lies within the error"
             return Verdict(*about, error, stated, STATED, why)
         why = f"{ending(row)}, and the reference {ending(other)}{remark(scene, reference, exact)}"
         return Verdict(*about, error, stated, WRONG, why)
@@ -222,7 +223,7 @@ def remark(scene: Scene, reference: Run, exact: Integrator) -> str:
     factor = amplification(scene, reference, exact)
     if factor <= MOST_AMPLIFIED:
         return ""
-    return f"; the motion amplifies a nudge {factor:.2g} times"
+    return f"; the motion amplifies a perturbation {factor:.2g} times"
 
 
 def amplification(scene: Scene, reference: Run, exact: Integrator) -> float:

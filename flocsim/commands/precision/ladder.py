@@ -58,7 +58,7 @@ def refuse_arguments(args: Namespace) -> None:
     """UsageError where an argument of the ladder is given with a replicate."""
     for name, given in (("--count", args.count is not None), ("--output", args.output)):
         if given:
-            raise UsageError(f"{name} is for the whole study: leave it out, or --replicate")
+            raise UsageError(f"{name} is for the whole study: leave out either it or --replicate")
 
 
 @attrs.define
@@ -194,15 +194,15 @@ def run(args: Namespace) -> int:
     methods, types = settled(config, ladders[::2], ladders[1::2], target)
     tell(
         f"\nwith {config.replicates} replicates the sampling error is "
-        f"{100.0 * sampling_error(config):.2g} %; flips below a fifth of it, at the least cost:"
+        f"{100.0 * sampling_error(config):.2g} %; the cheapest with flips below a fifth of it:"
     )
     for each in types:
-        end = "" if each["bound"] <= target else ", the tightest of the ladder: not enough"
+        end = "" if each["bound"] <= target else ", the tightest tested: not enough"
         tell(
             f"  {each['name']}: {each['method']}, tolerance = {each['tolerance']:g}, "
             f"{100.0 * each['expected']:.2g} % expected{end}"
         )
-    tell('  which [integrator] accuracy = "auto" finds by itself, for every type its own')
+    tell('  [integrator] accuracy = "auto" finds these by itself, for each type')
     chosen = {name: (type(each).__name__, each.tolerance) for name, each in methods.items()}
     if args.output:
         figure = draw_ladders(panels, chosen, target)

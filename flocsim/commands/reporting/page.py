@@ -15,7 +15,7 @@ MOST_FAILURES = 20
 def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Example]) -> str:
     """The HTML of a file; FileError as `summary_of` raises it."""
     said = summary_of(path, kind, found)
-    sections = [("results", "What was run, and the results", facts_of(said.facts))]
+    sections = [("results", "Study and results", facts_of(said.facts))]
     if said.warnings or said.failed:
         more = len(said.failed) - MOST_FAILURES
         shown = said.failed[:MOST_FAILURES]
@@ -29,15 +29,15 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
     if examples:
         motions = "\n".join(map(motion_of, examples))
         told = (
-            "<p>The first replicate of each class, of the flocs with the most vertices, run again "
-            "from the seed. Seen from the receiving floc; frames are spaced by distance, not time. "
-            "Red rings: outlines overlap there.</p>"
+            "<p>The first replicate of each class, for the flocs with the most vertices, run "
+            "again from the seed, in the frame of the receiving floc. Frames are spaced by "
+            "distance, not by time. Red rings mark overlapping outlines.</p>"
         )
         sections.append(("motion", "In motion", f"{told}<div class='motions'>{motions}</div>"))
     config = kind.run(found).get("config", "") if kind.run else ""
     if said.origin or config:
         came = facts_of(said.origin) + (f"<h3>Config</h3>{verbatim(str(config))}" if config else "")
-        sections.append(("provenance", "Where it came from", came))
+        sections.append(("provenance", "Origin", came))
     return page_of(f"{path}: {kind.title}", sections, SCRIPT)
 
 

@@ -49,8 +49,8 @@ def as_tuple(value: Any) -> tuple[str, ...]:
 
 @attrs.frozen
 class KernelScene(DrivenScene):
-    """With `kind = "kernel"`: what brings bodies of which sizes together, how their orientations
-    and offsets are sampled, and how their meetings begin and end."""
+    """With `kind = "kernel"`: the sizes of the bodies, what brings them together, how their
+    orientations and offsets are sampled, and how their meetings begin and end."""
 
     usual_replicates: ClassVar[int | None] = KERNEL_REPLICATES
 
@@ -62,7 +62,7 @@ class KernelScene(DrivenScene):
             "read": lambda value: read_meetings([value] if isinstance(value, str) else value),
             "allowed": '"settling", "shear" or "extension", or a list of them',
             "shown": '"settling"',
-            "help": "mechanisms that bring bodies together, each by itself: weight alone, or a "
+            "help": "mechanisms that bring bodies together, one at a time: weight alone, or a "
             "flow alone, u = (G y, 0) or u = (s x, -s y), without weight",
         },
     )
@@ -95,16 +95,16 @@ class KernelScene(DrivenScene):
         above=0.0,
         at_most=LARGEST_LENGTH,
         default="auto",
-        help="distance of the outlines at the start; auto: where what acts between them has become "
-        "`far`",
+        help="distance of the outlines at the start; auto: where the forces between them have "
+        "fallen to `far`",
     )
     far: float = quantity(
         "",
         above=0.0,
         at_most=0.1,
         default=1e-3,
-        help="share of the speed at which they meet that the forces between them may make at an "
-        "automatic start",
+        help="speed that the forces between two bodies may cause at an automatic start, as a share "
+        "of the speed at which the bodies approach each other",
     )
     scrambles: int = whole_field(
         2,
@@ -118,7 +118,7 @@ class KernelScene(DrivenScene):
 
     def __attrs_post_init__(self):
         if not set(self.meeting) <= set(MECHANISMS):
-            raise ConfigError(f"meeting must be of {', '.join(MECHANISMS)}")
+            raise ConfigError(f"meeting must be one or several of {', '.join(MECHANISMS)}")
         if (self.sizes is None) == (self.pairs is None):
             found = "neither" if self.sizes is None else "both"
             raise ConfigError(
@@ -127,16 +127,16 @@ class KernelScene(DrivenScene):
         if list(self.sizes or ()) != sorted(self.sizes or ()):
             raise ConfigError("sizes must be ascending radii")
         if len(self.sizes or ()) > MOST_CLASSES:
-            raise ConfigError(f"sizes may be {MOST_CLASSES} at most, found {len(self.sizes)}")
+            raise ConfigError(f"there may be at most {MOST_CLASSES} sizes, found {len(self.sizes)}")
         if self.sizes and len(self.sizes) == 1 and SETTLING in self.meeting:
             raise ConfigError(
-                "bodies of one size settle alike and never meet: give several sizes, or a meeting "
-                "in shear or extension"
+                "bodies of one size settle equally fast and never meet: give several sizes, or "
+                "a meeting in shear or extension"
             )
         if any(each in FLOWS for each in self.meeting) != (self.rate is not None):
             raise ConfigError(
-                'rate is that of a flow, and meeting = "shear" or "extension" needs one, as in '
-                'rate = "10 1/s"'
+                'rate belongs to a flow: meeting = "shear" or "extension" needs it, as in '
+                'rate = "10 1/s", and "settling" alone has none'
             )
         super().__attrs_post_init__()
 
@@ -194,7 +194,7 @@ class KernelScene(DrivenScene):
         if thermal_in(parts["forces"]):
             text = (
                 "brings bodies together from beyond the offsets that a study of rates samples, "
-                "which would cut its widths off: leave it out, or let two bodies meet by "
+                "and the rates would miss them: leave it out, or let two bodies meet by "
                 'scene.meeting = "brownian"'
             )
             yield ("forces", "thermal"), text

@@ -77,7 +77,7 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     beyond = text_problem(value)
     if beyond is not None or len(keys) > MOST_PARTS:
         what = beyond[1] if beyond else f"a key of more than {MOST_PARTS} parts"
-        raise ConfigError(f"--set {text[:40]!r}…: {what}: no config needs that")
+        raise ConfigError(f"--set {text[:40]!r}…: {what}: a config never needs that")
     try:
         table = tomllib.loads(f"value = {value}\n")
     except ValueError:
@@ -111,8 +111,9 @@ def load_config(
     if not isinstance(config.scene, PairScene):
         kind = config.scene.kind
         raise ConfigError(
-            f'{path} is of a {kind} (scene.kind = "{kind}"), not of two bodies: run it with '
-            "`flocsim ensemble`, and look at its results by `flocsim info` and `flocsim plot`"
+            f'{path} describes a study of kind "{kind}" (scene.kind), not one of two bodies: '
+            "run it with `flocsim ensemble`, and look at its results with `flocsim info` and "
+            "`flocsim plot`"
         )
     return config
 
@@ -217,7 +218,9 @@ class Reader:
                 self.problems.misfit(("scene", key), error)
                 continue
             if said != fixed.get(key):
-                self.problems.note(("scene", key), f"goes with {' or '.join(found)}: remove it")
+                self.problems.note(
+                    ("scene", key), f"applies only with {' or '.join(found)}: remove it"
+                )
         return {key: value for key, value in table.items() if key not in owners}
 
     def check_alternatives(self, name, table, keys):
@@ -236,17 +239,19 @@ class Reader:
             given = table.get(other, DEFAULTS.get(other))
             if other and given != word:
                 found = f"but {other} is {show(given)}" if given else f"and there is no {other}"
-                self.problems.note((name, key), f'goes with {other} = "{word}", {found}: remove it')
+                self.problems.note(
+                    (name, key), f'applies only with {other} = "{word}", {found}: remove it'
+                )
 
     def library(self, name):
         path = self.folder / name
         if str(name) == NAME_OF_SHIPPED and not os.path.lexists(path):
             return SHIPPED
         if not os.path.isfile(path):
-            what = "is no ordinary file" if os.path.exists(path) else "does not exist"
+            what = "is not an ordinary file" if os.path.exists(path) else "does not exist"
             text = (
-                f"{path} {what}; name a library that `flocsim fit` wrote, or "
-                f'"{NAME_OF_SHIPPED}", the one that ships with flocsim'
+                f"{path} {what}; name a library written by `flocsim fit`, or "
+                f'"{NAME_OF_SHIPPED}", the one included in flocsim'
             )
             self.problems.note(("shapes", "file"), text)
         return self.sources.library(path)
@@ -315,7 +320,8 @@ class Reader:
         if taken:
             self.problems.note(
                 (*place, "class"),
-                f"its parameter {taken[0]} has the name of a key of flocsim's own: give it another",
+                f"its parameter {taken[0]} has the same name as one of flocsim's own keys: rename "
+                "it",
             )
             return None
         parameters = {key: value for key, value in table.items() if key != "class"}

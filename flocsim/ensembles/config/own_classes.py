@@ -98,7 +98,7 @@ def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None =
 def why_unfit(found, kind):
     """What is wrong with a class of this kind, in words; "" where nothing is."""
     if not (inspect.isclass(found) and issubclass(found, kind.bases)):
-        return f"is no {kind.name}: subclass {kind.advice}"
+        return f"is not a subclass of {kind.advice}"
     if inspect.isabstract(found):
         return f"does not define {', '.join(sorted(found.__abstractmethods__))}"
     if "__attrs_attrs__" not in vars(found):
@@ -133,7 +133,7 @@ def check_shape(shape: Shape) -> None:
             raise ConfigError(f"{name} must be a finite number above 0, found {value!r}")
     larger = shape.scaled(2.0)
     if not np.isclose(larger.equivalent_radius, 2.0 * shape.equivalent_radius, rtol=1e-9, atol=0):
-        raise ConfigError("scaled(2.0) must be a shape of four times the area")
+        raise ConfigError("scaled(2.0) must return a shape of four times the area")
 
 
 def load_module(name, folder, sources):
@@ -193,7 +193,9 @@ def run_file(name, path, source):
     known = sys.modules.get(name)
     if known is not None and not hasattr(known, SOURCE):
         if os.path.realpath(getattr(known, "__file__", None) or "") != file:
-            raise ConfigError(f"{file} has the name of a module that is already loaded: rename it")
+            raise ConfigError(
+                f"{file} has the same name as a module that is already loaded: rename it"
+            )
         return known
     if known is not None and getattr(known, SOURCE) == (file, source):
         return known

@@ -63,7 +63,7 @@ def of_measured(value: Any) -> Any:
 
 def size_limit(which: str, **more: Any) -> Any:
     """The least or largest size that is drawn."""
-    help = f"{which} r_eq that is drawn; none: of all"
+    help = f"{which} r_eq that is drawn; none: no limit"
     return quantity("m", above=0.0, at_most=LARGEST_LENGTH, default=None, help=help, **more)
 
 
@@ -74,9 +74,9 @@ WEIGHT: Any = choice(
     default=of_measured("number"),
     shown='"number"',
     only_for=("pairs", MEASURED),
-    help="how often a measured floc is drawn: number, as in its pictures; area, in proportion to "
-    "its area, the volume of a floc in the plane; volume, to r_eq³, that of equivalent spheres, as "
-    "laser diffraction and Coulter counters give it",
+    help="how often a measured floc is drawn: number, as often as in its pictures; area, in "
+    "proportion to its area, the volume of a floc in the plane; volume, in proportion to r_eq³, "
+    "the volume of the equivalent sphere, as laser diffraction and Coulter counters report it",
 )
 CLASSES: Any = read_by(
     either(
@@ -93,9 +93,9 @@ CLASSES: Any = read_by(
     shown="1",
     unit="m",
     only_for=("pairs", MEASURED),
-    help="size classes of the measured flocs, each pair of which is a collision type: so many, "
-    "of equal weight (`q1` of the smallest to `q2`, …), or the r_eq between them (`to10um`, "
-    "`10to20um`, `from20um`)",
+    help="size classes of the measured flocs, each pair of which is a collision type: their "
+    "number, for classes of equal weight (`q1`, the smallest, `q2`, …), or the r_eq that separate "
+    "them (`to10um`, `10to20um`, `from20um`)",
 )
 """Keys of measured flocs."""
 
@@ -122,12 +122,12 @@ def uneven_points(parts: Mapping[str, Any], scrambles: int, of_what: str) -> Ite
     if rest or points < 1 or points & (points - 1):
         least = scrambles << (max(points, 1).bit_length() - 1)
         text = (
-            f"must be {of_what} times a power of 2, as Sobol's points are even only so: found "
-            f"{replicates}, take {least} or {2 * least}"
+            f"must be {of_what} times a power of 2, as only then are Sobol's points even: found "
+            f"{replicates}, give {least} or {2 * least}"
         )
         yield ("replicates",), text
     if parts["stop"] is not None and parts["stop"].half_width is not None:
-        text = "is for probabilities of independent replicates, and Sobol's points are all run: "
+        text = "is for independent replicates, and Sobol's points have to be run to the last: "
         yield ("stop", "half_width"), text + "give more replicates and --resume instead"
 
 
@@ -139,7 +139,8 @@ def outline_problems(parts: Mapping[str, Any], *, settles: bool) -> Iterator[Pro
     if not settles:
         yield ("forces",), 'law = "outline" is for pairs that settle: give gap = "surface" instead'
     elif thermal_in(parts["forces"]):
-        yield ("forces", "thermal"), 'does not go with law = "outline" yet: leave one of them out'
+        text = 'cannot yet be combined with law = "outline": leave one of them out'
+        yield ("forces", "thermal"), text
 
 
 @attrs.frozen
@@ -157,8 +158,8 @@ class PairScene:
     kind: str = one_tag(
         "binary",
         of=KINDS_OF_SCENES,
-        help='encounters of two bodies; "swarm": many bodies in a box, "kernel": rates of '
-        "encounters, with keys of their own below",
+        help='"binary": encounters of two bodies; "swarm": many bodies in a box; "kernel": rates '
+        "of encounters; the latter two have keys of their own, below",
     )
     pairs: tuple[tuple[float, float], ...] | str | None = read_by(
         either(
@@ -173,7 +174,7 @@ class PairScene:
         default=None,
         unit="m",
         help="equivalent radii (receiving, approaching), instead of `types`; measured: two flocs "
-        "of the library are drawn from all, each at its own size, the faster of the two approaches",
+        "are drawn from the whole library, each at its own size; the faster of the two approaches",
     )
     types: tuple[str, ...] | None = read_by(
         list_of(one_of(tuple(TYPES)), "a list of 'I', 'II', 'III'"),
@@ -221,7 +222,8 @@ class PairScene:
         low, high = self.min_radius or 0.0, self.max_radius or LARGEST_LENGTH
         if low >= high:
             raise ConfigError(
-                f"min_radius = {low:g} m is not below max_radius = {high:g} m: no floc is between"
+                f"min_radius = {low:g} m is not below max_radius = {high:g} m: no floc lies "
+                "between them"
             )
         borders = self.classes if isinstance(self.classes, tuple) else ()
         if list(borders) != sorted(borders) or any(not low < each < high for each in borders):
@@ -231,7 +233,7 @@ class PairScene:
             )
         count = len(self.class_labels)
         if count > MOST_CLASSES:
-            raise ConfigError(f"classes may be {MOST_CLASSES} at most, found {count}")
+            raise ConfigError(f"there may be at most {MOST_CLASSES} classes, found {count}")
 
     def meeting_of(self, place: int) -> str:
         """What brings the bodies of the collision type at a place of `names` together."""
@@ -299,12 +301,12 @@ class PairScene:
                 yield ("fluid", name), f"{self.flow_in_fluid}: leave it out"
         shapes = parts["shapes"]
         if self.is_measured and shapes.source != "library":
-            text = '"measured" draws flocs that were measured, but shapes.source is no library: '
-            text += 'give source = "library" and file, which `flocsim fit` wrote'
+            text = '"measured" draws measured flocs, but shapes.source is not a library: '
+            text += 'give source = "library" and file, written by `flocsim fit`'
             yield ("scene", "pairs"), text
         elif self.is_measured and shapes.size != "own":
             text = 'scene.pairs = "measured", which takes every floc at its own size: leave size '
-            yield ("shapes", "size"), f'"{shapes.size}" does not go with {text}out'
+            yield ("shapes", "size"), f'"{shapes.size}" cannot be combined with {text}out'
 
 
 @attrs.frozen
@@ -321,9 +323,10 @@ class DrivenScene(PairScene):
         "projected",
         "radius",
         default="projected",
-        help="δ_max: the facing horizontal half-extents at the drawn orientations (1 just grazes), "
-        "or R_i + R_j, the largest centroid-to-outline distances (beyond any touch in a straight "
-        "fall; at 1 two spheres just graze, and attraction may draw any pair together)",
+        help="δ_max: projected, the sum of the facing horizontal half-extents at the drawn "
+        "orientations (at 1 the outlines just graze), or radius, R_i + R_j, the largest "
+        "centroid-to-outline distances (at 1 two spheres just graze; no other pair would touch in "
+        "a straight fall, but attraction may draw it together)",
     )
     start_gap: float = quantity(
         "m",
@@ -337,14 +340,14 @@ class DrivenScene(PairScene):
         "m",
         above=0.0,
         default="start_gap",
-        help="a pair that touched and is further apart than this, and parting, has departed",
+        help="a pair that has touched, is farther apart than this and is separating has departed",
     )
     rest_time: float | str = word_or_quantity(
         "auto",
         "s",
         above=0.0,
         default="auto",
-        help="how long a doublet must rest as a rigid body to count as bound",
+        help="how long a doublet must keep its pose to count as bound",
     )
 
 
@@ -355,14 +358,15 @@ class SettlingScene(DrivenScene):
     meeting: str = one_tag(
         SETTLING,
         of=MEETINGS,
-        help="what brings the two together: settling, the faster from above; or a flow alone, "
-        "their weight left out: shear, u = (G y, 0), or extension, u = (s x, -s y), in which δ is "
-        "how near the centres would come to each other, as a share of R_i + R_j; or thermal motion "
-        "alone, brownian, their weight left out: let go `release` apart, in any direction, they "
-        "touch, or miss each other once they are `escape` apart; needs [forces.thermal]",
+        help="what brings the two together. settling: their weight, the faster comes from above; "
+        "shear, u = (G y, 0), or extension, u = (s x, -s y): a flow alone, without weight, where δ "
+        "is the distance to which the centres would approach each other, as a fraction of "
+        "R_i + R_j; brownian: thermal motion alone, without weight: released at a distance "
+        "`release`, in any direction, they either touch, or miss each other once they are `escape` "
+        "apart; needs [forces.thermal]",
     )
     receiver: str = choice(
-        "free", "fixed", default="free", help="whether the receiving body i settles or is held"
+        "free", "fixed", default="free", help="whether the receiving body i settles or is fixed"
     )
 
     takes_outlines = True
@@ -370,8 +374,8 @@ class SettlingScene(DrivenScene):
 
 @attrs.frozen
 class FlowScene(DrivenScene):
-    """With `meeting = "shear"` or `"extension"` a flow alone carries bodies together; `receiver`
-    is no key then, and this one is:"""
+    """With `meeting = "shear"` or `"extension"` a flow alone brings bodies together; there is no
+    key `receiver` then, but there is this one:"""
 
     meeting: str = choice(*FLOWS, default=SHEAR, help="the flow, see above")
     rate: float = quantity(
@@ -384,16 +388,16 @@ class FlowScene(DrivenScene):
     )
 
     flow_in_fluid = (
-        "is another flow than that of scene.meeting, along which bodies come from afar; in a flow "
-        "that turns faster than it strains all ways are closed, and none do"
+        "adds to the flow of scene.meeting, along which bodies come from far away; in a flow that "
+        "turns faster than it strains all paths are closed, so that none do"
     )
 
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         yield from super().problems(parts)
         if self.meeting == SHEAR and thermal_in(parts["forces"]):
             text = (
-                '"shear" has no end with [forces.thermal]: across a shear flow kicks bring a pair '
-                'back from any distance, so that none has departed; give "extension", "settling" '
+                '"shear" never ends with [forces.thermal]: across a shear flow kicks bring a pair '
+                'back from any distance, so that no pair departs; give "extension", "settling" '
                 'or "brownian", or leave forces.thermal out'
             )
             yield ("scene", "meeting"), text
@@ -401,8 +405,8 @@ class FlowScene(DrivenScene):
 
 @attrs.frozen
 class BrownianScene(PairScene):
-    """With `meeting = "brownian"` two bodies meet by thermal motion alone, or do not; of the keys
-    above only those of sizes and `time_limit` go with it, and these:"""
+    """With `meeting = "brownian"` two bodies meet, or miss each other, by thermal motion alone; of
+    the keys above only those of sizes and `time_limit` apply, and these:"""
 
     meeting: str = choice(BROWNIAN, default=BROWNIAN, help="thermal motion alone, see above")
     release: float = quantity(
@@ -410,7 +414,7 @@ class BrownianScene(PairScene):
         above=1.0,
         default=2.0,
         help="distance of the centres at the start, over r_i + r_j; there "
-        "outlines of any angle have to be clear of each other",
+        "the outlines must not overlap at any angle",
     )
     escape: float = quantity(
         "",
@@ -419,20 +423,20 @@ class BrownianScene(PairScene):
         help="distance of the centres, over r_i + r_j, at which a pair has missed, or departed",
     )
 
-    flow_in_fluid = "carries bodies along, and thermal motion alone is to move them"
+    flow_in_fluid = "would carry the bodies, which thermal motion alone must move"
 
     def __attrs_post_init__(self):
         super().__attrs_post_init__()
         if not self.release < self.escape:
             raise ConfigError(
                 f"release = {self.release:g} must be below escape = {self.escape:g}: bodies are "
-                "let go nearer than where they have missed"
+                "released inside the distance at which they have missed"
             )
 
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         yield from super().problems(parts)
         if not thermal_in(parts["forces"]):
-            text = '"brownian" needs kicks: add [forces.thermal], of a temperature above 0 K'
+            text = '"brownian" needs kicks: add [forces.thermal], with a temperature above 0 K'
             yield ("scene", "meeting"), text
 
 

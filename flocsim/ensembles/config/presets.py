@@ -1,28 +1,28 @@
-"""Presets: values that lie under the user's config file, each of which the file can override.
+"""Presets: values for keys that the user's config file does not give; the file overrides them.
 
-- ``tang2014``: the paper's findings come out. Its Table 1, a mass per area of 2.0 kg/m² (the
+- ``tang2014``: reproduces the paper's findings. Its Table 1, a mass per area of 2.0 kg/m² (a
   compromise between the masses that Table 1's damping implies), no buoyancy, and a Debye length
   of 0.98 µm, that of pure water. Attraction and repulsion then balance at 344 nm and 5925 nm; the
   outer root bounds the zone.
-- ``tang2014-literal``: as printed, with a Debye length of 0.98 nm. Attraction wins at every
-  distance by more than 160 times, so that there is no zone: a run says so and stops. Give
-  ``[zone]`` a distance or a centre to run it all the same.
+- ``tang2014-literal``: as printed, with a Debye length of 0.98 nm. Attraction exceeds repulsion at
+  every distance, by more than 160 times, so that there is no zone: a run stops with an error. Give
+  ``[zone]`` a distance or a centre to run it nevertheless.
 - ``si``: solid particles of real weight. Quartz in water with buoyancy, forces between the
   outlines, a Debye length of 0.98 nm and a Hamaker constant of 4.7e-20 J. Here too there is no
   root (S = H_A κ/(24π ε0 ε_r φ²) = 4.1, above 4/e² = 0.54, the largest that has one), so the zone
   is given: d_0 = 10 nm. That is where the attraction H_A r*/(6 d²) of a Type I pair falls to the
   weight of its falling body (9.5 nm; Type II 6.2 nm, Type III 48 nm), and ten Debye lengths,
-  where the repulsion has long died out.
-- ``clay``: flocs of mud in the sea, the lighter the larger they are. Primary particles of 4 µm and
+  where the repulsion has become negligible.
+- ``clay``: flocs of mud in the sea, less dense the larger they are. Primary particles of 4 µm and
   2650 kg/m³, fractal dimension 2.1 (Verney et al. 2011, Cont. Shelf Res. 31, S64, who take 4 µm and
   1.9 to 2.1); water of 15 °C and 35 g/kg, whose viscosity, density, permittivity and Debye length
   follow (flocsim.water); a Hamaker constant of 2.0e-20 J, that of mica across water (Israelachvili
-  2011, Intermolecular and Surface Forces, Table 13.3), and a potential of 15 mV, which mobilities
-  of 0.8e-8 m²/(V s) of particles in estuaries and the sea come to (Hunter and Liss 1982, Limnol.
-  Oceanogr. 27, 322). Below 0.3 nm, about the size of a hydrated ion, the attraction grows no more:
-  in sea water the double layer is as thin, and with a d_min of 1 nm would win at the touch. No root
-  here either; d_0 as in ``si``. In rivers mobilities are about twice as
-  large: ``salinity = 0``, an ``ionic_strength`` of 1 to 5 mmol/l, 30 mV.
+  2011, Intermolecular and Surface Forces, Table 13.3), and a potential of 15 mV, which corresponds
+  to mobilities of 0.8e-8 m²/(V s) of particles in estuaries and the sea (Hunter and Liss 1982,
+  Limnol. Oceanogr. 27, 322). Below 0.3 nm, about the size of a hydrated ion, the attraction no
+  longer grows: in sea water the double layer is equally thin, and with a d_min of 1 nm repulsion
+  would win at contact. No root here either; d_0 as in ``si``. In rivers mobilities are about twice
+  as large: ``salinity = 0``, an ``ionic_strength`` of 1 to 5 mmol/l, 30 mV.
 """
 
 from typing import Any

@@ -93,8 +93,8 @@ class StopConfig:
     With `half_width`, the rule looks at fixed numbers of replicates (`least`, then 5/4 as many
     each time), the same for any number of ranks, and the study ends at the first at which the 95 %
     interval of every estimate in every condition is narrow enough. A condition without events
-    does not keep the study running. As any sequential rule, it makes intervals cover a little less
-    often than they say.
+    does not keep the study running. Like any sequential rule, it makes intervals cover a little
+    less often than they state.
     """
 
     half_width: float | None = quantity(
@@ -118,7 +118,7 @@ class StopConfig:
         at_least=0.0,
         at_most=1.0,
         default=0.1,
-        help="share of all replicates that may fail; a study of more is given up, exit code 70",
+        help="share of all replicates that may fail; beyond it the study stops, exit code 70",
     )
     undecided: float = quantity(
         "",
@@ -126,8 +126,8 @@ class StopConfig:
         at_most=1.0,
         default=MOST_UNKNOWN,
         help="share of a condition's replicates, or of a rate's encounters, that may be undecided "
-        "or failed; a study of more is complete, but ends with exit code 65, and such rates have "
-        "an interval alone",
+        "or failed; beyond it the study is completed, but ends with exit code 65, and such rates "
+        "are given as intervals only",
     )
 
 
@@ -154,8 +154,8 @@ class ShapesConfig:
         metadata=named_class(
             SHAPE,
             "a shape of your own instead of a `source`, the same for both bodies, scaled to "
-            "their sizes; its parameters are further keys, and of those here only `vertices` goes "
-            "with it",
+            "their sizes; its parameters are further keys, and of the keys here only `vertices` "
+            "can be given with it",
         ),
     )
     source: str | None = choice(
@@ -163,15 +163,15 @@ class ShapesConfig:
         "library",
         default=unless_own("synthetic"),
         shown='"synthetic"',
-        help="grown by flocsim, or fitted to images",
+        help="flocs grown by flocsim, or fitted to images",
     )
     file: str | os.PathLike | None = attrs.field(
         default=None,
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",
-            "help": 'shape library that `flocsim fit` wrote, or "synthetic", the one that ships '
-            'with flocsim (24 grown flocs at N = 4, 8, 16, 32, 64); with source = "library" only',
+            "help": 'shape library written by `flocsim fit`, or "synthetic", the one included '
+            'in flocsim (24 grown flocs at N = 4, 8, 16, 32, 64); only with source = "library"',
             "only_for": ("source", "library"),
         },
     )
@@ -181,39 +181,39 @@ class ShapesConfig:
         default=unless_own((1, 4, 16, 64), lambda own: (len(own.vertices),)),
         shown="[1, 4, 16, 64]",
         beside_class=True,
-        help="N, numbers of vertices of the spheropolygons; 1 is the equivalent sphere",
+        help="numbers N of vertices of the spheropolygons; 1 is the equivalent sphere",
     )
     radius: float = quantity(
         "m",
         above=0.0,
         at_most=LARGEST_LENGTH,
         default=1e-6,
-        help="spheroradius r of the flocs once they are resized",
+        help="spheroradius r of the flocs after resizing",
     )
     pool: int = whole_field(
         1,
         10**6,
         default=10,
         help="number of flocs, nearest in size-to-spheroradius ratio, from which each replicate "
-        "draws its two",
+        "draws its pair",
     )
     size: str = choice(
         "scene",
         "own",
         default="scene",
-        help="scene: every floc is resized to the radius that its collision type asks for; own: it "
-        "keeps the size at which it was measured, its spheroradius with it, and is drawn from the "
-        '`pool` flocs nearest to that radius, or as `scene.pairs = "measured"` says, which '
-        "implies it; the faster of the two approaches",
+        help="scene: every floc is resized to the radius required by its collision type; own: it "
+        "keeps its measured size and spheroradius, and is drawn from the `pool` flocs nearest to "
+        'that radius, or as `scene.pairs = "measured"` says, which implies "own"; the faster of '
+        "the two approaches",
         only_for=("source", "library"),
     )
     pairs_alike_in: str = choice(
         "vertices",
         "error",
         default="vertices",
-        help="vertices: both flocs have N vertices; error: the receiver has that number of "
-        "vertices, of those it was fitted with, whose relative error RE is nearest to that of the "
-        "approaching floc with N",
+        help="vertices: both flocs have N vertices; error: of the numbers of vertices with which "
+        "the receiver was fitted, it has the one whose relative error RE is nearest to that of the "
+        "approaching floc with N vertices",
     )
     outlines: str = choice(
         CUT,
@@ -221,9 +221,10 @@ class ShapesConfig:
         BAND,
         default=CUT,
         help="cut: outlines as they were cut from the pictures; closer, wider: at the ends of "
-        "their bands, as another eye might have cut them; band: as cut, and every replicate is run "
-        "twice more, with both outlines cut closer and wider, which gives every probability of a "
-        "study of pairs a third error, shape; all but cut need a library of `flocsim fit --band`",
+        "their bands, as another observer might have cut them; band: as cut, and every replicate "
+        "is run twice more, with both outlines cut closer and wider, which gives every probability "
+        "of a study of pairs a third error, shape; all except cut need a library made by "
+        "`flocsim fit --band`",
         only_for=("source", "library"),
     )
     fractal_dimension: float = quantity(
@@ -232,10 +233,14 @@ class ShapesConfig:
         at_most=1.95,
         default=1.8,
         only_for=("source", "synthetic"),
-        help="of the synthetic flocs, in the plane",
+        help="fractal dimension of the synthetic flocs, in the plane",
     )
     primary_particles: int = whole_field(
-        2, 2000, default=60, only_for=("source", "synthetic"), help="number in each synthetic floc"
+        2,
+        2000,
+        default=60,
+        only_for=("source", "synthetic"),
+        help="number of primary particles in each synthetic floc",
     )
 
     def __attrs_post_init__(self):
@@ -250,7 +255,7 @@ class ShapesConfig:
                     )
         if self.source == "library" and self.file is None:
             raise ConfigError(
-                'source = "library" needs file, the shape library that `flocsim fit` wrote'
+                'source = "library" needs file, a shape library written by `flocsim fit`'
             )
 
     @property
@@ -277,8 +282,8 @@ class BodiesConfig:
             "read": number_or_table("kg/m^3", FractalDensity, FRACTAL),
             "unit": "kg/m^3",
             "allowed": FRACTAL,
-            "help": "ρ: ρ_s = ρ · depth; of flocs that are the looser the larger they are ρ = "
-            "ρ_f + (solid − ρ_f)(primary/D)^(3 − dimension), D = 2 r_eq, ρ_f of the fluid",
+            "help": "ρ: ρ_s = ρ · depth; as a table, for flocs that are less dense the larger they "
+            "are: ρ = ρ_f + (solid − ρ_f)(primary/D)^(3 − dimension), D = 2 r_eq, ρ_f of the fluid",
         },
     )
     depth: float | str = word_or_quantity(
@@ -329,7 +334,7 @@ METHODS: dict[str, type] = {
 
 @attrs.frozen
 class IntegratorConfig:
-    """[integrator]: how time goes on."""
+    """[integrator]: how the motion is integrated in time."""
 
     own: Integrator | None = attrs.field(
         default=None,
@@ -337,7 +342,7 @@ class IntegratorConfig:
         metadata=named_class(
             INTEGRATOR,
             "an integrator of your own instead of a `name`; its parameters are further keys, and "
-            "of those here only `max_steps` goes with it",
+            "of the keys here only `max_steps` and `check_share` can be given with it",
         ),
     )
     name: str | None = choice(
@@ -349,22 +354,26 @@ class IntegratorConfig:
     accuracy: str | None = choice(
         "auto",
         default=None,
-        help="instead of a `name` and a `tolerance`: a pilot tries methods and tolerances on up to "
-        "900 replicates before the first, and takes for every collision type the cheapest whose "
-        "flips it expects to stay below a fifth of the sampling error that so many `replicates` "
-        "leave; the results file holds what was taken and why",
+        help="instead of a `name` and a `tolerance`: before the study a pilot tries methods and "
+        "tolerances on up to 900 replicates, and chooses for every collision type the cheapest "
+        "whose flips are expected to stay below a fifth of the sampling error of `replicates`; the "
+        "results file records the choice and the reasons",
     )
     tolerance: float = quantity(
-        "m", above=0.0, default=1e-9, help="largest error of a step, what it leads to included"
+        "m",
+        above=0.0,
+        default=1e-9,
+        help="largest error of a step, including the later errors that follow from it",
     )
     max_steps: int = whole_field(
         1,
         MOST_STEPS,
         default=200_000,
         beside_class=True,
-        help="steps that a replicate may take; one that has not ended, or has failed, is tried "
-        "once more with five times as many; of a swarm, those that an island may try from one "
-        "common time to the next, of more than 50 bodies 50 times so many over its bodies",
+        help="largest number of steps of a replicate; one that has not ended by then, or has "
+        "failed, is tried once more with five times as many; in a swarm, the largest number that "
+        "an island may try from one common time to the next (for an island of more than 50 bodies "
+        "this number times 50 over its bodies)",
     )
     step: float | None = quantity(
         "s", above=0.0, default=None, help="for methods with a fixed step"
@@ -376,12 +385,12 @@ class IntegratorConfig:
         at_most=1.0,
         default="auto",
         beside_class=True,
-        help="share of the replicates that are run again at a 100 times tighter tolerance (a fixed "
-        "step: at a quarter of it); the outcomes that change are the numerical error of the "
+        help="share of the replicates that are run again at a 100 times tighter tolerance (with a "
+        "fixed step: at a quarter of it); the outcomes that change give the numerical error of the "
         'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
         "of a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most "
-        "3.5 % and at least 1 %; of hooks, rests and misses, which flip most, three times as many; "
-        "one in sixteen of these is run a third time, tighter still; 0: none",
+        "3.5 % and at least 1 %; three times as many of the hooks, rests and misses, which flip "
+        "most often; one in sixteen of these is run a third time, tighter still; 0: none",
     )
 
     def __attrs_post_init__(self):
@@ -421,7 +430,7 @@ class OutputConfig:
         "a string",
         default="study.h5",
         shown='"study.h5"',
-        help="results file, relative to the current folder; the default has the config's name",
+        help="results file, relative to the current folder; by default it has the config's name",
     )
 
 
@@ -435,8 +444,10 @@ class Config:
     {place: source} of the user's own classes.
     """
 
-    preset: str | None = choice(*PRESETS, default=None, help="values that lie under the file's own")
-    seed: int = whole_field(0, LARGEST_SEED, default=1, help="of all random numbers")
+    preset: str | None = choice(
+        *PRESETS, default=None, help="set of values for keys that the file does not give"
+    )
+    seed: int = whole_field(0, LARGEST_SEED, default=1, help="seed of all random numbers")
     replicates: int = whole_field(
         1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
     )
@@ -446,7 +457,7 @@ class Config:
         default="random",
         help="how orientations and flocs of two bodies are drawn: independently, or evenly, by the "
         f"points of {SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the intervals "
-        "follow (studies of rates draw so in any case)",
+        "follow (studies of rates always use Sobol sequences)",
     )
     scene: PairScene = attrs.Factory(SettlingScene)
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
@@ -634,7 +645,7 @@ def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
         yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
     if parts["shapes"].outlines == BAND and parts["scene"].kind != "binary":
         text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
-        yield ("shapes", "outlines"), f"{text}, and compare"
+        yield ("shapes", "outlines"), f"{text}, and compare the results"
     yield from parts["scene"].problems(parts)
 
 

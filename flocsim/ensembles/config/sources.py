@@ -58,7 +58,7 @@ def read_sources(run: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     none that flocsim wrote."""
     found = read_json(run["modules"], {}) if "modules" in run else {}
     if not all(matches(each, KEPT) for each in found.values()):
-        raise ValueError("run/modules cannot be read: it is of another form")
+        raise ValueError("run/modules cannot be read: its form is unknown")
     return found
 
 
@@ -74,11 +74,12 @@ class Consent:
         """ConfigError unless the source of a module, in the file ``path``, is the one known."""
         known = self.known.get(place)
         if known is None:
-            raise ConfigError(f"{self.file} keeps no source of {path}, {self.advice(path)}")
+            raise ConfigError(f"{self.file} has no source of {path}, {self.advice(path)}")
         if known["digest"] != digest_of(source):
             line = first_difference(known["source"], source.decode("utf-8", "replace"))
             raise ConfigError(
-                f"{path} is not what {self.file} was made with{line}, {self.advice(path)}"
+                f"{path} differs from the one that {self.file} was made with{line}, "
+                f"{self.advice(path)}"
             )
 
     def check_module(self, module: str, name: str, folder: Path) -> None:
@@ -100,8 +101,9 @@ class Consent:
     def advice(self, path: str | os.PathLike) -> str:
         """Why it was not run, and how to have it run."""
         return (
-            f"and {path} was not run, for whoever made a file chose what modules it names: look at "
-            "it, and name the folder of the study to run it (--folder DIR, or flocsim.open(file, "
+            f"and {path} was not run, because whoever made the file chose which modules it names: "
+            "inspect it, and name the folder of the study to run it (--folder DIR, or "
+            "flocsim.open(file, "
             'folder="…"))'
         )
 
@@ -211,7 +213,7 @@ class Neighbours(importlib.abc.MetaPathFinder):
             if self.sources.consent is None:
                 return None
             raise ConfigError(
-                f"{spec.origin} has no source to be compared, "
+                f"{spec.origin} has no source to compare, "
                 f"{self.sources.consent.advice(spec.origin)}"
             )
         spec.loader = SourceLoader(fullname, spec.loader.path, self)

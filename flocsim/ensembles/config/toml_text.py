@@ -113,7 +113,7 @@ def read_text_file(path: str | os.PathLike) -> str:
             found = sys.stdin.buffer.read(LARGEST_FILE + 1)
             return found.decode("utf-8-sig").replace("\r\n", "\n")
         if not Path(path).exists():
-            raise ConfigError(f"{path}: there is no such file; `flocsim init {path}` writes one")
+            raise ConfigError(f"{path}: no such file; `flocsim init {path}` writes one")
         if not Path(path).is_file():
             raise ConfigError(f"{path}: not an ordinary file; name a TOML config file")
         if Path(path).stat().st_size > LARGEST_FILE:
@@ -139,11 +139,13 @@ def parse(path: str | os.PathLike, text: str) -> dict:
     beyond = text_problem(text)
     if beyond is not None:
         place = f"{path}:{beyond[0]}" if beyond[0] else path
-        raise ConfigError(f"{place}: {beyond[1]}: no config needs that; name a TOML config file")
+        raise ConfigError(
+            f"{place}: {beyond[1]}: a config never needs that; name a TOML config file"
+        )
     try:
         tables = tomllib.loads(text)
         if wrong := key_problem(tables):
-            raise ConfigError(f"{path}: {wrong}: no config needs that")
+            raise ConfigError(f"{path}: {wrong}: a config never needs that")
         return tables
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid TOML: nested too deeply") from error

@@ -81,7 +81,7 @@ def number_or_table(unit: str, kind: type, allowed: str) -> Reader:
         findings, values = [], {}
         for key, each in value.items():
             if key not in fields:
-                text = f"is no key{suggestion(key, fields)}; known: {list_words(fields)}"
+                text = f"is not a key{suggestion(key, fields)}; known: {list_words(fields)}"
                 findings.append(("." + dotted([key]), text))
                 continue
             try:
@@ -187,7 +187,7 @@ def list_of(
         first = {}
         for place, item in items.items() if distinct else ():
             if first.setdefault(item, place) != place:
-                text = f"must differ from the others, found the same as in [{first[item]}]"
+                text = f"must differ from the others, found the same value as in [{first[item]}]"
                 findings.append((f"[{place}]", text))
         if findings:
             raise Misfit(*findings)

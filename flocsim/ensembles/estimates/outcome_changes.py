@@ -33,5 +33,5 @@ def changes_between(a: np.ndarray, b: np.ndarray) -> OutcomeChanges:
 
 def second_run_changes(results: Results) -> OutcomeChanges:
     """The OutcomeChanges of a study's second runs; its table of replicates must be there."""
-    assert results.replicates is not None, "the table of replicates was left on the disk"
+    assert results.replicates is not None, "the table of replicates was not read into memory"
     return changes_between(results.replicates["outcome"], results.replicates["checked_outcome"])

@@ -133,7 +133,7 @@ def checked_codes(
     outcome, inside, bond = np.asarray(outcome), np.asarray(inside), np.asarray(bond)
     if not outcome.shape == inside.shape == bond.shape or outcome.ndim == 0:
         raise UsageError(
-            "outcome, inside and bond must have one shape, found "
+            "outcome, inside and bond must have the same shape, found "
             f"{outcome.shape}, {inside.shape} and {bond.shape}"
         )
     touched_inside = (inside == 1) & np.isin(outcome, [*INSIDE_CLASSES, UNDECIDED, FAILED])

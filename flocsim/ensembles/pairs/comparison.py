@@ -30,8 +30,8 @@ MEANINGS = {
     "difference": "second minus first",
     "difference_low": "difference, lower 95 % bound",
     "difference_high": "difference, upper 95 % bound",
-    "change_low": "by how much the difference would change, run exactly: lower 95 % bound",
-    "change_high": "by how much the difference would change, run exactly: upper 95 % bound",
+    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
+    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
     "n_first": "replicates that count in the first file",
     "n_second": "replicates that count in the second file",
 }

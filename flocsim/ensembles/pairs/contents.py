@@ -66,11 +66,11 @@ SHOWN = {
 """The probabilities of a condition that have columns of their own, and their headings."""
 
 ERRORS_TEXT = (
-    "Each probability is followed by its 95 % interval, of sampling (Wilson's) and of what "
-    "undecided and failed replicates could have come to, and by the least and the most by which it "
-    "would change if all replicates were computed exactly (95 %; of those pooled the larger, after "
-    "±), and, where outlines were cut closer and wider as well, if all were cut so (shape, 95 %). "
-    "– where there was no event, ± ? where none was run again."
+    "Each probability is followed by its 95 % interval, which covers sampling (Wilson's) and the "
+    "possible outcomes of undecided and failed replicates; by the lower and upper bound of its "
+    "change if all replicates were computed exactly (95 %; for pooled ones the larger of the two, "
+    "after ±); and, where outlines were also cut closer and wider, by its change if all were cut "
+    "so (shape, 95 %). – means that there was no event, ± ? that no replicate was run again."
 )
 
 
@@ -141,7 +141,7 @@ def summary(results: Overview) -> Summary:
     """What a results file says of its study; ValueError where that cannot be read."""
     run = results.run
     facts = conditions(results) + sizes(results) + outcomes(results)
-    facts += [("numerical error", checked_line(results) or "unknown: none was run again")]
+    facts += [("numerical error", checked_line(results) or "unknown: no replicate was run again")]
     facts += [("", line) for line in change_lines(results)]
     if choice := stored(run, "accuracy"):
         facts += [("accuracy", line) for line in choice_lines(choice)]
@@ -170,7 +170,7 @@ def conditions(results: Results) -> Facts:
         ("preset", preset(results.run)),
         *axes_of(results),
         ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
-        *([("over the config", json.dumps(over))] if over else []),
+        *([("overrides", json.dumps(over))] if over else []),
     ]
 
 
@@ -226,7 +226,7 @@ def outcomes(results: Overview) -> Facts:
     if any(number for _, number in named):
         rows.append(("reasons", ", ".join(f"{n} {w}" for w, n in named if n)))
     if totals.count:
-        steps = f"{totals.steps / totals.count:.4g} in the mean replicate, {totals.most_steps} at "
+        steps = f"{totals.steps / totals.count:.4g} on average, {totals.most_steps} at "
         steps += f"most; {totals.rejected} of {totals.steps + totals.rejected} rejected"
         rows.append(("steps", steps))
     return rows
@@ -257,7 +257,7 @@ def so_far(found: Any) -> Facts:
         *axes_of(results),
         ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
          f"{planned}"),
-        ("numerical error", checked_line(results) or "unknown: none was run again yet"),
+        ("numerical error", checked_line(results) or "unknown: no replicate was run again yet"),
     ]  # fmt: skip
 
 

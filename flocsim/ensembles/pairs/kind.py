@@ -73,7 +73,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     if apart := why_apart(file):
         raise ValueError(apart)
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
-        raise ValueError("its codes of failures have other words")
+        raise ValueError("its failure codes have other meanings")
     places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
     run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
     return OldTable(rows, places, len(rows["replicate"]), run)
@@ -230,7 +230,7 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
     try:
         sums = sums_of(codes, 1, 0, total(runs))
     except UsageError as error:
-        raise FileError(f"{store.journal.path} holds no readable rows: {error}") from error
+        raise FileError(f"{store.journal.path} has no readable rows: {error}") from error
     return {
         name: values for name, values in sums.items()
         if name not in (*POOLED_NAMES, JOINT) and not name.endswith(OF_OUTLINES)

@@ -91,7 +91,7 @@ class StudyResults(Tables):
         """What was run: the config that the file holds, and what was laid over it."""
         text = str(self.run.get("config", ""))
         if not text:
-            raise FileError(f"{self.path} holds no config: it was not written by flocsim ensemble")
+            raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
         if self.sources.config is None:
             self.sources.config = text
             self.sources.consent = None if self.trusted else Consent(str(self.path), self.modules)
@@ -111,14 +111,14 @@ class StudyResults(Tables):
         try:
             return read_sources(self.run)
         except ValueError as error:
-            raise FileError(f"{self.path} holds no readable results: {error}") from error
+            raise FileError(f"{self.path} has no readable results: {error}") from error
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
         try:
             return stored(self.run, name)
         except ValueError as error:
-            raise FileError(f"{self.path} holds no readable results: {error}") from error
+            raise FileError(f"{self.path} has no readable results: {error}") from error
 
     def table(self) -> str:
         """Counts and probabilities of every condition as the command prints them, as text."""
@@ -131,7 +131,7 @@ class StudyResults(Tables):
         group = self.known(group)
         arrays: Mapping[str, np.ndarray] = getattr(self, group)
         if not arrays:
-            raise UsageError(f"{self.path} has no group {group}: it was written without")
+            raise UsageError(f"{self.path} has no group {group}: it was written without it")
         return self.results.labelled(group, arrays)
 
     def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
@@ -202,8 +202,8 @@ class StudyResults(Tables):
         for name in REPEATED:
             if found.row[name] != row[name]:
                 raise UsageError(
-                    f"{self.path} cannot be run again as it was: {name} is {row[name]} in the "
-                    f"file, {found.row[name]} now; use the kind of machine that it was made with"
+                    f"{self.path} cannot be reproduced: {name} is {row[name]} in the file, "
+                    f"{found.row[name]} now; use the kind of machine that it was made on"
                 )
 
     def study_with(self, vertices: int) -> Study:
@@ -229,14 +229,14 @@ class StudyResults(Tables):
         """UsageError where something differs from what the file says."""
         if unlike:
             raise UsageError(
-                f"{self.path} cannot be run again as it was: {unlike[0]}; use the flocsim, the "
+                f"{self.path} cannot be reproduced: {unlike[0]}; use the version of flocsim, the "
                 "files and the kind of machine that it was made with"
             )
 
     def methods(self) -> dict[str, Integrator]:
         """The methods of a config that needs no pilot."""
         if self.config.integrator.is_chosen:
-            raise FileError(f"{self.path} does not say what methods its pilot has chosen")
+            raise FileError(f"{self.path} does not record which methods its pilot chose")
         return methods_of(self.config)
 
     def contradictions(self) -> list[str]:
@@ -244,11 +244,12 @@ class StudyResults(Tables):
         shapes, lines = self.config.shapes, []
         lacking = set(self.config.scene.names) - set(self.types)
         if lacking:
-            lines.append(f"its config has the type {min(lacking)}, its rows have not")
+            lines.append(f"its config has the type {min(lacking)}, but its rows do not")
         grown = shapes.own is None and shapes.source == "synthetic" and max(shapes.vertices) > 1
         if grown and len(self.results.flocs) != shapes.pool:
             lines.append(
-                f"its config asks for {shapes.pool} flocs, its rows have {len(self.results.flocs)}"
+                f"its config asks for {shapes.pool} flocs, but its rows have "
+                f"{len(self.results.flocs)}"
             )
         return lines
 

@@ -61,7 +61,7 @@ def recorded_methods(record: dict) -> dict[str, Integrator] | None:
     """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record.
     UsageError for methods that are none."""
     for each in record.get("types", []):
-        chosen(each["method"], tuple(METHODS), "the method of a pilot's choice", 0)
+        chosen(each["method"], tuple(METHODS), "the method chosen by a pilot", 0)
     return {
         each["name"]: METHODS[each["method"]](each["tolerance"]) for each in record.get("types", [])
     } or None
@@ -73,7 +73,7 @@ def replicate_of(replicate: int, place: Place, study: Study, most: int | None = 
     ``most`` steps, where they are less than the config's.
     """
     if not is_whole(replicate) or not replicate >= 0:
-        raise UsageError(f"replicate must be a whole number from 0, found {replicate!r}")
+        raise UsageError(f"replicate must be a whole number of at least 0, found {replicate!r}")
     began, draw = time.perf_counter(), study.draw(*place, int(replicate))
     driver, system = study.driver(draw.encounter), draw.encounter.system
 

@@ -19,10 +19,10 @@ MOST_DIFFERENCES = 3
 
 HASHED = {
     "code": "flocsim's own code",
-    "kernels": "code that is compiled",
+    "kernels": "compiled code",
     "flocs": "flocs",
-    "numbers": "numbers that the forces work with",
-    "arithmetic": "rounding of sin, exp and the like (processor, C library or numpy)",
+    "numbers": "parameters of the forces",
+    "arithmetic": "rounding of sin, exp and similar functions (processor, C library or numpy)",
 }
 """First part of a name of the identity → words in place of two hashes."""
 
@@ -86,7 +86,7 @@ def unlike(rank: int, apart: Sequence[tuple[str, Any, Any]], host: str) -> str:
     return (
         f"rank {rank} on {platform.node()} has {', '.join(parts)}"
         f"{f', and {more} more' if more > 0 else ''}, unlike rank 0 on {host}: nothing was run; "
-        "start all ranks with the same words, files and installation"
+        "start all ranks with the same arguments, files and installation"
     )
 
 

@@ -202,7 +202,7 @@ def counted_in(
     def read(first: int, stop: int) -> tuple[np.ndarray, ...]:
         for block in blocks_of((first, stop), replicates, conditions):
             if block not in whole and not file.is_whole(block, codes[block], COUNTED):
-                raise FileError(f"{file.path} does not hold what was written to it")
+                raise FileError(f"{file.path} does not contain what was written to it")
             whole.add(block)
         starts = range(first, first + conditions * replicates, replicates)
         columns = (
@@ -291,7 +291,7 @@ class Assembly:
         if failed:
             self.warn(
                 f"{len(failed)} of {self.comm.size} ranks could not write their share of the "
-                f"results, rank 0 does it for them; {answers[failed[0]].failed}"
+                f"results, so rank 0 writes it; {answers[failed[0]].failed}"
             )
         for rank in failed:
             self.write_here(parts[rank])

@@ -248,8 +248,8 @@ class MpiCommunicator(Communicator):
                 raise SystemExit(UsageError.exit_code)  # the first says it for all
             raise UsageError(
                 f"the launcher started {launched} ranks but MPI counts {self.size}: mpirun and the "
-                "MPI library that mpi4py uses are of different kinds; use the mpirun beside this "
-                "Python, or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix (Open MPI)"
+                "MPI library used by mpi4py do not match; use the mpirun of this Python "
+                "environment, or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix (Open MPI)"
             )
         INTERRUPTION.speaks = self.rank == 0
         if self.concurrent:

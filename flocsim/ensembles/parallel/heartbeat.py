@@ -150,6 +150,6 @@ class Heartbeat:
         who = f"rank {first} ({self.where.get(first, 'of which there was no sign at all')})"
         more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
         return (
-            f"{who}{more} has been silent for {self.seconds:g} s, so that the job ends; "
-            "what was computed is kept: continue with --resume"
+            f"{who}{more} has been silent for {self.seconds:g} s, so the job ends; what was "
+            "computed is kept: continue with --resume"
         )

@@ -106,7 +106,7 @@ def parts_of(
             for pair in pairs:
                 attrs.evolve(pair, system=part.left_out(pair.system))
         except FlocsimError:
-            yield Finding(name, why="the pair would not come together")
+            yield Finding(name, why="the pair would not meet")
             continue
         yield part
     if all(isinstance(each, Overdamped) for each in methods):
@@ -186,7 +186,7 @@ def words_of(finding: Finding, runs: Sequence[Timed]) -> str:
     flips = sum(run.flipped for run in again)
     if again and low <= float(wilson(flips, len(again))[1]):
         return (
-            f"{name}: {changed} of {count} outcomes change, which may be numerical (of "
-            f"{len(again)} run again more exactly {flips} do); {cost}"
+            f"{name}: {changed} of {count} outcomes change, which may be numerical error ({flips} "
+            f"of {len(again)} change when run again more accurately); {cost}"
         )
     return f"{name}: matters, without it {changed} of {count} outcomes change"

@@ -38,7 +38,7 @@ def mixture_warnings(path: object, found: Sequence[dict], now: Sequence[dict]) -
     """
     kinds = distinct([*found, *now])
     names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
-    end = "rows of both kinds will stand in one file, and may differ in their last digits"
+    end = "the file will have rows of both kinds, which may differ in their last digits"
     if len(now) > 1:
         here = " and ".join(names[kinds.index(kind)] for kind in now)
         yield f"the ranks run on different kinds of CPU, {here}: {end}"

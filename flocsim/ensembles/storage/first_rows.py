@@ -46,8 +46,9 @@ def difference(
     for rank, each in enumerate(arithmetic):
         if each != arithmetic[0]:
             return (
-                f"rank {rank} rounds sin, exp and the like otherwise than rank 0 (another kind of "
-                "processor, another C library or numpy): give the job machines of one kind"
+                f"rank {rank} rounds sin, exp and similar functions differently from rank 0 "
+                "(another kind of processor, C library or numpy): run the job on machines of one "
+                "kind"
             )
     for code in study.kinds:
         (name, n, share), replicate = study.first_of(code)
@@ -55,12 +56,12 @@ def difference(
         for rank, rows in enumerate(ranks):
             if rows.get(code) != ranks[0].get(code):
                 return (
-                    f"{which} comes out otherwise on rank {rank} than on rank 0: give the job "
-                    "machines of one kind, or leave out what is random in a force of your own"
+                    f"{which} differs between rank {rank} and rank 0: run the job on machines of "
+                    "one kind, or remove randomness from a force of your own"
                 )
         if code in stored and stored[code] != ranks[0].get(code):
             return (
-                f"{which} comes out otherwise here than it is in the file: go on where the run was "
+                f"{which} comes out differently here from the file: resume where the run was "
                 "begun, or start over with --restart"
             )
     return ""

@@ -211,7 +211,7 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 
 
 def kernel_facts(study):
-    """Fingerprints of the code that is compiled for spheres and for polygons, by every method."""
+    """Fingerprints of the compiled code for spheres and for polygons, by every method."""
     config = study.config
     meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
     pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
@@ -356,12 +356,12 @@ def differences(stored: dict, current: dict) -> list[str]:
 
 
 EXPLAINED = {
-    "arithmetic": "this machine rounds sin, exp and the like otherwise (another kind of processor, "
-    "another C library or numpy): resume where the run was begun, or start over",
+    "arithmetic": "this machine rounds sin, exp and similar functions differently (another kind "
+    "of processor, C library or numpy): resume where the run was begun, or start over",
     "code": "flocsim's own code has changed",
     "flocs": "the flocs with N = {} have changed",
-    "start": "what {} begins a run with has changed",
-    "numbers": "the numbers that the forces work with have changed for type {}",
+    "start": "the initial values of {} have changed",
+    "numbers": "the parameters of the forces have changed for type {}",
     "kernels": "the compiled code for {} has changed (flocsim, a force or an integrator of your "
     "own, Python, numba or numpy)",
 }

@@ -47,9 +47,9 @@ def plan_of(text: str | bytes, path: str | os.PathLike) -> Plan:
         found = read_json(text, PLAN)
         parts = {name: found["common"] | facts for name, facts in found["parts"].items()}
         if not all(matches(facts, {"asked": ASKED}) for facts in parts.values()):
-            raise ValueError("it is of another form")
+            raise ValueError("its form is unknown")
     except (ValueError, TypeError) as error:
-        raise FileError(f"{path} holds no plan of a sweep: {error}; move it away") from error
+        raise FileError(f"{path} has no plan of a sweep: {error}; move it away") from error
     return parts
 
 
@@ -98,8 +98,9 @@ def hold(before: Plan, plan: Plan, folder: Path) -> None:
         wrong = apart(facts, plan[name]) if name in plan else "it is not asked for now"
         if wrong:
             raise UsageError(
-                f"{folder / name} began as another part: {wrong}; ask for what the sweep began "
-                "with, in its order, and more behind, or name another output"
+                f"{folder / name} began as another part: {wrong}; ask for the values that the "
+                "sweep began with, in their order, with further ones at the end, or name another "
+                "output"
             )
 
 
@@ -111,6 +112,6 @@ def refuse_other_part(path: str, output: str, identity: Facts) -> None:
         raise UsageError(f"{path} has no part {Path(output).name}")
     if unlike := differences({k: v for k, v in planned.items() if k != "asked"}, identity):
         raise UsageError(
-            f"{output} is another study than when the sweep began: {unlike[0]}; put that back and "
-            "resume the sweep, or begin another one"
+            f"{output} is no longer the study that the sweep began with: {unlike[0]}; undo that "
+            "and resume the sweep, or begin a new one"
         )

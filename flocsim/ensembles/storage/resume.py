@@ -43,8 +43,8 @@ NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
 
 WAYS = (
-    "extend it by --resume if it is of this study, or add --overwrite, which keeps the old one "
-    "under another name"
+    "extend it with --resume if it belongs to this study, or add --overwrite, which keeps the old "
+    "one under another name"
 )
 """What a user can do about a file in the place of the results."""
 
@@ -125,7 +125,7 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
     try:
         if not journal.has_lock:
             remarks.append(
-                f"the file system of {path} has no locks: see that no two jobs write there"
+                f"the file system of {path} has no locks: make sure that no two jobs write there"
             )
         if mode != RESUME and not overwrite:
             check_free(output)  # before an unfinished run is put aside
@@ -135,7 +135,7 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
             remarks.append(f"the unfinished run is kept as {journal.put_aside()}")
         elif not journal.is_journal:
             raise FileError(
-                f"{path} is no journal of flocsim, or damaged from its start: move it away"
+                f"{path} is not a journal of flocsim, or is damaged at its start: move it away"
             )
         elif mode == NEW:
             raise UsageError(
@@ -233,8 +233,8 @@ def refuse_fewer(start, output, replicates):
             such = f"type {name}, N = {n}, delta {share:g}"
             what.insert(0, f"{len(left_out)} conditions such as {such}")
         raise UsageError(
-            f"{output} has rows that this run does not ask for ({'; '.join(what)}), and others are "
-            "missing in it: ask for all of them together, or name another output"
+            f"{output} has rows that this run does not ask for ({'; '.join(what)}), and lacks "
+            "others: ask for all of them together, or name another output"
         )
     start.at_least = old.count
 
@@ -244,7 +244,7 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
     journal: Any = start.journal
     sessions = [record.description for record in journal.records if record.kind == SESSION]
     if not all(is_session(each) for each in sessions):
-        raise FileError(f"{journal.path} was begun by no flocsim: move it away")
+        raise FileError(f"{journal.path} was not begun by flocsim: move it away")
     start.history += [{key: each[key] for key in HISTORY} for each in sessions]
     for description in sessions:
         refuse_other(start, journal.path, description["identity"])
@@ -262,8 +262,7 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
             take_chunk(start, study, record, known, places, session)
         elif record.kind == CHUNK:
             start.remarks.append(
-                f"{journal.path}: {named(record.description)}: it is not as flocsim writes it: "
-                "computed again"
+                f"{journal.path}: {named(record.description)}: its form is unknown: computed again"
             )
     for each in journal.damage:
         start.remarks.append(
@@ -277,7 +276,7 @@ def take_part(start, study, record, known, places):
     about = record.description
     try:
         if not matches(about, KEPT) or about["identity"] not in known:
-            raise ValueError("nothing vouches for what was kept of a replicate")
+            raise ValueError("what was kept of a replicate cannot be verified")
         place = places.get(condition_of(about))
         study.check_part(about, start.journal.read(record.offset, record.length))
     except ValueError as error:
@@ -298,7 +297,7 @@ def refuse_other(start, path, stored, remedy=REMEDY):
         shown = "; ".join(lines[:MOST_DIFFERENCES])
         rest = len(lines) - MOST_DIFFERENCES
         more = f"; and {rest} more" if rest > 0 else ""
-        raise UsageError(f"{path} is of another study: {shown}{more}; {remedy}")
+        raise UsageError(f"{path} belongs to another study: {shown}{more}; {remedy}")
 
 
 def take_chunk(start, study, record, known, places, session):
@@ -309,7 +308,7 @@ def take_chunk(start, study, record, known, places, session):
     about = record.description
     if about["identity"] not in known:
         start.remarks.append(
-            f"{start.journal.path}: nothing vouches for {named(about)}: computed again"
+            f"{start.journal.path}: {named(about)} cannot be verified: computed again"
         )
         return
     place = places.get(condition_of(about))
@@ -341,14 +340,14 @@ def take_results(start, study, output, old_rows):
         old = old_rows(output, start.resources)
         run, count = old.run, old.count
         if "identity" not in run:
-            raise UsageError(f"{output} does not say what it was made from: {ELSEWHERE}")
+            raise UsageError(f"{output} does not record what it was made from: {ELSEWHERE}")
         refuse_other(start, output, stored(run, "identity"), ELSEWHERE)
         found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
         check_old(study, old)
     except UNREADABLE as error:
         if isinstance(error, FlocsimError):
             raise
-        raise FileError(f"{output} holds no readable results: {error}; {ELSEWHERE}") from error
+        raise FileError(f"{output} has no readable results: {error}; {ELSEWHERE}") from error
     for place, condition in enumerate(start.store.conditions):
         if condition in old.places and count:
             for interval in [(0, count)] if old.there is None else old.there[condition]:

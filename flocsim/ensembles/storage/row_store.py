@@ -172,7 +172,9 @@ class RowStore:
                 chunk = (start, end), offset, digest
                 yield low, {name: self.column(name, *chunk, (low, high)) for name in self.starts}
         if missing(merged(reached), first, stop):
-            raise FileError(f"{self.journal.path} does not have all rows: run it again by --resume")
+            raise FileError(
+                f"{self.journal.path} does not have all rows: run it again with --resume"
+            )
 
     def column(self, name, chunk, offset, digest, wanted):
         """The values of a column that a chunk in the journal has of the wanted replicates."""
@@ -188,7 +190,7 @@ class RowStore:
             if len(data) != length or digest_of(data, len(digest)) != digest:
                 raise FileError(
                     f"{self.journal.path} is damaged from byte {offset} to {offset + length}, or "
-                    "was changed since it was written: run it again by --resume, which computes "
+                    "was changed after it was written: run it again with --resume, which computes "
                     "what is missing"
                 )
             self.held[offset] = data
@@ -284,7 +286,7 @@ class OldColumns:
         now = stamp(self.path)
         changed = self.written is not None and (now is None or now[1:] != self.written)
         if changed or ending_of(descriptor) != self.ending:
-            raise FileError(f"{self.path} is another file here")
+            raise FileError(f"{self.path} is a different file here")
         columns = {
             name: Column(descriptor, name, offset, self.shape)
             for name, offset in self.offsets.items()

@@ -63,11 +63,11 @@ def store_of(
     many = math.prod(len(axes[name]) for name in ORDER)
     if many > MOST_CONDITIONS:
         raise FileError(
-            f"{journal.path} is of {many} conditions, and no more than {MOST_CONDITIONS} are shown "
-            "before all are there: wait for the results"
+            f"{journal.path} has {many} conditions, and at most {MOST_CONDITIONS} are shown before "
+            "a study is complete: wait for the results"
         )
     if any(len(set(axes[name])) < len(axes[name]) for name in ORDER):
-        raise FileError(f"{journal.path} has conditions that are the same")
+        raise FileError(f"{journal.path} has the same condition twice")
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
     places = {condition: place for place, condition in enumerate(conditions)}
     store, notes, unread = RowStore(journal, conditions, row), [], 0
@@ -102,7 +102,9 @@ def read_unfinished(path: str | Path) -> Unfinished:
     sessions = [each.description for each in records if each.kind == SESSION]
     sessions = [each for each in sessions if is_session(each)]
     if not sessions:
-        raise FileError(f"{path} is no journal of an unfinished run, or has just begun: try again")
+        raise FileError(
+            f"{path} is not a journal of an unfinished run, or has only just begun: try again"
+        )
     asked = sessions[-1].get("asked")
     # Pairs come first, and are all that says nothing of itself.
     first, *others = kinds().values()

@@ -80,13 +80,13 @@ class Bonds:
         if self.flow not in FLOWS:
             raise UsageError(f"flow must be one of {', '.join(FLOWS)}, found {self.flow!r}")
         if self.count is not None and (not is_whole(self.count) or self.count < 1):
-            raise UsageError(f"count must be a whole number from 1, found {self.count!r}")
+            raise UsageError(f"count must be a whole number of at least 1, found {self.count!r}")
         if not is_number(self.precision) or not 1e-9 <= self.precision <= 1.0:
             raise UsageError(f"precision must lie between 1e-9 and 1, found {self.precision!r}")
         found = list(bound_doublets(self.results))
         if not found:
             raise UsageError(
-                f"{self.results.path} holds no bound doublet (class {' or '.join(AGGREGATED)}): "
+                f"{self.results.path} has no bound doublet (class {' or '.join(AGGREGATED)}): "
                 "there is no bond to test"
             )
         object.__setattr__(self, "found", found)
@@ -253,7 +253,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     at = tuple(found.column(name) for name in (*AXES, "replicate"))
     count = int(at[3].max(initial=-1)) + 1
     if len(set(zip(*at, strict=True))) < len(at[0]) or np.any(at[3] < 0):
-        raise ValueError("it has a doublet twice")
+        raise ValueError("it has the same doublet twice")
     columns = {}
     for name in ROW.fields or ():
         blank = NOT_APPLICABLE if name == "bond" else 0
@@ -293,7 +293,7 @@ def in_words(opening: Opening) -> str:
         return f"opens at {opening.opens:.4g} 1/s already, the lowest rate {runs}"
     if word == "holds_at_most_rate":
         return f"holds up to {opening.holds:.4g} 1/s, the highest rate {runs}"
-    return f"a run failed behind {opening.holds:.4g} 1/s {runs}"
+    return f"a run failed above {opening.holds:.4g} 1/s {runs}"
 
 
 SURVEY = {"bound": [int], "wanted": int, "about": {}}
@@ -305,7 +305,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     asked = sessions[-1]["asked"]
     survey, shape = asked["strength"], tuple(len(asked[name]) for name in ORDER)
     if len(survey["bound"]) != np.prod(shape):
-        raise FileError(f"{path} does not say what is bound")
+        raise FileError(f"{path} does not record what is bound")
     bound = np.array(survey["bound"], dtype=np.int64).reshape(shape)
     about = survey["about"] | {"asked": survey["wanted"], "complete": False}
     with ReadOnlyJournal(str(path)) as journal:

@@ -76,9 +76,9 @@ def elasticities(
     if not ratio > 1.0 or not math.isfinite(ratio):
         raise UsageError(f"the ratio of an elasticity must be above 1 and finite, found {ratio:g}")
     if not keys or len(set(keys)) < len(keys):
-        raise UsageError("elasticities are of at least one key, each named once")
+        raise UsageError("give at least one key, each only once, for elasticities")
     if study.config.scene.kind != "binary":
-        raise UsageError("elasticities are of probabilities of pairs: sweep the key instead")
+        raise UsageError("elasticities are for probabilities of pairs: sweep the key instead")
     values = [number_of(study, key) for key in keys]
     found: list[Comparison] = []
     for key, value in zip(keys, values, strict=True):
@@ -110,11 +110,11 @@ def named(output: str | os.PathLike, key: str) -> Path:
 
 
 def number_of(study: Study, key: str) -> float:
-    """The value of a parameter (SI); UsageError where it is no number above 0."""
+    """The value of a parameter (SI); UsageError where it is not a number above 0."""
     value, _ = value_of(study.config, key)
     if not is_number(value) or not value > 0.0:
         raise UsageError(
-            f"{key} has no elasticity, as it is {value!r}: name a key whose value is a number "
+            f"{key} has no elasticity: its value is {value!r}; name a key whose value is a number "
             "above 0 in the config, or sweep it"
         )
     return float(value)

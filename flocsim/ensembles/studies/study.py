@@ -54,7 +54,7 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
     """
     if (launched_size() or 0) > 1:
         raise UsageError(
-            "Study.run starts processes of its own and cannot be run as ranks: use "
+            "Study.run starts its own processes and cannot be run under MPI: use "
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
     environment = os.environ | {"PYTHONUNBUFFERED": "1", **path_to_flocsim()}
@@ -109,7 +109,7 @@ def listen(process, text, quiet):
 
 def error_of(code: int, said: Sequence[str]) -> FlocsimError:
     """The error that an exit code stands for, with the last words in a script's terms."""
-    last = next((line for line in reversed(said) if line.strip()), "it said nothing")
+    last = next((line for line in reversed(said) if line.strip()), "without output")
     for word, meant in WORDS.items():
         last = last.replace(word, meant)
     last = last.removeprefix("flocsim: ")
@@ -140,12 +140,12 @@ class Study:
         if isinstance(source, Mapping):
             place = Path("." if folder is None else folder) / "study.toml"
             if not place.parent.is_dir():
-                raise UsageError(f"{place.parent} is not a folder: name one that is there")
+                raise UsageError(f"{place.parent} is not a folder: name an existing one")
             self._take(place, toml_text(source), {})
         elif folder is None:
             self._take(Path(source), read_text_file(source), {})
         else:
-            raise UsageError("folder goes with a dict; a file's own folder is taken for a file")
+            raise UsageError("folder is for a dict; for a file, the file's own folder is used")
 
     def _take(
         self, path: Path, text: str, overrides: dict[str, Any], sources: Sources | None = None
@@ -164,7 +164,7 @@ class Study:
         found: dict[str, Any] = {}
         for key, value in {**(changes or {}), **keys}.items():
             if not isinstance(key, str) or not all(key.split(".")):
-                raise ConfigError(f"keys are words with dots between them, found {key!r}")
+                raise ConfigError(f"keys are words separated by dots, found {key!r}")
             try:
                 found = lay_over(found, nested([(key.split("."), value)]))
             except TypeError:
@@ -188,7 +188,7 @@ class Study:
         cannot be written.
         """
         if not is_whole(jobs) or jobs < 1:
-            raise UsageError(f"jobs must be a whole number from 1, found {jobs!r}")
+            raise UsageError(f"jobs must be a whole number of at least 1, found {jobs!r}")
         if mode not in MODES:
             raise UsageError(f"mode must be one of {', '.join(MODES)}, found {mode!r}")
         target = Path(self.config.output.file if output is None else output)
@@ -223,7 +223,7 @@ class Study:
         """
         if not isinstance(self.config.scene, PairScene):
             raise UsageError(
-                f"a replicate of a {self.config.scene.kind} is no collision: run the study, and "
+                f"a replicate of a {self.config.scene.kind} is not a collision: run the study, and "
                 "look at the group snapshots of its results"
             )
         place = place_of(self.config, type, vertices, delta)
@@ -236,7 +236,7 @@ class Study:
         return f"Study({str(self.path)!r}: {count} conditions × {self.config.replicates}{over})"
 
 
-WAYS = 'say mode="resume" to go on or extend, or overwrite=True, which keeps the old one'
+WAYS = 'give mode="resume" to resume or extend it, or overwrite=True, which keeps the old one'
 
 
 def settings_of(table: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:

@@ -110,12 +110,12 @@ def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Pa
     """{its results file: Study} of every value; UsageError for keys that cannot be swept."""
     values = {key: list(each) for key, each in over.items()}
     if not values or not all(values.values()):
-        raise UsageError("a sweep is over at least one key and one value: --over KEY=VALUE,VALUE")
+        raise UsageError("a sweep needs at least one key and one value: --over KEY=VALUE,VALUE")
     if int(np.prod([len(each) for each in values.values()], dtype=object)) > MOST_PARTS:
         raise UsageError(f"a sweep has at most {MOST_PARTS} values")
     for key in values:
         if key in FIXED or key.split(".")[0] in NO_PHYSICS:
-            raise UsageError(f"{key} cannot be swept: it is a dimension already, or no physics")
+            raise UsageError(f"{key} cannot be swept: it is a dimension already, or not physics")
     folder = parts_folder(output)
     return {
         folder / f"{number:04d}.h5": study.with_(dict(zip(values, point, strict=True)))
@@ -156,10 +156,10 @@ def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> An
     become so by more rows (``whole``: where they have less)."""
     found = open_any(path, study.path.parent)
     if joined_of(found) is None:
-        raise UsageError(f"{path} is no part of a sweep: name another output")
+        raise UsageError(f"{path} is not a part of a sweep: name another output")
     if wrong := apart(facts_in(found), planned, whole):
         raise UsageError(
-            f"{path} is no part of this sweep: {wrong}; ask for what it holds, or name another "
+            f"{path} is not a part of this sweep: {wrong}; ask for what it has, or name another "
             "output"
         )
     return found
@@ -195,7 +195,7 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
         if not all(map(is_number, values)):
             values = [str(each) for each in list(over[key])]
         if len(set(values)) < len(values):
-            raise UsageError(f"{key} has one value twice: {', '.join(map(str, over[key]))}")
+            raise UsageError(f"{key} has the same value twice: {', '.join(map(str, over[key]))}")
         swept[name] = Swept(key, values, found[0][1])
     return swept
 

@@ -56,7 +56,7 @@ def check_part(part: Part, form: Form) -> None:
 
 
 def refuse(part: Part, form: Form) -> None:
-    raise ValueError("a record is of no known kind")
+    raise ValueError("a record is of an unknown kind")
 
 
 def shaped(part: Part, shapes: Mapping[str, tuple[str, tuple[int, ...]]]) -> None:
@@ -66,9 +66,9 @@ def shaped(part: Part, shapes: Mapping[str, tuple[str, tuple[int, ...]]]) -> Non
     for name, (kind, shape) in shapes.items():
         array = part.arrays[name]
         if array.dtype.str[1:] != kind or array.shape != shape:
-            raise ValueError(f"the array {name} of a record is of another form")
+            raise ValueError(f"the array {name} of a record has an unknown form")
         if kind == "f8" and not np.isfinite(array).all():
-            raise ValueError(f"the array {name} of a record holds what is no number")
+            raise ValueError(f"the array {name} of a record has values that are not numbers")
 
 
 def demand(condition: Any, name: str) -> None:

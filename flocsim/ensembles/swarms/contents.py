@@ -46,7 +46,7 @@ def facts_of(results: SwarmResults) -> Facts:
     width, height = 1e6 * bodies["box"].mean(axis=0)
     return [
         ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
-         f"{int(ends['finished'].sum())} came to their end"),
+         f"{int(ends['finished'].sum())} were completed"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
         ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "

@@ -84,10 +84,10 @@ def dry_run(config: Config, ranks: int) -> str:
         f"{config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
         f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, "
         f"median {np.median(radii):.4g} ({sizes})",
-        f"  box {1e6 * width:.5g} x {1e6 * height:.5g} um, repeats itself {repeats}"
+        f"  box {1e6 * width:.5g} x {1e6 * height:.5g} um, periodic {repeats}"
         f"{', with a floor' if scene.floor else ''}; bodies cover {area / (width * height):.4f}",
         f"  {scene.duration:g} s{speed}",
-        f"  {moments} snapshots, one in {scene.interval:g} s; a state to go on from every "
+        f"  {moments} snapshots, one every {scene.interval:g} s; a state to resume from every "
         f"{duration(scene.checkpoint)}; results file about {size / 1e6:.3g} MB",
         *([f"  {words}"] if (words := config.fluid.words) else []),
         f"  integrator: {config.integrator.label}, tolerance {method.tolerance:g} m",
@@ -232,7 +232,7 @@ def verdict(found: SwarmResults) -> tuple[int, str]:
         return 0, ""
     notes = json.loads(found.run.get("failed", "[]"))
     first = f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
-    line = f"{missed} of {len(finished)} swarms ended before their time; the first: {first}"
+    line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
     return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
 
 
@@ -240,7 +240,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     """What a journal has of swarms, of which those appear that have begun."""
     asked, form, unread = sessions[-1]["asked"]["replicates"], form_of(sessions[-1]["asked"]), 0
     if not form.times or form.bodies < 1:
-        raise FileError(f"{path} does not say what is kept of a swarm")
+        raise FileError(f"{path} does not record what is kept of a swarm")
     parts: dict[int, list[Record]] = {}
     notes: list[dict] = []
     with ReadOnlyJournal(str(path)) as journal:
@@ -265,7 +265,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
             raise FileError(f"{path} has no snapshot yet: try again later")
         known = max(max(each.moments, default=0) for each in swarms.values()) + 1
         if known > done:
-            raise FileError(f"{path} holds no readable swarms: snapshots of it are missing")
+            raise FileError(f"{path} has no readable swarms: snapshots of it are missing")
         seen = attrs.evolve(form, times=form.times[:known])
         groups = groups_of(seen, list(swarms.values()), journal.read)
     groups["ends"] = {name: np.zeros(len(swarms), kind) for name, (kind, _, _) in ENDS.items()}
@@ -273,7 +273,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     try:
         check_swarm(made.scales, groups)
     except ValueError as error:
-        raise FileError(f"{path} holds no readable swarms: {error}") from error
+        raise FileError(f"{path} has no readable swarms: {error}") from error
     return Unfinished(
         path, FORMAT, made, done, asked * len(form.times), notes, sessions, unread, "snapshots"
     )

@@ -86,12 +86,12 @@ class Found:
 
 def part_in(record: Record | None, read: Read) -> Part:
     """The Part of a record that is there."""
-    assert record is not None, "a replicate that is read has its bodies"
+    assert record is not None, "a replicate that was read must have its bodies"
     return part_of(record.description, read(record.offset, record.length))
 
 
 def told(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Facts as JSON has them: what is no number is None."""
+    """Facts as JSON has them: what is not a number is None."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
         for name, value in facts.items()
@@ -101,22 +101,22 @@ def told(facts: Mapping[str, Any]) -> dict[str, Any]:
 def part_of(about: dict[str, Any], data: bytes) -> Part:
     """The Part of a record of the journal, by its description; ValueError where it is none."""
     if not matches(about, LISTED):
-        raise ValueError("a record is of another form")
+        raise ValueError("a record has an unknown form")
     arrays, place = {}, 0
     for listed in about["arrays"]:
         name, kind, shape = checked_listing(listed)
         count = math.prod(shape)
         size = count * np.dtype(KINDS[kind]).itemsize
         if place + size > len(data):
-            raise ValueError(f"the array {name} of a record is cut short")
+            raise ValueError(f"the array {name} of a record is truncated")
         values = np.frombuffer(data, KINDS[kind], count, place)
         arrays[name] = values.reshape(shape).copy()
         place += size
     if place != len(data):
-        raise ValueError("a record has more than it lists")
+        raise ValueError("a record has more arrays than it lists")
     facts = about.get("facts", {})
     if not isinstance(facts, dict):
-        raise ValueError("a record is of another form")
+        raise ValueError("a record has an unknown form")
     return Part(about["of"], arrays, facts)
 
 
@@ -128,4 +128,4 @@ def checked_listing(listed: Sequence[Any]) -> tuple[str, str, tuple[int, ...]]:
         known = isinstance(shape, list) and len(shape) <= 3
         if known and all(type(each) is int and 0 <= each < 2**32 for each in shape):
             return listed[0], listed[1], tuple(shape)
-    raise ValueError("a record lists no array")
+    raise ValueError("a record lists no arrays")

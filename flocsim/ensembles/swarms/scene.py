@@ -28,8 +28,8 @@ RADIUS = number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH))
 
 @attrs.frozen
 class SwarmScene:
-    """With `kind = "swarm"`: how many bodies of what sizes begin where, for how long they are
-    followed, and what is kept."""
+    """With `kind = "swarm"`: the number and sizes of the bodies, where they start, for how long
+    they are followed, and what is kept."""
 
     without: ClassVar[frozenset[str]] = frozenset({"zone", "stop", "sampling"})
     """Tables and keys that such a study has no use for."""
@@ -42,8 +42,9 @@ class SwarmScene:
         above=0.0,
         at_most=0.9,
         default=None,
-        help="share of the box that bodies cover at the start; it makes the box, as high as wide "
-        "unless `aspect` says otherwise. Placed at random one after another, flocs reach some .3",
+        help="share of the box that bodies cover at the start; it sets the size of the box, which "
+        "is as high as it is wide unless `aspect` says otherwise. Placed at random one after "
+        "another, flocs reach about 0.3",
     )
     box: tuple[float, float] | None = read_by(
         vector(2, "m", above=0.0),
@@ -60,19 +61,20 @@ class SwarmScene:
         "x",
         "none",
         default="xy",
-        help="along what axes the box repeats itself; along others bodies begin inside it, and may "
-        "leave it",
+        help="axes along which the box is periodic; along the others bodies start inside it, and "
+        "may leave it",
     )
     floor: bool = flag(
-        default=False, help="a fixed wall below the box, where it does not repeat itself upwards"
+        default=False, help="a fixed wall below the box, which must not be periodic in y"
     )
     leaving: str = choice(
         "keep",
         "remove",
         "reenter",
         default="keep",
-        help="what becomes of clusters that leave through a side at which the box does not repeat "
-        "itself: keep, they go on outside; remove; reenter, over the opposite side",
+        help="what happens to clusters that leave through a side at which the box is not periodic: "
+        "keep: they continue outside; remove: they are taken out; reenter: they come in again at "
+        "the opposite side",
     )
     radius: float | None = quantity(
         "m",
@@ -94,8 +96,8 @@ class SwarmScene:
         "area",
         "volume",
         default="number",
-        help="how often a measured floc is drawn: number, as in its pictures; area or volume, in "
-        "proportion to r_eq² or r_eq³",
+        help="how often a measured floc is drawn: number, as often as in its pictures; area or "
+        "volume, in proportion to r_eq² or r_eq³",
     )
     min_radius: float | None = size_limit("least")
     max_radius: float | None = size_limit("largest")
@@ -124,17 +126,18 @@ class SwarmScene:
         "a list of ascending radii",
         default=None,
         unit="m",
-        help="equivalent radii √(A/π) between the size classes in which clusters are counted, for "
-        "population balances",
+        help="equivalent radii √(A/π) that separate the size classes in which clusters are "
+        "counted, for population balances",
     )
     checkpoint: float = quantity(
         "s",
         above=0.0,
         default=60.0,
-        help="wall time after which a replicate's state is kept, to go on from with --resume",
+        help="wall time after which the state of a replicate is saved, from which --resume "
+        "continues",
     )
     all_pairs: bool = flag(
-        default=False, help="take forces without a reach for more than 200 bodies all the same"
+        default=False, help="allow forces of unlimited reach for more than 200 bodies"
     )
 
     def __attrs_post_init__(self):
@@ -142,13 +145,13 @@ class SwarmScene:
             found = "neither" if self.box is None else "both"
             raise ConfigError(f"a swarm needs area_fraction or box, found {found}")
         if self.box is not None and self.aspect != 1.0:
-            raise ConfigError("aspect goes with area_fraction: the box says its height itself")
+            raise ConfigError("aspect belongs to area_fraction: box gives the height already")
         if self.floor and self.periodic == "xy":
-            raise ConfigError('a floor needs periodic = "x" or "none": the box repeats itself in y')
+            raise ConfigError('a floor needs periodic = "x" or "none": the box is periodic in y')
         if self.leaving != "keep" and self.periodic == "xy":
             raise ConfigError(
                 f'leaving = "{self.leaving}" needs periodic = "x" or "none": nothing leaves a box '
-                "that repeats itself on all sides"
+                "that is periodic on all sides"
             )
         low, high = self.min_radius or 0.0, self.max_radius or math.inf
         if low >= high:
@@ -158,7 +161,7 @@ class SwarmScene:
                 f"radius = {self.radius:g} m is not between min_radius and max_radius"
             )
         if self.spread > 0.0 and self.radius is None:
-            raise ConfigError("spread goes with radius, the median of the distribution")
+            raise ConfigError("spread needs radius, the median of the distribution")
         if list(self.bounds) != sorted(set(self.bounds)):
             raise ConfigError("classes must be ascending radii")
         if self.interval > self.duration:
@@ -196,14 +199,15 @@ class SwarmScene:
         yield from outline_problems(parts, settles=False)
         for name, force in zip(parts["force_names"], parts["forces"], strict=True):
             if unlike(force):
-                text = "is of two unlike bodies, and those of a swarm are alike: give one number"
+                text = "is given for two unlike bodies, but those of a swarm are alike: give one"
+                text += " number"
                 yield ("forces", name, "potential"), text
         shapes = parts["shapes"]
         if len(shapes.vertices) > 1:
             found = f"found {list(shapes.vertices)}: give one"
             yield ("shapes", "vertices"), f"a swarm has bodies of one number of vertices, {found}"
         if shapes.pairs_alike_in == "error":
-            yield ("shapes", "pairs_alike_in"), "is for pairs, and a swarm has none"
+            yield ("shapes", "pairs_alike_in"), "is for pairs, which a swarm does not have"
         if self.is_measured and shapes.source != "library":
             text = 'needs radius, the median r_eq, or measured flocs (shapes.source = "library")'
             yield ("scene",), text

@@ -191,7 +191,7 @@ class SwarmStudy(StudyKind):
         """ValueError where bodies or snapshots of a finished replicate are not there."""
         [*finished] = rows["finished"]
         if len(finished) > 1 or not Found.of(parts).has(self.pieces if finished[0] else 0):
-            raise ValueError("its snapshots are not all there")
+            raise ValueError("some of its snapshots are missing")
 
     def counts_part(self, description: dict) -> bool:
         """Whether it is a snapshot."""
@@ -243,7 +243,7 @@ class SwarmStudy(StudyKind):
         scene = self.scene
         if scene.box is not None:
             return scene.box
-        assert scene.area_fraction is not None, "a scene has one of the two"
+        assert scene.area_fraction is not None, "a scene has either a radius or a library"
         area = sum(shape.area for shape in shapes) / scene.area_fraction
         width = math.sqrt(area / scene.aspect)
         return width, area / width
@@ -312,7 +312,7 @@ def settling(system: System, body: Body) -> Body:
 
 def lognormal(scene: SwarmScene, numbers: np.ndarray) -> np.ndarray:
     """Equivalent radii [m] of a lognormal distribution between its limits, by uniform numbers."""
-    assert scene.radius is not None, "flocs of measured sizes are drawn otherwise"
+    assert scene.radius is not None, "flocs of measured sizes are drawn differently"
     if scene.spread == 0.0:
         return np.full(len(numbers), scene.radius)
     from scipy.special import ndtr, ndtri

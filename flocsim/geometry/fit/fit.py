@@ -111,8 +111,8 @@ def fit_mask(
     equivalent = np.sqrt(floc.sum() / np.pi)
     if radius >= equivalent and preserve_area:
         raise UsageError(
-            f"the area cannot be preserved: a spheroradius of {radius:g} px alone covers more than "
-            f"the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
+            f"the area cannot be preserved: a disk of spheroradius {radius:g} px alone covers more "
+            f"than the floc of r_eq = {equivalent:.2f} px; use r < r_eq"
         )
     if radius >= equivalent:
         warnings.warn(

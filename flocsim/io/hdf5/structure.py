@@ -141,7 +141,7 @@ def structure_of(file: BinaryIO, size: int) -> dict[str, Node]:
     try:
         walk.begin()
     except (struct.error, IndexError) as error:
-        raise Unfit("a header in it is cut short") from error
+        raise Unfit("a header in it is truncated") from error
     walk.check_apart()
     return walk.nodes
 
@@ -194,7 +194,7 @@ class Walk:
         if signature != SIGNATURE:
             raise Unfit("it is not HDF5")
         if versions != [0] * 5 or sizes != [8, 8, 0] or plan != [LEAF_SIZE // 2, NODE_SIZE // 2, 0]:
-            raise Unfit("its HDF5 format is another one than h5py writes")
+            raise Unfit("its HDF5 format is not the one that h5py writes")
         if (base, free, end, driver, name) != (0, NOWHERE, self.size, NOWHERE, 0):
             raise Unfit("its superblock is not one that h5py writes")
         self.object_at("", root, kind, scratch)
@@ -207,7 +207,7 @@ class Walk:
             raise Unfit(f"its groups are nested more than {MOST_LEVELS} deep")
         where = path or "the root"
         if kind not in (0, 1):
-            raise Unfit(f"{where} is a link: flocsim writes none")
+            raise Unfit(f"{where} is a link, which flocsim never writes")
         found, attributes = {}, {}
         for number, body in self.messages(where, address):
             if number == ATTRIBUTE:
@@ -217,12 +217,12 @@ class Walk:
                 attributes[name] = about
             elif number in (SPACE, TYPE, FILL, LAYOUT, TABLE):
                 if number in found:
-                    raise Unfit(f"the header of {where} says one thing twice")
+                    raise Unfit(f"the header of {where} has the same entry twice")
                 found[number] = body
         if TABLE in found and len(found) == 1:
             self.nodes[path] = Node(None, (), attributes)
             if kind == 1 and scratch != found[TABLE][:16]:
-                raise Unfit(f"{where} is in two places")
+                raise Unfit(f"{where} occurs twice")
             self.group(path, found[TABLE])
         elif found.keys() == {SPACE, TYPE, FILL, LAYOUT} and kind == 0 and path:
             type_, shape = self.values_of(where, found)
@@ -244,7 +244,7 @@ class Walk:
                 place += 8 + long
                 seen += 1
                 if number in FOREIGN:
-                    raise Unfit(f"{where} has {FOREIGN[number]}: flocsim writes none")
+                    raise Unfit(f"{where} has {FOREIGN[number]}, which flocsim never writes")
                 known = number in (
                     NIL, SPACE, TYPE, FILL, LAYOUT, ATTRIBUTE, MORE, TABLE, TIME
                 )  # fmt: skip
@@ -256,7 +256,7 @@ class Walk:
                     blocks.append(struct.unpack_from("<QQ", body))
                 yield number, body
             if place != size:
-                raise Unfit(f"the header of {where} is cut short")
+                raise Unfit(f"the header of {where} is truncated")
         if seen != count:
             raise Unfit(f"the header of {where} has {seen} entries and promises {count}")
 
@@ -312,13 +312,13 @@ class Walk:
         shape = shape_of(where, found[SPACE])
         version, layout, start, length = struct.unpack_from("<BBQQ", padded(found[LAYOUT], 18))
         if (version, layout) != (3, 1):
-            raise Unfit(f"the values of {where} are in pieces, packed, or in another dataset")
+            raise Unfit(f"the values of {where} are chunked, compressed, or in another dataset")
         if not (found[FILL][0] == 2 and found[FILL][1] in (1, 2, 3) and found[FILL][2] <= 2
                 and found[FILL][3:8] in (b"\0" * 5, b"\1" + b"\0" * 4)):  # fmt: skip
-            raise Unfit(f"{where} has a value of its own for what is missing")
+            raise Unfit(f"{where} has a fill value of its own")
         wanted = math.prod(shape) * size_of(kind)
         if length != wanted:
-            raise Unfit(f"{where} has {length} bytes of values, and {wanted} by its shape")
+            raise Unfit(f"{where} has {length} bytes of values, where its shape needs {wanted}")
         if kind in ("references", "scales", "flag"):
             raise Unfit(f"{where} holds values of a type that flocsim does not write")
         if kind == "text":
@@ -344,13 +344,13 @@ class Walk:
         length = math.prod(shape) * size_of(kind)
         values = body[place : place + length]
         if len(values) < length:
-            raise Unfit(f"{inside} is cut short")
+            raise Unfit(f"{inside} is truncated")
         if kind == "text":
             self.text_values(inside, values)
         elif kind == "references":
             for count, heap, number in struct.iter_unpack("<IQI", values):
                 if count != 1 or len(self.texts.content(heap, number)) != 8:
-                    raise Unfit(f"{inside} leads to no dataset")
+                    raise Unfit(f"{inside} does not lead to a dataset")
         return decoded(name), (kind, shape)
 
     def text_values(self, where, values):
@@ -358,7 +358,7 @@ class Walk:
             raise Unfit(f"{where} has more than {MOST_TEXTS} texts")
         for length, heap, number in struct.iter_unpack("<IQI", values):
             if length and len(self.texts.content(heap, number)) != length:
-                raise Unfit(f"a text of {where} is not as long as it says")
+                raise Unfit(f"a text of {where} is not as long as stated")
 
 
 def padded(body, length):
@@ -372,7 +372,7 @@ def decoded(name):
     except UnicodeDecodeError:
         raise Unfit("a name in it is not UTF-8") from None
     if not text.isprintable() or "/" in text or text in ("", ".", ".."):
-        raise Unfit(f"a name in it is none that flocsim writes: {text!r}")
+        raise Unfit(f"a name in it is not one that flocsim writes: {text!r}")
     return text
 
 
@@ -390,5 +390,5 @@ def shape_of(where, message):
     if version != 1 or rank > MOST_DIMENSIONS or flags > 1 or len(message) < 8 * (1 + rank):
         raise Unfit(f"{where} has a shape that flocsim does not write")
     if flags and sizes[:rank] != sizes[rank:]:
-        raise Unfit(f"{where} has a shape that may grow: flocsim writes none")
+        raise Unfit(f"{where} has a resizable shape, which flocsim never writes")
     return sizes[:rank]

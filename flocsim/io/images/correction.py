@@ -48,8 +48,7 @@ def read_names(option: str, text: str) -> Names:
         names.append((picture, int(number)))
     if begun:
         raise UsageError(
-            f"{option} takes flocs by their numbers or names, such as 3,5 or 023.png#7, found "
-            f"{text!r}"
+            f"{option} takes numbers or names of flocs, such as 3,5 or 023.png#7, found {text!r}"
         )
     return tuple(names)
 
@@ -61,8 +60,8 @@ def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]
         for picture, number in names:
             if picture is None and len(known) != 1:
                 raise UsageError(
-                    f"--{option} {number}: there are {len(known)} pictures; name the one that is "
-                    f"meant, for example {next(iter(known), 'a.png')}#{number}"
+                    f"--{option} {number}: there are {len(known)} pictures; name the picture too, "
+                    f"for example {next(iter(known), 'a.png')}#{number}"
                 )
             name = next(iter(known)) if picture is None else picture
             if name not in known:
@@ -73,7 +72,7 @@ def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]
             numbers = {each.label for each in (*known[name].regions, *known[name].rejected)}
             if number not in numbers:
                 raise UsageError(
-                    f"--{option} {name}#{number}: the picture has no such region, its last is "
+                    f"--{option} {name}#{number}: the picture has no such region; its last is "
                     f"{max(numbers, default=0)}; the table of all regions and the overlay name them"
                 )
 
@@ -113,8 +112,8 @@ def label_image(shape: tuple[int, int], regions: Iterable[Region], name: str = "
     for region in regions:
         if region.label > MOST_LABEL:
             raise ImageError(
-                f"{name}: a label image has numbers to {MOST_LABEL}, found {region.label}; leave "
-                "small regions out by --min-radius"
+                f"{name}: a label image has numbers up to {MOST_LABEL}, found {region.label}; "
+                "leave out small regions with --min-radius"
             )
         top, left, bottom, right = region.bbox
         labels[top:bottom, left:right][region.mask[1:-1, 1:-1]] = region.label

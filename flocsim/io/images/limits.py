@@ -56,7 +56,7 @@ def check_promise(path: Path, pixels: int) -> None:
     """ImageError for a file that is far too small for the pixels that it promises."""
     size = path.stat().st_size
     if pixels > PIXELS_PER_BYTE * size:
-        raise ImageError(f"{path}: promises {pixels} pixels in {size} bytes: it is damaged")
+        raise ImageError(f"{path}: claims {pixels} pixels in {size} bytes: it is damaged")
 
 
 def check_array(name: object, array: np.ndarray) -> None:
@@ -75,7 +75,7 @@ def read_array(file: BinaryIO, size: int, name: str) -> np.ndarray:
     form = np.lib.format
     version = form.read_magic(file)
     if version not in ((1, 0), (2, 0), (3, 0)):
-        raise ImageError(f"{name}: is of a version of NumPy's format that is unknown")
+        raise ImageError(f"{name}: has an unknown version of NumPy's format")
     read = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
     shape, by_columns, dtype = read(file)
     check_shape(name, shape)
@@ -84,10 +84,10 @@ def read_array(file: BinaryIO, size: int, name: str) -> np.ndarray:
         raise ImageError(f"{name}: holds values of type {dtype!s:.40}, not numbers or flags")
     length = math.prod(shape) * dtype.itemsize
     if length > size:
-        raise ImageError(f"{name}: promises {length} bytes of values and has fewer")
+        raise ImageError(f"{name}: claims {length} bytes of values but has fewer")
     data = file.read(length)
     if len(data) < length:
-        raise ImageError(f"{name}: is cut short")
+        raise ImageError(f"{name}: is truncated")
     return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
 
 
@@ -98,11 +98,11 @@ def check_entries(path: Path, entries: Iterable[Any]) -> None:
         raise ImageError(f"{path}: holds more than {MOST_ARRAYS} arrays")
     names = [entry.filename for entry in entries]
     if len({name.removesuffix(".npy") for name in names}) < len(names):
-        raise ImageError(f"{path}: holds two arrays of one name")
+        raise ImageError(f"{path}: has two arrays of the same name")
     for entry in entries:
         name = entry.filename
         if not name.isprintable() or len(name) > LONGEST_NAME or entry.is_dir():
-            raise ImageError(f"{path}: holds an array of a name that none has: {name[:60]!r}")
+            raise ImageError(f"{path}: has an array with an impossible name: {name[:60]!r}")
         if entry.file_size > 8 * MOST_PIXELS:
             raise ImageError(
                 f"{path}: {name} would be {entry.file_size} bytes, more than {8 * MOST_PIXELS}"
@@ -123,7 +123,7 @@ def check_spread(name: object, shape: Sequence[int], boxes: Iterable[Any]) -> No
         raise ImageError(f"{name}: holds {count} labels, more than {MOST_LABELS}")
     if spread > MOST_SPREAD * math.prod(shape) + 2**20:
         raise ImageError(
-            f"{name}: its {count} labels are scattered all over it; give each floc its own"
+            f"{name}: its {count} labels are scattered over the image; give each floc its own label"
         )
 
 
@@ -133,4 +133,4 @@ def check_deflated(name: object, file: Any, places: Iterable[tuple[int, int, int
         file.seek(offset)
         unpacked = zlib.decompressobj().decompress(file.read(length), wanted + 1)
         if len(unpacked) > wanted:
-            raise ImageError(f"{name}: a piece of it unpacks to more than {wanted} bytes")
+            raise ImageError(f"{name}: a part of it decompresses to more than {wanted} bytes")

@@ -80,7 +80,7 @@ def _members(path, archive):
     for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
         left -= entry.file_size
         if left < 0:
-            raise ImageError(f"{path}: would be more than {MOST_BYTES} bytes unpacked")
+            raise ImageError(f"{path}: would be more than {MOST_BYTES} bytes after decompression")
         key = entry.filename.removesuffix(".npy")
         with archive.open(entry) as file:
             yield key, read_array(file, entry.file_size, f"{path} {key}")
@@ -100,7 +100,7 @@ def _unpacked(path, arrays):
         if bits.dtype != np.uint8 or bits.ndim != 1 or not 0 < size <= 8 * bits.size:
             raise ImageError(f"{path} {key}: not the bits of {height} × {width} pixels")
         if min(height, width) < 1:
-            raise ImageError(f"{path} {key}: {height} × {width} is no size of a mask")
+            raise ImageError(f"{path} {key}: {height} × {width} is not a possible size of a mask")
         masks.append((key, np.unpackbits(bits)[:size].reshape(height, width)))
     return masks
 

@@ -28,7 +28,7 @@ PLAIN, DEFLATED = (1, 32773), (8, 32946)
 ONLY = Plane()
 """The only picture of a file that has no other."""
 
-CHOOSE = "choose by --page and --channel, or save the one that you want as its own file"
+CHOOSE = "choose with --page and --channel, or save the picture that you want as a file of its own"
 
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
@@ -99,8 +99,8 @@ def _decode(path, frame):
     except Exception as problem:
         if type(problem).__name__ == "DecompressionBombError":
             raise ImageError(
-                f"{path}: its pixels are more than the {MOST_PIXELS} that a picture may have; "
-                "cut it into smaller ones"
+                f"{path}: it has more than the {MOST_PIXELS} pixels that a picture may have; cut "
+                "it into smaller ones"
             ) from problem
         # Decoders raise nearly anything on damaged files; all of it means one thing to the user.
         if path.suffix.lower() in (".tif", ".tiff"):
@@ -175,7 +175,7 @@ def check_tiff(path, tiff, frame=0):
 
 def _one_line(problem):
     if type(problem).__name__ == "UnidentifiedImageError":
-        return "its content is of no known picture format"
+        return "its content has no known picture format"
     if isinstance(problem, MemoryError):
         return "out of memory"
     return " ".join(str(problem).split())[:120] or type(problem).__name__
@@ -199,8 +199,8 @@ def _luminance(pixels, path):
         return pixels
     if pixels.ndim != 3 or pixels.shape[2] > 4:
         raise ImageError(
-            f"{path}: an array of shape {pixels.shape} is not one grey or colour picture; "
-            "save the picture that you want to its own file"
+            f"{path}: an array of shape {pixels.shape} is not a single grey or colour picture; "
+            "save the picture that you want as a file of its own"
         )
     has_alpha = pixels.shape[2] in (2, 4)
     colours = pixels[..., :-1] if has_alpha else pixels

@@ -18,7 +18,7 @@ BETWEEN = 0.02
 EDGE = 2
 """Pixels on either side of an edge that packing as JPEG makes grey."""
 
-WAY = "fit it without --masks, or give a mask of two values or labels, one value a floc"
+WAY = "fit it without --masks, or give a mask of two values or labels, one value for each floc"
 
 
 def agreement(labels: np.ndarray) -> float:
@@ -63,7 +63,7 @@ def check_halves(name: object, grey: np.ndarray) -> None:
     if between > BETWEEN * max(smaller, 1):
         raise ImageError(
             f"{name}: is a photograph, not a mask: {between} pixels are neither black nor white; "
-            f"{WAY} (JPEG does not keep labels: take PNG)"
+            f"{WAY} (JPEG does not preserve labels: use PNG)"
         )
 
 

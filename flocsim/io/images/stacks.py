@@ -177,12 +177,12 @@ def planes_of(
     count, channels = stack.page_count, stack.channel_count
     if pages is None and count > 1:
         raise ImageError(
-            f"{path}: holds {count} pages; choose by --page 1, --page 1,3 or --page all"
+            f"{path}: holds {count} pages; choose with --page 1, --page 1,3 or --page all"
         )
     if channel is None and channels > 1:
         named = [f"{k} {name}".strip() for k, name in enumerate(stack.channels, 1)]
         words = f" ({', '.join(named)})" if any(stack.channels) else ""
-        raise ImageError(f"{path}: has {channels} channels{words}; choose by --channel 1")
+        raise ImageError(f"{path}: has {channels} channels{words}; choose with --channel 1")
     wanted = range(count) if pages in (None, "all") else page_numbers(pages)
     if max(wanted) >= count:
         raise ImageError(f"{path}: has no page {max(wanted) + 1}, only {count}")
@@ -210,7 +210,7 @@ def channel_place(path, stack, text):
         return stack.channels.index(text)
     if not (text.isdecimal() and text.isascii() and int(text) > 0):
         named = ", ".join(filter(None, stack.channels)) or "none by name"
-        raise ImageError(f"{path}: has no channel {text!r}, it has {named}")
+        raise ImageError(f"{path}: has no channel {text!r}; it has {named}")
     if int(text) > stack.channel_count > 1:
         raise ImageError(f"{path}: has no channel {text}, only {stack.channel_count}")
     return int(text) - 1

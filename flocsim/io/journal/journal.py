@@ -100,7 +100,8 @@ class Journal:
         if not self.is_as_left():
             raise FileError(
                 f"{self.path} was changed by another program while this run wrote to it; what is "
-                "whole in it stays: see that nothing else writes there, and continue with --resume"
+                "intact in it is kept: make sure that nothing else writes there, and continue "
+                "with --resume"
             )
         if self.known > self.end:
             os.ftruncate(self.file.descriptor, self.end)

@@ -122,7 +122,7 @@ class LockedFile:
     def put_aside(self) -> Path:
         """Rename the file to the first of NAME.1, NAME.2, … that is free; its new path."""
         if not self.is_in_place():
-            raise FileError(f"{self.path} was replaced just now: look what is there")
+            raise FileError(f"{self.path} was replaced just now: check what is there")
         descriptor, target = self.free_file()
         os.close(descriptor)
         try:
@@ -147,7 +147,8 @@ class LockedFile:
             os.close(descriptor)
             raise FileError(
                 f"{self.path} was replaced by another file while this run wrote to it: what is "
-                f"finished is in {copy}; move either away, rename that one, continue with --resume"
+                f"finished is in {copy}; move the other file away, rename {copy} to it, and "
+                "continue with --resume"
             ) from error
         except OSError as error:
             os.close(descriptor)

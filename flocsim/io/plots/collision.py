@@ -330,7 +330,9 @@ def check_lengths(count, *sequences):
     """UsageError unless there is at least one time, and one entry of each sequence per time."""
     lengths = [len(sequence) for sequence in sequences]
     if count == 0 or any(length != count for length in lengths):
-        raise UsageError(f"a figure of {count} times needs as many of all else, found {lengths}")
+        raise UsageError(
+            f"a figure of {count} times needs as many of everything else, found {lengths}"
+        )
 
 
 def frame_labels(count, centre_distance, zone_distance):

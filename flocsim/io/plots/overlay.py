@@ -73,7 +73,7 @@ def draw_overlay(
             for ring in swept_rings(fit.parts):
                 axes.plot(*(ring * (1.0, -1.0) + (first_column - 1, first_row - 1)).T,
                           color=FLOC_COLOUR, linewidth=0.8)  # fmt: skip
-            sure = "" if region.parted != region.parted else f" parted, {region.parted:.2f}"
+            sure = "" if region.parted != region.parted else f" separated, {region.parted:.2f}"
             labels.put(f"{region.label}{sure}", region.bbox, FLOC_COLOUR, 7)
             for mask in region.band or ():
                 draw_mask(axes, mask, region.bbox, FLOC_COLOUR, linewidths=0.3)
@@ -211,7 +211,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         )  # fmt: skip
         for axes, text in zip(panels, words, strict=True):
             axes.set_title(text, fontsize=8)
-        panels[3].text(0.0, -0.02, "blue: left out, orange: too much", fontsize=7, va="top",
+        panels[3].text(0.0, -0.02, "blue: missing, orange: in excess", fontsize=7, va="top",
                        transform=panels[3].transAxes)  # fmt: skip
         if name:
             figure.suptitle(plain(visible(name, keep="")), x=0.01, ha="left", fontsize=9)

@@ -212,7 +212,7 @@ def outcomes(results: Results) -> Figure:
         shares = ", ".join(f"{share:g}" for share in np.sort(results.delta))
         told = "\n".join(textwrap.wrap(shares, LETTERS_WIDE)[:MOST_LINES])
         graze = "\n1: grazes" if 1.0 in results.delta else ""
-        title = "each bar from left:\n" + r"$\delta\,/\,\delta_{\max}$ = " + f"\n{told}{graze}"
+        title = "bars from left:\n" + r"$\delta\,/\,\delta_{\max}$ = " + f"\n{told}{graze}"
         place_legend(last, end_handles(), title)
         return figure
 
@@ -234,8 +234,8 @@ def efficiencies(results: Results) -> Figure:
             for index, axial in enumerate((False, True)):
                 found = efficiency(results.probabilities, results.delta, axial)
                 if found is None:
-                    note_if_empty(axes, np.array([np.nan]), "delta does not\nreach from 0 to 1")
-                    continue
+                    note_if_empty(axes, np.array([np.nan]), "delta does not\nspan 0 to 1")
+                    break
                 bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
         add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
@@ -260,13 +260,14 @@ def against_size(results: Results) -> Figure:
         figure, panels, _ = panel_grid(titles, LABELS["pr_a"], x_label="approaching $r_j$ [µm]")
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
-        missing = "the sizes are not known" if results.pooled else "not yet pooled"
+        missing = "sizes unknown" if results.pooled else "not yet pooled"
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.minorticks_off()
+            axes.set_xlim(*room_for(r_j[known]))
             if not (known.any() and results.pooled):
                 note_if_empty(axes, np.array([np.nan]), missing)
                 continue
@@ -283,6 +284,13 @@ def against_size(results: Results) -> Figure:
             marks = receivers[apart] if few else np.geomspace(low, high, 4)
             bar.set_ticks(marks, labels=[f"{each:.3g}" for each in marks])
         return figure
+
+
+def room_for(sizes):
+    """Limits of a logarithmic axis around sizes, wide enough for one of the ticks 1, 2, 5, ...."""
+    low, high = (sizes.min(), sizes.max()) if sizes.size else (1.0, 10.0)
+    margin = max(1.15, np.sqrt(2.6 * low / high))
+    return low / margin, high * margin
 
 
 def add_line_legend(axes, words, colours, title):

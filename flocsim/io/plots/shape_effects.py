@@ -130,7 +130,7 @@ def shape_effects(results: Results) -> Figure:
             for axes in row:
                 set_probability_axis(axes)
             if results.replicates is None:
-                note(row[0], "of finished studies alone")
+                note(row[0], "only for finished studies")
                 continue
             rows = {name: each[t, number] for name, each in results.replicates.items()}
             effects = {name: shape_effect(rows, name) for name in PAIR_MEASURES}

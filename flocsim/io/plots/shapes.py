@@ -5,7 +5,6 @@ the name that `flocsim plot` gives it; the first line of its docstring is the co
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -32,10 +31,8 @@ CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
 DODGE = 0.06
 """Shift of the two classes against each other, in steps of the axis of N."""
 
-UNCROSSED: dict[str, Any] = {
-    "frameon": True, "facecolor": "white", "edgecolor": "none", "framealpha": 1.0,
-}  # fmt: skip
-"""Of a legend that no line strikes through."""
+BELOW_LEGEND = 0.66
+"""Share of a panel's height that is left to the data below a legend."""
 
 PANEL_SIZE = (2.6, 2.3)
 MARGIN = 0.75
@@ -84,20 +81,22 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
     found = np.array([2e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(found, 0.0)
     with house_style():
-        figure = new_figure(6.4, 2.8)
+        figure, top = new_figure(6.4, 2.8), 0.0
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
-            axes.hist(found, bins=bins, weights=weights / weights.sum(), color=BAR_COLOUR,
-                      edgecolor="white", linewidth=0.5)  # fmt: skip
+            bars, _, _ = axes.hist(found, bins=bins, weights=weights / weights.sum(),
+                                   color=BAR_COLOUR, edgecolor="white",
+                                   linewidth=0.5)  # fmt: skip
+            top = max(top, bars.max())
             marks = zip(diameters_at(found, by_volume), SHARES, (":", "--", "-."), strict=True)
             for value, share, dashes in marks:
-                axes.axvline(value, color="0.25", linestyle=dashes,
+                axes.axvline(value, ymax=BELOW_LEGEND, color="0.25", linestyle=dashes,
                              label=f"D{100 * share:.0f} = {value:.3g} µm")  # fmt: skip
             axes.set(title=f"by {word}", xlabel="diameter $2r_\\mathrm{eq}$ [µm]")
             axes.set_xlim(left=0.0)
-            axes.legend(**UNCROSSED)
-        panels[0].set_ylabel("share")
+            axes.legend(loc="upper left")
+        panels[0].set(ylabel="share", ylim=(0.0, top / BELOW_LEGEND))
         return figure
 
 
@@ -154,9 +153,10 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
             axes.set_title(f"spheroradius r = {radius:g} px")
             axes.set_xlabel("vertices $N$")
         panels[0].set_ylabel("relative error RE [%]")
-        panels[0].set_ylim(bottom=0.0)
+        room = panels[0].dataLim.ymax / BELOW_LEGEND
+        panels[0].set_ylim(0.0, max(panels[0].get_ylim()[1], room))
         title = "mean ± standard deviation\ndashed: circle of equal area"
-        panels[0].legend(title=title, alignment="left", loc="upper right", **UNCROSSED)
+        panels[0].legend(title=title, alignment="left", loc="upper right")
         return figure
 
 

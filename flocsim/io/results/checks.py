@@ -56,19 +56,19 @@ def check_coordinates(file: Any) -> None:
              for axis, words in schema.LAST_AXES.items()}  # fmt: skip
     for path, words in (lists | {"differences/event": schema.EVENTS}).items():
         if path in file and tuple(file[path].asstr()[()]) != words:
-            raise ValueError(f"{path} holds other words than {', '.join(words)}")
+            raise ValueError(f"{path} has other words than {', '.join(words)}")
 
 
 def check_tables(results: Results) -> None:
     """ValueError for names, counts or probabilities that cannot be."""
-    refuse(len(set(results.types)) < len(results.types), "types that are the same")
+    refuse(len(set(results.types)) < len(results.types), "a type twice")
     refuse(not all(name.isprintable() for name in results.types), "types of unprintable names")
-    refuse(np.unique(results.vertices).size < results.vertices.size, "vertices that are the same")
+    refuse(np.unique(results.vertices).size < results.vertices.size, "a number of vertices twice")
     refuse(np.any(results.vertices < 1), "vertices below 1")
-    refuse(not np.isfinite(results.delta).all(), "delta that are no numbers")
-    refuse(np.unique(results.delta).size < results.delta.size, "delta that are the same")
+    refuse(not np.isfinite(results.delta).all(), "values of delta that are not numbers")
+    refuse(np.unique(results.delta).size < results.delta.size, "a value of delta twice")
     for name, values in results.radii.items():
-        refuse(np.any(values <= 0.0) or np.any(np.isinf(values)), f"{name} that are no radii")
+        refuse(np.any(values <= 0.0) or np.any(np.isinf(values)), f"{name} that are not radii")
     table = results.probabilities
     for name in schema.TABLE:
         if name.startswith("n_"):

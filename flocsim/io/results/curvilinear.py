@@ -81,10 +81,10 @@ SPHERES = "spheres"
 """The name of what two spheres in water do, which no formula says."""
 
 ABOUT_SPHERES = [
-    "curvilinear factor 'spheres': how often equivalent spheres touch with the water that they "
-    "push at each other, over how often they do without; resistance functions of Jeffrey and "
+    "curvilinear factor 'spheres': how often equivalent spheres touch with hydrodynamic "
+    "interaction, over how often they do without; resistance functions of Jeffrey and "
     "Onishi (1984) and Jeffrey (1992), the study's own forces, no inertia",
-    "it is one of solid spheres: what shapes and permeable flocs do to it is not known",
+    "it is for solid spheres: how it changes for shapes and permeable flocs is not known",
 ]
 """Lines for whoever gets numbers with that factor in them."""
 
@@ -92,12 +92,14 @@ ABOUT_SPHERES = [
 def formula(name: str, mechanism: str) -> tuple[Callable[[np.ndarray], np.ndarray], str]:
     """(function of p, how it is written); UsageError for a name or a mechanism that has none."""
     if name not in CORRECTIONS:
-        raise UsageError(f"curvilinear factors are those of {', '.join(CORRECTIONS)}, found {name}")
+        raise UsageError(
+            f"the curvilinear factor must be one of {', '.join(CORRECTIONS)}, found {name}"
+        )
     known = CORRECTIONS[name].mechanisms
     if mechanism not in known:
         raise UsageError(
-            f"{name} has no curvilinear factor for {mechanism}: choose of {', '.join(known)}, or "
-            "leave it out and keep the upper bound"
+            f"{name} has no curvilinear factor for {mechanism}: choose one of {', '.join(known)}, "
+            "or leave it out and keep the upper bound"
         )
     return known[mechanism]
 
@@ -134,8 +136,8 @@ def about_factor(name: str, mechanism: str) -> list[str]:
     return [
         f"curvilinear factor '{name}' in {mechanism}: {written}, p = r_small/r_large; "
         f"{CORRECTIONS[name].source}",
-        "it is one of solid spheres and multiplies the rectilinear kernel; for flocs, through "
-        "which water passes, it is not known",
-        "efficiency times factor is common practice and approximate: neither was computed with the "
-        "other",
+        "it is for solid spheres and multiplies the rectilinear kernel; for flocs, which are "
+        "permeable, it is not known",
+        "multiplying efficiency and factor is common practice but approximate: neither was "
+        "computed with the other",
     ]

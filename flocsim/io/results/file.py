@@ -246,14 +246,14 @@ def opened(path: str | os.PathLike) -> Iterator[Any]:
     older schema is made into one of this in memory.
     """
     with opened_file(
-        path, lambda reason: f"{path} holds no readable results: {reason}; run it again"
+        path, lambda reason: f"{path} has no readable results: {reason}; run it again"
     ) as (file, nodes):
         known = nodes[""].attributes
         if text_of(file, nodes, "format") != FORMAT:
             what = text_of(file, nodes, "format") or text_of(file, nodes, "kind")
             found = f", it holds a {what}" if what else ""
             raise FileError(
-                f"{path} is not a results file{found}: name one that flocsim ensemble wrote"
+                f"{path} is not a results file{found}: name one written by flocsim ensemble"
             )
         version = read_version(file, known)
         if version in older.VERSIONS:
@@ -262,18 +262,20 @@ def opened(path: str | os.PathLike) -> Iterator[Any]:
             return
         if version != SCHEMA_VERSION:
             raise FileError(
-                f"{path} has results of schema version {version}, this flocsim reads "
+                f"{path} has results of schema version {version}; this flocsim reads "
                 f"{older.VERSIONS[0]} to {SCHEMA_VERSION}: read it with the version that wrote it"
             )
         if older.WRITTEN_AS in known:
-            raise ValueError(f"it has an attribute {older.WRITTEN_AS}, which no file has")
+            raise ValueError(
+                f"it has an attribute {older.WRITTEN_AS}, which no file of flocsim has"
+            )
         check_structure(nodes)
         check_coordinates(file)
         yield file
 
 
 def read_version(file, known):
-    """The schema version of an open file; "unknown" where it is no number or word."""
+    """The schema version of an open file; "unknown" where it is not a number or word."""
     if known.get("schema_version") not in (("i8", ()), ("text", ())):
         return "unknown"
     return (

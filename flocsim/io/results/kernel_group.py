@@ -37,13 +37,13 @@ EFFICIENCIES = {
 ESTIMATES = WIDTHS | RATES | EFFICIENCIES
 BOUNDS = {
     "": "",
-    "_low": ", lower 95 % bound, undecided and failed points taken for misses",
-    "_high": ", upper 95 % bound, undecided and failed points taken for captures",
-    "_numerical": ", by how much numerics change it: 95 % bound",
+    "_low": ", lower 95 % bound, undecided and failed points counted as misses",
+    "_high": ", upper 95 % bound, undecided and failed points counted as captures",
+    "_numerical": ", its change by numerical error: 95 % bound",
 }
 CHANGE = {
-    "_change_low": ", by how much it would change, run exactly: lower 95 % bound",
-    "_change_high": ", by how much it would change, run exactly: upper 95 % bound",
+    "_change_low": ", its change if all runs were exact: lower 95 % bound",
+    "_change_high": ", its change if all runs were exact: upper 95 % bound",
 }
 FLIPS = {
     f"flips_{name}": ("f8", "1", f"share of points run again that flip: encounters {words} or not")
@@ -56,8 +56,8 @@ BESIDES = {
               "r_i + r_j"),
     "checked": ("f8", "1", "points that were run again at a tighter tolerance"),
     "undecided": ("f8", "1", "share of the sampled flux whose encounters are undecided or failed"),
-    "edge": ("f8", "1", "share of what aggregates that came in the outermost tenth of the offsets "
-             "that were sampled for attraction; where not 0, the width may be cut off"),
+    "edge": ("f8", "1", "share of what aggregates that came from the outermost tenth of the "
+        "offsets sampled because of attraction; if not 0, the width may be cut off"),
 }  # fmt: skip
 KERNEL = {
     name + suffix: (kind, unit, text + bound)

@@ -29,8 +29,8 @@ REFERENCES = {
         "spheres": (1.0, "pi (r_i + r_j)^2 |w_i - w_j|, rectilinear, of the equivalent spheres"),
         "flocmod": (
             1.0 / 18.0,
-            "FLOCMOD's pi/4 (D_i + D_j)^2 g/mu |drho_i D_i^2 - drho_j D_j^2|, which lacks Stokes's "
-            "1/18 (its drho D^2 being those of the bodies here)",
+            "FLOCMOD's pi/4 (D_i + D_j)^2 g/mu |drho_i D_i^2 - drho_j D_j^2|, which lacks "
+            "Stokes's 1/18 (with the drho D^2 of these bodies)",
         ),
     },
     "shear": {
@@ -82,7 +82,7 @@ def efficiency_for(
     known = REFERENCES.get(mechanism, {})
     if model not in known:
         raise UsageError(
-            f"{model} has no kernel for {mechanism}: choose of {', '.join(known)}, or another "
+            f"{model} has no kernel for {mechanism}: choose one of {', '.join(known)}, or another "
             "mechanism"
         )
     m, v = kernel.place_of(mechanism, vertices)
@@ -103,12 +103,12 @@ def kernel_matrix(
         bound = ["with hydrodynamic interaction, of the outlines in the plane"]
     if kernel.water and (curvilinear is not None or factors is not None):
         raise UsageError(
-            "the study has the water between the bodies in it ([forces.hydrodynamics]): a "
+            "the study already includes the water between the bodies ([forces.hydrodynamics]): a "
             "curvilinear factor would count it twice; leave it out"
         )
     if (curvilinear is not None or factors is not None) and quantity not in OF_MODELS:
         raise UsageError(
-            f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: take "
+            f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: use "
             "efficiency, or leave it out"
         )
     if quantity in OF_MODELS:
@@ -134,11 +134,11 @@ def kernel_matrix(
     else:
         raise UsageError(f"a matrix holds one of {', '.join(QUANTITIES)}, found {quantity}")
     if np.isnan(values).any():
-        what.append("where there is nothing it is not known, as where points are undecided")
+        what.append("an empty cell is unknown, for example because points are undecided")
     if unknown := np.nanmax(kernel.arrays["undecided"][m, v], initial=0.0):
         what.append(
-            f"up to {100.0 * unknown:.2g} % of a pair's encounters are undecided or failed: ends "
-            "of intervals (_low, _high) hold whatever they could have come to"
+            f"up to {100.0 * unknown:.2g} % of a pair's encounters are undecided or failed: the "
+            "bounds (_low, _high) include every outcome that they could have had"
         )
     lines = [
         *what,

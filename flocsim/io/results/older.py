@@ -57,7 +57,7 @@ ADDED = {
             ),
             "replicates": frozenset({"checked_outcome", "checked_inside", "checked_bond"}),
         },
-        "none was run again for its numerical error",
+        "no replicate was run again for its numerical error",
     ),
     4: Addition(
         {
@@ -65,15 +65,15 @@ ADDED = {
             "pooled": frozenset(schema.RADII),
             "replicates": frozenset({*schema.RADII, "D_0", "d_c_over_D_0"}),
         },
-        "they do not have the radii and D_0 that each was run with",
+        "they lack the radii and D_0 of each replicate",
     ),
     5: Addition(
         {"probabilities": frozenset({"n_held"})},
-        "pairs that rest apart without touching are not distinguished from those that miss",
+        "pairs held apart without touching are not distinguished from those that miss",
     ),
     6: Addition(
         {"replicates": frozenset(schema.SHAPE_COLUMNS)},
-        "they do not have the shape measures of the bodies",
+        "they lack the shape measures of the bodies",
     ),
     7: Addition(
         {
@@ -85,7 +85,7 @@ ADDED = {
             ),
             "kernel": frozenset(f"{name}{end}" for name in ESTIMATES for end in CHANGE),
         },
-        "none was run a third time, or with outlines cut closer and wider",
+        "no replicate was run a third time, or with outlines cut closer and wider",
     ),
 }  # fmt: skip
 """Version → what it added to that before it."""
@@ -134,7 +134,7 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
     if np.prod(nodes["replicates/outcome"].shape, dtype=object) > MOST_ROWS:
         raise ValueError(
             f"it has more than {MOST_ROWS} rows of schema version {version}: read it with the "
-            "flocsim that wrote it"
+            "version of flocsim that wrote it"
         )
     image = image_of(results_of(file, groups), {WRITTEN_AS: version})
     with parsed(image, len(image.getbuffer())) as (now, _):

@@ -141,7 +141,7 @@ class RowFile:
         frame = frame_of(results)
         plan = plan_of(frame, self.plan.rows)
         if (plan.size, plan.columns) != (self.plan.size, self.plan.columns):
-            raise ValueError("the tables have moved the columns")
+            raise ValueError("the tables have displaced the columns")
         table = plan.cuts()
         starts = np.concatenate([[0], np.cumsum(table["length"][:-1], dtype=np.int64)])
         number = {int(start): place for place, start in enumerate(starts)}
@@ -188,7 +188,7 @@ def shared_row_file(path: str, token: bytes, plan: Plan) -> Iterator[RowFile]:
         raise FileError(f"{path} cannot be seen here: {error.strerror}") from error
     try:
         if os.pread(descriptor, TOKEN_SIZE, 0) != token:
-            raise FileError(f"{path} is another file here: the ranks share no file system")
+            raise FileError(f"{path} is a different file here: the ranks share no file system")
         yield RowFile(path, token, plan, descriptor)
     finally:
         os.close(descriptor)

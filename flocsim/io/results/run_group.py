@@ -39,8 +39,8 @@ def sphere_words(facts: dict) -> str:
         for name in ("free", "touch", "stability")
     )
     return (
-        f"let go {1e6 * facts['release']:.4g} um apart, escaped at {1e6 * facts['escape']:.4g} um, "
-        f"D = {facts['diffusion']:.4g} m2/s; equivalent spheres touch with probability {free} "
+        f"released {1e6 * facts['release']:.4g} um apart, escaped at {1e6 * facts['escape']:.4g} "
+        f"um, D = {facts['diffusion']:.4g} m2/s; equivalent spheres touch with probability {free} "
         f"without forces between them, {touch} with them; stability ratio W = {stability}"
     )
 
@@ -55,10 +55,10 @@ def choice_lines(record: dict) -> list[str]:
         lines.append(
             f"{each['name']}: {each['method']}, {each['tolerance']:g} m, expected flips "
             f"{100.0 * each['expected']:.2g} % ({from_pilot})"
-            + ("" if each["bound"] <= record["target"] else "; the ladder ends here")
+            + ("" if each["bound"] <= record["target"] else "; the tightest setting")
         )
     lines.append(
-        f"asked for: flips below {100.0 * record['target']:.2g} %, a fifth of a sampling error of "
+        f"target: flips below {100.0 * record['target']:.2g} %, a fifth of a sampling error of "
         f"{100.0 * record['half_width']:.2g} %"
     )
     return lines
@@ -68,7 +68,7 @@ def water_words(facts: dict) -> str:
     """The facts of one collision type in a line."""
     return (
         f"{facts['type']}: equivalent spheres touch {facts['water']:.4g} times as often as on "
-        f"undisturbed ways with the water between them, {facts['alone']:.4g} times without it"
+        f"undisturbed paths with the water between them, {facts['alone']:.4g} times without it"
     )
 
 

@@ -57,11 +57,11 @@ COUNTS = {
     "n_tested": ("i8", "1", "doublets put into flows"),
     "n_opened": ("i8", "1", "doublets that opened"),
     "n_holding": ("i8", "1", "doublets that held at every rate"),
-    "n_failed": ("i8", "1", "doublets of which a run failed"),
+    "n_failed": ("i8", "1", "doublets with a failed run"),
 }
 """Columns (type, vertices, delta) of ``conditions``."""
 
-RATE = {"rate": ("f8", "s-1", "rate at which a share of the doublets has opened; inf: no such")}
+RATE = {"rate": ("f8", "s-1", "rate at which a share of the doublets has opened; inf: none")}
 """The column (type, vertices, delta, quantile)."""
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -140,12 +140,12 @@ def write_strengths(path: str | Path, found: Strengths, rule: Rule = keep) -> No
 def read_strengths(path: str | os.PathLike) -> Strengths:
     """The Strengths of a file; FileError for one that is absent, damaged, or of another kind."""
     with opened_file(
-        path, lambda reason: f"{path} holds no readable strengths of bonds: {reason}"
+        path, lambda reason: f"{path} has no readable strengths of bonds: {reason}"
     ) as (file, nodes):
         check_format(file, nodes, FORMAT, SCHEMA_VERSION, {"about": "text"})
         known = read_json(str(file.attrs["about"]), {})
         if not isinstance(known, dict):
-            raise ValueError("its attribute about is no table")
+            raise ValueError("its attribute about is not a table")
         wanted = {name: group.arrays for name, group in GROUPS.items()}
         hold_against(nodes, wanted, wanted, {"quantile": len(QUANTILES)})
         doublets, conditions = (group.read(file[name]) for name, group in GROUPS.items())
@@ -160,7 +160,7 @@ def check_places(columns, shape):
     """ValueError for doublets of conditions that the file does not have, or of unknown codes."""
     for name, length in zip(AXES, shape, strict=True):
         if np.any((columns[name] < 0) | (columns[name] >= length)):
-            raise ValueError(f"a doublet is of no {name} of the file")
+            raise ValueError(f"a doublet has a {name} that the file does not have")
     check_opened(columns.__getitem__)
 
 

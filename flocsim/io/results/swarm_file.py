@@ -35,17 +35,17 @@ COUNTS = {
     "clusters": ("f8", "1", "clusters, single bodies among them"),
     "largest": ("f8", "1", "bodies of the largest cluster"),
     "mean_size": ("f8", "1", "body-weighted mean cluster size"),
-    "percolating": ("f8", "1", "clusters that hang together with their images round the box"),
-    "gyration": ("f8", "m", "radius of gyration of a cluster, in the mean over mass; of those "
-                 "that do not percolate"),
-    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, in the mean over mass; "
-                 "of those that do not percolate"),
+    "percolating": ("f8", "1", "clusters connected to their own images around the box"),
+    "gyration": ("f8", "m", "radius of gyration of a cluster, mass-weighted mean; of those that "
+        "do not percolate"),
+    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, mass-weighted mean; "
+        "of those that do not percolate"),
     "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
-    "settling": ("f8", "m s-1", "downward velocity of clusters, in the mean over mass"),
-    "bonds_certificate": ("f8", "1", "touching pairs that no later load can part"),
+    "settling": ("f8", "m s-1", "downward velocity of clusters, mass-weighted mean"),
+    "bonds_certificate": ("f8", "1", "touching pairs that no later load can separate"),
     "bonds_hook": ("f8", "1", "touching pairs at rest whose contacts carry the load"),
     "bonds_rest": ("f8", "1", "touching pairs that have kept their pose, without such a proof"),
-    "bonds_touching": ("f8", "1", "touching pairs of which nothing is proved"),
+    "bonds_touching": ("f8", "1", "touching pairs without any proof"),
     "removed": ("f8", "1", "bodies that have left the box for good"),
     "reentered": ("f8", "1", "how often bodies have left the box and re-entered"),
     "median_error": ("f8", "m", "median over bodies of the stated error of position"),
@@ -69,8 +69,8 @@ GONE = -2
 BONDS = {
     "bond_replicate": ("i4", "1", "replicate of the pair"),
     "bond_time": ("i4", "1", "place of the snapshot among the times"),
-    "bond_later": ("i4", "1", "the later one of two bodies that touch"),
-    "bond_earlier": ("i4", "1", "the earlier one"),
+    "bond_later": ("i4", "1", "second of two bodies that touch"),
+    "bond_earlier": ("i4", "1", "first of the two"),
     "bond_kind": ("i4", "1", "0 touching, 1 certificate, 2 hook, 3 rest"),
 }
 """Columns (bond,): the pairs that touch at all times of all replicates."""
@@ -177,7 +177,7 @@ def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> N
 def read_swarm(path: str | os.PathLike) -> SwarmResults:
     """The SwarmResults in a file; FileError for one that is absent, damaged, of another kind or
     version."""
-    with opened_file(path, lambda why: f"{path} holds no readable results of a swarm: {why}") as (
+    with opened_file(path, lambda why: f"{path} has no readable results of a swarm: {why}") as (
         file,
         nodes,
     ):
@@ -206,7 +206,7 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         raise ValueError("its bodies have core points that are not there")
     for name in ("r_eq", "spheroradius"):
         if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
-            raise ValueError(f"bodies/{name} holds what is no radius")
+            raise ValueError(f"bodies/{name} has values that are not radii")
     for replicate, body in np.ndindex(*first.shape):
         begin, many = int(first[replicate, body]), int(count[replicate, body])
         columns = (
@@ -214,16 +214,16 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         )  # fmt: skip
         table = PointTable(*columns)
         if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
-            raise ValueError("bodies/point_radius holds what is no radius")
+            raise ValueError("bodies/point_radius has values that are not radii")
         parts_in(table)
     if not np.all((bodies["box"] > 0.0) & np.isfinite(bodies["box"])):
         raise ValueError("its box has no size")
     if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
-        raise ValueError("its times do not rise")
+        raise ValueError("its times do not increase")
     check_bonds(groups["bonds"], groups["snapshots"]["cluster"].shape)
     labels = groups["snapshots"]["cluster"]
     if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
-        raise ValueError("snapshots/cluster holds what is no cluster")
+        raise ValueError("snapshots/cluster has values that are not clusters")
 
 
 def check_bonds(bonds: Mapping[str, np.ndarray], shape: tuple[int, ...]) -> None:
@@ -231,7 +231,7 @@ def check_bonds(bonds: Mapping[str, np.ndarray], shape: tuple[int, ...]) -> None
     limits = (*shape, shape[2], KIND_COUNT)
     for name, limit in zip(BONDS, limits, strict=True):
         if np.any(bonds[name] < 0) or np.any(bonds[name] >= limit):
-            raise ValueError(f"bonds/{name} holds what cannot be")
+            raise ValueError(f"bonds/{name} has impossible values")
 
 
 def table_of(results: SwarmResults) -> str:

@@ -83,15 +83,15 @@ def read_sweep(
     of studies that are joined."""
     with opened_file(
         path,
-        lambda reason: f"{path} holds no readable sweep: {reason}; join it again with --resume",
+        lambda reason: f"{path} has no readable sweep: {reason}; join it again with --resume",
     ) as (file, nodes):
         check_format(file, nodes, FORMAT, SCHEMA_VERSION, {"swept": "text"})
         about = read_json(str(file.attrs["swept"]), {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
-            raise ValueError("its attribute swept names no keys")
+            raise ValueError("its attribute swept does not name any keys")
         joined, lengths = next((each for each in known if each[0].keys() <= nodes.keys()), ({}, {}))
         if not joined:
-            raise ValueError("it has no groups that a sweep joins")
+            raise ValueError("it has no group of a sweep")
         declared = {name: joined_group(each, name, about, nodes) for name, each in joined.items()}
         wanted = {name: group.arrays for name, group in declared.items()}
         hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, list(joined), lengths)

@@ -27,16 +27,18 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
         parts.append(f"the {fitted} largest fitted")
     reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
     if reasons:
-        parts.append(f"rejected {' and '.join(reasons)}")
+        *others, last = reasons
+        listed = f"{', '.join(others)} and {last}" if others else last
+        parts.append(f"rejected {listed}")
     if found.left_whole:
-        parts.append(f"{found.left_whole} with necks not parted (--neck)")
+        parts.append(f"{found.left_whole} with necks not separated (--neck)")
     sure = [each.parted for each in found.regions if each.parted == each.parted]
     if sure:
         low, high = (f"{value:.2f}" for value in (min(sure), max(sure)))
         how = low if low == high else f"{low} to {high}"
-        parts.append(f"{len(sure)} parted at necks, confidence {how} (--neck 0 joins them)")
+        parts.append(f"{len(sure)} separated at necks, confidence {how} (--neck 0 joins them)")
     if found.annotated:
-        parts.append("a scale bar or its writing left out")
+        parts.append("a scale bar or its label left out")
     about = f"foreground {100 * found.foreground_share:.2f} %"
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
@@ -51,8 +53,8 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         if coarse:
             print(
                 f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not "
-                f"below r_eq of {plural(coarse, 'floc')}, which it cannot follow; use a smaller "
-                "--radius",
+                f"below r_eq of {plural(coarse, 'floc')}, whose outline the fit cannot follow; use "
+                "a smaller --radius",
                 file=sys.stderr,
             )
 

@@ -127,7 +127,11 @@ UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
 
 POPULATION_COLUMNS = declared(
     {
-        "weight": ("f8", "1", "flocs that it stands for, of which the filters kept it alone"),
+        "weight": (
+            "f8",
+            "1",
+            "number of flocs that it represents, of which the filters kept only this one",
+        ),
         "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
         "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
     },
@@ -225,7 +229,7 @@ def measures_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
     table = np.stack(list(columns.values()))
     known = np.isfinite(table) & (table > 0.0)
     if not np.all(known.all(axis=0) | np.isnan(table).all(axis=0)):
-        raise ValueError("measures holds values that are no numbers of a floc's")
+        raise ValueError("measures has values that a floc cannot have")
     rows = table.T.tolist()
     return {"measures": [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]}
 
@@ -234,7 +238,7 @@ def population_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
     """What the picture leaves open of all flocs; ValueError for what cannot be."""
     for name, values in columns.items():
         if not np.all((values > 0.0) & (values <= MOST_PIXELS)):
-            raise ValueError(f"population/{name} holds values that are no numbers of a floc's")
+            raise ValueError(f"population/{name} has values that a floc cannot have")
     return {name: values.tolist() for name, values in columns.items()}
 
 
@@ -328,13 +332,13 @@ def write_library(
     if repeated is not None:
         raise UsageError(f"floc id {repeated!r} occurs twice: give every floc its own")
     if len({tuple(sorted(entry.fits)) for entry in entries}) > 1 or not entries[0].fits:
-        raise UsageError("every floc of a library needs fits at the same numbers of vertices")
+        raise UsageError("every floc in a library needs fits at the same numbers of vertices")
     largest = max(entries, key=reach_of)
     if reach_of(largest) > LARGEST:
         raise UsageError(
-            f"floc {largest.floc_id} reaches {reach_of(largest):.3g} m far, and none in a library "
-            f"may reach beyond {LARGEST:g} m: with pixels of {largest.pixel_size:g} m? Give the "
-            "size of one, as in '0.95 um'"
+            f"floc {largest.floc_id} reaches {reach_of(largest):.3g} m, and no floc in a library "
+            f"may reach beyond {LARGEST:g} m: are its pixels really {largest.pixel_size:g} m? Give "
+            "the size of one, as in '0.95 um'"
         )
 
     compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
@@ -381,17 +385,17 @@ def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
     """The flocs of a shape library, in the order of writing.
 
     Raises FileError for a file that is missing, damaged, of another kind or another version, or
-    that holds what cannot be.
+    that has impossible values.
     """
     with opened(path) as (file, nodes):
         if text_of(file, nodes, "kind") != KIND:
-            raise FileError(f"{path} is no shape library: name a file that flocsim fit wrote")
+            raise FileError(f"{path} is not a shape library: name a file written by flocsim fit")
         version = nodes[""].attributes.get("schema_version") == ("i8", ()) and int(
             file.attrs["schema_version"]
         )
         if version not in (SCHEMA_VERSION, COMPOUND_VERSION):
             raise FileError(
-                f"{path} has schema version {version or 'unknown'}, this flocsim reads "
+                f"{path} has schema version {version or 'unknown'}; this flocsim reads "
                 f"{SCHEMA_VERSION} and {COMPOUND_VERSION}: make it again with flocsim fit"
             )
         check_structure(nodes, version == COMPOUND_VERSION)
@@ -419,7 +423,7 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
         group, _, count = path.rpartition("/")
         if group in kinds:
             if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
-                raise ValueError(f"{path} is no number of vertices to {MOST_VERTICES}")
+                raise ValueError(f"{path} is not a number of vertices up to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
             counts[group].add(count)
     optional = {name: group.columns for name, group in OPTIONAL.items()}
@@ -427,10 +431,10 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
     if lengths["floc"] < 1 or not counts["fits"]:
         raise ValueError("there are no flocs")
     if any(each != counts["fits"] for each in counts.values()):
-        raise ValueError("the ends of its bands have other numbers of vertices than its fits")
+        raise ValueError("the ends of its bands have different numbers of vertices from its fits")
     for name, (kind, shape) in nodes[""].attributes.items():
         if shape != () or kind not in ("text", "flag", "i8", "f8"):
-            raise ValueError(f"its attribute {name} is no text or number")
+            raise ValueError(f"its attribute {name} is neither text nor a number")
 
 
 def _entries(file):
@@ -443,11 +447,11 @@ def _entries(file):
             most = LARGEST if name == "pixel_size" else MOST_PIXELS
             inside = (values >= least) & (values <= most) & (values != 0 if least == 0.0 else True)
             if not inside.all():
-                raise ValueError(f"flocs/{name} holds values that are no numbers of a floc's")
+                raise ValueError(f"flocs/{name} has values that a floc cannot have")
         flocs[ATTRIBUTES.get(name, name)] = values.tolist()
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
-        raise ValueError("two flocs have one id")
+        raise ValueError("two flocs have the same id")
     for name, group in OPTIONAL.items():
         if name in file:
             flocs |= group.read({each: file[name][each][()] for each in group.columns})
@@ -482,9 +486,7 @@ def _fits(count, group):
         ("relative_error", error, np.inf),
     ):
         if not (np.isfinite(values).all() and np.all(values >= 0.0) and np.all(values <= most)):
-            raise ValueError(
-                f"{group.name[1:]}/{name} holds values that are no numbers of a floc's"
-            )
+            raise ValueError(f"{group.name[1:]}/{name} has values that a floc cannot have")
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
     return vertices, radius, error, _tables(count, group, vertices, radius)
@@ -497,7 +499,7 @@ def _tables(count, group, vertices, radius):
     columns = {ATTRIBUTES[name].removeprefix("points."): group[name][()] for name in POINT_COLUMNS}
     wide = columns["radius"]
     if not np.all((wide > 0.0) & (wide <= LARGEST)) or np.any(wide.min(axis=1) != radius):
-        raise ValueError(f"fits/{count}/point_radius holds values that are no radii of a floc's")
+        raise ValueError(f"fits/{count}/point_radius has values that are not radii")
     tables = []
     for row, place in enumerate(vertices):
         table = PointTable(place, **{name: values[row] for name, values in columns.items()})

@@ -212,7 +212,7 @@ def test_init_writes_a_study_of_measured_flocs(tmp_path):
 def test_init_never_overwrites_unasked(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("precious")
-    with pytest.raises(UsageError, match=r"exists already.*--overwrite"):
+    with pytest.raises(UsageError, match=r"already exists.*--overwrite"):
         run_init(str(path))
     assert path.read_text() == "precious"
     assert run_init(str(path), "--overwrite") == 0

@@ -43,10 +43,10 @@ WRONG = {
     "[scene.delta]\nx = 1": "scene.delta must be a list of fractions such as [0.0, 0.5], found a t",
     "[shapes]\nvertices = [1, 3.0]": "[1] must be an integer from 1 to 512, found 3.0",
     "[shapes]\nvertices = [513]": "found 513",
-    "[shapes]\nfile = 'x.h5'": 'shapes.file: goes with source = "library", but source is '
+    "[shapes]\nfile = 'x.h5'": 'shapes.file: applies only with source = "library", but source is '
     "'synthetic': remove it",
     "[shapes]\nsource = 'library'": 'shapes: source = "library" needs file',
-    "[shapes]\nsource = 'library'\nfile = '.'\npool = 1": "is no ordinary file",
+    "[shapes]\nsource = 'library'\nfile = '.'\npool = 1": "is not an ordinary file",
     "[shapes]\nsource = 'library'\nfile = ''": "shapes.file must be a string that is not blank",
     "[shapes]\nfractal_dimension = 2": "at least 1.2 and at most 1.95, found 2",
     "[shapes]\npool = " + "9" * 40: "found a number of more than 30 digits",
@@ -74,10 +74,13 @@ WRONG = {
     "[forces.mine]\nclass = 'own'": "forces.mine.class must be 'module:Class' such as",
     "[forces.mine]\nclass = 'no_such:A'": "forces.mine.class: there is no module 'no_such', "
     "neither no_such.py nor installed",
-    "[scene]\nweight = 'area'": 'scene.weight: goes with pairs = "measured", and there is no pairs',
-    "[scene]\npairs = [[1e-6, 2e-6]]\nmax_radius = 1e-6": 'scene.max_radius: goes with pairs = "m',
-    "[scene]\narea_fraction = 0.1": 'scene.area_fraction: goes with kind = "swarm": remove it',
-    "[scene]\nsizes = [1e-6]": 'scene.sizes: goes with kind = "kernel": remove it',
+    "[scene]\nweight = "
+    "'area'": 'scene.weight: applies only with pairs = "measured", and there is no pairs',
+    "[scene]\npairs = [[1e-6, 2e-6]]\nmax_radius = "
+    "1e-6": 'scene.max_radius: applies only with pairs = "m',
+    "[scene]\narea_fraction = "
+    "0.1": 'scene.area_fraction: applies only with kind = "swarm": remove it',
+    "[scene]\nsizes = [1e-6]": 'scene.sizes: applies only with kind = "kernel": remove it',
     "[scene]\nrelease = '3 kg'": "scene.release must be a finite number above 1, found '3 kg'",
     "[scene]\nkind = 'swarn'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'swarn'",
     "[scene]\nkind = 'shear'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'shear'",

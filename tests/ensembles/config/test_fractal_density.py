@@ -54,7 +54,7 @@ def test_settling_speeds_grow_as_d_to_the_power_of_n_minus_one(tmp_path, dimensi
         ('{law = "fractal", primary = "4 s", dimension = 2.1, solid = 2650}', "primary"),
         ('{law = "fractal", primry = "4 um", dimension = 2.1, solid = 2650}', "primry"),
         ('{law = "fractal", primary = "4 um", dimension = 2.1, solid = 900}', "does not sink"),
-        ('{"\\u0001\\u009f" = 1}', "is no key"),
+        ('{"\\u0001\\u009f" = 1}', "is not a key"),
         ('"heavy"', "must be"),
         ("-5.0", "must be"),
     ],

@@ -200,11 +200,11 @@ def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_module, monkeypat
         ),
         ("own:Yukawa", "", "3: forces.own: needs strength"),
         ("own:Yukawe", "", "has no 'Yukawe'; its forces: Yukawa, NoKernel, Undecorated"),
-        ("own:Apple", "", "is no force: subclass flocsim.forces.BodyForce"),
-        ("own:SCALE", "", "is no force: subclass flocsim.forces.BodyForce"),
+        ("own:Apple", "", "is not a subclass of flocsim.forces.BodyForce"),
+        ("own:SCALE", "", "is not a subclass of flocsim.forces.BodyForce"),
         ("own:NoKernel", "", "does not define kernel"),
         ("own:Undecorated", "", "is not decorated: put @attrs.frozen"),
-        ("math:pi", "", "is no force"),
+        ("math:pi", "", "is not a subclass of flocsim.forces"),
         ("own.sub:A", "", "there is no module 'own.sub'"),
     ],
 )
@@ -317,11 +317,15 @@ def test_a_name_makes_flocsims_own_integrator(name, made):
         ("own:Mine", "step = 1\nname = 'implicit'", "3: integrator.class: excludes name, which is"),
         ("own:Mein", "", "3: integrator.class: module 'own' ("),
         ("own:Mein", "", "has no 'Mein'; its integrators: Mine, Stepless, Lost, Backward"),
-        ("own:Rod", "", "is no integrator: subclass flocsim.integrators.Integrator"),
+        ("own:Rod", "", "is not a subclass of flocsim.integrators.Integrator"),
         ("own:Stepless", "", "does not define attempt, next_step"),
         ("own:Lost", "", "2: integrator: module 'flocsim.hooks' has no attribute 'no_such_hook'"),
         ("own:Backward", "", "2: integrator: first_step must be a number above 0, found -1.0"),
-        ("own:Greedy", "", "its parameter max_steps has the name of a key of flocsim's own"),
+        (
+            "own:Greedy",
+            "",
+            "its parameter max_steps has the same name as one of flocsim's own keys",
+        ),
         ("own", "", "must be 'module:Class' such as 'mine:SemiImplicitEuler', found 'own'"),
         ("nowhere:A", "", "there is no module 'nowhere', neither nowhere.py nor installed"),
     ],
@@ -381,11 +385,15 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
         ),
         ("own:Rod", "length = 1\npoints = 1", "2: shapes: one core point is a sphere: leave class"),
         ("own:Rod", "length = 1\npoints = -1", "2: shapes: Number of samples, -1, must be non-neg"),
-        ("own:Stiff", "length = 1", "scaled(2.0) must be a shape of four times the area"),
+        ("own:Stiff", "length = 1", "scaled(2.0) must return a shape of four times the area"),
         ("own:Hollow", "length = 1", "2: shapes: area must be a finite number above 0, found 0.0"),
         ("own:Broken", "length = 1", "2: shapes: no such point"),
-        ("own:Outline", "", "its parameter vertices has the name of a key of flocsim's own"),
-        ("own:Mine", "", "is no shape: subclass flocsim.geometry.shapes.shape.Shape"),
+        (
+            "own:Outline",
+            "",
+            "its parameter vertices has the same name as one of flocsim's own keys",
+        ),
+        ("own:Mine", "", "is not a subclass of flocsim.geometry.shapes.shape.Shape"),
         ("own:Rood", "", "has no 'Rood'; its shapes: Rod, Stiff, Hollow, Broken, Outline"),
     ],
 )
@@ -451,7 +459,7 @@ def first_identity(tmp_path_factory):
                 "largest_step = 1e-7": "largest_step = 1e-7\n\n    def fresh_clock(self):\n        "
                 "return 1.0 + VelocityVerlet.fresh_clock(self)"
             },
-            "what the integrator begins a run with has changed",
+            "the initial values of the integrator have changed",
         ),
         ({"1.0 * step": "0.9 * step"}, "the compiled code for polygons has changed"),
         ({"largest_step = 1e-7": "largest_step = 2e-7"}, "integrator.largest_step is 1e-07 in the"),
@@ -466,7 +474,7 @@ def test_an_edit_makes_it_another_study(tmp_path, own_module, first_identity, ed
     own_module.write_text(OWN_MODULE.replace(old, new))
     if said is None:
         [line] = problem_lines(tmp_path, OWN_STUDY)
-        assert "scaled(2.0) must be a shape of four times the area" in line
+        assert "scaled(2.0) must return a shape of four times the area" in line
         return
     found = differences(first_identity, identity_of(Study(load_text(tmp_path, OWN_STUDY))))
     assert bool(found) == bool(said)

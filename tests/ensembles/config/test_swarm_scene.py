@@ -29,7 +29,7 @@ def test_a_swarm_is_a_scene_of_its_own(tmp_path):
         ({"scene": {"every": "1 s"}}, "every = 1 s is longer than duration = 0.3 s"),
         ({"scene": {"classes": ["2 um", "1 um"]}}, "classes must be ascending radii"),
         ("radius spread", "needs radius, the median r_eq, or measured"),
-        ("radius", "spread goes with radius"),
+        ("radius", "spread needs radius"),
         ({"shapes": {"vertices": [1, 4]}}, "bodies of one number of vertices, found [1, 4]"),
         ({"integrator": {"accuracy": "auto"}}, "is for studies of pairs"),
         ({"scene": {"types": ["I"]}}, "types"),

@@ -79,7 +79,11 @@ def test_unlike_potentials_are_for_pairs(tmp_path):
     layer = '[forces.double_layer]\npotential = ["15 mV", "-40 mV"]'
     assert force(loaded(tmp_path, "", layer), "double_layer").potential == (15e-3, -40e-3)
     swarm = '[scene]\nkind = "swarm"\nnumber = 5\nradius = "5 um"\narea_fraction = 0.1\n'
-    with pytest.raises(ConfigError, match=r"forces\.double_layer\.potential: is of two unlike"):
+    with pytest.raises(
+        ConfigError,
+        match=r"forces\.double_layer\.potential: is given for two "
+        "unlike",
+    ):
         loaded(tmp_path, "", layer + "\n" + swarm + "[shapes]\nvertices = [4]")
     with pytest.raises(ConfigError, match=r"double_layer\.potential\[1\] must be an electric"):
         loaded(tmp_path, "", layer.replace("-40 mV", "3 m"))

@@ -241,7 +241,7 @@ def test_a_bond_that_does_not_go_with_the_outcome_is_refused(outcome, bond):
 
 
 def test_shapes_must_agree():
-    with pytest.raises(UsageError, match="one shape"):
+    with pytest.raises(UsageError, match="the same shape"):
         tabulate([[0, 1]], [[1]], [[1, 255]])
 
 

@@ -36,7 +36,7 @@ HERE = Facts({"seed": 1, "kernels.spheres": "ab", "code": "cd"}, {"version of nu
     ("identity", "versions", "said"),
     [
         ({"seed": 2}, {}, "seed 2 where rank 0 has 1"),
-        ({"kernels.spheres": "xy"}, {}, "other code that is compiled (spheres)"),
+        ({"kernels.spheres": "xy"}, {}, "other compiled code (spheres)"),
         ({"code": "xy"}, {}, "other flocsim's own code"),
         ({"flocs.4": "xy"}, {}, "other flocs (4)"),
         ({"code": "xy", "seed": 2}, {}, "seed 2 where rank 0 has 1, other flocsim's own code"),
@@ -226,7 +226,7 @@ def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
-    assert "other code that is compiled (spheres)" in line
+    assert "other compiled code (spheres)" in line
     assert not list(tmp_path.glob("small.h5*"))
 
 
@@ -251,5 +251,5 @@ def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
     errors = [job.communicate(timeout=60)[1] for job in jobs]
     assert sorted(job.returncode for job in jobs) == [0, 2]
     [line] = [line for each in errors for line in problems(each)]
-    assert "exists already and is left as it is" in line
+    assert "already exists and is left as it is" in line
     assert read_results(tmp_path / "small.h5").count == 3

@@ -279,7 +279,7 @@ def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path,
 
     monkeypatch.setattr(assembly, "old_columns", other)
     made, [line], _ = assemble(folder, 2)
-    assert "study.h5 is another file here" in line
+    assert "study.h5 is a different file here" in line
     assert made.exists()
 
 

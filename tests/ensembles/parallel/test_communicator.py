@@ -87,7 +87,7 @@ def test_processes_of_this_machine_give_the_same_bytes(serial, jobs):
 
 @pytest.mark.parametrize(
     ("words", "ranks", "said"),
-    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one of the two")],
+    [(["--jobs", 0], None, "must be at least 1"), (["--jobs", 2], 2, "leave out one or the other")],
 )
 def test_jobs_that_cannot_be_are_refused(serial, words, ranks, said):
     done = run_command(serial, "small.toml", *words, ranks=ranks)
@@ -168,7 +168,7 @@ def test_a_rank_that_fails_half_way_ends_the_whole_job(tmp_path):
     done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
     assert time.monotonic() - began < 15.0
     assert done.returncode == 70
-    assert "flocsim: rank 1: out of memory: ask for fewer ranks on a machine" in done.stderr
+    assert "flocsim: rank 1: out of memory: use fewer ranks on each machine" in done.stderr
     assert not (tmp_path / "small.h5").exists()
 
 
@@ -198,7 +198,7 @@ def test_a_config_that_one_rank_cannot_load_stops_all(tmp_path):
 
 
 WRONG = [
-    (["nowhere.toml"], {}, 2, "nowhere.toml: there is no such file"),
+    (["nowhere.toml"], {}, 2, "nowhere.toml: no such file"),
     (["small.toml"], {"seed": "="}, 2, "small.toml:2: not valid TOML"),
     (["small.toml"], {"types": '["IV"]'}, 2, "scene.types"),
     (["small.toml"], {"preset": '"tang2014-literal"'}, 2, "no attraction zone"),
@@ -262,7 +262,7 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, ranks):
     done = run_command(serial, *again, "--resume", "--jobs", 2, timeout=60)
     assert done.returncode == 0
     # What was computed beyond the three replicates that are asked for now is not thrown away.
-    beyond = "has rows beyond what was asked for, and stays"
+    beyond = "has more rows than were asked for, and is kept"
     lines = unexpected(done.stderr)
     assert all(beyond in line for line in lines)
     assert (serial / f"late{ranks}.h5.journal").exists() == (lines != [])

@@ -112,7 +112,7 @@ def test_where_the_ladder_ends_it_is_said(tmp_path):
     study = auto_study(tmp_path, 10**6)
     choice = choose(study, MadeUp((0.5, 0.5)))
     assert rungs_of(study, choice) == pytest.approx([RUNGS[-1]] * 2)
-    assert all("the ladder ends here" in line for line in choice_lines(choice.record)[:2])
+    assert all("the tightest setting" in line for line in choice_lines(choice.record)[:2])
 
 
 def test_a_study_that_is_too_small_runs_no_pilot(tmp_path):

@@ -52,7 +52,7 @@ def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, 
     found = {each.name: each for each in find(study, runs, never, seconds=0.0)}
     assert list(found) == [*study.config.force_names, INERTIA]
     for name in ("gravity", "drag"):
-        assert "come together" in found[name].why
+        assert "would not meet" in found[name].why
     assert "needs a contact force" in found["contact"].why
     assert found["double_layer"][1:3] == (0, LEAST)
     assert found["double_layer"].time > 0.0
@@ -137,8 +137,8 @@ def again(count, flips):
         (Finding("a", 0, 200, 1.2), 0, "would save none of the time"),
         (Finding(INERTIA, 0, 200, 0.5), 0, "replicates (Overdamped agrees) (rate below"),
         (Finding("a", 8, 20, 0.9), 0, "a: matters, without it 8 of 20 outcomes change"),
-        (Finding("a", 2, 200, 0.9), 1, "a: 2 of 200 outcomes change, which may be numerical (of "
-         "100 run again more exactly 1 do); leaving it out would save 10 %"),
+        (Finding("a", 2, 200, 0.9), 1, "a: 2 of 200 outcomes change, which may be numerical "
+         "error (1 of 100 change when run again more accurately); leaving it out would save 10 %"),
         (Finding("a", why="it must"), 0, "a: stays, it must"),
     ],
 )  # fmt: skip

@@ -80,7 +80,7 @@ def test_a_mixture_is_told_in_one_line():
     [line] = mixture_warnings("r.h5", [OTHER], [HERE])
     assert line == (
         "r.h5 has rows of another kind of CPU, znver2, and this is znver4 (avx512f; numpy with "
-        "X86_V4): rows of both kinds will stand in one file, and may differ in their last digits"
+        "X86_V4): the file will have rows of both kinds, which may differ in their last digits"
     )
     [line] = mixture_warnings("r.h5", [], [HERE, OTHER])
     assert line.startswith("the ranks run on different kinds of CPU, znver4 (avx512f; numpy")
@@ -130,7 +130,7 @@ def test_a_journal_resumed_on_another_kind_says_so_and_records_both(tmp_path, mo
     assert session["cpus"] == [HERE]
     assert run_on(tmp_path, monkeypatch, OTHER, replicates=6).computed == 1
     [line] = problems(capsys.readouterr().err)
-    assert "and this is znver2: rows of both kinds will stand in one file" in line
+    assert "and this is znver2: the file will have rows of both kinds" in line
     results = read_results(tmp_path / "r.h5")
     assert json.loads(results.run["cpus"]) == [HERE, OTHER]
     assert (results.replicates["angle_i"][..., :5] == whole.replicates["angle_i"]).all()

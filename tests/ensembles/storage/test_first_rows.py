@@ -70,9 +70,9 @@ def test_a_rank_whose_first_row_differs_is_named(tmp_path):
     assert difference(study, [rows, rows], "aa", {}) == difference(study, [rows], "a", rows) == ""
     line = difference(study, [rows, rows, other], "aaa", {})
     assert line.startswith(
-        "replicate 0 of type I, N = 1, delta 0 comes out otherwise on rank 2 tha"
+        "replicate 0 of type I, N = 1, delta 0 differs between rank 2 and rank 0"
     )
-    assert "otherwise here than it is in the file" in difference(study, [rows], "a", other)
+    assert "differently here from the file" in difference(study, [rows], "a", other)
     assert "rank 1 rounds sin, exp" in difference(study, [rows, rows], "ab", {})
 
 

@@ -92,7 +92,7 @@ def test_a_description_that_is_none_is_damage(reader, tmp_path, kind, words):
 )  # fmt: skip
 def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
     (kind, description, data), *chunks = reader.parts
-    with pytest.raises(FileError, match="begun by no flocsim"):
+    with pytest.raises(FileError, match="not begun by flocsim"):
         taken(reader, tmp_path, [(kind, description | change, data), *chunks])
 
 

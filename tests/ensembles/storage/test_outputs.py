@@ -37,7 +37,7 @@ def results_in(folder):
 @pytest.mark.parametrize("mode", [NEW, RESTART])
 def test_finished_results_are_in_the_way(finished, mode, seed):
     before = results_in(finished)
-    said = r"r\.h5 exists already.*--resume.*--overwrite"
+    said = r"r\.h5 already exists.*--resume.*--overwrite"
     with pytest.raises(SharedError, match=said) as caught:
         go(finished, mode, seed=seed)
     assert isinstance(caught.value.args[0], UsageError)
@@ -50,7 +50,7 @@ def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished, m
     (finished / "other" / "r.h5.journal").rename(finished / "r.h5.journal")
     before = results_in(finished)
     assert len(before["r.h5.journal"]) > 1000
-    with pytest.raises(SharedError, match="exists already"):
+    with pytest.raises(SharedError, match="already exists"):
         go(finished, RESTART)
     assert results_in(finished) == before
 
@@ -82,7 +82,7 @@ def test_an_unfinished_run_does_not_replace_results_of_another_study(tmp_path, m
     (tmp_path / "r.h5").unlink()
     stop_at_the_end(monkeypatch, tmp_path)
     (tmp_path / "r.h5").write_bytes(other)
-    with pytest.raises(SharedError, match=r"is of another study.*--overwrite"):
+    with pytest.raises(SharedError, match=r"belongs to another study.*--overwrite"):
         go(tmp_path, RESUME)
     assert (tmp_path / "r.h5").read_bytes() == other
     assert go(tmp_path, RESUME, overwrite=True).computed == 0
@@ -115,7 +115,7 @@ def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
         return original(path, *more)
 
     monkeypatch.setattr(pairs, "new_row_file", appear)
-    with pytest.raises(SharedError, match=r"r\.h5 .*(exists already|is there by now)"):
+    with pytest.raises(SharedError, match=r"r\.h5 .*(already exists|has meanwhile been written)"):
         go(tmp_path, mode, replicates=5)
     assert (tmp_path / "r.h5").read_bytes() == b"of another program"
     monkeypatch.undo()

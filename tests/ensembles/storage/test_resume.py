@@ -119,7 +119,7 @@ def test_another_study_is_refused(request, tmp_path, whole, change, said, finish
     if finished:
         (folder / "r.h5").write_bytes(whole.read_bytes())
     before = {path: path.read_bytes() for path in folder.glob("r.h5*")}
-    with pytest.raises(SharedError, match="is of another study") as caught:
+    with pytest.raises(SharedError, match="belongs to another study") as caught:
         go_on(folder, overrides=change)
     assert isinstance(caught.value.args[0], UsageError)
     assert said in str(caught.value)
@@ -134,7 +134,7 @@ def test_other_physics_are_refused(stopped, monkeypatch):
 
 def test_another_kind_of_processor_is_refused_and_said(stopped, monkeypatch):
     monkeypatch.setattr(identity, "arithmetic_digest", lambda: "other")
-    with pytest.raises(SharedError, match="rounds sin, exp and the like otherwise"):
+    with pytest.raises(SharedError, match="rounds sin, exp and similar functions differently"):
         go_on(stopped)
 
 
@@ -209,7 +209,7 @@ def test_chunks_without_a_session_to_vouch_for_them_are_run_again(stopped, whole
 
 def test_what_is_no_journal_is_not_written_over(tmp_path):
     (tmp_path / "r.h5.journal").write_text("Dear diary,\n")
-    with pytest.raises(SharedError, match="is no journal of flocsim") as caught:
+    with pytest.raises(SharedError, match="is not a journal of flocsim") as caught:
         go_on(tmp_path)
     assert isinstance(caught.value.args[0], FileError)
     assert (tmp_path / "r.h5.journal").read_text() == "Dear diary,\n"

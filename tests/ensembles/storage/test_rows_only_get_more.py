@@ -123,7 +123,7 @@ def test_a_journal_with_more_than_is_asked_for_stays(
     before = rows_in(stopped / "r.h5.journal")
     ended = go_on(stopped, **fewer)
     assert ended.code == 0
-    assert "r.h5.journal has rows beyond what was asked for, and stays" in capsys.readouterr().err
+    assert "r.h5.journal has more rows than were asked for, and is kept" in capsys.readouterr().err
     assert rows_in(stopped / "r.h5.journal") == before + ended.computed
     alone = tmp_path_factory.mktemp("alone")
     go_on(alone, NEW, **fewer)
@@ -171,7 +171,7 @@ def test_a_journal_beside_results_of_another_study_replaces_them_not(stopped, wh
     go_on(stopped.parent / stopped.name, RESTART, seed=9)
     others = (stopped / "r.h5").read_bytes()
     (stopped / "r.h5.journal.1").rename(stopped / "r.h5.journal")
-    with pytest.raises(SharedError, match=r"r.h5 is of another study: seed is 9"):
+    with pytest.raises(SharedError, match=r"r.h5 belongs to another study: seed is 9"):
         go_on(stopped)
     assert (stopped / "r.h5").read_bytes() == others
     assert rows_in(stopped / "r.h5.journal") == 50
@@ -316,7 +316,7 @@ def test_a_job_that_waited_for_another_looks_at_its_results_anew(
         if mode == RESUME:
             assert go_on(finished, mode).computed == 0
         else:
-            with pytest.raises(SharedError, match="exists already and is left as it is") as caught:
+            with pytest.raises(SharedError, match="already exists and is left as it is") as caught:
                 go_on(finished, mode)
             assert caught.value.args[0].exit_code == 2
     finally:
@@ -359,4 +359,4 @@ def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(locked_file, "lock", lambda *words: None)
     assert go_on(tmp_path, NEW).code == 0
     [line] = problems(capsys.readouterr().err)
-    assert "has no locks: see that no two jobs write there" in line
+    assert "has no locks: make sure that no two jobs write there" in line

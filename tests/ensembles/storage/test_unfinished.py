@@ -86,7 +86,7 @@ def test_a_journal_that_does_not_say_what_was_asked_tells_what_it_has(tmp_path):
 
 def test_what_has_no_replicate_yet_is_said_in_one_line(tmp_path):
     Journal(tmp_path / "r.h5.journal").file.close()
-    with pytest.raises(FileError, match="has just begun"):
+    with pytest.raises(FileError, match="has only just begun"):
         read_unfinished(tmp_path / "r.h5.journal")
 
 
@@ -102,9 +102,9 @@ def test_finished_results_are_read_themselves(tmp_path):
     [
         (
             {"types": ["I", *map(str, range(300))], "delta": [*range(300)]},
-            "is of 180600 conditions",
+            "has 180600 conditions",
         ),
-        ({"types": ["I"] * 300}, "conditions that are the same"),
+        ({"types": ["I"] * 300}, "the same condition twice"),
     ],
 )
 def test_a_journal_of_too_many_conditions_is_refused_at_once(tmp_path, asked, said):

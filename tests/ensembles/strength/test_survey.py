@@ -114,7 +114,7 @@ def test_what_is_found_is_told_and_failures_are_noted(fake, monkeypatch):
         module, "Doublet", lambda *words: SimpleNamespace(opening=lambda *_: failed)
     )
     row, note = study.run_task((0, 1, 0.0), 0, lambda: False)
-    assert note["why"] == in_words(failed) == "a run failed behind 4 1/s (3 runs)"
+    assert note["why"] == in_words(failed) == "a run failed above 4 1/s (3 runs)"
     assert note["replicate"] == 0
 
 
@@ -133,7 +133,7 @@ def test_bad_input_is_refused(fake, given, words):
     with pytest.raises(UsageError, match=words):
         survey(fake, **given)
     fake.replicates["outcome"][:] = 4
-    with pytest.raises(UsageError, match="holds no bound doublet"):
+    with pytest.raises(UsageError, match="has no bound doublet"):
         survey(fake)
 
 
@@ -249,7 +249,7 @@ def test_a_damaged_or_strange_file_is_refused(tmp_path):
     wrong = mixed()
     wrong.doublets.columns["type"].values[0] = 7
     write_strengths(tmp_path / "t.h5", wrong)
-    with pytest.raises(FileError, match="no type of the file"):
+    with pytest.raises(FileError, match="a type that the file does not have"):
         read_strengths(tmp_path / "t.h5")
 
 
@@ -287,13 +287,13 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()
     assert command("--flow", "extension") == 2
-    assert not fake.asked and "exists already" in capsys.readouterr().err
+    assert not fake.asked and "already exists" in capsys.readouterr().err
     assert (tmp_path / "study-strength.h5").read_bytes() == before
     assert command("--flow", "extension", "--overwrite", "--quiet") == 0
     assert (tmp_path / "study-strength.1.h5").read_bytes() == before
     assert read_strengths("study-strength.h5").about["flow"] == "extension"
     assert command("-o", "study.h5", "--overwrite") == 2
-    assert "which is read" in capsys.readouterr().err
+    assert "which is an input" in capsys.readouterr().err
     assert command("--jobs", "0") == 2
 
 

@@ -55,7 +55,7 @@ def test_the_command_prints_a_table_writes_a_figure_and_goes_on(
     ("words", "said"),
     [
         (["--elasticities", "forces.contact.nothing"], "forces.contact.nothing"),
-        (["--elasticities", "scene.receiver"], "it is 'free'"),
+        (["--elasticities", "scene.receiver"], "its value is 'free'"),
         (["--elasticities", "seed"], "cannot be swept"),
         (["--elasticities", "forces.contact.k_n", "--ratio", "1"], "must be above 1"),
         (["--elasticities", "forces.contact.k_n", "--over", "seed=1,2"], "needs one of"),

@@ -72,7 +72,7 @@ def test_with_takes_dotted_nested_and_named_keys_and_leaves_the_first_alone(tmp_
         ({"forces.contact.kn": 1.0}, r"unknown key \(did you mean 'k_n'\?\)"),
         ({"forces.van_der_waals.hamaker": "5 kg"}, "hamaker must be"),
         ({"sed": 1}, "did you mean 'seed'"),
-        ({"a..b": 1}, "keys are words with dots"),
+        ({"a..b": 1}, "keys are words separated by dots"),
     ],
 )
 def test_what_is_wrong_is_told_as_of_a_file(tmp_path, changes, text):
@@ -103,9 +103,9 @@ def test_a_file_in_the_way_is_left_alone(finished):
     folder = finished.folder
     study = flocsim.Study(folder / "small.toml").with_({"shapes.vertices": [1]})
     before = (folder / "small.h5").read_bytes()
-    with pytest.raises(UsageError, match=r'exists already.*mode="resume".*overwrite=True'):
+    with pytest.raises(UsageError, match=r'already exists.*mode="resume".*overwrite=True'):
         study.run(output=folder / "small.h5")
-    with pytest.raises(UsageError, match="is read"):
+    with pytest.raises(UsageError, match="is an input"):
         study.run(output=study.path)
     assert (folder / "small.h5").read_bytes() == before
     again = study.run(output=folder / "small.h5", mode="resume")
@@ -232,4 +232,4 @@ def test_what_is_no_study_is_done_by_one_rank(tmp_path):
     assert done.returncode == 0, done.stderr
     alone = run_command(tmp_path, *words, module="flocsim")
     assert done.stdout == alone.stdout
-    assert done.stderr.count("runs on one rank; the others") == 1
+    assert done.stderr.count("runs on one rank only, and the other") == 1

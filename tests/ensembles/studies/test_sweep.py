@@ -59,11 +59,11 @@ def test_the_joined_file_has_the_key_as_a_dimension(swept):
 def test_files_in_the_way_are_left_alone(swept, tmp_path, capsys):
     study, path = swept
     before = path.read_bytes()
-    with pytest.raises(UsageError, match=r'exists already .* say mode="resume"'):
+    with pytest.raises(UsageError, match=r'already exists .* give mode="resume"'):
         flocsim.sweep(study, {HAMAKER: [1e-18]}, path)
     words = ["sweep", str(study.path), "--over", f"{HAMAKER}=1e-18", "-o", str(path)]
     assert main(words) == 2
-    assert "extend it by --resume" in capsys.readouterr().err
+    assert "extend it with --resume" in capsys.readouterr().err
     other = tmp_path / "other.h5"
     other.write_bytes(b"mine")
     with pytest.raises(FileError, match="is not an HDF5 file"):
@@ -102,7 +102,7 @@ def test_a_grid_has_an_axis_for_each_key(tmp_path):
         ({"seed": [1, 2]}, "cannot be swept"),
         ({"output.file": ["a"]}, "cannot be swept"),
         ({HAMAKER: ["5 kg"]}, "hamaker must be"),
-        ({HAMAKER: [1e-20, "1e-20 J"]}, "one value twice"),
+        ({HAMAKER: [1e-20, "1e-20 J"]}, "same value twice"),
     ],
 )
 def test_what_cannot_be_swept_is_told(tmp_path, over, text):

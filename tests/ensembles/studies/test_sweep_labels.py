@@ -90,7 +90,7 @@ def test_an_edit_ends_the_sweep_before_its_next_part(edits, edit, ratios, at):
     output, over = folder / "x.h5", {HAMAKER: [1e-20, 1e-19]}
     if at < 2:
         done[at] = lambda: edit(folder)
-        with pytest.raises(UsageError, match=rf"000{at}.h5 is another study than when") as caught:
+        with pytest.raises(UsageError, match=rf"000{at}.h5 is no longer the study that") as caught:
             flocsim.sweep(study, over, output)
         assert "\n" not in str(caught.value) and not output.exists()
         # Neither what is edited goes on with the sweep, nor what is made anew of it.

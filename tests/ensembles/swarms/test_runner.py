@@ -255,7 +255,7 @@ def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
     fewer = ["swarm", "swarm.toml", "--resume", "--replicates", "1", "--quiet"]
     assert main(fewer) == 0
     said = capsys.readouterr().err.splitlines()
-    assert len(said) == 2 and "exists already" in said[0]
+    assert len(said) == 2 and "already exists" in said[0]
     assert "seed is 4 in the file, 9 now" in said[1]
     assert main(["swarm", "swarm.toml", "--resume"]) == 0
     assert "2 replicates, 0 of them run" in capsys.readouterr().out
@@ -303,7 +303,7 @@ def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
     file = str(finished / "swarm.h5")
     assert main(["info", file]) == 0
     said = capsys.readouterr().out
-    assert "2 of 12 bodies, 2 came to their end" in said and "means over 2 swarms" in said
+    assert "2 of 12 bodies, 2 were completed" in said and "means over 2 swarms" in said
     assert main(["info", file, "--config"]) == 0
     assert 'kind = "swarm"' in capsys.readouterr().out
     assert main(["plot", file, "--animation", "s.gif"]) == 0

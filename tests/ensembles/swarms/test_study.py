@@ -148,5 +148,5 @@ def test_bodies_begin_at_the_flow_of_their_places(tmp_path):
 )  # fmt: skip
 def test_flows_that_do_not_repeat_themselves_say_the_way_out(tmp_path, periodic, gradient, axis):
     changes = {"scene": {"periodic": periodic}, "fluid": {"gradient": gradient}}
-    with pytest.raises(UsageError, match=f"changes along {axis}.*shear flow u_x = g y"):
+    with pytest.raises(UsageError, match=f"varies along {axis}.*shear flow u_x = g y"):
         study(tmp_path, changes).swarm(0)

@@ -88,7 +88,7 @@ def fill(file, name):
 
 INSTEAD = {
     "external": (external, "values in another file"),
-    "virtual": (virtual, "in pieces, packed|another dataset|flocsim does not write"),
+    "virtual": (virtual, "chunked, compressed|another dataset|flocsim does not write"),
     "packed": (bomb, "filters or compression"),
     "filled": (fill, "flocsim does not write|value of its own|bytes of values"),
     "soft link": (lambda f, n: f.__setitem__(n, h5py.SoftLink("/run")), "link"),
@@ -96,7 +96,7 @@ INSTEAD = {
     "hard link": (lambda f, n: f.__setitem__(n, f[n.partition("/")[0]]), None),
     "group": (lambda f, n: f.create_group(n), "unknown group"),
     "empty": (lambda f, n: f.__setitem__(n, h5py.Empty("f8")), "shape that flocsim"),
-    "may grow": (lambda f, n: f.create_dataset(n, (3,), "f8", maxshape=(9,)), "may grow|pieces"),
+    "resizable": (lambda f, n: f.create_dataset(n, (3,), "f8", maxshape=(9,)), "resizable|chunked"),
     "float32": (lambda f, n: f.__setitem__(n, np.zeros(3, "f4")), "a type that flocsim"),
     "big-endian": (lambda f, n: f.__setitem__(n, np.zeros(3, ">f8")), "a type that flocsim"),
     "complex": (lambda f, n: f.__setitem__(n, np.zeros(3, "c16")), "a type that flocsim"),
@@ -185,7 +185,7 @@ def test_the_newest_format_is_refused_not_followed(tmp_path):
     with h5py.File(image, "w", libver="latest") as file:
         file.attrs["format"] = "flocsim results"
     (tmp_path / "r.h5").write_bytes(seal(image.getvalue()))
-    refused(tmp_path / "r.h5", "another one than h5py writes")
+    refused(tmp_path / "r.h5", "not the one that h5py writes")
 
 
 def put(name, place, value):

@@ -78,11 +78,11 @@ def head(shape, descr="'|u1'"):
     [
         (head("(100000, 100000)"), "more than the"),
         (head("(9223372036854775807, 2)"), "more than the"),
-        (head("(1000, 1000)"), "promises 1000000 bytes"),
+        (head("(1000, 1000)"), "claims 1000000 bytes"),
         (head("(-1, 5)"), "not numbers"),
         (head("(2, 2)", "'|O'") + bytes(32), "not numbers"),
         (head("(" * 400), "cannot be read"),
-        (head("(2, 2)") + b"\0", "promises|cut short"),
+        (head("(2, 2)") + b"\0", "claims|truncated"),
         (b"", "cannot be read"),
         (b"\x93NUMPY\x09\0", "unknown"),
     ],
@@ -105,7 +105,7 @@ def npy(array):
 def test_names_that_no_array_has_are_refused(tmp_path, name):
     with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
         archive.writestr(name, npy(SQUARE))
-    refused(tmp_path / "m.npz", "name that none has|would be")
+    refused(tmp_path / "m.npz", "with an impossible name|would be")
 
 
 def test_an_archive_is_read_where_it_lies(tmp_path):
@@ -121,7 +121,7 @@ def test_two_arrays_of_one_name_are_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "m.npz", "w") as archive:
         for name in ("a", "a.npy"):
             archive.writestr(name, npy(SQUARE))
-    refused(tmp_path / "m.npz", "two arrays of one name")
+    refused(tmp_path / "m.npz", "two arrays of the same name")
 
 
 def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path, monkeypatch):
@@ -129,7 +129,7 @@ def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path, monkeypatch):
     with zipfile.ZipFile(tmp_path / "m.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for name in "abc":
             archive.writestr(name, npy(np.zeros((600, 600), "u1")))
-    refused(tmp_path / "m.npz", "unpacked")
+    refused(tmp_path / "m.npz", "after decompression")
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_a_tiff_that_unpacks_to_more_than_its_pixels_is_refused(tmp_path):
     struct.pack_into("<I", changed, places[1], len(data))
     struct.pack_into("<I" if counts.dtype == 4 else "<H", changed, places[0], len(bomb))
     path.write_bytes(changed)
-    refused(path, "unpacks to more", read_grey)
+    refused(path, "decompresses to more", read_grey)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")

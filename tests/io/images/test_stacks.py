@@ -32,9 +32,9 @@ def test_every_page_is_that_of_the_file(tmp_path, count, kind):
         with pytest.warns() if kind != "grey" and count in (3, 4) else nothing():
             more = {"photometric": "minisblack"} if kind == "grey" else {}
             tifffile.imwrite(path, data, **more)
-    with pytest.raises(ImageError, match=f"holds {count} pages; choose by --page 1, "):
+    with pytest.raises(ImageError, match=f"holds {count} pages; choose with --page 1, "):
         chosen(path)
-    with pytest.raises(ImageError, match=f"holds {count} pictures; choose by --page"):
+    with pytest.raises(ImageError, match=f"holds {count} pictures; choose with --page"):
         read_pixels(path)
     found = chosen(path, "all")
     assert [name for name, _ in found] == [f":{k + 1}" for k in range(count)]
@@ -59,7 +59,7 @@ def test_channels_are_told_from_pages(tmp_path, kind):
     path = tmp_path / ("s.ome.tif" if kind == "ome" else "s.tif")
     about = {"axes": "TCYX"} | ({"Channel": {"Name": ["DAPI", "b", "c"]}} if kind == "ome" else {})
     tifffile.imwrite(path, data, imagej=kind == "imagej", metadata=about)
-    with pytest.raises(ImageError, match=r"has 3 channels.*choose by --channel 1"):
+    with pytest.raises(ImageError, match=r"has 3 channels.*choose with --channel 1"):
         chosen(path, "all")
     for channel in (1, 2, 3):
         for (_, plane), page in zip(chosen(path, "all", str(channel)), data, strict=True):

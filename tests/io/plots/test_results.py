@@ -234,7 +234,16 @@ def test_sizes_are_a_numeric_axis():
     np.testing.assert_allclose(lines[1], [[10.0, 0.8], [20.0, 0.6]])
 
 
-@pytest.mark.parametrize(("change", "said"), [("pooled", "not yet pooled"), ("radii", "not known")])
+def test_a_single_size_is_on_its_axis_beside_a_tick():
+    made = pooled_sizes()
+    radii = made.radii | {"r_j": np.full(4, 23.02e-6)}
+    low, high = against_size(attrs.evolve(made, radii=radii)).axes[0].get_xlim()
+    assert low < 20.0 < 23.02 < high
+
+
+@pytest.mark.parametrize(
+    ("change", "said"), [("pooled", "not yet pooled"), ("radii", "sizes unknown")]
+)
 def test_without_sizes_or_pooled_numbers_the_figure_says_so(change, said):
     made = pooled_sizes()
     unknown = {"pooled": {}, "radii": make_results(made.types, vertices=(1, 8)).radii}[change]

@@ -48,7 +48,7 @@ def test_parts_that_cannot_be_are_refused(tmp_path):
     results = compound_results()
     results.groups["bodies"]["point_ring"][1, 5] = 7
     write_swarm(tmp_path / "s.h5", results)
-    with pytest.raises(FileError, match="holds no readable results"):
+    with pytest.raises(FileError, match="has no readable results"):
         read_swarm(tmp_path / "s.h5")
 
 
@@ -57,7 +57,7 @@ def test_bonds_of_bodies_that_are_not_there_are_refused(tmp_path):
         results = make_swarm_results()
         results.groups["bonds"][name] = np.array([0, 9], "i4")
         write_swarm(tmp_path / f"{name}.h5", results)
-        with pytest.raises(FileError, match=f"bonds/{name} holds what cannot be"):
+        with pytest.raises(FileError, match=f"bonds/{name} has impossible values"):
             read_swarm(tmp_path / f"{name}.h5")
 
 

@@ -107,9 +107,11 @@ def test_a_small_sphere_of_the_same_density_is_caught_from_half_its_area():
 
 
 def test_what_has_no_factor_is_refused():
-    with pytest.raises(UsageError, match="hill has no curvilinear factor for extension: choose of"):
+    with pytest.raises(
+        UsageError, match="hill has no curvilinear factor for extension: choose one of"
+    ):
         curvilinear_factor("hill", "extension", 1e-6, 1e-6)
-    with pytest.raises(UsageError, match="are those of hill, burd, found han_lawler"):
+    with pytest.raises(UsageError, match="must be one of hill, burd, found han_lawler"):
         curvilinear_factor("han_lawler", "shear", 1e-6, 1e-6)
     for wrong in (0.0, -1e-6, np.nan, np.inf):
         with pytest.raises(UsageError, match="must be above 0 and finite"):

@@ -211,7 +211,7 @@ def test_foreign_hdf5_is_refused(tmp_path):
     path = tmp_path / "foreign.h5"
     with h5py.File(path, "w") as file:
         file["x"] = 1.0
-    with pytest.raises(FileError, match="another kind"):
+    with pytest.raises(FileError, match="not from flocsim"):
         read_results(path)
     path.write_bytes(files.seal(path.read_bytes()))
     with pytest.raises(FileError, match="not a results file"):

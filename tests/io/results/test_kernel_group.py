@@ -88,7 +88,7 @@ def test_a_factor_multiplies_efficiencies_alone():
     kernel = some_kernel()
     with pytest.raises(UsageError, match="multiplies the kernels of spheres, not alpha"):
         kernel_matrix(kernel, "shear", 32, "alpha", curvilinear="hill")
-    with pytest.raises(UsageError, match="are those of hill, burd"):
+    with pytest.raises(UsageError, match="must be one of hill, burd"):
         kernel_matrix(kernel, "shear", 32, curvilinear="nobody")
 
 

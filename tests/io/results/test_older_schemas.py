@@ -112,7 +112,7 @@ def test_commands_read_it(stored, version, monkeypatch, capsys):
     assert "Traceback" not in said.err
     opened = flocsim.open(name)
     assert opened.types == ("I", "III") and "Pr[inside]" in opened.table()
-    with pytest.raises(UsageError, match="cannot be run again as it was: "):
+    with pytest.raises(UsageError, match="cannot be reproduced: "):
         opened.replicate(0)
 
 
@@ -132,7 +132,11 @@ def test_it_is_not_extended_and_one_line_says_what_differs(stored, version, caps
     Path("study.toml").write_text(str(flocsim.open(path).run["config"]), "utf-8")
     assert main(["ensemble", "study.toml", "-o", path.name, "--resume", "--quiet"]) == 2
     [line] = [each for each in capsys.readouterr().err.splitlines() if "warning: " not in each]
-    said = "of another study: " if version == SCHEMA_VERSION else f"of schema version {version}: "
+    said = (
+        "belongs to another study: "
+        if version == SCHEMA_VERSION
+        else f"of schema version {version}: "
+    )
     assert re.search(said, line), line
     assert path.read_bytes() == before and not Path(f"{path.name}.journal").exists()
 
@@ -170,5 +174,5 @@ def test_no_file_says_itself_that_it_was_older(tmp_path):
     with h5py.File(image, "r+") as file:
         file.attrs[older.WRITTEN_AS] = 2
     (tmp_path / "r.h5").write_bytes(seal(image.read_bytes()))
-    with pytest.raises(FileError, match="which no file has"):
+    with pytest.raises(FileError, match="which no file of flocsim has"):
         read_results(tmp_path / "r.h5")

@@ -38,7 +38,7 @@ def test_a_config_names_it_by_one_word(tmp_path):
     text = SMALL.replace("pool = 2", 'source = "library"\nfile = "synthetic"')
     config = load_text(tmp_path, text)
     assert len(load_flocs(config.shapes, 1)) == FLOCS
-    with pytest.raises(ConfigError, match='or "synthetic", the one that ships with flocsim'):
+    with pytest.raises(ConfigError, match='or "synthetic", the one included in flocsim'):
         load_text(tmp_path, text.replace('"synthetic"', '"other.h5"'))
 
 
