@@ -1,14 +1,14 @@
 """Drag: of Stokes, and of Schiller and Naumann where the flow around a body is not slow."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import attrs
 
 from flocsim.body import Fluid
 from flocsim.errors import RangeError
 from flocsim.fields import choice, flag
-from flocsim.forces.base import BodyForce
+from flocsim.forces.base import BodyForce, Force
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
@@ -58,6 +58,31 @@ def resisted(body, c, s, vx, vy, spin):
     )
 
 
+def shielded_by(body, x, y):
+    """Q (x, y): what is left in a cluster of a motion, or of the force against it."""
+    xy = body.shielding_xy
+    return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
+
+
+def shielded_drag(body, x, y, viscosity, density, with_inertia):
+    """Force on the equivalent sphere in a cluster at the velocity (x, y) against the flow."""
+    x, y = shielded_by(body, x, y)
+    translation = 6.0 * math.pi * viscosity * body.radius
+    if with_inertia:
+        reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
+        translation *= inertial_factor(reynolds)
+    return shielded_by(body, -translation * x, -translation * y)
+
+
+def shielded_shape(body, x, y, spin, viscosity):
+    """The same on a shape that turns against the flow, too, and its torque."""
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    x, y = shielded_by(body, x, y)
+    x, y, turn = resisted(body, c, s, x, y, spin)
+    x, y = shielded_by(body, c * x - s * y, s * x + c * y)
+    return -viscosity * x, -viscosity * y, -viscosity * turn
+
+
 def resisted_in(body, flow):
     """(cosine and sine of its angle, the same of its motion in a flow)."""
     u, v, turning = flow_at(flow, body.x, body.y)
@@ -100,6 +125,11 @@ class StokesDrag(BodyForce):
     a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
     simple shear G; another shape is taken for the ellipse of its moments.
 
+    ``clusters``: bodies of a swarm that touch shield each other from the flow. Their drag R becomes
+    Q R Q, the same Q for all of a cluster, with which all of them together resist as much as the
+    cluster does (flocsim.swarms.together.shielding); torques stay those of each. Re is then that of
+    Q (v − u).
+
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
     an addition, without it nothing would stop a spin.
@@ -117,6 +147,12 @@ class StokesDrag(BodyForce):
 
     strain: bool = flag(
         default=False, help="a flow's strain turns long bodies, too: Jeffery's orbits"
+    )
+
+    clusters: bool = flag(
+        default=False,
+        help="in swarms: flocs that touch shield each other from the flow, so that a cluster "
+        "settles at its own speed",
     )
 
     def __attrs_post_init__(self) -> None:
@@ -139,6 +175,11 @@ class StokesDrag(BodyForce):
         """Still water needs no flow, and no derivative by the place; a flow without strain, none by
         the angle."""
         stokes = self.law == "stokes"
+        if self.clusters:
+            moves = any(fluid.flow)
+            if self.law == "shape":
+                return self.shape_in_cluster if moves else self.shape_in_cluster_still
+            return self.in_cluster if moves else self.in_cluster_still
         if self.law == "shape":
             if not any(fluid.flow):
                 return self.shape_still
@@ -149,14 +190,21 @@ class StokesDrag(BodyForce):
             return self.strained if stokes else self.inertial_strained
         return self.kernel if stokes else self.inertial
 
+    @property
+    def with_inertia(self) -> bool:
+        """Whether its force is more than Stokes's."""
+        return self.law == "schiller_naumann"
+
     def remarks(self, fluid: Fluid) -> list[str]:
-        """Whether the flow's strain turns bodies."""
+        """Whether it follows shapes, the flow's strain and clusters."""
+        clusters = ["less in clusters of a swarm"] * self.clusters
         if self.law == "shape":
-            return ["of each body's own outline"]
+            return ["of each body's own outline", *clusters]
         if not self.strain:
-            return []
+            return clusters
         strained = any(strain_of(fluid.flow))
-        return ["long bodies turned by strain" if strained else "no strain in this flow: left out"]
+        words = "long bodies turned by strain" if strained else "no strain in this flow: left out"
+        return [words, *clusters]
 
     @staticmethod
     def kernel(body, viscosity, flow, rotational):
@@ -233,3 +281,40 @@ class StokesDrag(BodyForce):
         translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         return -translation * body.vx, -translation * body.vy, -rotation * body.spin
+
+    @staticmethod
+    def in_cluster_still(body, viscosity, density, rotational, with_inertia):
+        """Force and torque on the equivalent sphere in a cluster, in still water."""
+        fx, fy = shielded_drag(body, body.vx, body.vy, viscosity, density, with_inertia)
+        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+        return fx, fy, -rotation * body.spin
+
+    @staticmethod
+    def in_cluster(body, viscosity, density, flow, rotational, with_inertia, strain):
+        """The same in the flow, whose strain may turn the body."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        fx, fy = shielded_drag(body, body.vx - u, body.vy - v, viscosity, density, with_inertia)
+        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+        spin = body.spin - turning - strain * strained_spin(body, flow)
+        return fx, fy, -rotation * spin
+
+    @staticmethod
+    def shape_in_cluster_still(body, viscosity):
+        """Force and torque on the shape in a cluster, in still water."""
+        return shielded_shape(body, body.vx, body.vy, body.spin, viscosity)
+
+    @staticmethod
+    def shape_in_cluster(body, viscosity, flow):
+        """The same in the flow."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        x, y, spin = body.vx - u, body.vy - v, body.spin - turning
+        fx, fy, torque = shielded_shape(body, x, y, spin, viscosity)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = strained_load(body, c, s, flow)
+        x, y = shielded_by(body, c * x - s * y, s * x + c * y)
+        return fx + viscosity * x, fy + viscosity * y, torque + viscosity * turn
+
+
+def shields_clusters(forces: Iterable[Force]) -> bool:
+    """Whether a drag among the forces is less in clusters."""
+    return any(isinstance(force, StokesDrag) and force.clusters for force in forces)

@@ -1,11 +1,14 @@
 """Clusters of a swarm: which bodies hang together, how large, open and fast such clusters are."""
 
+import functools
 import math
+from collections.abc import Callable
 
 import attrs
 import numpy as np
 
 from flocsim.body import Body
+from flocsim.compiler.composer import compose
 from flocsim.swarms.together.contacts import Neighbours
 
 ROUNDING = 1e-6
@@ -13,28 +16,61 @@ ROUNDING = 1e-6
 others by a whole box."""
 
 
+def walk_together(pairs, vectors, first, other, way, labels, places, queue):
+    """``labels`` (n,) of clusters in the order of their first bodies, and ``places`` (n, 2) as seen
+    from those along contacts from ``pairs[k, 1]`` to ``pairs[k, 0]``; the rest is scratch."""
+    for body in range(first.shape[0]):
+        first[body] = 0
+    for pair in range(pairs.shape[0]):
+        first[pairs[pair, 0] + 1] += 1
+        first[pairs[pair, 1] + 1] += 1
+    for body in range(labels.shape[0]):
+        first[body + 1] += first[body]
+        queue[body] = first[body]
+        labels[body] = -1
+    for pair in range(pairs.shape[0]):
+        for end in range(2):
+            body, sign = pairs[pair, end], 1.0 if end == 1 else -1.0
+            row = queue[body]
+            other[row] = pairs[pair, 1 - end]
+            way[row, 0], way[row, 1] = sign * vectors[pair, 0], sign * vectors[pair, 1]
+            queue[body] += 1
+    clusters = 0
+    for start in range(labels.shape[0]):
+        if labels[start] >= 0:
+            continue
+        labels[start], queue[0], done, known = clusters, start, 0, 1
+        while done < known:
+            body = queue[done]
+            done += 1
+            for row in range(first[body], first[body + 1]):
+                next_ = other[row]
+                if labels[next_] < 0:
+                    labels[next_] = clusters
+                    places[next_, 0] = places[body, 0] + way[row, 0]
+                    places[next_, 1] = places[body, 1] + way[row, 1]
+                    queue[known] = next_
+                    known += 1
+        clusters += 1
+
+
+@functools.cache
+def walk() -> Callable:
+    """The compiled function."""
+    return compose(walk_together, {}, what="the search for clusters")
+
+
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
     """(label of every body's cluster (n,), the body's place (n, 2) [m] as seen from the cluster's
     first one, along the contacts): clusters are whole across the seams of a box, but for those that
     percolate."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    later, earlier = neighbours.pairs.T
-    graph = coo_array((np.ones(len(later)), (later, earlier)), shape=(count, count)).tocsr()
-    _, labels = connected_components(graph, directed=False)
-    apart = {}
-    for (a, b), vector in zip(neighbours.pairs.tolist(), neighbours.vector, strict=True):
-        apart[a, b], apart[b, a] = vector, -vector
-    both = (graph + graph.T).tocsr()
-    places = np.zeros((count, 2))
-    _, firsts = np.unique(labels, return_index=True)
-    for first in firsts:
-        if both.indptr[first] == both.indptr[first + 1]:
-            continue
-        order, before = breadth_first_order(both, first, directed=False)
-        for body in order[1:]:
-            places[body] = places[before[body]] + apart[body, before[body]]
+    ends = 2 * len(neighbours.pairs)
+    labels, places = np.zeros(count, dtype=np.int64), np.zeros((count, 2))
+    walk()(
+        neighbours.pairs, neighbours.vector, np.zeros(count + 1, dtype=np.int64),
+        np.zeros(ends, dtype=np.int64), np.zeros((ends, 2)), labels, places,
+        np.zeros(count, dtype=np.int64),
+    )  # fmt: skip
     return labels, places
 
 
