@@ -2,7 +2,7 @@
 
 two_spheres: the resistance functions of two unequal spheres, exactly; pair: what follows from them
 for motion in a plane; encounters: which of two spheres that meet touch; prism: the drag of a
-floc's outline; clusters: how rigid clusters of bodies move. May import errors.
+floc's outline; clusters: how rigid clusters of bodies move. May import compiler and errors.
 """
 
 from flocsim.hydrodynamics.encounters import Meeting, bend

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from flocsim.compiler.composer import compose
-from flocsim.hydrodynamics import SpherePair, prism
-from flocsim.hydrodynamics.clusters import LESS_ACROSS, LESS_ALONG, cluster_mobilities, push
+from flocsim.hydrodynamics import SpherePair, clusters, prism
+from flocsim.hydrodynamics.clusters import LESS_ACROSS, LESS_ALONG, mobilities, push
 
 RADIUS = 2.0e-6
 ALONE = 1.0 / (6.0 * np.pi)
@@ -25,10 +24,7 @@ def mobility(places, radii=None):
     n = len(places)
     radii = np.ones(n) if radii is None else np.array(radii, dtype=float)
     own = np.column_stack([ALONE / radii, 0.0 * radii, ALONE / radii])
-    found = np.zeros((1, 3))
-    x, y = np.ascontiguousarray(places.T)
-    kernel = compose(cluster_mobilities, {})
-    kernel(np.array([0, n]), x, y, radii, own, np.zeros((5, n)), found)
+    found = mobilities(np.zeros(n, dtype=int), places, radii, own)
     xx, xy, yy = found[0] / ALONE
     return np.array([[xx, xy], [xy, yy]])
 
@@ -114,6 +110,27 @@ def test_shares_make_the_least_of_the_sum(drawn):
             xx, xy, yy = (ALONE / a, 0.0, ALONE / a) if i == j else push(*(place - other), a, b)
             alike += shares[i] * shares[j] * np.array([[xx, xy], [xy, yy]]) / ALONE
     assert np.trace(mobility(places, radii)) < np.trace(alike)
+
+
+def test_cells_of_many_bodies_count_as_the_bodies_do(monkeypatch):
+    rng = np.random.default_rng(4)
+    turns = 0.5 * rng.normal(size=400).cumsum()
+    places = np.cumsum(2.0 * np.column_stack([np.cos(turns), np.sin(turns)]), axis=0)
+    radii = rng.uniform(0.7, 1.0, 400)
+    by_cells = mobility(places, radii)
+    monkeypatch.setattr(clusters, "FEW", 1000)
+    assert by_cells == pytest.approx(mobility(places, radii), rel=1e-2, abs=1e-3)
+
+
+def test_clusters_do_not_see_each_other(drawn):
+    places, radii = drawn
+    own = np.column_stack([ALONE / radii, 0.0 * radii, ALONE / radii])
+    label = np.arange(40) % 3
+    found = mobilities(label, places, radii, own)
+    for each in range(3):
+        chosen = label == each
+        alone = mobilities(label[chosen] * 0, places[chosen], radii[chosen], own[chosen])
+        assert found[each] == pytest.approx(alone[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("b", [1.0, 0.4])

@@ -12,18 +12,16 @@ drag changes with the next one, at once: velocities relax to it, which takes mic
 nothing else jumps.
 """
 
-import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 import flocsim.arrays as at
 from flocsim.body import Body
-from flocsim.compiler.composer import compose
 from flocsim.forces.base import Force
 from flocsim.forces.shape_drag import drag_radius, follows_shape
-from flocsim.hydrodynamics.clusters import cluster_mobilities
+from flocsim.hydrodynamics.clusters import mobilities
 from flocsim.swarms.together.clusters import placed_together
 from flocsim.swarms.together.contacts import Gauge, Neighbours
 
@@ -34,12 +32,6 @@ one, and a contact that opens for a moment changes no drag."""
 WAY = 0.5
 """Bodies go so many mean bounding radii against each other in a window at most: by that much later
 does the drag of those that meet change."""
-
-
-@functools.cache
-def mobilities() -> Callable:
-    """The compiled function."""
-    return compose(cluster_mobilities, {}, what="the drag of clusters")
 
 
 class Shielding:
@@ -67,16 +59,10 @@ class Shielding:
         members = np.flatnonzero((size[label] > 1) & free)
         if not len(members):
             return
-        members = members[np.argsort(label[members], kind="stable")]
-        _, starts, own_label = np.unique(label[members], return_index=True, return_inverse=True)
+        _, own_label = np.unique(label[members], return_inverse=True)
         resistance = self.resistances(known[members], position[members, 2], members)
-        found = np.zeros((len(starts), 3))
-        x, y = np.ascontiguousarray(places[members].T)
-        mobilities()(
-            np.append(starts, len(members)), x, y, self.radii[members], inverses(resistance),
-            np.zeros((5, len(members))), found,
-        )  # fmt: skip
-        together = np.add.reduceat(resistance, starts)
+        found = mobilities(own_label, places[members], self.radii[members], inverses(resistance))
+        together = np.column_stack([np.bincount(own_label, axis) for axis in resistance.T])
         shielding = between(together, inverses(found))
         known[members, at.SHIELDING : at.SHIELDING + 3] = shielding[own_label]
 
