@@ -10,6 +10,7 @@ less 1, in the mean of all directions and of the two main ones.
 """
 
 import argparse
+import itertools
 import math
 import statistics
 import time
@@ -177,11 +178,17 @@ def law():
 def cost(number, duration, repeats):
     """Print the time of a swarm of clusters with their drag over that without, from one start."""
     rng = np.random.default_rng(1)
-    bodies, first, sizes = [], 0.0, [1, 2, 4, 8, 16, 32, 64, 128]
-    while len(bodies) < number:
-        places = 0.99999 * R * cluster(sizes[len(bodies) % len(sizes)], rng)
+    bodies, first = [], 0.0
+    for size in itertools.cycle([1, 2, 4, 8, 16, 32, 64, 128]):
+        if len(bodies) >= number:
+            break
+        places = 0.99999 * R * cluster(size, rng)
         places -= places.min(axis=0) - [first, 0.0]
-        bodies += [Body(Sphere(R), tuple(place), density=1100.0) for place in places.tolist()]
+        # Unlike weights, so that clusters roll about with either drag.
+        bodies += [
+            Body(Sphere(R), tuple(place), density=rng.uniform(1050.0, 1150.0))
+            for place in places.tolist()
+        ]
         first = places[:, 0].max() + 6.0 * R
     columns = ("clusters", "CPU s", "windows", "steps of bodies", "largest", "CPU µs a step")
     table = Table(f"{len(bodies)} discs in clusters, {duration}", columns)
@@ -196,8 +203,9 @@ def cost(number, duration, repeats):
                 taken = time.process_time() - began
                 times[clusters].append(taken)
                 steps[clusters] = run.effort.body_steps
-                table.add(clusters, taken, run.effort.windows, steps[clusters],
-                          int(run.clusters().size.max()), 1e6 * taken / steps[clusters])  # fmt: skip
+                largest = int(run.clusters().size.max())
+                row = clusters, taken, run.effort.windows, steps[clusters], largest
+                table.add(*row, 1e6 * taken / steps[clusters])
     table.print()
     without, with_them = (statistics.median(times[each]) for each in (False, True))
     print(f"CPU time {with_them / without:.3f} times that without, "

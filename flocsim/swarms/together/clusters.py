@@ -178,19 +178,65 @@ class Clusters:
         return float(slope)
 
 
+DIRECTIONS = 256
+"""In which the furthest point of a cluster is sought, for its convex hull."""
+
+
+def support_areas(starts, first, points, radii, x, y, angle, furthest, areas):
+    """Areas [m²] of the convex hulls of clusters, of their furthest points in many directions.
+
+    Bodies of cluster c: ``starts[c]`` to before ``starts[c + 1]``; core points of a body, about its
+    centroid, and the ``radii`` of their disks: from ``first[i]`` on; ``furthest`` (DIRECTIONS, 5)
+    is scratch.
+    """
+    for k in range(furthest.shape[0]):
+        turn = 2.0 * math.pi * k / furthest.shape[0]
+        furthest[k, 3], furthest[k, 4] = math.cos(turn), math.sin(turn)
+    for c in range(starts.shape[0] - 1):
+        for k in range(furthest.shape[0]):
+            furthest[k, 2] = -math.inf
+        for i in range(starts[c], starts[c + 1]):
+            cosine, sine = math.cos(angle[i]), math.sin(angle[i])
+            for point in range(first[i], first[i + 1]):
+                px = x[i] + cosine * points[point, 0] - sine * points[point, 1]
+                py = y[i] + sine * points[point, 0] + cosine * points[point, 1]
+                for k in range(furthest.shape[0]):
+                    nx, ny = furthest[k, 3], furthest[k, 4]
+                    far = nx * px + ny * py + radii[point]
+                    if far > furthest[k, 2]:
+                        furthest[k, 0] = px + radii[point] * nx
+                        furthest[k, 1] = py + radii[point] * ny
+                        furthest[k, 2] = far
+        area = 0.0
+        last = furthest.shape[0] - 1
+        for k in range(furthest.shape[0]):
+            area += furthest[last, 0] * furthest[k, 1] - furthest[k, 0] * furthest[last, 1]
+            last = k
+        areas[c] = 0.5 * area
+
+
+@functools.cache
+def supports() -> Callable:
+    """The compiled function."""
+    return compose(support_areas, {}, what="the hulls of clusters")
+
+
 def hull_areas(
     bodies: list[Body], places: np.ndarray, angles: np.ndarray, label: np.ndarray, ends: np.ndarray
 ) -> np.ndarray:
-    """Areas [m²] of the convex hulls of clusters' outlines, whose arcs are drawn by 64 points; NaN
-    for those that have no ``ends`` (c,)."""
-    from scipy.spatial import ConvexHull
-
-    areas = np.full(len(ends), math.nan)
-    for cluster in np.flatnonzero(ends).tolist():
-        rings = []
-        for each in np.flatnonzero(label == cluster):
-            x, y = places[each].tolist()
-            rings += bodies[each].shape.outline(x, y, float(angles[each]))
-        # In micrometres: the hull's own rounding is far below them.
-        areas[cluster] = 1e-12 * ConvexHull(1e6 * np.concatenate(rings)).volume
-    return areas
+    """Areas [m²] of the convex hulls of clusters' core points swept by their disks; NaN for those
+    that have no ``ends`` (c,)."""
+    order = np.argsort(label, kind="stable")
+    shapes = [bodies[each].shape for each in order.tolist()]
+    rings = [ring for shape in shapes for part in shape.parts for ring in part.rings[:1]]
+    swept = [part.radius for shape in shapes for part in shape.parts]
+    sizes = np.array([len(ring) for ring in rings])
+    parts = np.cumsum([0, *(len(shape.parts) for shape in shapes)])
+    x, y = np.ascontiguousarray(places[order].T)
+    areas = np.zeros(len(ends))
+    supports()(
+        np.append(0, np.cumsum(np.bincount(label, minlength=len(ends)))),
+        np.append(0, np.cumsum(sizes))[parts], np.concatenate(rings),
+        np.repeat(np.array(swept), sizes), x, y, angles[order], np.zeros((DIRECTIONS, 5)), areas,
+    )  # fmt: skip
+    return np.where(ends, areas, math.nan)
