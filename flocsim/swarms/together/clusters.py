@@ -9,6 +9,7 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.compiler.composer import compose
+from flocsim.hydrodynamics.clusters import mobilities
 from flocsim.swarms.together.contacts import Neighbours
 
 ROUNDING = 1e-6
@@ -94,10 +95,12 @@ class Clusters:
     ``label`` (n,): the cluster of every body, −1 for fixed ones; of every cluster: ``size`` (c,)
     its bodies; ``mass`` [kg]; ``area`` [m²] of its bodies; ``gyration`` [m], the radius of gyration
     R_g = √(Σ (m ρ² + I)/Σ m) about its centre of mass, that of a body by itself included;
+    ``hydrodynamic`` [m], R_h of the sphere that is as hard to move in the mean of all directions of
+    the plane, of bodies that are spheres of r_eq (flocsim.hydrodynamics.clusters);
     ``velocity`` (c, 2) [m/s] of its centre of mass; ``porosity``, 1 − area/area of the convex hull
     of its bodies' core points swept by their disks (0 for one convex body); ``percolates`` (c,),
     whether it hangs together with its own images round a box that repeats itself. Such a cluster
-    has no end, so that ``gyration`` and ``porosity`` are NaN.
+    has no end, so that ``gyration``, ``hydrodynamic`` and ``porosity`` are NaN.
     """
 
     label: np.ndarray
@@ -105,6 +108,7 @@ class Clusters:
     mass: np.ndarray
     area: np.ndarray
     gyration: np.ndarray
+    hydrodynamic: np.ndarray
     velocity: np.ndarray
     porosity: np.ndarray
     percolates: np.ndarray
@@ -140,10 +144,11 @@ class Clusters:
         motion = np.column_stack([mean(velocity[free, axis]) for axis in range(2)])
         area = np.bincount(label, [body.shape.area for body in known], count)
         hulls = hull_areas(known, own, position[free, 2], label, ~percolates)
+        radius = hydrodynamic_radii(known, own, label, ~percolates)
         whole = np.full(len(bodies), -1)
         whole[free] = label
         return cls(
-            whole, np.bincount(label, minlength=count), total, area, gyration, motion,
+            whole, np.bincount(label, minlength=count), total, area, gyration, radius, motion,
             np.clip(1.0 - area / hulls, 0.0, 1.0), percolates,
         )  # fmt: skip
 
@@ -176,6 +181,23 @@ class Clusters:
             return math.nan
         slope, _ = np.polyfit(np.log(self.gyration[chosen]), np.log(self.mass[chosen]), 1)
         return float(slope)
+
+
+def hydrodynamic_radii(
+    bodies: list[Body], places: np.ndarray, label: np.ndarray, ends: np.ndarray
+) -> np.ndarray:
+    """R_h [m] of clusters of spheres of r_eq; NaN for those that have no ``ends`` (c,)."""
+    radii = np.array([body.shape.equivalent_radius for body in bodies])
+    found = np.where(ends, np.bincount(label, radii, len(ends)), math.nan)
+    several = ends & (np.bincount(label, minlength=len(ends)) > 1)
+    chosen = several[label]
+    if chosen.any():
+        _, number = np.unique(label[chosen], return_inverse=True)
+        alone = 1.0 / (6.0 * math.pi * radii[chosen])
+        own = np.column_stack([alone, 0.0 * alone, alone])
+        moved = mobilities(number, places[chosen], radii[chosen], own)
+        found[several] = 1.0 / (3.0 * math.pi * (moved[:, 0] + moved[:, 2]))
+    return found
 
 
 DIRECTIONS = 256
