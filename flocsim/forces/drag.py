@@ -7,8 +7,9 @@ import attrs
 
 from flocsim.body import Fluid
 from flocsim.errors import RangeError
-from flocsim.fields import choice, flag
+from flocsim.fields import choice, flag, quantity
 from flocsim.forces.base import BodyForce, Force
+from flocsim.hydrodynamics.permeable import drag_factor, turning_factor
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
@@ -64,14 +65,24 @@ def shielded_by(body, x, y):
     return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
 
 
-def shielded_drag(body, x, y, viscosity, density, with_inertia):
-    """Force on the equivalent sphere in a cluster at the velocity (x, y) against the flow."""
+def general_drag(body, x, y, viscosity, density, with_inertia, permeability):
+    """Force on the equivalent sphere, shielded and permeable, at a velocity against the flow."""
     x, y = shielded_by(body, x, y)
     translation = 6.0 * math.pi * viscosity * body.radius
+    if permeability > 0.0:
+        translation *= drag_factor(body.radius, permeability)
     if with_inertia:
         reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
         translation *= inertial_factor(reynolds)
     return shielded_by(body, -translation * x, -translation * y)
+
+
+def general_turning(body, viscosity, rotational, permeability):
+    """How much the equivalent sphere, permeable, resists turning."""
+    rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+    if permeability > 0.0:
+        rotation *= turning_factor(body.radius, permeability)
+    return rotation
 
 
 def shielded_shape(body, x, y, spin, viscosity):
@@ -130,6 +141,10 @@ class StokesDrag(BodyForce):
     cluster does (flocsim.swarms.together.shielding); torques stay those of each. Re is then that of
     Q (v − u).
 
+    ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the
+    equivalent sphere, 2β²(1 − tanh β/β)/(2β² + 3(1 − tanh β/β)) with β = r_eq/√k, its torque by
+    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.permeable); 0 is impermeable.
+
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
     an addition, without it nothing would stop a spin.
@@ -154,11 +169,20 @@ class StokesDrag(BodyForce):
         help="in swarms: flocs that touch shield each other from the flow, so that a cluster "
         "settles at its own speed",
     )
+    permeability: float = quantity(
+        "m^2", at_least=0.0, default=0.0,
+        help="of flocs that water passes through: k of Brinkman's equation in the equivalent "
+        "sphere; 0: none does",
+    )  # fmt: skip
 
     def __attrs_post_init__(self) -> None:
         if self.strain and not self.rotational:
             raise RangeError(
                 "strain must be false where rotational is: it is a part of the drag torque"
+            )
+        if self.law == "shape" and self.permeability > 0.0:
+            raise RangeError(
+                'permeability must be 0 where law is "shape": it is known of equivalent spheres'
             )
         if self.law == "shape" and not self.rotational:
             raise RangeError(
@@ -175,11 +199,11 @@ class StokesDrag(BodyForce):
         """Still water needs no flow, and no derivative by the place; a flow without strain, none by
         the angle."""
         stokes = self.law == "stokes"
-        if self.clusters:
+        if self.clusters or self.permeability > 0.0:
             moves = any(fluid.flow)
             if self.law == "shape":
-                return self.shape_in_cluster if moves else self.shape_in_cluster_still
-            return self.in_cluster if moves else self.in_cluster_still
+                return self.general_shape if moves else self.general_shape_still
+            return self.general if moves else self.general_still
         if self.law == "shape":
             if not any(fluid.flow):
                 return self.shape_still
@@ -197,14 +221,15 @@ class StokesDrag(BodyForce):
 
     def remarks(self, fluid: Fluid) -> list[str]:
         """Whether it follows shapes, the flow's strain and clusters."""
-        clusters = ["less in clusters of a swarm"] * self.clusters
+        others = ["less in clusters of a swarm"] * self.clusters
+        others += ["less as water passes through"] * (self.permeability > 0.0)
         if self.law == "shape":
-            return ["of each body's own outline", *clusters]
+            return ["of each body's own outline", *others]
         if not self.strain:
-            return clusters
+            return others
         strained = any(strain_of(fluid.flow))
         words = "long bodies turned by strain" if strained else "no strain in this flow: left out"
-        return [words, *clusters]
+        return [words, *others]
 
     @staticmethod
     def kernel(body, viscosity, flow, rotational):
@@ -283,28 +308,30 @@ class StokesDrag(BodyForce):
         return -translation * body.vx, -translation * body.vy, -rotation * body.spin
 
     @staticmethod
-    def in_cluster_still(body, viscosity, density, rotational, with_inertia):
-        """Force and torque on the equivalent sphere in a cluster, in still water."""
-        fx, fy = shielded_drag(body, body.vx, body.vy, viscosity, density, with_inertia)
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-        return fx, fy, -rotation * body.spin
+    def general_still(body, viscosity, density, rotational, with_inertia, permeability):
+        """Force and torque on the equivalent sphere, shielded and permeable, in still water."""
+        fx, fy = general_drag(
+            body, body.vx, body.vy, viscosity, density, with_inertia, permeability
+        )
+        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * body.spin
 
     @staticmethod
-    def in_cluster(body, viscosity, density, flow, rotational, with_inertia, strain):
+    def general(body, viscosity, density, flow, rotational, with_inertia, strain, permeability):
         """The same in the flow, whose strain may turn the body."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        fx, fy = shielded_drag(body, body.vx - u, body.vy - v, viscosity, density, with_inertia)
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+        fx, fy = general_drag(
+            body, body.vx - u, body.vy - v, viscosity, density, with_inertia, permeability
+        )
         spin = body.spin - turning - strain * strained_spin(body, flow)
-        return fx, fy, -rotation * spin
+        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * spin
 
     @staticmethod
-    def shape_in_cluster_still(body, viscosity):
+    def general_shape_still(body, viscosity):
         """Force and torque on the shape in a cluster, in still water."""
         return shielded_shape(body, body.vx, body.vy, body.spin, viscosity)
 
     @staticmethod
-    def shape_in_cluster(body, viscosity, flow):
+    def general_shape(body, viscosity, flow):
         """The same in the flow."""
         u, v, turning = flow_at(flow, body.x, body.y)
         x, y, spin = body.vx - u, body.vy - v, body.spin - turning
@@ -318,3 +345,8 @@ class StokesDrag(BodyForce):
 def shields_clusters(forces: Iterable[Force]) -> bool:
     """Whether a drag among the forces is less in clusters."""
     return any(isinstance(force, StokesDrag) and force.clusters for force in forces)
+
+
+def is_permeable(forces: Iterable[Force]) -> bool:
+    """Whether a drag among the forces is that of bodies which water passes through."""
+    return any(isinstance(force, StokesDrag) and force.permeability > 0.0 for force in forces)
