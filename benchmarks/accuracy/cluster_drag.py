@@ -207,9 +207,9 @@ def cost(number, duration, repeats):
                 row = clusters, taken, run.effort.windows, steps[clusters], largest
                 table.add(*row, 1e6 * taken / steps[clusters])
     table.print()
-    without, with_them = (statistics.median(times[each]) for each in (False, True))
-    print(f"CPU time {with_them / without:.3f} times that without, "
-          f"for {steps[True] / steps[False]:.3f} times the steps")  # fmt: skip
+    without, with_them = (statistics.median(times[each]) / steps[each] for each in (False, True))
+    print(f"CPU time of a step {with_them / without:.3f} times that without; "
+          f"{steps[True] / steps[False]:.2f} times the steps")  # fmt: skip
 
 
 def main():
