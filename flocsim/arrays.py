@@ -25,7 +25,12 @@ import numpy as np
 RESISTANCE_COLUMNS = 12
 """How many numbers a body's resistance has: six of R, six of Γ."""
 
-SCENE_BODY_COLUMNS = RESISTANCE + RESISTANCE_COLUMNS
+SHIELDING = RESISTANCE + RESISTANCE_COLUMNS
+"""From here on: BodyView.shielding_xx … in a cluster; those of a body alone are 1, 0 and 1."""
+
+UNSHIELDED = (1.0, 0.0, 1.0)
+
+SCENE_BODY_COLUMNS = SHIELDING + len(UNSHIELDED)
 """How many columns ``Scene.bodies`` has."""
 
 # Columns of ``Work.motion``; in ``Work.rates`` the velocity stands in the first three.
@@ -363,6 +368,9 @@ class BodyView(NamedTuple):
     ``resistance_xx`` … and ``strain_xx_x`` …: in the frame of the shape, over the viscosity, the
     symmetric R of (v_x, v_y, spin) [m, m², m³] and what E_xx = −E_yy, and E_xy, put on a body that
     goes along [m², m², m³] (flocsim.hydrodynamics.PrismDrag), 0 where no drag follows shapes.
+
+    ``shielding_xx``, ``_xy`` and ``_yy``: Q, symmetric, by which the drag R of a body in a cluster
+    of a swarm becomes Q R Q (flocsim.swarms.together.shielding); 1, 0 and 1 elsewhere.
     """
 
     time: float
@@ -393,6 +401,9 @@ class BodyView(NamedTuple):
     strain_xy_x: float = 0.0
     strain_xy_y: float = 0.0
     strain_xy_s: float = 0.0
+    shielding_xx: float = 1.0
+    shielding_xy: float = 0.0
+    shielding_yy: float = 1.0
 
 
 class PlainBodyView(NamedTuple):

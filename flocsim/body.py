@@ -9,7 +9,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim import water
-from flocsim.arrays import RESISTANCE_COLUMNS, Scene
+from flocsim.arrays import RESISTANCE_COLUMNS, UNSHIELDED, Scene
 from flocsim.constants import (
     ROOM_TEMPERATURE,
     WATER_DENSITY,
@@ -308,8 +308,9 @@ def scene_of(
         list(range(len(bodies))),
     )
     water = np.zeros((len(bodies), RESISTANCE_COLUMNS)) if resistances is None else resistances
+    alone = np.tile(UNSHIELDED, (len(bodies), 1))
     return Scene(
-        bodies=np.ascontiguousarray(np.hstack([np.array(columns, dtype=float).T, np.array(water)])),
+        bodies=np.hstack([np.array(columns, dtype=float).T, np.array(water), alone]),
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         parameters=np.array(parameters, dtype=float),

@@ -20,6 +20,7 @@ from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.double_layer import refuse_unlike
+from flocsim.forces.drag import shields_clusters
 from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
 from flocsim.forces.shape_drag import resistance_numbers
 from flocsim.forces.smoothing import smoothing_of
@@ -258,6 +259,10 @@ class System:
         """
         end: float = in_unit(until, "s", "until")
         check_limits(end, max_steps)
+        if shields_clusters(self.forces):
+            raise UsageError(
+                "a System does not know its clusters: run a Swarm, or leave the drag's clusters out"
+            )
         if start is None:
             self.check_overlaps()
         elif amplification:

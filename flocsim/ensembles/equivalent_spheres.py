@@ -26,6 +26,7 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.errors import UsageError
 from flocsim.forces import VanDerWaals
+from flocsim.forces.drag import is_permeable
 from flocsim.forces.thermal import thermal_in
 from flocsim.hydrodynamics import Meeting, SpherePair
 
@@ -101,6 +102,8 @@ def unknown_in_water(pair: Encounter) -> str:
     """Why what water does to two spheres cannot be said of a pair; "" where it can."""
     if thermal_in(pair.system.forces):
         return "with thermal kicks: leave [forces.thermal] out"
+    if is_permeable(pair.system.forces):
+        return "of flocs that water passes through: leave the permeability of [forces.drag] out"
     if any(body.fixed for body in pair.system.bodies):
         return "with a fixed receiver: choose scene.receiver = 'free'"
     if pair.meeting == SETTLING and any(pair.system.fluid.flow):

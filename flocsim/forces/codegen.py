@@ -52,6 +52,7 @@ def changed_body(view, axis, by):
         view.resistance_xs, view.resistance_ys, view.resistance_ss,
         view.strain_xx_x, view.strain_xx_y, view.strain_xx_s,
         view.strain_xy_x, view.strain_xy_y, view.strain_xy_s,
+        view.shielding_xx, view.shielding_xy, view.shielding_yy,
     )  # fmt: skip
 
 

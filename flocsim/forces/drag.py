@@ -1,14 +1,15 @@
 """Drag: of Stokes, and of Schiller and Naumann where the flow around a body is not slow."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import attrs
 
 from flocsim.body import Fluid
 from flocsim.errors import RangeError
-from flocsim.fields import choice, flag
-from flocsim.forces.base import BodyForce
+from flocsim.fields import choice, flag, quantity
+from flocsim.forces.base import BodyForce, Force
+from flocsim.hydrodynamics.permeable import drag_factor, turning_factor
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
@@ -58,6 +59,41 @@ def resisted(body, c, s, vx, vy, spin):
     )
 
 
+def shielded_by(body, x, y):
+    """Q (x, y): what is left in a cluster of a motion, or of the force against it."""
+    xy = body.shielding_xy
+    return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
+
+
+def general_drag(body, x, y, viscosity, density, with_inertia, permeability):
+    """Force on the equivalent sphere, shielded and permeable, at a velocity against the flow."""
+    x, y = shielded_by(body, x, y)
+    translation = 6.0 * math.pi * viscosity * body.radius
+    if permeability > 0.0:
+        translation *= drag_factor(body.radius, permeability)
+    if with_inertia:
+        reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
+        translation *= inertial_factor(reynolds)
+    return shielded_by(body, -translation * x, -translation * y)
+
+
+def general_turning(body, viscosity, rotational, permeability):
+    """How much the equivalent sphere, permeable, resists turning."""
+    rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
+    if permeability > 0.0:
+        rotation *= turning_factor(body.radius, permeability)
+    return rotation
+
+
+def shielded_shape(body, x, y, spin, viscosity):
+    """The same on a shape that turns against the flow, too, and its torque."""
+    c, s = math.cos(body.angle), math.sin(body.angle)
+    x, y = shielded_by(body, x, y)
+    x, y, turn = resisted(body, c, s, x, y, spin)
+    x, y = shielded_by(body, c * x - s * y, s * x + c * y)
+    return -viscosity * x, -viscosity * y, -viscosity * turn
+
+
 def resisted_in(body, flow):
     """(cosine and sine of its angle, the same of its motion in a flow)."""
     u, v, turning = flow_at(flow, body.x, body.y)
@@ -100,6 +136,15 @@ class StokesDrag(BodyForce):
     a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
     simple shear G; any other shape is treated as the ellipse of its moments.
 
+    ``clusters``: bodies of a swarm that touch shield each other from the flow. Their drag R becomes
+    Q R Q, the same Q for all of a cluster, with which all of them together resist as much as the
+    cluster does (flocsim.swarms.together.shielding); torques stay those of each. Re is then that of
+    Q (v − u).
+
+    ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the
+    equivalent sphere, 2β²(1 − tanh β/β)/(2β² + 3(1 − tanh β/β)) with β = r_eq/√k, its torque by
+    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.permeable); 0 is impermeable.
+
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
     an addition; without it nothing would stop a spin.
@@ -119,10 +164,25 @@ class StokesDrag(BodyForce):
         default=False, help="a flow's strain turns long bodies, too: Jeffery's orbits"
     )
 
+    clusters: bool = flag(
+        default=False,
+        help="in swarms: flocs that touch shield each other from the flow, so that a cluster "
+        "settles at its own speed",
+    )
+    permeability: float = quantity(
+        "m^2", at_least=0.0, default=0.0,
+        help="of flocs that water passes through: k of Brinkman's equation in the equivalent "
+        "sphere; 0: none does",
+    )  # fmt: skip
+
     def __attrs_post_init__(self) -> None:
         if self.strain and not self.rotational:
             raise RangeError(
                 "strain must be false where rotational is: it is a part of the drag torque"
+            )
+        if self.law == "shape" and self.permeability > 0.0:
+            raise RangeError(
+                'permeability must be 0 where law is "shape": it is known of equivalent spheres'
             )
         if self.law == "shape" and not self.rotational:
             raise RangeError(
@@ -139,6 +199,11 @@ class StokesDrag(BodyForce):
         """Still water needs no flow, and no derivative by the place; a flow without strain, none by
         the angle."""
         stokes = self.law == "stokes"
+        if self.clusters or self.permeability > 0.0:
+            moves = any(fluid.flow)
+            if self.law == "shape":
+                return self.general_shape if moves else self.general_shape_still
+            return self.general if moves else self.general_still
         if self.law == "shape":
             if not any(fluid.flow):
                 return self.shape_still
@@ -149,14 +214,22 @@ class StokesDrag(BodyForce):
             return self.strained if stokes else self.inertial_strained
         return self.kernel if stokes else self.inertial
 
+    @property
+    def with_inertia(self) -> bool:
+        """Whether its force is more than Stokes's."""
+        return self.law == "schiller_naumann"
+
     def remarks(self, fluid: Fluid) -> list[str]:
-        """Whether the flow's strain turns bodies."""
+        """Whether it follows shapes, the flow's strain and clusters."""
+        others = ["less in clusters of a swarm"] * self.clusters
+        others += ["less as water passes through"] * (self.permeability > 0.0)
         if self.law == "shape":
-            return ["of each body's own outline"]
+            return ["of each body's own outline", *others]
         if not self.strain:
-            return []
+            return others
         strained = any(strain_of(fluid.flow))
-        return ["long bodies turned by strain" if strained else "no strain in this flow: left out"]
+        words = "long bodies turned by strain" if strained else "no strain in this flow: left out"
+        return [words, *others]
 
     @staticmethod
     def kernel(body, viscosity, flow, rotational):
@@ -233,3 +306,47 @@ class StokesDrag(BodyForce):
         translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
         rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
         return -translation * body.vx, -translation * body.vy, -rotation * body.spin
+
+    @staticmethod
+    def general_still(body, viscosity, density, rotational, with_inertia, permeability):
+        """Force and torque on the equivalent sphere, shielded and permeable, in still water."""
+        fx, fy = general_drag(
+            body, body.vx, body.vy, viscosity, density, with_inertia, permeability
+        )
+        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * body.spin
+
+    @staticmethod
+    def general(body, viscosity, density, flow, rotational, with_inertia, strain, permeability):
+        """The same in the flow, whose strain may turn the body."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        fx, fy = general_drag(
+            body, body.vx - u, body.vy - v, viscosity, density, with_inertia, permeability
+        )
+        spin = body.spin - turning - strain * strained_spin(body, flow)
+        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * spin
+
+    @staticmethod
+    def general_shape_still(body, viscosity):
+        """Force and torque on the shape in a cluster, in still water."""
+        return shielded_shape(body, body.vx, body.vy, body.spin, viscosity)
+
+    @staticmethod
+    def general_shape(body, viscosity, flow):
+        """The same in the flow."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        x, y, spin = body.vx - u, body.vy - v, body.spin - turning
+        fx, fy, torque = shielded_shape(body, x, y, spin, viscosity)
+        c, s = math.cos(body.angle), math.sin(body.angle)
+        x, y, turn = strained_load(body, c, s, flow)
+        x, y = shielded_by(body, c * x - s * y, s * x + c * y)
+        return fx + viscosity * x, fy + viscosity * y, torque + viscosity * turn
+
+
+def shields_clusters(forces: Iterable[Force]) -> bool:
+    """Whether a drag among the forces is less in clusters."""
+    return any(isinstance(force, StokesDrag) and force.clusters for force in forces)
+
+
+def is_permeable(forces: Iterable[Force]) -> bool:
+    """Whether a drag among the forces is that of bodies which water passes through."""
+    return any(isinstance(force, StokesDrag) and force.permeability > 0.0 for force in forces)

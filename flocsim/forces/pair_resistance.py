@@ -15,7 +15,7 @@ from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import quantity
 from flocsim.forces.base import Force, SurfaceForce
-from flocsim.forces.drag import StokesDrag
+from flocsim.forces.drag import StokesDrag, is_permeable
 from flocsim.forces.shape_drag import drag_radius, facts_of
 from flocsim.forces.thermal import Thermal
 from flocsim.hydrodynamics import pair, pair_table, two_spheres
@@ -139,10 +139,12 @@ def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
                 "between bodies as it is: leave Thermal or PairResistance out"
             )
     drags = [force for force in forces if isinstance(force, StokesDrag)]
-    if len(drags) != 1 or drags[0].law == "schiller_naumann" or not drags[0].rotational:
+    usual = len(drags) == 1 and drags[0].rotational and not is_permeable(drags)
+    if not usual or drags[0].law == "schiller_naumann":
         raise UsageError(
             "PairResistance is what two bodies add to the drag of each in slow flow: give one "
-            'StokesDrag beside it, of the law "stokes" or "shape" and with rotational = true'
+            'StokesDrag beside it, of the law "stokes" or "shape", with rotational = true and '
+            "without permeability"
         )
     return found[0]
 

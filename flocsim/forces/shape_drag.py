@@ -18,6 +18,7 @@ from flocsim.forces.base import Force
 from flocsim.forces.drag import StokesDrag
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import prism, prism_drag
+from flocsim.hydrodynamics.permeable import drag_factor
 
 DIGITS = 7
 """Of an outline over r_eq, and of the depth: shapes that differ by less are one."""
@@ -58,9 +59,14 @@ def body_resistance(body: Body) -> tuple[float, ...]:
 
 def drag_radius(forces: Iterable[Force], body: Body) -> float:
     """Of the sphere that is as hard to move as a body in the mean of all directions of its plane,
-    free to turn [m]: r_eq unless a drag follows shapes."""
+    free to turn [m]: r_eq unless a drag follows shapes, or is of bodies that water passes
+    through."""
+    radius = body.shape.equivalent_radius
     if not follows_shape(forces):
-        return body.shape.equivalent_radius
+        for force in forces:
+            if isinstance(force, StokesDrag) and force.permeability > 0.0:
+                radius *= drag_factor(radius, force.permeability)
+        return radius
     free = np.linalg.inv(resistance_matrices(body_resistance(body))[0])
     return float(1.0 / (3.0 * math.pi * (free[0, 0] + free[1, 1])))
 

@@ -12,6 +12,7 @@ from flocsim.constants import BOLTZMANN, MINIMUM_GAP
 from flocsim.errors import UsageError
 from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import BodyForce, Force
+from flocsim.forces.drag import is_permeable, shields_clusters
 from flocsim.forces.shape_drag import follows_shape
 
 FAR_SHARE = 0.1
@@ -118,6 +119,12 @@ def kicks_of(
         raise UsageError(
             'thermal motion cannot have the drag law "shape": its kicks are those of equivalent '
             "spheres, and such bodies would not stay at their temperature: give another law"
+        )
+    if shields_clusters(forces) or is_permeable(forces):
+        raise UsageError(
+            "thermal motion cannot have a drag that is less in clusters, or of permeable bodies: "
+            "its kicks are those of solid spheres alone, and such bodies would get too hot; leave "
+            "the drag's clusters and permeability out"
         )
     thermal = found[0]
     spread = 2.0 * sum(thermal.diffusion(fluid, radius) for radius in radii[:2])

@@ -20,6 +20,7 @@ from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.leaving import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
+from flocsim.swarms.together.shielding import WAY, Shielding
 
 if TYPE_CHECKING:
     from flocsim.swarms.runner import Islands
@@ -128,15 +129,16 @@ class Progress:
     """A swarm on its way.
 
     Parameters: ``runner``; ``swarm``, its arrays; ``box`` [m]; ``reach`` [m] of all forces;
-    ``until`` [s]; ``leaving``, what becomes of bodies that leave the box (None: they go on).
+    ``until`` [s]; ``leaving``, what becomes of bodies that leave the box (None: they go on);
+    ``shielding``, what clusters make of drag (None: nothing).
     """
 
     def __init__(
         self, runner: Runner, swarm: Swarm, box: tuple[float, float], reach: float, until: float,
-        leaving: Leaving | None = None,
+        leaving: Leaving | None = None, shielding: Shielding | None = None,
     ) -> None:  # fmt: skip
         self.runner, self.swarm, self.box, self.reach = runner, swarm, box, reach
-        self.leaving = leaving
+        self.leaving, self.shielding = leaving, shielding
         self.gone = np.zeros(len(swarm.bodies), bool)
         self.returns = np.zeros(len(swarm.bodies), dtype=np.int64)
         self.free = swarm.bodies[:, at.FREE] == 1.0
@@ -161,9 +163,12 @@ class Progress:
         return way / fastest if fastest > 0.0 else math.inf
 
     def longest_span(self) -> float:
-        """The longest window in which the images of bodies can be told apart [s]."""
-        side = min(self.box)
-        return self.time_to_go(LONGEST_WAY * side) if side < math.inf else math.inf
+        """The longest window in which the images of bodies can be told apart, and shielding is of
+        the clusters that there are [s]."""
+        way = LONGEST_WAY * min(self.box)
+        if self.shielding is not None:
+            way = min(way, WAY * self.mean_radius)
+        return self.time_to_go(way) if way < math.inf else math.inf
 
     @property
     def error(self) -> float:
@@ -231,6 +236,8 @@ class Progress:
             self.time = stop
             return Status.FINISHED
         swarm, span = self.swarm, min(self.span, self.longest_span())
+        if self.shielding is not None:
+            self.shielding.apply(swarm.bodies, swarm.motion[:, :3])
         least = swarm._replace(wander=self.least_wander)
         clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
         finished = Finished(self.free)

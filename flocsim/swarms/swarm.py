@@ -13,6 +13,7 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number, is_whole
 from flocsim.forces.base import Force
+from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import refuse_pair_resistance
 from flocsim.forces.thermal import kicks_of
@@ -32,6 +33,7 @@ from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.together.bonds import BondGauge, Bonds
 from flocsim.swarms.together.clusters import Clusters
 from flocsim.swarms.together.contacts import Gauge, Neighbours
+from flocsim.swarms.together.shielding import Shielding
 from flocsim.system import System, check_bodies, check_forces, check_limits, read_seed
 
 
@@ -223,7 +225,10 @@ class Swarm:
             [ThreadArrays(scene) for _ in range(threads)], max_steps,
         )  # fmt: skip
         swarm = swarm_of(scene, *self.system.motion(), self.integrator.fresh_clock())
-        return Progress(runner, swarm, self.box, self.reach, until, leaving)
+        shielding = None
+        if shields_clusters(self.forces):
+            shielding = Shielding(self.bodies, self.forces, self.gauge())
+        return Progress(runner, swarm, self.box, self.reach, until, leaving, shielding)
 
     def fillings(self) -> dict[Callable, Callable]:
         """{hook: function} of integrator, shapes and the watch over paths; the same with a box and

@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.io.results.swarm_file import BONDS, ENDS, SwarmResults
+from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SwarmResults
 
 SWARM = """\
 preset = "si"
@@ -70,13 +70,17 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
         },
         "bonds": dict(zip(BONDS, np.array([[0, 1, 1, 0, 1], [1, 2, 1, 0, 2]], "i4").T.copy(),
                           strict=True)),
+        "clusters": {
+            name: np.arange(3).astype(kind) if kind == "f8" else np.array([0, 1, 1], kind)
+            for name, (kind, _, _) in CLUSTERS.items()
+        },
         "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
     }  # fmt: skip
     scales = {
         "replicate": np.arange(replicates), "time": 0.1 * np.arange(times),
         "class": np.array([0.0, 1e-5]), "body": np.arange(bodies),
         "component": np.array(["x", "y", "angle"]), "axis": np.array(["x", "y"]),
-        "point": np.arange(bodies), "bond": np.arange(2),
+        "point": np.arange(bodies), "bond": np.arange(2), "row": np.arange(3),
     }  # fmt: skip
     run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,
            "periodic": "xy", "overrides": "{}"}  # fmt: skip

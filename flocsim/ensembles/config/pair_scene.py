@@ -26,6 +26,7 @@ from flocsim.fields import (
     quantity,
     word_or_quantity,
 )
+from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import act_along_outlines
 from flocsim.forces.thermal import thermal_in
 
@@ -296,6 +297,8 @@ class PairScene:
     def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
         """What does not go together with the other tables of a config, by their names."""
         yield from outline_problems(parts, settles=self.takes_outlines)
+        if shields_clusters(parts["forces"]):
+            yield ("forces", "drag", "clusters"), "is for swarms: leave it out"
         for name in ("velocity", "gradient") if self.flow_in_fluid else ():
             if any(getattr(parts["fluid"], name)):
                 yield ("fluid", name), f"{self.flow_in_fluid}: leave it out"

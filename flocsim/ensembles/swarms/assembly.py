@@ -10,13 +10,18 @@ from flocsim.ensembles.swarms.records import Found, Read, part_in
 from flocsim.io.results.swarm_file import (
     AXES,
     BONDS,
+    CLUSTERS,
     COMPONENTS,
     COUNTS,
+    ENDLESS,
     GONE,
     POINTS,
     RINGS,
     SwarmResults,
 )
+
+PLACED = ("bond_replicate", "cluster_replicate")
+"""Columns that count replicates."""
 
 Groups = dict[str, dict[str, np.ndarray]]
 
@@ -41,6 +46,7 @@ def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
     motion = np.full((*shape, form.bodies, 6), np.nan)
     labels = np.full((*shape, form.bodies), -1, dtype=np.int32)
     bonds = [np.zeros((0, len(BONDS)), dtype=np.int32)]
+    rows = [np.zeros((0, len(CLUSTERS)))]
     for row, own in enumerate(found):
         for place, record in own.moments.items():
             part = part_in(record, read)
@@ -54,6 +60,10 @@ def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
             pairs = part.arrays["bonds"]
             at = np.broadcast_to(np.array([row, place], np.int32), (len(pairs), 2))
             bonds.append(np.concatenate([at, pairs], axis=1))
+            known = part.arrays["clusters"]
+            size = np.bincount(labels[row, place][labels[row, place] >= 0], minlength=len(known))
+            at = np.broadcast_to(np.array([row, place]), (len(known), 2))
+            rows.append(np.column_stack([at, np.arange(len(known)), size, known]))
     groups["counts"] = numbers | {"n_class": by_class}
     groups["snapshots"] = {
         "position": motion[..., :3], "velocity": motion[..., 3:], "cluster": labels,
@@ -61,6 +71,15 @@ def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
     together = np.concatenate(bonds)
     together = together[np.lexsort(together.T[::-1])]
     groups["bonds"] = dict(zip(BONDS, together.T.copy(), strict=True))
+    groups["clusters"] = {
+        name: column.astype(kind)
+        for (name, (kind, _, _)), column in zip(
+            CLUSTERS.items(), np.concatenate(rows).T, strict=True
+        )
+    }
+    for name in ENDLESS:
+        column = groups["clusters"][name]
+        column[column < 0.0] = np.nan
     return groups
 
 
@@ -72,7 +91,7 @@ def appended(old: Groups, new: Groups) -> Groups:
     for group, columns in new.items():
         groups[group] = {}
         for name, column in columns.items():
-            parts = [old[group][name], column + many if name == "bond_replicate" else column]
+            parts = [old[group][name], column + many if name in PLACED else column]
             if name in POINTS | RINGS:
                 parts = [
                     np.array([filled_up(each, points) for each in part]).reshape(
@@ -95,6 +114,7 @@ def results_from(
         "body": np.arange(form.bodies), "component": np.array(COMPONENTS),
         "axis": np.array(AXES), "point": np.arange(points),
         "bond": np.arange(len(groups["bonds"]["bond_kind"])),
+        "row": np.arange(len(groups["clusters"]["cluster_bodies"])),
     }  # fmt: skip
     return SwarmResults(scales, groups, dict(run))
 

@@ -10,7 +10,7 @@ import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Part
 from flocsim.fields import is_number, is_whole
-from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT
+from flocsim.io.results.swarm_file import COUNTS, GONE, KIND_COUNT, OF_CLUSTERS
 from flocsim.swarms.progress import Effort
 
 EFFORT = tuple(field.name for field in attrs.fields(Effort))
@@ -98,13 +98,16 @@ def check_moment(part: Part, form: Form) -> None:
     n = form.bodies
     bonds = part.arrays.get("bonds", np.zeros((0, 3)))
     many = len(bonds) if bonds.ndim else 0
+    found = part.arrays.get("clusters", np.zeros((0, 0)))
     shaped(part, {
         "motion": ("f8", (n, 6)), "cluster": ("i4", (n,)), "counts": ("i8", (form.classes,)),
         "bonds": ("i4", (many, 3)),
+        "clusters": ("f8", (len(found) if found.ndim else 0, len(OF_CLUSTERS))),
     })  # fmt: skip
     demand(np.all((bonds >= 0) & (bonds < [n, n, KIND_COUNT])), "bonds")
     labels = part.arrays["cluster"]
     demand(np.all((labels >= GONE) & (labels < n)), "cluster")
+    demand(len(found) == labels.max(initial=-1) + 1, "clusters")
     demand(np.all((part.arrays["counts"] >= 0) & (part.arrays["counts"] <= n)), "counts")
     demand(is_count(part.facts.get("place"), form.moments - 1), "place")
     for name in COUNTS:

@@ -72,8 +72,11 @@ def sweep_rows(found: Any) -> list[tuple[str, ...]]:
 
 def figures(found: SwarmResults) -> Figures:
     """{name: function} of the figures that swarms have."""
-    many = len(found.scales["class"]) > 1
-    return {name: draw for name, draw in SWARM_FIGURES.items() if many or name != "classes"}
+    there = {
+        "classes": len(found.scales["class"]) > 1,
+        "speed": len(found.groups["clusters"]["cluster_speed"]) > 0,
+    }
+    return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
 
 
 def first_swarm(found: SwarmResults) -> tuple:

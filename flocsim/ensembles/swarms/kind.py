@@ -30,7 +30,7 @@ from flocsim.ensembles.storage.identity import (
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished
-from flocsim.ensembles.swarms.assembly import appended, groups_of, results_from
+from flocsim.ensembles.swarms.assembly import PLACED, appended, groups_of, results_from
 from flocsim.ensembles.swarms.checks import FORM, Form, check_part
 from flocsim.ensembles.swarms.records import Found, part_of
 from flocsim.ensembles.swarms.scene import SwarmScene
@@ -210,13 +210,12 @@ def results(
 
 def first_of(found: SwarmResults, count: int) -> dict[str, dict[str, np.ndarray]]:
     """The groups of the first replicates of results."""
-    bonds = found.groups["bonds"]
-    kept = bonds["bond_replicate"] < count
-    groups = {
-        group: {name: values[:count] for name, values in columns.items()}
-        for group, columns in found.groups.items() if group != "bonds"
-    }  # fmt: skip
-    return groups | {"bonds": {name: values[kept] for name, values in bonds.items()}}
+    groups = {}
+    for group, columns in found.groups.items():
+        listed = [columns[name] for name in PLACED if name in columns]
+        kept = listed[0] < count if listed else slice(count)
+        groups[group] = {name: values[kept] for name, values in columns.items()}
+    return groups
 
 
 def facts(study: SwarmStudy) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Left, Part
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import GONE, WALL
+from flocsim.io.results.swarm_file import GONE, OF_CLUSTERS, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.swarm import Swarm
@@ -127,9 +127,23 @@ def moment_part(
     # A record has numbers only.
     arrays = {"motion": np.where(progress.gone[:, None], 0.0, motion), "cluster": label}
     arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
+    arrays["clusters"] = cluster_rows(found, bonds)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
     return Part(MOMENT, arrays, facts)
+
+
+def cluster_rows(clusters: Clusters, bonds: Bonds) -> np.ndarray:
+    """OF_CLUSTERS of every cluster (c, 6), −1 for what one that percolates has not."""
+    later, earlier = clusters.label[bonds.pairs].T
+    inside = later[(later == earlier) & (later >= 0)]
+    columns = {
+        "mass": clusters.mass, "gyration": clusters.gyration,
+        "hydrodynamic": clusters.hydrodynamic, "speed": -clusters.velocity[:, 1],
+        "porosity": clusters.porosity, "bonds": np.bincount(inside, minlength=len(clusters)),
+    }  # fmt: skip
+    rows = np.column_stack([columns[name] for name in OF_CLUSTERS]).astype(float)
+    return np.where(np.isnan(rows), -1.0, rows)
 
 
 def summary_of(clusters: Clusters) -> dict[str, float]:

@@ -27,6 +27,7 @@ def body_view(scene, work, time, state, body):
         known[body, at.RESISTANCE + 6], known[body, at.RESISTANCE + 7],
         known[body, at.RESISTANCE + 8], known[body, at.RESISTANCE + 9],
         known[body, at.RESISTANCE + 10], known[body, at.RESISTANCE + 11],
+        known[body, at.SHIELDING], known[body, at.SHIELDING + 1], known[body, at.SHIELDING + 2],
     )  # fmt: skip
 
 

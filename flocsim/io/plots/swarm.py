@@ -131,6 +131,31 @@ def sizes(results: SwarmResults) -> Figure:
         return figure
 
 
+def speed(results: SwarmResults) -> Figure:
+    """Speed of clusters against their radius of gyration, at several times, all swarms together."""
+    found, times = results.groups["clusters"], results.scales["time"]
+    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS).round().astype(int))
+    shown = (found["cluster_gyration"] > 0.0) & (found["cluster_speed"] > 0.0)
+    with house_style():
+        figure = new_figure(4.4, 2.8)
+        axes = figure.subplots()
+        for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
+            rows = shown & (found["cluster_time"] == place)
+            axes.plot(MICRO * found["cluster_gyration"][rows], 1e3 * found["cluster_speed"][rows],
+                      "o", color=colour, markersize=3.0, label=f"{times[place]:.4g} s")  # fmt: skip
+        axes.set_xlabel("radius of gyration [µm]")
+        axes.set_ylabel("settling [mm/s]")
+        if shown.any():
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            set_log_axis(axes.xaxis)
+            set_log_axis(axes.yaxis)
+        endless = np.isnan(found["cluster_gyration"]).any()
+        title = "of those that\ndo not percolate" if endless else None
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=title)
+        return figure
+
+
 def classes(results: SwarmResults) -> Figure:
     """Clusters of each size class over time, by equivalent radius, in the mean over swarms."""
     numbers = mean(results.groups["counts"]["n_class"])
@@ -268,5 +293,6 @@ SWARM_FIGURES: dict[str, Callable[[SwarmResults], Figure]] = {
     "snapshots": snapshots,
     "clusters": clusters,
     "sizes": sizes,
+    "speed": speed,
     "classes": classes,
 }

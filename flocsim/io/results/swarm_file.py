@@ -4,6 +4,7 @@
 - ``snapshots``  places, velocities and clusters of all bodies at every time
 - ``bodies``     the bodies of every replicate: sizes, masses, core points, and its box
 - ``bonds``      the pairs that touch, and what holds them, at every time
+- ``clusters``   every cluster at every time: size, radii, speed, porosity, bonds
 - ``ends``       how every replicate ended, and what it took
 - ``run``        scalars: config text, versions, machine
 """
@@ -25,7 +26,9 @@ from flocsim.io.opening import opened_file
 from flocsim.io.terminal import aligned
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
+WITHOUT_CLUSTERS = 4
+"""The version before, whose files have no group `clusters`."""
 
 WALL = -2
 """In `bodies/floc`: a wall."""
@@ -78,6 +81,27 @@ BONDS = {
 KIND_COUNT = 4
 """Kinds of bonds."""
 
+CLUSTERS = {
+    "cluster_replicate": ("i4", "1", "replicate of the cluster"),
+    "cluster_time": ("i4", "1", "place of the snapshot among the times"),
+    "cluster_number": ("i4", "1", "its number in snapshots/cluster"),
+    "cluster_bodies": ("i4", "1", "bodies of the cluster"),
+    "cluster_mass": ("f8", "kg", "mass"),
+    "cluster_gyration": ("f8", "m", "radius of gyration; NaN: it percolates"),
+    "cluster_hydrodynamic": ("f8", "m", "hydrodynamic radius of spheres of r_eq at its bodies' "
+                             "places; NaN: it percolates"),
+    "cluster_speed": ("f8", "m s-1", "downward velocity of its centre of mass"),
+    "cluster_porosity": ("f8", "1", "1 - area/area of the convex hull; NaN: it percolates"),
+    "cluster_bonds": ("i4", "1", "pairs of its bodies that touch"),
+}  # fmt: skip
+"""Columns (row,): every cluster at all times of all replicates."""
+
+OF_CLUSTERS = tuple(name.removeprefix("cluster_") for name in [*CLUSTERS][4:])
+"""What a record of a snapshot has of a cluster."""
+
+ENDLESS = ("cluster_gyration", "cluster_hydrodynamic", "cluster_porosity")
+"""What one that percolates has not."""
+
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
     "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
@@ -116,6 +140,7 @@ SCALES = {
     "axis": ("text", "1", "of a point"),
     "point": ("i8", "1", "number of the core point"),
     "bond": ("i8", "1", "number of the pair"),
+    "row": ("i8", "1", "number of the row"),
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
@@ -132,6 +157,7 @@ GROUPS = {
         | declared(RINGS, ("replicate", "point")) | declared(BOX, ("replicate", "axis")), SCALES,
     ),
     "bonds": Group.of(declared(BONDS, ("bond",)), SCALES),
+    "clusters": Group.of(declared(CLUSTERS, ("row",)), SCALES),
     "ends": Group.of(declared(ENDS, ("replicate",)), SCALES),
 }  # fmt: skip
 
@@ -181,17 +207,25 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
         file,
         nodes,
     ):
-        check_format(file, nodes, FORMAT, SCHEMA_VERSION)
-        wanted = {name: group.arrays for name, group in GROUPS.items()}
-        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*GROUPS, "run"])
+        known = dict(GROUPS)
+        if "clusters" in nodes:
+            check_format(file, nodes, FORMAT, SCHEMA_VERSION)
+        else:
+            check_format(file, nodes, FORMAT, WITHOUT_CLUSTERS)
+            del known["clusters"]
+        wanted = {name: group.arrays for name, group in known.items()}
+        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*known, "run"])
         scales: dict[str, np.ndarray] = {}
-        groups: dict[str, dict[str, np.ndarray]] = {}
-        for name, group in GROUPS.items():
+        groups: dict[str, dict[str, np.ndarray]] = {
+            "clusters": {name: np.zeros(0, kind) for name, (kind, _, _) in CLUSTERS.items()}
+        }
+        for name, group in known.items():
             found = group.read(file[name])
             groups[name] = {column: found[column] for column in group.columns}
             for axis in group.scales:
                 if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):
                     raise ValueError(f"{name}/{axis} is not that of the other groups")
+        scales.setdefault("row", np.zeros(0, dtype=np.int64))
         run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)
@@ -220,18 +254,20 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         raise ValueError("its box has no size")
     if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
         raise ValueError("its times do not increase")
-    check_bonds(groups["bonds"], groups["snapshots"]["cluster"].shape)
+    replicates, times, many = groups["snapshots"]["cluster"].shape
+    check_rows("bonds", groups["bonds"], (replicates, times, many, many, KIND_COUNT))
+    check_rows("clusters", groups["clusters"], (replicates, times, many, many + 1))
     labels = groups["snapshots"]["cluster"]
     if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
         raise ValueError("snapshots/cluster has values that are not clusters")
 
 
-def check_bonds(bonds: Mapping[str, np.ndarray], shape: tuple[int, ...]) -> None:
-    """ValueError for pairs that are none of (replicates, times, bodies), or of no kind."""
-    limits = (*shape, shape[2], KIND_COUNT)
-    for name, limit in zip(BONDS, limits, strict=True):
-        if np.any(bonds[name] < 0) or np.any(bonds[name] >= limit):
-            raise ValueError(f"bonds/{name} has impossible values")
+def check_rows(group: str, columns: Mapping[str, np.ndarray], limits: tuple[int, ...]) -> None:
+    """ValueError where one of the first columns of a group does not count from 0 to below its
+    limit."""
+    for (name, values), limit in zip(columns.items(), limits, strict=False):
+        if np.any(values < 0) or np.any(values >= limit):
+            raise ValueError(f"{group}/{name} has impossible values")
 
 
 def table_of(results: SwarmResults) -> str:

@@ -1,11 +1,15 @@
 """Clusters of a swarm: which bodies hang together, how large, open and fast such clusters are."""
 
+import functools
 import math
+from collections.abc import Callable
 
 import attrs
 import numpy as np
 
 from flocsim.body import Body
+from flocsim.compiler.composer import compose
+from flocsim.hydrodynamics.clusters import mobilities
 from flocsim.swarms.together.contacts import Neighbours
 
 ROUNDING = 1e-6
@@ -13,28 +17,61 @@ ROUNDING = 1e-6
 others by a whole box."""
 
 
+def walk_together(pairs, vectors, first, other, way, labels, places, queue):
+    """``labels`` (n,) of clusters in the order of their first bodies, and ``places`` (n, 2) as seen
+    from those along contacts from ``pairs[k, 1]`` to ``pairs[k, 0]``; the rest is scratch."""
+    for body in range(first.shape[0]):
+        first[body] = 0
+    for pair in range(pairs.shape[0]):
+        first[pairs[pair, 0] + 1] += 1
+        first[pairs[pair, 1] + 1] += 1
+    for body in range(labels.shape[0]):
+        first[body + 1] += first[body]
+        queue[body] = first[body]
+        labels[body] = -1
+    for pair in range(pairs.shape[0]):
+        for end in range(2):
+            body, sign = pairs[pair, end], 1.0 if end == 1 else -1.0
+            row = queue[body]
+            other[row] = pairs[pair, 1 - end]
+            way[row, 0], way[row, 1] = sign * vectors[pair, 0], sign * vectors[pair, 1]
+            queue[body] += 1
+    clusters = 0
+    for start in range(labels.shape[0]):
+        if labels[start] >= 0:
+            continue
+        labels[start], queue[0], done, known = clusters, start, 0, 1
+        while done < known:
+            body = queue[done]
+            done += 1
+            for row in range(first[body], first[body + 1]):
+                next_ = other[row]
+                if labels[next_] < 0:
+                    labels[next_] = clusters
+                    places[next_, 0] = places[body, 0] + way[row, 0]
+                    places[next_, 1] = places[body, 1] + way[row, 1]
+                    queue[known] = next_
+                    known += 1
+        clusters += 1
+
+
+@functools.cache
+def walk() -> Callable:
+    """The compiled function."""
+    return compose(walk_together, {}, what="the search for clusters")
+
+
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
     """(label of every body's cluster (n,), the body's place (n, 2) [m] as seen from the cluster's
     first one, along the contacts): clusters are whole across the seams of a box, but for those that
     percolate."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import breadth_first_order, connected_components
-
-    later, earlier = neighbours.pairs.T
-    graph = coo_array((np.ones(len(later)), (later, earlier)), shape=(count, count)).tocsr()
-    _, labels = connected_components(graph, directed=False)
-    apart = {}
-    for (a, b), vector in zip(neighbours.pairs.tolist(), neighbours.vector, strict=True):
-        apart[a, b], apart[b, a] = vector, -vector
-    both = (graph + graph.T).tocsr()
-    places = np.zeros((count, 2))
-    _, firsts = np.unique(labels, return_index=True)
-    for first in firsts:
-        if both.indptr[first] == both.indptr[first + 1]:
-            continue
-        order, before = breadth_first_order(both, first, directed=False)
-        for body in order[1:]:
-            places[body] = places[before[body]] + apart[body, before[body]]
+    ends = 2 * len(neighbours.pairs)
+    labels, places = np.zeros(count, dtype=np.int64), np.zeros((count, 2))
+    walk()(
+        neighbours.pairs, neighbours.vector, np.zeros(count + 1, dtype=np.int64),
+        np.zeros(ends, dtype=np.int64), np.zeros((ends, 2)), labels, places,
+        np.zeros(count, dtype=np.int64),
+    )  # fmt: skip
     return labels, places
 
 
@@ -58,10 +95,12 @@ class Clusters:
     ``label`` (n,): the cluster of every body, −1 for fixed ones; of every cluster: ``size`` (c,)
     its bodies; ``mass`` [kg]; ``area`` [m²] of its bodies; ``gyration`` [m], the radius of gyration
     R_g = √(Σ (m ρ² + I)/Σ m) about its centre of mass, that of a body by itself included;
+    ``hydrodynamic`` [m], R_h of the sphere that is as hard to move in the mean of all directions of
+    the plane, of bodies that are spheres of r_eq (flocsim.hydrodynamics.clusters);
     ``velocity`` (c, 2) [m/s] of its centre of mass; ``porosity``, 1 − area/area of the convex hull
     of its bodies' core points swept by their disks (0 for one convex body); ``percolates`` (c,),
     whether it hangs together with its own images round a box that repeats itself. Such a cluster
-    has no end, so that ``gyration`` and ``porosity`` are NaN.
+    has no end, so that ``gyration``, ``hydrodynamic`` and ``porosity`` are NaN.
     """
 
     label: np.ndarray
@@ -69,6 +108,7 @@ class Clusters:
     mass: np.ndarray
     area: np.ndarray
     gyration: np.ndarray
+    hydrodynamic: np.ndarray
     velocity: np.ndarray
     porosity: np.ndarray
     percolates: np.ndarray
@@ -104,10 +144,11 @@ class Clusters:
         motion = np.column_stack([mean(velocity[free, axis]) for axis in range(2)])
         area = np.bincount(label, [body.shape.area for body in known], count)
         hulls = hull_areas(known, own, position[free, 2], label, ~percolates)
+        radius = hydrodynamic_radii(known, own, label, ~percolates)
         whole = np.full(len(bodies), -1)
         whole[free] = label
         return cls(
-            whole, np.bincount(label, minlength=count), total, area, gyration, motion,
+            whole, np.bincount(label, minlength=count), total, area, gyration, radius, motion,
             np.clip(1.0 - area / hulls, 0.0, 1.0), percolates,
         )  # fmt: skip
 
@@ -142,19 +183,82 @@ class Clusters:
         return float(slope)
 
 
+def hydrodynamic_radii(
+    bodies: list[Body], places: np.ndarray, label: np.ndarray, ends: np.ndarray
+) -> np.ndarray:
+    """R_h [m] of clusters of spheres of r_eq; NaN for those that have no ``ends`` (c,)."""
+    radii = np.array([body.shape.equivalent_radius for body in bodies])
+    found = np.where(ends, np.bincount(label, radii, len(ends)), math.nan)
+    several = ends & (np.bincount(label, minlength=len(ends)) > 1)
+    chosen = several[label]
+    if chosen.any():
+        _, number = np.unique(label[chosen], return_inverse=True)
+        alone = 1.0 / (6.0 * math.pi * radii[chosen])
+        own = np.column_stack([alone, 0.0 * alone, alone])
+        moved = mobilities(number, places[chosen], radii[chosen], own)
+        found[several] = 1.0 / (3.0 * math.pi * (moved[:, 0] + moved[:, 2]))
+    return found
+
+
+DIRECTIONS = 256
+"""In which the furthest point of a cluster is sought, for its convex hull."""
+
+
+def support_areas(starts, first, points, radii, x, y, angle, furthest, areas):
+    """Areas [m²] of the convex hulls of clusters, of their furthest points in many directions.
+
+    Bodies of cluster c: ``starts[c]`` to before ``starts[c + 1]``; core points of a body, about its
+    centroid, and the ``radii`` of their disks: from ``first[i]`` on; ``furthest`` (DIRECTIONS, 5)
+    is scratch.
+    """
+    for k in range(furthest.shape[0]):
+        turn = 2.0 * math.pi * k / furthest.shape[0]
+        furthest[k, 3], furthest[k, 4] = math.cos(turn), math.sin(turn)
+    for c in range(starts.shape[0] - 1):
+        for k in range(furthest.shape[0]):
+            furthest[k, 2] = -math.inf
+        for i in range(starts[c], starts[c + 1]):
+            cosine, sine = math.cos(angle[i]), math.sin(angle[i])
+            for point in range(first[i], first[i + 1]):
+                px = x[i] + cosine * points[point, 0] - sine * points[point, 1]
+                py = y[i] + sine * points[point, 0] + cosine * points[point, 1]
+                for k in range(furthest.shape[0]):
+                    nx, ny = furthest[k, 3], furthest[k, 4]
+                    far = nx * px + ny * py + radii[point]
+                    if far > furthest[k, 2]:
+                        furthest[k, 0] = px + radii[point] * nx
+                        furthest[k, 1] = py + radii[point] * ny
+                        furthest[k, 2] = far
+        area = 0.0
+        last = furthest.shape[0] - 1
+        for k in range(furthest.shape[0]):
+            area += furthest[last, 0] * furthest[k, 1] - furthest[k, 0] * furthest[last, 1]
+            last = k
+        areas[c] = 0.5 * area
+
+
+@functools.cache
+def supports() -> Callable:
+    """The compiled function."""
+    return compose(support_areas, {}, what="the hulls of clusters")
+
+
 def hull_areas(
     bodies: list[Body], places: np.ndarray, angles: np.ndarray, label: np.ndarray, ends: np.ndarray
 ) -> np.ndarray:
-    """Areas [m²] of the convex hulls of clusters' outlines, whose arcs are drawn by 64 points; NaN
-    for those that have no ``ends`` (c,)."""
-    from scipy.spatial import ConvexHull
-
-    areas = np.full(len(ends), math.nan)
-    for cluster in np.flatnonzero(ends).tolist():
-        rings = []
-        for each in np.flatnonzero(label == cluster):
-            x, y = places[each].tolist()
-            rings += bodies[each].shape.outline(x, y, float(angles[each]))
-        # In micrometres: the hull's own rounding is far below them.
-        areas[cluster] = 1e-12 * ConvexHull(1e6 * np.concatenate(rings)).volume
-    return areas
+    """Areas [m²] of the convex hulls of clusters' core points swept by their disks; NaN for those
+    that have no ``ends`` (c,)."""
+    order = np.argsort(label, kind="stable")
+    shapes = [bodies[each].shape for each in order.tolist()]
+    rings = [ring for shape in shapes for part in shape.parts for ring in part.rings[:1]]
+    swept = [part.radius for shape in shapes for part in shape.parts]
+    sizes = np.array([len(ring) for ring in rings])
+    parts = np.cumsum([0, *(len(shape.parts) for shape in shapes)])
+    x, y = np.ascontiguousarray(places[order].T)
+    areas = np.zeros(len(ends))
+    supports()(
+        np.append(0, np.cumsum(np.bincount(label, minlength=len(ends)))),
+        np.append(0, np.cumsum(sizes))[parts], np.concatenate(rings),
+        np.repeat(np.array(swept), sizes), x, y, angles[order], np.zeros((DIRECTIONS, 5)), areas,
+    )  # fmt: skip
+    return np.where(ends, areas, math.nan)

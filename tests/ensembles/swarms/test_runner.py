@@ -65,6 +65,22 @@ def test_what_is_written_agrees_with_itself(finished):
         found = int(np.sum(rows & (bonds["bond_kind"] == place)))
         assert found == counts[f"bonds_{kinds[place]}"][k, t]
     assert len(bonds["bond_kind"]) > 0
+    clusters = results.groups["clusters"]
+    for k, t in np.ndindex(counts["clusters"].shape):
+        rows = (clusters["cluster_replicate"] == k) & (clusters["cluster_time"] == t)
+        label = results.groups["snapshots"]["cluster"][k, t]
+        assert clusters["cluster_number"][rows].tolist() == [*range(label.max() + 1)]
+        assert clusters["cluster_bodies"][rows].tolist() == np.bincount(label).tolist()
+        assert clusters["cluster_bodies"][rows].max() == counts["largest"][k, t]
+        share = clusters["cluster_mass"][rows] / clusters["cluster_mass"][rows].sum()
+        assert share @ clusters["cluster_speed"][rows] == pytest.approx(counts["settling"][k, t])
+        assert share @ clusters["cluster_gyration"][rows] == pytest.approx(counts["gyration"][k, t])
+        inside = (bonds["bond_replicate"] == k) & (bonds["bond_time"] == t)
+        assert clusters["cluster_bonds"][rows].sum() == inside.sum()
+        alone = clusters["cluster_bodies"][rows] == 1
+        together = np.bincount(label, results.groups["bodies"]["r_eq"][k])
+        assert clusters["cluster_hydrodynamic"][rows][alone] == pytest.approx(together[alone])
+        assert np.all(clusters["cluster_hydrodynamic"][rows][~alone] < together[~alone])
     assert results.groups["ends"]["finished"].tolist() == [1, 1]
     assert json.loads(results.run["identity"])["seed"] == 4
 
@@ -308,7 +324,9 @@ def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
     assert 'kind = "swarm"' in capsys.readouterr().out
     assert main(["plot", file, "--animation", "s.gif"]) == 0
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"swarm-snapshots.png", "swarm-clusters.png", "swarm-sizes.png", "s.gif"}
+    assert names == {
+        "swarm-snapshots.png", "swarm-clusters.png", "swarm-sizes.png", "swarm-speed.png", "s.gif",
+    }  # fmt: skip
     pytest.importorskip("xarray")
     results = flocsim.open(file)
     data = results.to_xarray("snapshots")
