@@ -212,6 +212,20 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     PIECE_COLUMNS,
 ) = range(11)
 
+# Columns of ``Scene.charges``: up to GROUP neighbours, in the frame of their body.
+(
+    GROUP_X,  # the centre of a circle that holds them [m]
+    GROUP_Y,
+    GROUP_EXTENT,  # and its radius [m]
+    GROUP_COUNT,  # how many there are
+    FIRST_CHARGE,  # from here on, of each x, y [m], and its charge: geometry.surfaces.charges
+) = range(5)
+
+GROUP = 8
+"""Charges in a row at most."""
+
+CHARGE_COLUMNS = FIRST_CHARGE + 3 * GROUP
+
 # Places in ``Scene.water``: what two bodies' resistance follows from beside ``Scene.pair_table``.
 (
     VISCOSITY,  # [Pa s]
@@ -482,11 +496,14 @@ class Scene(NamedTuple):
         np.ndarray, ("pieces", PIECE_COLUMNS)
     ]  # see PLACE_X; none if nothing reads it
     first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
+    charges: Annotated[np.ndarray, ("groups", CHARGE_COLUMNS)]  # see GROUP_X; none likewise
+    first_charge: np.ndarray  # (n + 1,): where a body's charges begin
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws
     surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
     centre_reach: float  # the same of centre forces [m]
     outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
+    layer: tuple[float, float, float, float]  # of the charges' double layers: forces.outline
     smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
     events: int  # how many the contact forces have
     box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats

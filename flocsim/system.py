@@ -129,7 +129,8 @@ class System:
 
     def __attrs_post_init__(self) -> None:
         refuse_unlike(self.forces, len(self.bodies))
-        object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
+        shapes = [body.shape for body in self.bodies]
+        object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid, shapes))
         water_between(self.forces, self.bodies, self.fluid)
 
     def __repr__(self) -> str:
@@ -156,7 +157,8 @@ class System:
         """What its forces reach of an engine (flocsim.integrators.left_out): two systems of one
         family that reach the same share their compiled code."""
         return {
-            "outlines": "outline_pressure" in self.pieces.laws,
+            "outlines": "outline_pressure" in self.pieces.laws or self.pieces.layer[2] > 0.0,
+            "charges": self.pieces.layer[2] > 0.0,
             "plain": self.pieces.plain_bodies,
             "water": resistance_of_pairs(self.forces) is not None,
         }
@@ -171,7 +173,7 @@ class System:
             self.bodies, self.fluid, pieces.parameters,
             laws=self.laws(jit=jit),
             surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
-            outlines=pieces.outlines,
+            outlines=pieces.outlines, layer=pieces.layer,
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),

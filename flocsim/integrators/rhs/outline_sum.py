@@ -22,8 +22,9 @@ from flocsim.geometry.surfaces.distances import (
 )
 from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
 from flocsim.hooks import hook
+from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.views import effective_mass
-from flocsim.laws import outline_pressure
+from flocsim.laws import OUTLINE_PRESSURE, has, outline_pressure
 
 LENS = 100.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
@@ -202,6 +203,16 @@ def radii_of(scene, a, b):
     return scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS]
 
 
+def acts_along(scene):
+    """Whether anything acts along outlines."""
+    return outline_reach(scene) > 0.0
+
+
+def outline_reach(scene):
+    """The gap of outlines up to which anything acts along them [m]; below 0 where nothing does."""
+    return max(scene.outlines[0], scene.layer[2])
+
+
 def depth_of(scene, a, b):
     """The depth along which two bodies act on each other [m]."""
     if scene.outlines[2] > 0.0:
@@ -263,9 +274,14 @@ def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
     c, s = math.cos(angle_b), math.sin(angle_b)
     turn = angle_a - angle_b
     seen_x, seen_y = c * x + s * y, c * y - s * x
-    across, up, torque = sum_along(
-        scene, work, time, a, b, seen_x, seen_y, math.cos(turn), math.sin(turn)
-    )
+    cosine, sine = math.cos(turn), math.sin(turn)
+    across, up, torque = 0.0, 0.0, 0.0
+    if has(scene, OUTLINE_PRESSURE):
+        across, up, torque = sum_along(scene, work, time, a, b, seen_x, seen_y, cosine, sine)
+    if scene.layer[2] > 0.0:
+        fx, fy, turning = sum_charges(scene, a, b, seen_x, seen_y, cosine, sine)
+        depth = depth_of(scene, a, b)
+        across, up, torque = across + depth * fx, up + depth * fy, torque + depth * turning
     own = torque - (seen_x * up - seen_y * across)
     return c * across - s * up, s * across + c * up, own, -torque
 
