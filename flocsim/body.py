@@ -21,6 +21,7 @@ from flocsim.fields import choice, flag, in_unit, is_number, quantity, word_or_q
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import charges_of_bodies
+from flocsim.geometry.surfaces.field import field_of_bodies
 from flocsim.geometry.surfaces.pieces import pieces_of_bodies
 from flocsim.laws import LAWS
 
@@ -33,7 +34,7 @@ NO_SMOOTHING = (1.0, 0.0, 0.0)
 NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
 """``Scene.outlines`` of a scene without forces between outlines."""
 
-NO_LAYER = (0.0, 0.0, -1.0, 0.0)
+NO_LAYER = (0.0, 0.0, -1.0)
 """``Scene.layer`` of a scene without charges."""
 
 NO_WATER = (np.zeros((0, at.TABLE_COLUMNS, 4)), np.zeros(at.WATER_SIZE))
@@ -286,7 +287,7 @@ def scene_of(
     surface_reach: float = -1.0,
     centre_reach: float = -1.0,
     outlines: tuple[float, float, float, float] = NO_OUTLINES,
-    layer: tuple[float, float, float, float] = NO_LAYER,
+    layer: tuple[float, float, float] = NO_LAYER,
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
     box: tuple[float, float] = NO_BOX,
@@ -318,6 +319,7 @@ def scene_of(
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         **charges_of_bodies(shapes, layer[0])._asdict(),
+        **field_of_bodies(shapes, layer[0])._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),

@@ -121,7 +121,7 @@ class Pieces:
     centre_reach: float = -1.0
     smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
     outlines: tuple[float, float, float, float] = NO_OUTLINES
-    layer: tuple[float, float, float, float] = NO_LAYER
+    layer: tuple[float, float, float] = NO_LAYER
     events: int = 0
     plain_bodies: bool = True
     used: dict[str, Force] = attrs.Factory(dict)

@@ -10,10 +10,8 @@ from flocsim.forces.check import fields_read, reach_of, sample_points
 from flocsim.forces.double_layer import DoubleLayer
 from flocsim.forces.van_der_waals import cut_at
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.surfaces.charges import DEEP, check_length, is_thin
-
-FADED = 18.0
-"""Debye lengths beyond which charges are not asked for: e^−18 of the force at touch, 2e-8."""
+from flocsim.geometry.surfaces.charges import is_thin
+from flocsim.geometry.surfaces.field import FADED
 
 
 def act_along_outlines(forces: Iterable[Force]) -> bool:
@@ -39,15 +37,13 @@ def layer_along(forces: Iterable[PairForce], shapes: Sequence[Shape]) -> DoubleL
     """The double layer among forces between outlines that acts between charges, as it is too thick
     beside what is round in these shapes for a sum of plates; None without.
 
-    UsageError for several; ShapeError for an outline that takes too many charges.
+    UsageError for several.
     """
     layers = [force for force in forces if isinstance(force, DoubleLayer)]
     if len(layers) > 1:
         raise UsageError("one double layer acts along outlines, found several: leave all but one")
     if not layers or not shapes or not layers[0].first or is_thin(shapes, layers[0].kappa):
         return None
-    for shape in shapes:
-        check_length(shape, layers[0].kappa)
     return layers[0]
 
 
@@ -65,14 +61,14 @@ def pressures_of(forces: Sequence[PairForce], shapes: Sequence[Shape]) -> list[P
 
 def layer_of_forces(
     forces: Sequence[PairForce], shapes: Sequence[Shape]
-) -> tuple[float, float, float, float]:
-    """``Scene.layer`` of some forces between outlines: κ [1/m]; 2πε φ_a φ_b [N]; the gap up to
-    which charges act on each other [m], and how far they may be for it [m]."""
+) -> tuple[float, float, float]:
+    """``Scene.layer`` of some forces between outlines: κ [1/m]; 2πε φ_a φ_b [N]; and the gap up to
+    which charges act [m], −1 without any."""
     layer = layer_along(forces, shapes)
     if layer is None:
         return NO_LAYER
     reach = cut_at(layer.cut, FADED * layer.debye_length)
-    return layer.kappa, layer.between_charges, reach, reach + 2.0 * DEEP * layer.debye_length
+    return layer.kappa, layer.between_charges, reach
 
 
 def outlines_of_forces(

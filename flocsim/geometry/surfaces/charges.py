@@ -31,7 +31,7 @@ from flocsim.geometry.surfaces.pieces import pieces_of_shape
 DEEP = 0.6
 """Depth of charges, and their distance from each other."""
 
-THIN = 50.0
+THIN = 60.0
 """κ times the least radius of curvature from which on double layers are as those of plates, within
 1 % (1/(2κr) of a cylinder over a plate)."""
 
@@ -41,6 +41,10 @@ MOST = 20_000
 FAR = 16.0
 """κρ beyond which charges are not seen in that."""
 
+NEAR = 0.15
+"""Charges nearer to each other than that, as behind reflex corners, are one: two would grow without
+bound against each other."""
+
 DENSE = 2000
 """Up to so many charges all of them are solved for at once; more, by what is near each alone."""
 
@@ -48,6 +52,11 @@ DENSE = 2000
 def is_thin(shapes: Sequence[Shape], kappa: float) -> bool:
     """Whether the double layers of some bodies are thin beside all that is round in them."""
     return min(float(part.radius) for shape in shapes for part in shape.parts) * kappa >= THIN
+
+
+def unit_of(shape: Shape, kappa: float) -> float:
+    """1/κ, or the least radius by which a shape is rounded where that is less [m]."""
+    return min(1.0 / kappa, *(float(part.radius) for part in shape.parts))
 
 
 def spacings(pieces, kappa):
@@ -60,24 +69,30 @@ def spacings(pieces, kappa):
         return spacing, np.maximum(np.ceil(lengths / spacing), 1.0)
 
 
+def too_long(shape: Shape, kappa: float, takes: str) -> ShapeError:
+    """What to say of an outline that takes more of something than there may be."""
+    radius = min(float(part.radius) for part in shape.parts)
+    return ShapeError(
+        f"the outline of a body of r_eq = {shape.equivalent_radius:.3g} m, rounded by "
+        f"{radius:.3g} m, is too long for a double layer of 1/κ = {1.0 / kappa:.3g} m along "
+        f'outlines (it takes {takes} at most): give gap = "surface" in the place of '
+        'law = "outline"'
+    )
+
+
 def check_length(shape: Shape, kappa: float) -> None:
     """ShapeError where a shape's outline takes more charges than can be solved for."""
     _, counts = spacings(pieces_of_shape(shape), kappa)
     if counts.sum() > MOST:
-        radius = min(float(part.radius) for part in shape.parts)
-        raise ShapeError(
-            f"the outline of a body of r_eq = {shape.equivalent_radius:.3g} m, rounded by "
-            f"{radius:.3g} m, is too long for the double layer of 1/κ = {1.0 / kappa:.3g} m along "
-            f"outlines (it takes {counts.sum():.3g} charges, of {MOST} at most): give gap = "
-            '"surface" in the place of law = "outline"'
-        )
+        raise too_long(shape, kappa, f"{counts.sum():.3g} charges, of {MOST}")
 
 
-def points_of(pieces, kappa):
-    """(points on an outline (n, 2), the places of charges behind them (n, 2)) [m]."""
+def points_of(pieces, kappa, times=1):
+    """(points on an outline (n, 2), what lies behind them as deep as charges (n, 2)) [m], so many
+    times as many as charges."""
     spacing, counts = spacings(pieces, kappa)
     points, places = [], []
-    for row, (depth, count) in enumerate(zip(spacing, counts.astype(int), strict=True)):
+    for row, (depth, count) in enumerate(zip(spacing, times * counts.astype(int), strict=True)):
         piece = piece_at(pieces, row)
         share = (2.0 * np.arange(count) + 1.0) / count - 1.0
         parameter = share * piece.size
@@ -91,7 +106,8 @@ def points_of(pieces, kappa):
 
 @lru_cache(maxsize=256)
 def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
-    """The charges (n, 3) of a shape around its centroid: x, y [m] and q [-], at κ [1/m].
+    """The charges (n, 3) of a shape around its centroid: x, y [m] and q [-], at κ [1/m], by least
+    squares of the potential at twice as many points.
 
     ShapeError for an outline that takes too many.
     """
@@ -100,15 +116,29 @@ def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
     from scipy.special import k0
 
     check_length(shape, kappa)
-    points, places = points_of(pieces_of_shape(shape), kappa)
-    one = np.ones(len(points))
-    if len(points) <= DENSE:
-        matrix = k0(kappa * distances(points, places))
-        return np.column_stack([places, np.linalg.solve(matrix, one)])
-    trees = cKDTree(points), cKDTree(places)
-    near = trees[0].sparse_distance_matrix(trees[1], FAR / kappa, output_type="coo_matrix").tocsc()
-    near.data = k0(kappa * near.data)
-    return np.column_stack([places, spsolve(near, one)])
+    pieces = pieces_of_shape(shape)
+    places = parted(points_of(pieces, kappa)[1], NEAR * unit_of(shape, kappa))
+    points, _ = points_of(pieces, kappa, 2)
+    if len(places) <= DENSE:
+        matrix, solve = k0(kappa * distances(points, places)), np.linalg.solve
+    else:
+        trees, far = (cKDTree(points), cKDTree(places)), FAR / kappa
+        near = trees[0].sparse_distance_matrix(trees[1], far, output_type="coo_matrix")
+        near.data = k0(kappa * near.data)
+        matrix, solve = near.tocsc(), spsolve
+    charges = solve(matrix.T @ matrix, matrix.T @ np.ones(len(points)))
+    return np.column_stack([places, charges])
+
+
+def parted(places, near):
+    """Places without those that are nearer than that [m] to an earlier one."""
+    from scipy.spatial import cKDTree
+
+    kept = np.ones(len(places), bool)
+    pairs = cKDTree(places).query_pairs(near, output_type="ndarray")
+    for first, second in sorted(map(sorted, pairs.tolist())):
+        kept[second] &= not kept[first]
+    return places[kept]
 
 
 def distances(points, others):

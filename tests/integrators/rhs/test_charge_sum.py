@@ -7,12 +7,16 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0, k1
 
-from flocsim import Sphere
+from flocsim import Body, Sphere, System
+from flocsim.arrays import work_of
+from flocsim.compiler.composer import compose
 from flocsim.constants import VACUUM_PERMITTIVITY
-from flocsim.errors import RangeError, UsageError
+from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import sample_points
-from flocsim.geometry.surfaces.charges import layer_energy
+from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
+from flocsim.integrators.rhs.charge_sum import field_at
+from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.integrators.rhs.test_outline_sum import SIZE, Pair, at_gap, rough, slab, slopes
 
 DEBYE = 0.98e-6
@@ -23,15 +27,17 @@ def layer(**given):
     return DoubleLayer(15e-3, DEBYE, law="outline", **given)
 
 
-@pytest.mark.parametrize("radius", [1.0, 5.0])
+@pytest.mark.parametrize(
+    ("radius", "allowed"), [(1.0, 2e-3), (5.0, 2e-3), (50.0, 2e-3), (100.0, 0.01)]
+)
 @pytest.mark.parametrize("gap", [0.0, 0.1, 1.0])
-def test_two_cylinders(radius, gap):
+def test_two_cylinders(radius, allowed, gap):
     """F = 2πε κ φ² K₁(κD)/K₀(κR)² a metre."""
     sphere, away = Sphere(radius * DEBYE), (2.0 * radius + gap) * DEBYE
     found = Pair(sphere, sphere, (away, 0.0, 0.0), layer(depth=1.0)).loads(away, 0.0, 0.0)
     exact = k1(2.0 * radius + gap) / k0(radius) ** 2
     exact *= 2.0 * math.pi * PERMITTIVITY * 15e-3**2 / DEBYE
-    assert found[0] == pytest.approx(exact, rel=5e-3)
+    assert found[0] == pytest.approx(exact, rel=allowed)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -47,8 +53,30 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed):
 
     wanted = slopes(energy, pose, 2e-3 * DEBYE, SIZE)
     strength = math.hypot(*wanted[:2])
-    np.testing.assert_allclose(found[:2], wanted[:2], atol=1e-6 * strength)
-    assert abs(found[2] - wanted[2]) < 1e-6 * strength * SIZE
+    # Of the charges themselves, not of their tables.
+    np.testing.assert_allclose(found[:2], wanted[:2], atol=1e-3 * strength)
+    assert abs(found[2] - wanted[2]) < 1e-3 * strength * SIZE
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_force_and_torque_are_the_slopes_of_the_potential_in_the_tables(seed):
+    """At any place, also where tiles meet."""
+    random = np.random.default_rng(seed)
+    one, other = rough(8, SIZE, seed), rough(8 + seed, 1.7 * SIZE, 50 + seed)
+    pose = at_gap(one, other, 1e-9 * 10.0 ** random.uniform(0.0, 3.6), *random.uniform(0, 6.28, 2))
+    pair = Pair(other, one, pose, layer(depth=1.0))
+    [_, strength, _], charges = pair.scene.layer, charges_of_shape(one, 1.0 / DEBYE)
+
+    def energy(each):
+        x, y, angle = each
+        c, s = math.cos(angle), math.sin(angle)
+        placed = charges[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
+        potentials = [field_at(pair.scene, 0, *place)[0] for place in placed]
+        return strength * charges[:, 2] @ potentials
+
+    wanted, found = slopes(energy, pose, 1e-3 * DEBYE, SIZE), pair.loads(*pose)
+    np.testing.assert_allclose(found[:2], wanted[:2], atol=1e-6 * math.hypot(*wanted[:2]))
+    assert abs(found[2] - wanted[2]) < 1e-6 * math.hypot(*wanted[:2]) * SIZE
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -115,7 +143,7 @@ def test_unlike_plates(boundary):
 
 
 @pytest.mark.parametrize("boundary", PLATES)
-@pytest.mark.parametrize(("debye", "allowed"), [(1.9e-9, 0.02), (2e-8, 0.05)])
+@pytest.mark.parametrize(("debye", "allowed"), [(1.5e-9, 0.02), (2e-8, 0.05)])
 def test_a_face_of_five_micrometres(boundary, debye, allowed):
     """Thin, by the pressure of plates, and thick, between charges and what is beside them."""
     length = 2.5e-6
@@ -128,6 +156,26 @@ def test_a_face_of_five_micrometres(boundary, debye, allowed):
         sample_points(force)[0]._replace(gap=gap), force.parts, force.kappa, force.closest
     )
     assert pair.loads(0.0, y, 0.0)[1] == pytest.approx(pressure * 25e-12, rel=allowed)
+
+
+def test_three_bodies_have_a_field_each():
+    bodies = [Body(Sphere(r), position=(x, 0.0), density=1100.0)
+              for r, x in ((2e-6, 0.0), (1e-6, 3.5e-6), (1.5e-6, 6.5e-6))]  # fmt: skip
+    system = System(bodies, [layer(depth=1.0)])
+    scene, found = system.scene(), []
+    work = work_of(scene, *system.motion())
+    entry = compose(between_outlines, system.compiled_calls)
+    for a, b in ((1, 0), (2, 1)):
+        x = bodies[a].position[0] - bodies[b].position[0]
+        found.append(entry(scene, work, 0.0, a, b, x, 0.0, 0.0, 0.0)[0])
+        pair = Pair(bodies[b].shape, bodies[a].shape, (x, 0.0, 0.0), layer(depth=1.0))
+        assert found[-1] == pytest.approx(pair.loads(x, 0.0, 0.0)[0], rel=1e-9)
+
+
+def test_a_field_of_too_many_nodes_is_refused():
+    sphere = Sphere(2e-3)
+    with pytest.raises(ShapeError, match=r"too long for a double layer.*give gap"):
+        Pair(sphere, Sphere(5e-6), (1e-2, 0.0, 0.0), layer())
 
 
 def test_opposite_potentials_attract():
