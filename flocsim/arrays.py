@@ -477,13 +477,15 @@ class PairView(NamedTuple):
 class OutlineView(NamedTuple):
     """A point of one outline beside another, as an OutlineForce kernel sees it.
 
-    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it; ``plate_gap``
-    that of two plates which van der Waals forces pull at as strongly there; ``depth`` [m] that of
-    the bodies along the third direction; radii are equivalent radii of both.
+    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it;
+    ``parted_gap`` the same of outlines that are moved apart to d_min where they are nearer;
+    ``plate_gap`` that of two plates which van der Waals forces pull at as strongly there; ``depth``
+    [m] that of the bodies along the third direction; radii are equivalent radii of both.
     """
 
     time: float
     gap: float
+    parted_gap: float
     plate_gap: float
     depth: float
     radius_i: float

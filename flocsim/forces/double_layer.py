@@ -138,7 +138,7 @@ class DoubleLayer(PairForce):
     def pressure(point, parts, kappa, closest):
         """Of plates [Pa], in powers of exp(−κd), which do not overflow."""
         first, even, odd = parts
-        x = kappa * max(point.gap, closest)
+        x = kappa * max(point.parted_gap, closest)
         fall = math.exp(-x)
         total = first * fall + 2.0 * even * fall / (1.0 + fall) ** 2
         if odd != 0.0:

@@ -13,6 +13,10 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import is_thin
 from flocsim.geometry.surfaces.field import FADED
 
+TOUCHING = 0.005
+"""Of a Debye length: where outlines are nearer, and no attraction says how near they count, the
+pressure of double layers grows no more."""
+
 
 def act_along_outlines(forces: Iterable[Force]) -> bool:
     """Whether any of some forces acts all along two outlines."""
@@ -96,7 +100,9 @@ def outlines_of_forces(
     ]
     known = list(zip(pressures, read, strict=True))
     floor = max((getattr(f, "d_min", 0.0) for f, r in known if "plate_gap" in r), default=0.0)
-    steady = [reach_of(force) for force, fields in known if "gap" in fields]
+    layers = [force for force in pressures if isinstance(force, DoubleLayer)]
+    floor = floor or max((f.d_min or TOUCHING * f.debye_length for f in layers), default=0.0)
+    steady = [reach_of(force) for force, fields in known if fields & {"gap", "parted_gap"}]
     return (
         max(map(reach_of, pressures), default=-1.0), floor or MINIMUM_GAP,
         0.0 if isinstance(depth, str) else depth, max(steady, default=0.0),

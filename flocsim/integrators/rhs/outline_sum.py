@@ -180,12 +180,12 @@ def add_node(scene, work, total, piece, parameter, weight, numbers):
     if not gap < lens:
         return total
     fx, fy, torque = total
-    size = -outline_pressure(scene, seen_at(view, gap, attraction, lens)) * weight * metres
+    size = -outline_pressure(scene, seen_at(view, gap, attraction, inset, lens)) * weight * metres
     return fx + size * nx, fy + size * ny, torque + size * (x * ny - y * nx)
 
 
-def seen_at(view, gap, attraction, lens):
-    """The OutlineView at a point with a gap and that S."""
+def seen_at(view, gap, attraction, inset, lens):
+    """The OutlineView at a point with a gap and that S, outlines being moved apart by an inset."""
     share = gap / lens
     share *= share
     attraction *= 1.0 - share * share * share
@@ -193,8 +193,8 @@ def seen_at(view, gap, attraction, lens):
     if attraction < 0.0:
         plates = min(plates, (-0.75 * attraction) ** (-1.0 / 3.0))
     return OutlineView(
-        view.time, gap, plates, view.depth, view.radius_i, view.radius_j, view.reduced_radius,
-        view.effective_mass,
+        view.time, gap, gap + inset, plates, view.depth, view.radius_i, view.radius_j,
+        view.reduced_radius, view.effective_mass,
     )  # fmt: skip
 
 
@@ -237,7 +237,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     depth = depth_of(scene, a, b)
     radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
-        time, least, least, depth, radius_a, radius_b,
+        time, least, least, least, depth, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
     numbers = inset, lens, view
