@@ -230,14 +230,17 @@ class System:
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 
     def check_overlaps(self) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
-        may: they do not act on each other."""
+        """UsageError where two bodies start with crossing cores or too deep an overlap, of forces
+        along outlines one beyond d_min; fixed ones may: they do not act on each other."""
+        reach, d_min, *_ = self.pieces.outlines
+        most = d_min if reach > 0.0 else math.inf
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
             if a.fixed and b.fixed:
                 continue
             fault = overlap_fault(
                 a.shape.placed_parts(*a.position, a.angle),
                 b.shape.placed_parts(*b.position, b.angle),
+                most,
             )
             if fault:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")
