@@ -157,7 +157,7 @@ def read_kernel(file: Any, identity: str, group: Group = KERNEL_GROUP) -> Kernel
 
 
 def fractal_in(identity: str) -> tuple[float, float, float] | None:
-    """(D_p, n_f, density of the solid) of a flocsim.body.FractalDensity in what rows follow from."""
+    """(D_p, n_f, density of the solid) of a FractalDensity in what rows follow from."""
     found = re.search(
         r"FractalDensity\(law='fractal', primary=([^,]+), dimension=([^,]+), solid=([^)]+)\)",
         identity,

@@ -118,7 +118,7 @@ def test_flocmods_kernels_are_these():
 
 
 def test_a_matrix_says_what_fractal_flocs_weigh():
-    density = FractalDensity(primary=4e-6, dimension=2.1, solid=2650.0)
+    density = FractalDensity("fractal", primary=4e-6, dimension=2.1, solid=2650.0)
     found = fractal_in(f'{{"bodies.density": "{density!r}"}}')
     text = kernel_matrix(attrs.evolve(some_kernel(), fractal=found), "shear", 32)
     assert "# flocs of n_f = 2.1, D_p = 4e-06 m, solid of 2650 kg/m3" in text
