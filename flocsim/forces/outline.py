@@ -8,9 +8,8 @@ from flocsim.errors import UsageError
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import fields_read, reach_of, sample_points
 from flocsim.forces.double_layer import DoubleLayer
-from flocsim.forces.van_der_waals import cut_at
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.surfaces.charges import is_thin
+from flocsim.geometry.surfaces.charges import THIN, is_thin
 from flocsim.geometry.surfaces.field import FADED
 
 TOUCHING = 0.005
@@ -48,6 +47,12 @@ def layer_along(forces: Iterable[PairForce], shapes: Sequence[Shape]) -> DoubleL
         raise UsageError("one double layer acts along outlines, found several: leave all but one")
     if not layers or not shapes or not layers[0].first or is_thin(shapes, layers[0].kappa):
         return None
+    if layers[0].cut is not None:
+        raise UsageError(
+            f"a double layer of {layers[0].debye_length:.3g} m between bodies rounded by less than "
+            f"{THIN:g} times as much ends {FADED:g} Debye lengths from an outline, found a cut of "
+            f"{layers[0].cut:.3g} m: leave it out"
+        )
     return layers[0]
 
 
@@ -71,8 +76,7 @@ def layer_of_forces(
     layer = layer_along(forces, shapes)
     if layer is None:
         return NO_LAYER
-    reach = cut_at(layer.cut, FADED * layer.debye_length)
-    return layer.kappa, layer.between_charges, reach
+    return layer.kappa, layer.between_charges, FADED * layer.debye_length
 
 
 def outlines_of_forces(

@@ -205,8 +205,10 @@ def test_what_has_no_bound_takes_a_least_gap():
         DoubleLayer(boundary="potential")
 
 
-def test_two_double_layers_are_refused():
+def test_two_double_layers_and_a_cut_of_a_thick_one_are_refused():
     sphere = Sphere(DEBYE)
+    with pytest.raises(UsageError, match="ends 12 Debye lengths from an outline, found a cut"):
+        Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(cut=1e-6))
     with pytest.raises(UsageError, match="one double layer acts along outlines"):
         Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(), layer())
 
