@@ -70,7 +70,7 @@ def draw(rows, presets, path):
             set_probability_axis(axes)
             axes.set(xscale="log", xlabel="Hamaker constant [J]", title=preset)
         panels[0].set_ylabel("Pr[A]")
-        panels[0].legend(title="forces by", loc="center left")
+        panels[0].legend(title="forces by", loc="center right")
         save(figure, path)
 
 
