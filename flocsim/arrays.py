@@ -217,6 +217,43 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     PIECE_COLUMNS,
 ) = range(11)
 
+# Columns of ``Scene.charges``: up to GROUP neighbours, in the frame of their body.
+(
+    GROUP_X,  # the centre of a circle that holds them [m]
+    GROUP_Y,
+    GROUP_EXTENT,  # and its radius [m]
+    GROUP_COUNT,  # how many there are
+    FIRST_CHARGE,  # from here on, of each x, y [m], and its charge: geometry.surfaces.charges
+) = range(5)
+
+GROUP = 8
+"""Charges in a row at most."""
+
+CHARGE_COLUMNS = FIRST_CHARGE + 3 * GROUP
+
+# Columns of ``Scene.grids``: where the field of a body's charges is known, in its own frame.
+(
+    GRID_X,  # the lower left corner [m]
+    GRID_Y,
+    GRID_STEP,  # from node to node [m]
+    GRID_ACROSS,  # how many tiles there are along x
+    GRID_UP,  # and along y
+    GRID_TILE,  # where they begin in ``tiles``
+    GRID_COLUMNS,
+) = range(7)
+
+TILE = 8
+"""Steps along a tile; its nodes are (TILE + 1)², those along its edges being its own."""
+
+# Columns of ``Scene.field``: of charges that make a potential of 1 on their outline.
+(
+    POTENTIAL,  # [-]
+    BY_X,  # its derivatives, of a step
+    BY_Y,
+    BY_XY,
+    FIELD_COLUMNS,
+) = range(5)
+
 # Places in ``Scene.water``: what two bodies' resistance follows from beside ``Scene.pair_table``.
 (
     VISCOSITY,  # [Pa s]
@@ -451,13 +488,15 @@ class PairView(NamedTuple):
 class OutlineView(NamedTuple):
     """A point of one outline beside another, as an OutlineForce kernel sees it.
 
-    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it; ``plate_gap``
-    that of two plates which van der Waals forces pull at as strongly there; ``depth`` [m] that of
-    the bodies along the third direction; radii are equivalent radii of both.
+    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it;
+    ``parted_gap`` the same of outlines that are moved apart to d_min where they are nearer;
+    ``plate_gap`` that of two plates which van der Waals forces pull at as strongly there; ``depth``
+    [m] that of the bodies along the third direction; radii are equivalent radii of both.
     """
 
     time: float
     gap: float
+    parted_gap: float
     plate_gap: float
     depth: float
     radius_i: float
@@ -493,11 +532,17 @@ class Scene(NamedTuple):
         np.ndarray, ("pieces", PIECE_COLUMNS)
     ]  # see PLACE_X; none if nothing reads it
     first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
+    charges: Annotated[np.ndarray, ("groups", CHARGE_COLUMNS)]  # see GROUP_X; none likewise
+    first_charge: np.ndarray  # (n + 1,): where a body's charges begin
+    grids: Annotated[np.ndarray, ("n", GRID_COLUMNS)]  # see GRID_X; zeros likewise
+    tiles: np.ndarray  # (tiles,): where the nodes of each begin in ``field``; −1: it has none
+    field: Annotated[np.ndarray, ("nodes", FIELD_COLUMNS)]  # see POTENTIAL
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws
     surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
     centre_reach: float  # the same of centre forces [m]
     outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
+    layer: tuple[float, float, float]  # of the charges' double layers: forces.outline
     smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
     events: int  # how many the contact forces have
     box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats

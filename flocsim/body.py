@@ -20,6 +20,8 @@ from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, in_unit, is_number, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.surfaces.charges import charges_of_bodies
+from flocsim.geometry.surfaces.field import field_of_bodies
 from flocsim.geometry.surfaces.pieces import pieces_of_bodies
 from flocsim.laws import LAWS
 
@@ -31,6 +33,9 @@ NO_SMOOTHING = (1.0, 0.0, 0.0)
 
 NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
 """``Scene.outlines`` of a scene without forces between outlines."""
+
+NO_LAYER = (0.0, 0.0, -1.0)
+"""``Scene.layer`` of a scene without charges."""
 
 NO_WATER = (np.zeros((0, at.TABLE_COLUMNS, 4)), np.zeros(at.WATER_SIZE))
 """``Scene.pair_table`` and ``Scene.water`` where nothing acts between bodies through the water."""
@@ -282,6 +287,7 @@ def scene_of(
     surface_reach: float = -1.0,
     centre_reach: float = -1.0,
     outlines: tuple[float, float, float, float] = NO_OUTLINES,
+    layer: tuple[float, float, float] = NO_LAYER,
     smoothing: tuple[float, float, float] = NO_SMOOTHING,
     events: int = 0,
     box: tuple[float, float] = NO_BOX,
@@ -313,11 +319,14 @@ def scene_of(
         bodies=np.hstack([np.array(columns, dtype=float).T, np.array(water), alone]),
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
+        **charges_of_bodies(shapes, layer[0])._asdict(),
+        **field_of_bodies(shapes, layer[0])._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,
         surface_reach=float(surface_reach),
         centre_reach=float(centre_reach),
         outlines=outlines,
+        layer=layer,
         smoothing=smoothing,
         events=int(events),
         box=box,

@@ -24,6 +24,7 @@ from flocsim.forces.check import (
     sample_pairs,
 )
 from flocsim.forces.codegen import PLACES, VELOCITIES
+from flocsim.forces.outline import layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
@@ -118,6 +119,9 @@ def about(system, force, implicit):
         place = "along the line of centres" if centres else "between the outlines"
         if force.acts_on == "outlines":
             place = "all along the outlines"
+            shapes = [body.shape for body in system.bodies]
+            if layer_along([force], shapes) is not None:
+                place += ", between charges behind them, for it is thick beside their corners"
         parts = [f"{place}, {reach_words(system, force)}"]
         derivative = pair_derivative(system, force)
     parts += force.remarks(system.fluid)

@@ -130,7 +130,8 @@ class System:
 
     def __attrs_post_init__(self) -> None:
         refuse_unlike(self.forces, len(self.bodies))
-        object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid))
+        shapes = [body.shape for body in self.bodies]
+        object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid, shapes))
         water_between(self.forces, self.bodies, self.fluid)
 
     def __repr__(self) -> str:
@@ -157,7 +158,8 @@ class System:
         """What its forces reach of an engine (flocsim.integrators.left_out): two systems of one
         family that reach the same share their compiled code."""
         return {
-            "outlines": "outline_pressure" in self.pieces.laws,
+            "outlines": "outline_pressure" in self.pieces.laws or self.pieces.layer[2] > 0.0,
+            "charges": self.pieces.layer[2] > 0.0,
             "plain": self.pieces.plain_bodies,
             "water": resistance_of_pairs(self.forces) is not None,
         }
@@ -172,7 +174,7 @@ class System:
             self.bodies, self.fluid, pieces.parameters,
             laws=self.laws(jit=jit),
             surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
-            outlines=pieces.outlines,
+            outlines=pieces.outlines, layer=pieces.layer,
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
             events=pieces.events,
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
@@ -229,14 +231,17 @@ class System:
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 
     def check_overlaps(self) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap; fixed ones
-        may: they do not act on each other."""
+        """UsageError where two bodies start with crossing cores or too deep an overlap, of forces
+        along outlines one beyond d_min; fixed ones may: they do not act on each other."""
+        reach, d_min, *_ = self.pieces.outlines
+        most = d_min if reach > 0.0 else math.inf
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
             if a.fixed and b.fixed:
                 continue
             fault = overlap_fault(
                 a.shape.placed_parts(*a.position, a.angle),
                 b.shape.placed_parts(*b.position, b.angle),
+                most,
             )
             if fault:
                 raise UsageError(f"bodies {i} and {j} start {fault}; move them apart")

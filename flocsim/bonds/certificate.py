@@ -24,9 +24,9 @@ from flocsim.bonds.bond import are_spheres, energy_of, is_closed, radii_of, spee
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
-from flocsim.integrators.rhs.outline_sum import outlines_apart
+from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import effective_mass, pair_view
-from flocsim.laws import CENTRE_FORCE, OUTLINE_PRESSURE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
 
 SAFETY = 3.0
 """Factor by which attraction must outweigh the load."""
@@ -52,7 +52,7 @@ def attraction_at(scene, work, time, bond, way):
         centres = -centre_force(scene, view)
     if scene.surface_reach > gap:
         surfaces = -surface_force(scene, pair_view(scene, time, bond.j, bond.i, gap, 0.0, distance))
-    if has(scene, OUTLINE_PRESSURE):
+    if acts_along(scene):
         surfaces -= outlines_apart(scene, work, time, bond.j, bond.i, way)
     return centres, surfaces
 
@@ -77,7 +77,7 @@ def most_between(scene, work, time, bond, start, end, near, share):
             left = min(left, abs(bond.distance + way - sizes))
         if scene.surface_reach > 0.0:
             left = min(left, abs(bond.surface_gap + way))
-        if bond.gap + way < scene.outlines[0]:
+        if bond.gap + way < outline_reach(scene):
             left = min(left, max(bond.gap + way, scene.outlines[1]))
         way += max(share * left, LEAST_RUNG)
     return all_of_it, follows, pries, best
@@ -93,7 +93,7 @@ def lets_out(scene, work, time, bond, pull, needed):
 def capacity(scene, work, time, bond, near):
     """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
     a repulsion of centres; that of centres alone, over a way ``near`` [m])."""
-    between = scene.surface_reach > bond.surface_gap or scene.outlines[0] > bond.gap
+    between = scene.surface_reach > bond.surface_gap or outline_reach(scene) > bond.gap
     if not has(scene, CENTRE_FORCE) and not between:
         return 0.0, 0.0, 0.0
     sizes = radii_of(scene, bond)
@@ -101,7 +101,7 @@ def capacity(scene, work, time, bond, near):
     most, follows, pries, best = most_between(scene, work, time, bond, 0.0, end, near, RUNG)
     # Once more about the highest place, which may be a cusp.
     around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
-    if scene.outlines[0] > 0.0:
+    if outline_reach(scene) > 0.0:
         around = min(around, RUNG * max(bond.gap + best, scene.outlines[1]))
     if has(scene, CENTRE_FORCE):
         around = min(around, RUNG * abs(bond.distance + best - sizes))
@@ -154,7 +154,7 @@ def is_trapped(scene, work, time, bond, load):
     """Whether the two have too little energy to leave each other's attraction between centres, in
     which they lie, against the load: its work out of it is more than SAFETY times their energy."""
     inside = has(scene, CENTRE_FORCE) and bond.distance < radii_of(scene, bond)
-    if not inside or max(scene.surface_reach, scene.outlines[0]) > 0.0 or load.alone == 0.0:
+    if not inside or max(scene.surface_reach, outline_reach(scene)) > 0.0 or load.alone == 0.0:
         return False
     pull = SAFETY * load.force
     centres, _ = attraction_at(scene, work, time, bond, 0.0)

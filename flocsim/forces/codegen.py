@@ -9,12 +9,12 @@ themselves: one call of a law costs less than one for every shift.
 """
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 import attrs
 
 from flocsim.arrays import NUMBERS_OF_SHAPES, BodyView, ContactView, PairView, PlainBodyView
-from flocsim.body import NO_OUTLINES, Fluid
+from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
 from flocsim.forces.check import (
@@ -26,9 +26,10 @@ from flocsim.forces.check import (
     reach_of,
     sample_pairs,
 )
-from flocsim.forces.outline import outlines_of_forces
+from flocsim.forces.outline import layer_of_forces, outlines_of_forces, pressures_of
 from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.forces.smoothing import smoothness
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.laws import LAWS
 
 
@@ -110,10 +111,10 @@ another kind leave the text of a law as it is."""
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
-    gap of outlines is smoothed (smoothing.py), how far those all along them look (outline.py), how
-    many events its contact forces have, whether its body forces are given PlainBodyViews, and which
-    forces are used and left out, {name: force} and {name: why}, each by a name of its own
-    (base.names_of)."""
+    gap of outlines is smoothed (smoothing.py), how far those all along them look and what acts
+    between their charges (outline.py), how many events its contact forces have, whether its body
+    forces are given PlainBodyViews, and which forces are used and left out, {name: force} and
+    {name: why}, each by a name of its own (base.names_of)."""
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
@@ -121,6 +122,7 @@ class Pieces:
     centre_reach: float = -1.0
     smoothness: tuple[float, float, float] = (1.0, 0.0, 1.0)
     outlines: tuple[float, float, float, float] = NO_OUTLINES
+    layer: tuple[float, float, float] = NO_LAYER
     events: int = 0
     plain_bodies: bool = True
     used: dict[str, Force] = attrs.Factory(dict)
@@ -350,8 +352,9 @@ def check_named(force, fluid, name):
         raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
 
 
-def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
-    """The Pieces of a scene with these forces in this fluid."""
+def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ()) -> Pieces:
+    """The Pieces of a scene with these forces in this fluid, between bodies of these shapes:
+    without any, double layers along outlines are as thin as between plates."""
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
     sources = {kind: Source(fluid) for kind in kinds}
@@ -366,8 +369,10 @@ def laws_of(forces: Iterable[Force], fluid: Fluid) -> Pieces:
     water = [stand_in(each) for each in pieces.used.values() if isinstance(each, PairResistance)]
     if kinds["surface"] or water:
         pieces.smoothness = smoothness([*kinds["surface"], *water], fluid)
-    write_outline_law(sources["outline"], kinds["outline"])
-    pieces.outlines = outlines_of_forces(kinds["outline"], fluid)
+    pressures = pressures_of(kinds["outline"], shapes)
+    write_outline_law(sources["outline"], pressures)
+    pieces.outlines = outlines_of_forces(kinds["outline"], pressures, fluid)
+    pieces.layer = layer_of_forces(kinds["outline"], shapes)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

@@ -15,7 +15,14 @@ from flocsim.geometry.contact import body_pairs
 from flocsim.hooks import choose_method, step_across
 from flocsim.integrators.backward_euler.choice import FEWEST
 from flocsim.integrators.radau import elimination
-from flocsim.integrators.rhs import forces, jacobian, outline_sum, pair_resistance, views
+from flocsim.integrators.rhs import (
+    charge_sum,
+    forces,
+    jacobian,
+    outline_sum,
+    pair_resistance,
+    views,
+)
 
 
 def list_none(scene, work, cut):
@@ -56,12 +63,12 @@ def none_apart(scene, work, time, a, b, way):
 
 
 def left_out(
-    bodies: float, *, outlines: bool, plain: bool, water: bool
+    bodies: float, *, outlines: bool, charges: bool, plain: bool, water: bool
 ) -> dict[Callable, Callable]:
     """{hook: function} that leaves out what a scene does not need, for
     flocsim.compiler.composer.compose: of so many bodies (inf: of any number), with forces along
-    ``outlines`` or without, ``plain``: whether no kernel reads the numbers of shapes; with the
-    resistance of ``water`` between two bodies, or without."""
+    ``outlines`` or without, some of them between ``charges``; ``plain``: whether no kernel reads
+    the numbers of shapes; with the resistance of ``water`` between two bodies, or without."""
     found: dict[Callable, Callable] = {}
     if plain:
         found |= {views.body_view: views.plain_body_view}
@@ -71,6 +78,8 @@ def left_out(
             jacobian.add_outlines: differentiate_none,
             outline_sum.outlines_apart: none_apart,
         }
+    if not charges:
+        found |= {charge_sum.sum_charges: charge_sum.no_charges}
     if not water:
         found |= pair_resistance.LEFT_OUT
     if bodies < FEWEST:

@@ -131,7 +131,8 @@ class Replay:
 
     def scene_of(self, forces: Sequence[Force]) -> Scene:
         """The run's scene with the laws of these of its forces, uncompiled."""
-        pieces = laws_of(forces, self.origin.fluid)
+        shapes = [body.shape for body in self.origin.bodies]
+        pieces = laws_of(forces, self.origin.fluid, shapes)
         water = NO_WATER
         if any(isinstance(force, PairResistance) for force in forces):
             water = self.run.scene.pair_table, self.run.scene.water
@@ -140,7 +141,7 @@ class Replay:
             parameters=np.array(pieces.parameters, dtype=float),
             surface_reach=float(pieces.surface_reach),
             centre_reach=float(pieces.centre_reach), events=int(pieces.events),
-            outlines=pieces.outlines, pair_table=water[0], water=water[1],
+            outlines=pieces.outlines, layer=pieces.layer, pair_table=water[0], water=water[1],
         )  # fmt: skip
 
     @functools.cached_property

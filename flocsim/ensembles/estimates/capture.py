@@ -53,7 +53,7 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import wilson
 from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, Events, kinds_of
-from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
+from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel, fractal_in
 from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
 
 BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
@@ -438,7 +438,8 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         for name, value in (each.values | numerical[cell]).items():
             arrays[name][m, v, i, j] = arrays[name][m, v, j, i] = value
     water = resistance_of_pairs(study.config.forces) is not None
-    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water)
+    fractal = fractal_in(repr(study.config.bodies.density))
+    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water, fractal)
 
 
 def fill_alike(arrays: dict[str, np.ndarray], meetings: Sequence[str], given: bool) -> None:

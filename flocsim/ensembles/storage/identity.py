@@ -143,6 +143,7 @@ def type_facts(study):
             *pieces.smoothness,
             pieces.events,
             *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
+            *(pieces.layer if pieces.layer[2] > 0.0 else ()),
         ]
         facts[f"numbers.{name}"] = digest(np.array(numbers, float))
         # A force of the user's own may compute what the zone follows from.

@@ -1,5 +1,6 @@
 """Whether two placed cores overlap too deeply to start from, and where they touch."""
 
+import math
 from collections.abc import Sequence
 from itertools import combinations, product
 
@@ -14,8 +15,13 @@ TOUCHING = 1e-12
 """Gap [m] below which outlines are shown as touching."""
 
 
-def overlap_fault(a: Sequence[Part], b: Sequence[Part]) -> str | None:
-    """What is wrong with two placed bodies, by their parts, in words; None if nothing is."""
+def overlap_fault(
+    a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
+) -> str | None:
+    """What is wrong with two placed bodies, by their parts, in words; None if nothing is.
+
+    ``along_outlines``: the overlap [m] up to which what acts all along them is known.
+    """
     pairs = list(product(a, b))
     if any(cores_overlap(one, other) for one, other in pairs):
         return "with one core inside or across the other"
@@ -24,6 +30,11 @@ def overlap_fault(a: Sequence[Part], b: Sequence[Part]) -> str | None:
         overlap = contact - core_gap(one, other)
         if overlap > DEEPEST_OVERLAP * contact:
             return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
+        if overlap > along_outlines:
+            return (
+                f"overlapping by {overlap:.3g} m, beyond d_min = {along_outlines:.3g} m of the "
+                "force along their outlines"
+            )
     return None
 
 

@@ -8,9 +8,9 @@ straight.
 import math
 
 import flocsim.arrays as at
-from flocsim.integrators.rhs.outline_sum import outlines_apart
+from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import pair_view
-from flocsim.laws import CENTRE_FORCE, OUTLINE_PRESSURE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
 
 BARRIER = 20.0
 """Thermal energies k_B T that hold a pair: by Kramers' rate kicks take e^20 = 5e8 times as long to
@@ -29,7 +29,7 @@ def repulsion_at(scene, work, time, a, b, distance, gap, way):
         force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
     if scene.surface_reach > gap:
         force += surface_force(scene, pair_view(scene, time, a, b, gap, 0.0, distance))
-    if has(scene, OUTLINE_PRESSURE):
+    if acts_along(scene):
         force += outlines_apart(scene, work, time, a, b, way)
     return force
 
@@ -50,7 +50,7 @@ def can_climb(scene, work, time, a, b, distance, gap, load, needed):
             rung = min(rung, RUNG * abs(distance + way - sizes))
         if scene.surface_reach > 0.0:
             rung = min(rung, RUNG * abs(gap + way))
-        if gap + way < scene.outlines[0]:
+        if gap + way < outline_reach(scene):
             rung = min(rung, RUNG * max(gap + way, scene.outlines[1]))
         rung = max(rung, LEAST_RUNG)
         middle = way + 0.5 * rung

@@ -8,7 +8,7 @@ import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.grazing import grazing_force
-from flocsim.integrators.rhs.outline_sum import outlines_in
+from flocsim.integrators.rhs.outline_sum import acts_along, outlines_in
 from flocsim.integrators.rhs.pair_resistance import add_pair_resistance
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view
 from flocsim.integrators.rhs.views import (
@@ -24,7 +24,6 @@ from flocsim.laws import (
     BODY_FORCE,
     CENTRE_FORCE,
     CONTACT_FORCE,
-    OUTLINE_PRESSURE,
     body_force,
     centre_force,
     contact_force,
@@ -126,7 +125,7 @@ def sum_other_forces(scene, work, time, state):
         add_centre_forces(scene, work, time, state)
     if scene.surface_reach > 0.0:
         add_surface_forces(scene, work, time, state)
-    if has(scene, OUTLINE_PRESSURE):
+    if acts_along(scene):
         add_outline_forces(scene, work, time, state)
     add_pair_resistance(scene, work, state)
 

@@ -20,7 +20,7 @@ from flocsim.hooks import hook
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
-from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.outline_sum import acts_along, between_outlines
 from flocsim.integrators.rhs.pair_resistance import add_pair_damping
 from flocsim.integrators.rhs.stated_error import doubted
 from flocsim.integrators.rhs.surface_gap import (
@@ -38,7 +38,6 @@ from flocsim.integrators.rhs.views import (
 from flocsim.laws import (
     CENTRE_FORCE,
     CONTACT_FORCE,
-    OUTLINE_PRESSURE,
     POSITION_DERIVATIVES,
     VELOCITY_DERIVATIVES,
     centre_derivatives,
@@ -346,7 +345,7 @@ def assemble_others(scene, work, time, remaining):
         add_centres(scene, work, time)
     if scene.surface_reach > 0.0:
         add_surfaces(scene, work, time)
-    if has(scene, OUTLINE_PRESSURE):
+    if acts_along(scene):
         add_outlines(scene, work, time)
     add_pair_damping(scene, work)
 

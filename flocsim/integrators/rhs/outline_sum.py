@@ -22,8 +22,9 @@ from flocsim.geometry.surfaces.distances import (
 )
 from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
 from flocsim.hooks import hook
+from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.views import effective_mass
-from flocsim.laws import outline_pressure
+from flocsim.laws import OUTLINE_PRESSURE, has, outline_pressure
 
 LENS = 100.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
@@ -179,12 +180,12 @@ def add_node(scene, work, total, piece, parameter, weight, numbers):
     if not gap < lens:
         return total
     fx, fy, torque = total
-    size = -outline_pressure(scene, seen_at(view, gap, attraction, lens)) * weight * metres
+    size = -outline_pressure(scene, seen_at(view, gap, attraction, inset, lens)) * weight * metres
     return fx + size * nx, fy + size * ny, torque + size * (x * ny - y * nx)
 
 
-def seen_at(view, gap, attraction, lens):
-    """The OutlineView at a point with a gap and that S."""
+def seen_at(view, gap, attraction, inset, lens):
+    """The OutlineView at a point with a gap and that S, outlines being moved apart by an inset."""
     share = gap / lens
     share *= share
     attraction *= 1.0 - share * share * share
@@ -192,14 +193,24 @@ def seen_at(view, gap, attraction, lens):
     if attraction < 0.0:
         plates = min(plates, (-0.75 * attraction) ** (-1.0 / 3.0))
     return OutlineView(
-        view.time, gap, plates, view.depth, view.radius_i, view.radius_j, view.reduced_radius,
-        view.effective_mass,
+        view.time, gap, gap + inset, plates, view.depth, view.radius_i, view.radius_j,
+        view.reduced_radius, view.effective_mass,
     )  # fmt: skip
 
 
 def radii_of(scene, a, b):
     """The equivalent radii of two bodies [m]."""
     return scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS]
+
+
+def acts_along(scene):
+    """Whether anything acts along outlines."""
+    return outline_reach(scene) > 0.0
+
+
+def outline_reach(scene):
+    """The gap of outlines up to which anything acts along them [m]; below 0 where nothing does."""
+    return max(scene.outlines[0], scene.layer[2])
 
 
 def depth_of(scene, a, b):
@@ -226,7 +237,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     depth = depth_of(scene, a, b)
     radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
-        time, least, least, depth, radius_a, radius_b,
+        time, least, least, least, depth, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
     numbers = inset, lens, view
@@ -263,9 +274,14 @@ def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
     c, s = math.cos(angle_b), math.sin(angle_b)
     turn = angle_a - angle_b
     seen_x, seen_y = c * x + s * y, c * y - s * x
-    across, up, torque = sum_along(
-        scene, work, time, a, b, seen_x, seen_y, math.cos(turn), math.sin(turn)
-    )
+    cosine, sine = math.cos(turn), math.sin(turn)
+    across, up, torque = 0.0, 0.0, 0.0
+    if has(scene, OUTLINE_PRESSURE):
+        across, up, torque = sum_along(scene, work, time, a, b, seen_x, seen_y, cosine, sine)
+    if scene.layer[2] > 0.0:
+        fx, fy, turning = sum_charges(scene, a, b, seen_x, seen_y, cosine, sine)
+        depth = depth_of(scene, a, b)
+        across, up, torque = across + depth * fx, up + depth * fy, torque + depth * turning
     own = torque - (seen_x * up - seen_y * across)
     return c * across - s * up, s * across + c * up, own, -torque
 

@@ -1,5 +1,6 @@
 """Group `kernel` of a results file: rates of encounters by mechanism, N and two size classes."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -85,7 +86,8 @@ class Kernel:
 
     NaN where a pair was not run: bodies of one size do not meet by settling, and all of theirs is
     0 but efficiencies, which are not known. ``water``: whether the bodies moved the water around
-    each other.
+    each other; ``fractal``: where their weight goes by their size, the diameter D_p of the primary
+    particles [m], the dimension n_f and the density of the solid [kg/m³].
     """
 
     mechanisms: tuple[str, ...]
@@ -94,6 +96,7 @@ class Kernel:
     radii: np.ndarray
     arrays: dict[str, np.ndarray]
     water: bool = False
+    fractal: tuple[float, float, float] | None = None
 
     def __attrs_post_init__(self):
         shape = (len(self.mechanisms), len(self.vertices), len(self.labels), len(self.labels))
@@ -149,7 +152,20 @@ def read_kernel(file: Any, identity: str, group: Group = KERNEL_GROUP) -> Kernel
         found["r_eq"],
         arrays,
         '"PairResistance"' in identity,
+        fractal_in(identity),
     )
+
+
+def fractal_in(identity: str) -> tuple[float, float, float] | None:
+    """(D_p, n_f, density of the solid) of a FractalDensity in what rows follow from."""
+    found = re.search(
+        r"FractalDensity\(law='fractal', primary=([^,]+), dimension=([^,]+), solid=([^)]+)\)",
+        identity,
+    )
+    if found is None:
+        return None
+    primary, dimension, solid = map(float, found.groups())
+    return primary, dimension, solid
 
 
 def check_kernel(arrays: Mapping[str, np.ndarray]) -> None:

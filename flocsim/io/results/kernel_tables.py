@@ -90,6 +90,17 @@ def efficiency_for(
     return np.where(kernel.arrays["beta3_reference"][m, v] == 0.0, 0.0, values)
 
 
+def weights_of(kernel: Kernel) -> list[str]:
+    """What a model is to take for the weight of flocs, where that goes by their size."""
+    if kernel.fractal is None:
+        return []
+    primary, dimension, solid = kernel.fractal
+    return [
+        f"flocs of n_f = {dimension:g}, D_p = {primary:g} m, solid of {solid:g} kg/m3: "
+        "drho = (rho_p - rho_w) (D_p/D)^(3 - n_f), as the model is to have it"
+    ]
+
+
 def kernel_matrix(
     kernel: Kernel, mechanism: str, vertices: int, quantity: str = "efficiency",
     model: str = "spheres", curvilinear: str | None = None, factors: np.ndarray | None = None,
@@ -143,6 +154,7 @@ def kernel_matrix(
     lines = [
         *what,
         f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",
+        *weights_of(kernel),
         *bound,
     ]
     text = io.StringIO()

@@ -2,12 +2,14 @@
 
 import csv
 
+import attrs
 import numpy as np
 import pytest
 
+from flocsim.body import FractalDensity
 from flocsim.errors import UsageError
 from flocsim.io.results.curvilinear import curvilinear_factor
-from flocsim.io.results.kernel_group import Kernel, check_kernel
+from flocsim.io.results.kernel_group import Kernel, check_kernel, fractal_in
 from flocsim.io.results.kernel_tables import efficiency_for, kernel_csv, kernel_matrix
 from tests.helpers.small_rates import some_kernel
 
@@ -113,6 +115,15 @@ def test_flocmods_kernels_are_these():
     speed = g * density * 4.0 * (r_j**2 - r_i**2) / (18.0 * viscosity)
     theirs = np.pi / 4.0 * (2.0 * size) ** 2 * g / viscosity * density * 4.0 * (r_j**2 - r_i**2)
     assert theirs == pytest.approx(18.0 * np.pi * size**2 * speed, rel=1e-12, abs=0.0)
+
+
+def test_a_matrix_says_what_fractal_flocs_weigh():
+    density = FractalDensity("fractal", primary=4e-6, dimension=2.1, solid=2650.0)
+    found = fractal_in(f'{{"bodies.density": "{density!r}"}}')
+    text = kernel_matrix(attrs.evolve(some_kernel(), fractal=found), "shear", 32)
+    assert "# flocs of n_f = 2.1, D_p = 4e-06 m, solid of 2650 kg/m3" in text
+    assert "n_f" not in kernel_matrix(some_kernel(), "shear", 32)
+    assert fractal_in('{"bodies.density": 2650.0}') is None
 
 
 def test_what_a_matrix_cannot_hold_is_refused():

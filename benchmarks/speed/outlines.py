@@ -1,0 +1,90 @@
+"""What forces between outlines cost at touch: a force evaluation, and what is made once a shape.
+
+    python -m benchmarks.speed.outlines [--pairs 8]
+
+evaluates force and torque of pairs of rough flocs, r_eq of some 5 and 16 µm, 1 nm apart at random
+poses, in a compiled loop: van der Waals forces (d_min 1 nm), double layers of 0.98 µm, which are
+thick beside corners of 1 µm, and of 1 nm, which are thin, each alone and the first two together.
+Goals for both: 1 µs at N = 16, 3 µs at N = 64.
+"""
+
+import time
+
+import numpy as np
+
+from benchmarks.reporting import Table, parser_of, print_heading
+from flocsim import Body, System
+from flocsim.arrays import work_of
+from flocsim.compiler.composer import compose
+from flocsim.forces import DoubleLayer, VanDerWaals
+from flocsim.geometry.surfaces import charges, field
+from flocsim.integrators.rhs.outline_sum import between_outlines
+from tests.integrators.rhs.test_outline_sum import at_gap, rough
+
+GOALS = {16: 1.0, 64: 3.0}
+PULL = VanDerWaals(1e-20, law="outline")
+THICK, THIN = (DoubleLayer(debye_length=each, law="outline") for each in (0.98e-6, 1e-9))
+FORCES = {
+    "van der Waals": (PULL,), "double layer, thick": (THICK,), "double layer, thin": (THIN,),
+    "both, thick": (PULL, THICK),
+}  # fmt: skip
+
+
+def many(scene, work, x, y, angle, count):
+    """The sum of so many forces, so that none is left out."""
+    total = 0.0
+    for k in range(count):
+        fx, _, _, _ = between_outlines(scene, work, 0.0, 1, 0, x, y, angle + 1e-15 * k, 0.0)
+        total += fx
+    return total
+
+
+def cost(one, other, pose, forces, count):
+    """Of an evaluation [µs]."""
+    bodies = [Body(other, density=1100.0), Body(one, pose[:2], pose[2], density=1100.0)]
+    system = System(bodies, forces)
+    scene = system.scene()
+    work = work_of(scene, *system.motion())
+    fillings = {**system.compiled_calls, **system.fillings()}
+    entry = compose(many, fillings)
+    given = [float(each) for each in pose]
+    entry(scene, work, *given, 1)
+    start = time.perf_counter()
+    entry(scene, work, *given, count)
+    return 1e6 * (time.perf_counter() - start) / count
+
+
+def main():
+    """Print both tables."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--pairs", type=int, default=8)
+    args = parser.parse_args()
+    pairs, count = (2, 500) if args.quick else (args.pairs, 2000)
+    print_heading()
+    table = Table("A force evaluation at touch, median of pairs",
+                  ("N", "forces", "µs", "least", "most", "over the goal"))  # fmt: skip
+    made = Table("Made once a shape, r_eq of some 16 µm, 1/κ = 0.98 µm",
+                 ("N", "charges", "ms", "nodes", "ms"))  # fmt: skip
+    for n, goal in GOALS.items():
+        found, rng = {name: [] for name in FORCES}, np.random.default_rng(n)
+        for seed in range(pairs):
+            one, other = rough(n, 5e-6, seed), rough(n, 16e-6, 50 + seed)
+            pose = at_gap(one, other, 1e-9, *rng.uniform(0.0, 6.28, 2))
+            for name, forces in FORCES.items():
+                found[name].append(cost(one, other, pose, forces, count))
+        for name, each in found.items():
+            middle = float(np.median(each))
+            table.add(n, name, middle, min(each), max(each), middle / goal)
+        shape, times = rough(n, 16e-6, 99), [time.perf_counter()]
+        known = charges.charges_of_shape(shape, THICK.kappa)
+        times.append(time.perf_counter())
+        nodes = field.field_of_shape(shape, THICK.kappa).field
+        times.append(time.perf_counter())
+        spent = 1e3 * np.diff(times)
+        made.add(n, len(known), float(spent[0]), len(nodes), float(spent[1]))
+    table.print(args.markdown)
+    made.print(args.markdown)
+
+
+if __name__ == "__main__":
+    main()
