@@ -75,7 +75,7 @@ class Profile:
         decades = math.log10(max(far, 10.0 * LEAST_GAP) / LEAST_GAP)
         ends = np.geomspace(LEAST_GAP, far, max(2, round(PANELS_A_DECADE * decades)))
         # Where a law has a kink a panel ends.
-        kinks = [getattr(force, "d_min", far) for force in forces]
+        kinks = [getattr(force, "d_min", None) or far for force in forces]
         reaches = [getattr(force, "reach", far) for force in forces]
         kept = [each for each in (*kinks, *reaches, *marks) if 0.0 < each < far]
         self.ends = np.unique(np.concatenate([[0.0], ends, kept]))
