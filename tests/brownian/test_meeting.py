@@ -53,8 +53,8 @@ def test_shapes_touch_with_their_outlines():
     [
         ([HALF], [Thermal()], 2e-6, "one of two bodies"),
         ([HALF, HALF], [StokesDrag()], 2e-6, "needs a Thermal force"),
-        ([HALF, HALF], [Thermal()], 0.9e-6, "release must lie between 1e-06 m"),
-        ([HALF, HALF], [Thermal()], 5e-6, "release must lie between"),
+        ([HALF, HALF], [Thermal()], 0.9e-6, "release must be between 1e-06 m"),
+        ([HALF, HALF], [Thermal()], 5e-6, "release must be between"),
     ],
 )
 def test_bad_input_is_refused(bodies, forces, release, words):

@@ -23,7 +23,7 @@ CONCERNED = {
         "tests/io/results", "tests/io/hdf5", "tests/io/plots/test_results.py",
         "tests/io/test_held.py", "tests/commands/test_info.py", "tests/commands/test_outputs.py",
         "tests/commands/test_plot.py", "tests/docs/test_schema_tables.py",
-        "tests/ensembles/test_study.py", "tests/ensembles/test_unfinished.py",
+        "tests/ensembles/test_study.py", "tests/ensembles/storage/test_resume.py",
         "tests/ensembles/estimates", "tests/ensembles/studies/test_compare.py",
         "tests/ensembles/parallel/test_assembly.py",
         "tests/ensembles/storage/test_rows_only_get_more.py",
