@@ -234,4 +234,4 @@ def test_a_strange_plan_is_refused_in_a_line(tmp_path, monkeypatch, capsys, text
     words = ["sweep", "s.toml", "--over", f"{HAMAKER}=1e-20", "-o", "x.h5", "--resume"]
     assert main(words) == FileError.exit_code
     told = capsys.readouterr().err
-    assert told.count("\n") == 1 and "sweep.json holds no plan of a sweep" in told
+    assert told.count("\n") == 1 and "sweep.json has no plan of a sweep" in told
