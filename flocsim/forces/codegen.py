@@ -26,7 +26,12 @@ from flocsim.forces.check import (
     reach_of,
     sample_pairs,
 )
-from flocsim.forces.outline import layer_of_forces, outlines_of_forces, pressures_of
+from flocsim.forces.outline import (
+    layer_along,
+    layer_numbers,
+    outlines_of_forces,
+    pressures_of,
+)
 from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.forces.smoothing import smoothness
 from flocsim.geometry.shapes.shape import Shape
@@ -369,10 +374,11 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
     water = [stand_in(each) for each in pieces.used.values() if isinstance(each, PairResistance)]
     if kinds["surface"] or water:
         pieces.smoothness = smoothness([*kinds["surface"], *water], fluid)
-    pressures = pressures_of(kinds["outline"], shapes)
+    layer = layer_along(kinds["outline"], shapes)
+    pressures = pressures_of(kinds["outline"], layer)
     write_outline_law(sources["outline"], pressures)
     pieces.outlines = outlines_of_forces(kinds["outline"], pressures, fluid)
-    pieces.layer = layer_of_forces(kinds["outline"], shapes)
+    pieces.layer = layer_numbers(layer)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

@@ -56,9 +56,9 @@ def layer_along(forces: Iterable[PairForce], shapes: Sequence[Shape]) -> DoubleL
     return layers[0]
 
 
-def pressures_of(forces: Sequence[PairForce], shapes: Sequence[Shape]) -> list[PairForce]:
-    """The forces between outlines that are pressures of plates, or have a part that is."""
-    layer = layer_along(forces, shapes)
+def pressures_of(forces: Sequence[PairForce], layer: DoubleLayer | None) -> list[PairForce]:
+    """The forces between outlines that are pressures of plates, or have a part that is; ``layer``:
+    of `layer_along`."""
     found: list[PairForce] = []
     for force in forces:
         if force is not layer:
@@ -68,12 +68,9 @@ def pressures_of(forces: Sequence[PairForce], shapes: Sequence[Shape]) -> list[P
     return found
 
 
-def layer_of_forces(
-    forces: Sequence[PairForce], shapes: Sequence[Shape]
-) -> tuple[float, float, float]:
-    """``Scene.layer`` of some forces between outlines: κ [1/m]; 2πε φ_a φ_b [N]; and the gap up to
+def layer_numbers(layer: DoubleLayer | None) -> tuple[float, float, float]:
+    """``Scene.layer`` of what `layer_along` found: κ [1/m]; 2πε φ_a φ_b [N]; and the gap up to
     which charges act [m], −1 without any."""
-    layer = layer_along(forces, shapes)
     if layer is None:
         return NO_LAYER
     return layer.kappa, layer.between_charges, FADED * layer.debye_length

@@ -17,7 +17,15 @@ from flocsim.forces.check import sample_points
 from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
 from flocsim.integrators.rhs.charge_sum import field_at
 from flocsim.integrators.rhs.outline_sum import between_outlines
-from tests.integrators.rhs.test_outline_sum import SIZE, Pair, at_gap, rough, slab, slopes
+from tests.integrators.rhs.test_outline_sum import (
+    SIZE,
+    Pair,
+    at_gap,
+    balanced,
+    rough,
+    slab,
+    slopes,
+)
 
 DEBYE = 0.98e-6
 PERMITTIVITY = 78.5 * VACUUM_PERMITTIVITY
@@ -81,14 +89,7 @@ def test_force_and_torque_are_the_slopes_of_the_potential_in_the_tables(seed):
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_third_law_with_torque_and_turned_together(swapped):
-    one, other = rough(8, SIZE, 1), rough(16, 1.7 * SIZE, 2)
-    if swapped:
-        one, other = other, one
-    x, y, angle = at_gap(one, other, 5e-9, 0.3, 1.0)
-    pair = Pair(other, one, (x, y, angle), layer())
-    found = pair.loads(x, y, angle)
-    moment = x * found[1] - y * found[0]
-    assert found[2] + found[3] == pytest.approx(-moment, abs=1e-9 * abs(SIZE * found[0]))
+    pair, (x, y, angle), found = balanced(swapped, layer())
     c, s = math.cos(0.7), math.sin(0.7)
     there = pair.loads(c * x - s * y, s * x + c * y, angle + 0.7, 0.7)
     turned = [c * there[0] + s * there[1], c * there[1] - s * there[0], there[2], there[3]]

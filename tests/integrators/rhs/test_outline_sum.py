@@ -95,16 +95,23 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed, gap, allowed):
     assert abs(found[2] - wanted[2]) < allowed * strength * SIZE
 
 
-@pytest.mark.parametrize("swapped", [False, True])
-def test_third_law_with_torque(swapped):
-    """Forces are opposite, and torques balance about any point, whichever body comes first."""
+def balanced(swapped, force):
+    """(a Pair of two rough bodies, its pose, its loads there), seen to obey the third law."""
     one, other = rough(8, SIZE, 1), rough(16, 1.7 * SIZE, 2)
     if swapped:
         one, other = other, one
-    x, y, angle = at_gap(one, other, 5e-9, 0.3, 1.0)
-    found = Pair(other, one, (x, y, angle), VanDerWaals(HAMAKER, law="outline")).loads(x, y, angle)
+    pose = x, y, _ = at_gap(one, other, 5e-9, 0.3, 1.0)
+    pair = Pair(other, one, pose, force)
+    found = pair.loads(*pose)
     moment = x * found[1] - y * found[0]
     assert found[2] + found[3] == pytest.approx(-moment, abs=1e-9 * abs(SIZE * found[0]))
+    return pair, pose, found
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_third_law_with_torque(swapped):
+    """Forces are opposite, and torques balance about any point, whichever body comes first."""
+    balanced(swapped, VanDerWaals(HAMAKER, law="outline"))
 
 
 def test_turned_and_shifted_together_nothing_changes():
