@@ -42,10 +42,8 @@ def parameter_beside(piece, x, y):
 
 
 def foot_of(piece, other):
-    """(parameter, gap): where a piece is nearest to another, and how far [m]; the parameter may lie
-    beyond its ends."""
-    squared, x, y, x_2, y_2 = between_cores(piece, other)
-    gap = math.sqrt(squared) - piece.inward - other.inward
+    """The parameter at which a piece is nearest to another; it may lie beyond its ends."""
+    _, x, y, x_2, y_2 = between_cores(piece, other)
     if piece.bend == 0.0:
-        return (x - piece.x) * piece.way_x + (y - piece.y) * piece.way_y, gap
-    return parameter_beside(piece, x_2, y_2), gap
+        return (x - piece.x) * piece.way_x + (y - piece.y) * piece.way_y
+    return parameter_beside(piece, x_2, y_2)

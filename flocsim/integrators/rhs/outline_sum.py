@@ -30,6 +30,10 @@ LENS = 100.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
 to less than 1e-5 of the attraction of touching outlines."""
 
+SAME = 1e-3
+"""Of the gap: pieces of the other outline that are as near as that are both the nearest, and feet
+that are as near to each other are one."""
+
 MOST_HALVES = 40
 """How often a way along a piece is halved: far below any length that counts."""
 
@@ -99,63 +103,65 @@ def gap_from(scene, work, x, y):
     return gap
 
 
-def find_feet(scene, work, piece, lens):
-    """Write the feet of a piece to ``work.feet``, in their order; how many there are."""
+def find_feet(scene, work, piece, inset, lens):
+    """Write the feet of a piece to ``work.feet``, in their order; how many there are. They are the
+    places, ends among them, from where the gap within the lens grows either way."""
     near, middle, count = work.near, work.near.shape[0] // 2, 0
     first, last = ends_of(piece)
-    best, least = 0.0, math.inf
     for j in range(near[middle]):
         other = piece_at(scene.pieces, near[middle + 1 + j])
         if apart_at_least(piece, other) >= lens:
             continue
-        parameter, gap = foot_of(piece, other)
-        held = min(max(parameter, first), last)
-        if gap < least:
-            best, least = held, gap
-        if first < parameter < last and gap < lens and count < MOST_FEET - 1:
-            x, y, _, _, _ = at_parameter(piece, parameter)
-            # Only where the other is what lies nearest there.
-            if gap <= 1.0001 * gap_from(scene, work, x, y) + 1e-15:
-                place = count
-                while place > 0 and work.feet[place - 1] > parameter:
-                    work.feet[place] = work.feet[place - 1]
-                    place -= 1
-                work.feet[place] = parameter
-                count += 1
-    if count == 0 and least < lens:
-        work.feet[0] = best
-        count = 1
+        parameter = min(max(foot_of(piece, other), first), last)
+        x, y, _, _, metres = at_parameter(piece, parameter)
+        gap = distance_to(x, y, other)
+        # Only where the other is what lies nearest there.
+        same = SAME * (gap + inset)
+        if gap < lens and gap <= gap_from(scene, work, x, y) + same:
+            count = add_foot(work.feet, count, parameter, same / metres)
     return count
 
 
-def scale_from(scene, work, piece, foot, end, inset, lens):
-    """(reach, scale) along a piece from a foot to an end, in its parameter: how far the other is
-    within the lens, and where the gap has grown by as much as it is at the foot."""
-    x, y, _, _, _ = at_parameter(piece, foot)
-    there = gap_from(scene, work, x, y) + inset
-    reach = end - foot
-    if not there < lens:
-        return 0.0, reach
+def add_foot(feet, count, parameter, same):
+    """Put a foot among those found so far, in their order, unless one is as near as ``same``; how
+    many there are then."""
+    place = count
+    while place > 0 and feet[place - 1] > parameter:
+        place -= 1
+    if place > 0 and parameter - feet[place - 1] <= same:
+        return count
+    if (place < count and feet[place] - parameter <= same) or count == MOST_FEET:
+        return count
+    for k in range(count, place, -1):
+        feet[k] = feet[k - 1]
+    feet[place] = parameter
+    return count + 1
+
+
+def way_to_gap(scene, work, piece, foot, way, wanted):
+    """How far along a piece from a foot, in its parameter and ``way`` at most, the gap has grown to
+    the one that is wanted [m]: continuous in where the bodies are, as the quadrature is then."""
+    x, y, _, _, _ = at_parameter(piece, foot + way)
+    beyond = gap_from(scene, work, x, y)
+    if beyond <= wanted:
+        return way
     for _ in range(MOST_HALVES):
-        x, y, _, _, _ = at_parameter(piece, foot + 0.5 * reach)
-        if gap_from(scene, work, x, y) <= lens:
-            break
-        reach *= 0.5
-    scale = reach
-    for _ in range(MOST_HALVES):
-        x, y, _, _, _ = at_parameter(piece, foot + scale)
-        if gap_from(scene, work, x, y) + inset <= 3.0 * there:
-            break
-        scale *= 0.5
-    return reach, scale
+        x, y, _, _, _ = at_parameter(piece, foot + 0.5 * way)
+        gap = gap_from(scene, work, x, y)
+        if gap <= wanted:
+            return 0.5 * way * (1.0 + (wanted - gap) / (beyond - gap))
+        beyond = gap
+        way *= 0.5
+    return way
 
 
 def add_side(scene, work, total, piece, foot, end, numbers):
     """(fx, fy, torque about the origin) of a piece from a foot to an end, added to a total."""
     inset, lens, _ = numbers
-    reach, scale = scale_from(scene, work, piece, foot, end, inset, lens)
-    if reach == 0.0:
-        return total
+    x, y, _, _, _ = at_parameter(piece, foot)
+    there = gap_from(scene, work, x, y)
+    reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
+    scale = way_to_gap(scene, work, piece, foot, reach, 3.0 * there + 2.0 * inset)
     near = abs(scale) < abs(reach)
     for node, weight in EIGHT:
         share = 0.5 * (1.0 + node)
@@ -244,7 +250,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     total = 0.0, 0.0, 0.0
     for i in range(work.near[0]):
         piece = placed(scene.pieces, work.near[1 + i], pose)
-        feet = find_feet(scene, work, piece, lens)
+        feet = find_feet(scene, work, piece, inset, lens)
         first, last = ends_of(piece)
         for k in range(feet):
             foot = work.feet[k]
