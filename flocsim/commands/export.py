@@ -10,7 +10,7 @@ import numpy as np
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.exchange import write_gsd
+from flocsim.io.exchange import WRITERS
 from flocsim.io.files import held, write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
@@ -23,7 +23,7 @@ from flocsim.io.results.kernel_tables import (
     kernel_matrix,
 )
 
-SUFFIXES = {"gsd": ".gsd", "csv": ".csv", "matrix": ".csv"}
+SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS} | {"csv": ".csv", "matrix": ".csv"}
 
 
 def add_parser(subparsers: Any) -> None:
@@ -31,14 +31,14 @@ def add_parser(subparsers: Any) -> None:
         "export",
         help=SUMMARIES["export"],
         description="gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or "
-        "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um. "
-        "(ParaView and xarray open the file directly.) For results of a kernel study, csv: a "
+        "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um; "
+        "vtkhdf: the same as outlines for ParaView, in m. For results of a kernel study, csv: a "
         "table of all pairs of size classes; matrix: a square matrix for each mechanism and "
         "N, whose header says what it multiplies.",
     )
     add = parser.add_argument
     add("format", choices=tuple(SUFFIXES))
-    add("source", help="file written by flocsim trajectory --save or flocsim kernel")
+    add("source", help="file written by flocsim trajectory --save, swarm or kernel")
     add("-o", "--output", metavar="FILE",
         help="file to write (default: run.gsd for run.h5, in the current folder); for matrices, "
         "the start of their names")  # fmt: skip
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         kind = file_kind(source := held(args.source), "motion")
         t, position, velocity, shapes = kind.motion(kind.read(source))
-        write_gsd(path, t, position, velocity, shapes, rule)
+        WRITERS[path.suffix.lower()](path, t, position, velocity, shapes, rule)
     print(path)
     return 0
 

@@ -13,7 +13,7 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.exchange import write_vtkhdf
+from flocsim.io.exchange import add_vtkhdf
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.groups import write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of
@@ -91,7 +91,7 @@ def write_trajectory(
     with h5py.File(buffer, "w") as file:
         file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})
         write_labelled(file, Labelled(coordinates, columns))
-        write_vtkhdf(file, times, position, shapes)
+        add_vtkhdf(file, times, position, shapes)
     write_file(path, seal(buffer.getvalue()), rule)
 
 

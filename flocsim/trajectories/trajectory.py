@@ -279,22 +279,22 @@ class Trajectory:
         )  # fmt: skip
 
     def export(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write the motion as GSD for OVITO and HOOMD; ``file`` ends in .gsd.
+        """Write the motion for OVITO and HOOMD, where ``file`` ends in .gsd, or for ParaView, in
+        .vtkhdf.
 
-        Lengths are µm in it, times s; shapes are polygons without their holes. A file that is there
-        is left alone, unless ``overwrite``. UsageError where gsd is not installed
-        (``pip install 'flocsim[formats]'``). For ParaView: `save`.
+        In GSD lengths are in µm, times in s, and shapes are polygons without their holes. A file
+        that is there is left alone, unless ``overwrite``. UsageError for another ending, and where
+        gsd is not installed (``pip install 'flocsim[formats]'``).
         """
-        from flocsim.io.exchange import write_gsd
+        from flocsim.io.exchange import WRITERS
         from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
 
         path, rule = Path(file), data_rule(overwrite)
-        if path.suffix.lower() != ".gsd":
-            raise UsageError(
-                f"{path}: an exported file must end in .gsd; ParaView reads files of `save`"
-            )
+        write = WRITERS.get(path.suffix.lower())
+        if write is None:
+            raise UsageError(f"{path}: an exported file must end in {' or '.join(WRITERS)}")
         check_outputs([Output(path, rule, ways=SCRIPT_WAYS)], [])
-        write_gsd(path, self.t, self.position, self.velocity, self.shapes, rule)
+        write(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 
 def watched(run: Run, watch: Watch | None) -> Status:

@@ -1,5 +1,6 @@
 """Motion read back by the programs that it is written for: VTK, gsd, OVITO, xarray."""
 
+import h5py
 import numpy as np
 import pytest
 import shapely
@@ -16,6 +17,7 @@ from flocsim.io.exchange import (
     placed,
     rings_of,
     write_gsd,
+    write_vtkhdf,
 )
 from flocsim.io.trajectory import read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
@@ -74,16 +76,20 @@ def test_long_motions_are_thinned_and_keep_their_ends():
     assert len(rows) == MOST_FRAMES and rows[0] == 0 and rows[-1] == 123_456
 
 
+@pytest.mark.parametrize("alone", [False, True], ids=["beside the motion", "alone"])
 @pytest.mark.parametrize("shapes", [SHAPES, (RING, SHAPES[0]), (framed(1e-6), beads(1e-6))])
-def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes):
+def test_vtk_reads_the_outlines_at_every_time(tmp_path, shapes, alone):
     hdf = pytest.importorskip("vtkmodules.vtkIOHDF", reason="needs flocsim[formats]")
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     times, position, velocity = motion()
-    write_trajectory(tmp_path / "m.h5", times, position, velocity, shapes, {})
+    if alone:
+        write_vtkhdf(tmp_path / "m", times, position, velocity, shapes)
+    else:
+        write_trajectory(tmp_path / "m", times, position, velocity, shapes, {})
     reader = hdf.vtkHDFReader()
-    reader.SetFileName(str(tmp_path / "m.h5"))
-    assert reader.CanReadFile(str(tmp_path / "m.h5"))
+    reader.SetFileName(str(tmp_path / "m"))
+    assert reader.CanReadFile(str(tmp_path / "m"))
     reader.UpdateInformation()
     assert reader.GetNumberOfSteps() == len(times)
     rings = [rings_of(shape) for shape in shapes]
@@ -188,6 +194,10 @@ def test_the_command_writes_what_a_file_of_motion_holds(tmp_path, monkeypatch, c
     assert "already exists and is left as it is" in capsys.readouterr().err
     assert main(["export", "gsd", "m.h5", "-o", "m.xyz"]) == 2
     assert main(["export", "gsd", "absent.h5"]) == 74
+    assert main(["export", "vtkhdf", "m.h5"]) == 0
+    with h5py.File("m.vtkhdf") as alone, h5py.File("m.h5") as beside:
+        points = [np.array(file["VTKHDF/Points"]) for file in (alone, beside)]
+    np.testing.assert_array_equal(*points)
 
 
 def test_the_file_with_outlines_is_read_again(tmp_path):

@@ -3,18 +3,27 @@
 import gzip
 from pathlib import Path
 
+import h5py
+import pytest
+
 import flocsim
 from flocsim.__main__ import main
 
 STORED = Path(__file__).parents[2] / "data"
 
 
-def test_files_of_schema_4_are_opened_described_and_drawn(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("schema", [4, 5])
+def test_files_of_earlier_schemas_are_opened_described_and_drawn(
+    tmp_path, monkeypatch, capsys, schema
+):
     monkeypatch.chdir(tmp_path)
-    Path("old.h5").write_bytes(gzip.decompress((STORED / "swarm_4.h5.gz").read_bytes()))
+    Path("old.h5").write_bytes(gzip.decompress((STORED / f"swarm_{schema}.h5.gz").read_bytes()))
     found = flocsim.open("old.h5")
     assert found.groups["snapshots"]["position"].shape == (1, 3, 4, 3)
     for command in ("info", "plot", "report"):
         assert main([command, "old.h5"]) == 0
     assert main(["compare", "old.h5", "old.h5"]) == 0
     assert "paired" in capsys.readouterr().out
+    assert main(["export", "vtkhdf", "old.h5"]) == 0
+    with h5py.File("old.vtkhdf") as file:
+        assert file["VTKHDF/Steps"].attrs["NSteps"] == 3
