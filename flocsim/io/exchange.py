@@ -1,6 +1,5 @@
 """Outlines of bodies at many instants, found once and then moved."""
 
-import io
 import json
 import tempfile
 from collections.abc import Sequence
@@ -150,20 +149,6 @@ KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
 
 
-def write_vtkhdf(
-    path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
-    shapes: Sequence[Shape], rule: Rule = keep,
-) -> None:  # fmt: skip
-    """Write a motion as `write_gsd` does, but as a file of moving outlines for ParaView, without
-    velocities; FileError where the file cannot be written."""
-    import h5py
-
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w") as file:
-        add_vtkhdf(file, times, position, shapes)
-    write_file(path, buffer.getvalue(), rule)
-
-
 def add_vtkhdf(file: Any, times: np.ndarray, position: np.ndarray, shapes: Sequence[Shape]) -> None:
     """Write the group into an open h5py file: ``times`` (k,) [s], ``position`` (k, n, 3).
 
@@ -206,7 +191,3 @@ def add_vtkhdf(file: Any, times: np.ndarray, position: np.ndarray, shapes: Seque
         steps[name] = np.zeros(frames, "i8")
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((frames, len(KINDS)), "i8")
-
-
-WRITERS = {".gsd": write_gsd, ".vtkhdf": write_vtkhdf}
-"""What writes a motion, by the ending of the file's name."""

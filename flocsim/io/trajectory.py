@@ -13,7 +13,7 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.exchange import add_vtkhdf
+from flocsim.io.exchange import add_vtkhdf, write_gsd
 from flocsim.io.files import Rule, keep, seal, write_file
 from flocsim.io.groups import write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of
@@ -93,6 +93,24 @@ def write_trajectory(
         write_labelled(file, Labelled(coordinates, columns))
         add_vtkhdf(file, times, position, shapes)
     write_file(path, seal(buffer.getvalue()), rule)
+
+
+def write_vtkhdf(
+    path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
+    shapes: Sequence[Shape], rule: Rule = keep,
+) -> None:  # fmt: skip
+    """Write a motion as `write_gsd` does, but as a file of moving outlines for ParaView, without
+    velocities; FileError where the file cannot be written."""
+    import h5py
+
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        add_vtkhdf(file, times, position, shapes)
+    write_file(path, buffer.getvalue(), rule)
+
+
+WRITERS = {".gsd": write_gsd, ".vtkhdf": write_vtkhdf}
+"""What writes a motion, by the ending of the file's name."""
 
 
 @attrs.frozen(eq=False)

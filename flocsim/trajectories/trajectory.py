@@ -286,8 +286,8 @@ class Trajectory:
         that is there is left alone, unless ``overwrite``. UsageError for another ending, and where
         gsd is not installed (``pip install 'flocsim[formats]'``).
         """
-        from flocsim.io.exchange import WRITERS
         from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
+        from flocsim.io.trajectory import WRITERS
 
         path, rule = Path(file), data_rule(overwrite)
         write = WRITERS.get(path.suffix.lower())

@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SwarmResults
+from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SwarmResults, events_of
 
 SWARM = """\
 preset = "si"
@@ -74,6 +74,7 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
             name: np.arange(3).astype(kind) if kind == "f8" else np.array([0, 1, 1], kind)
             for name, (kind, _, _) in CLUSTERS.items()
         },
+        "events": events_of(np.zeros((0, 0, 0))),
         "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
     }  # fmt: skip
     scales = {
@@ -81,6 +82,7 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
         "class": np.array([0.0, 1e-5]), "body": np.arange(bodies),
         "component": np.array(["x", "y", "angle"]), "axis": np.array(["x", "y"]),
         "point": np.arange(bodies), "bond": np.arange(2), "row": np.arange(3),
+        "event": np.arange(0),
     }  # fmt: skip
     run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,
            "periodic": "xy", "overrides": "{}"}  # fmt: skip

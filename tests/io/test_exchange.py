@@ -17,9 +17,8 @@ from flocsim.io.exchange import (
     placed,
     rings_of,
     write_gsd,
-    write_vtkhdf,
 )
-from flocsim.io.trajectory import read_trajectory, write_trajectory
+from flocsim.io.trajectory import read_trajectory, write_trajectory, write_vtkhdf
 from tests.helpers.compound_shapes import beads, framed
 
 SHAPES = (
@@ -197,7 +196,7 @@ def test_the_command_writes_what_a_file_of_motion_holds(tmp_path, monkeypatch, c
     assert main(["export", "vtkhdf", "m.h5"]) == 0
     with h5py.File("m.vtkhdf") as alone, h5py.File("m.h5") as beside:
         points = [np.array(file["VTKHDF/Points"]) for file in (alone, beside)]
-    np.testing.assert_array_equal(*points)
+    np.testing.assert_allclose(*points, rtol=1e-12, atol=1e-18)
 
 
 def test_the_file_with_outlines_is_read_again(tmp_path):

@@ -18,9 +18,10 @@ from flocsim.io.results.swarm_file import (
     POINTS,
     RINGS,
     SwarmResults,
+    events_of,
 )
 
-PLACED = ("bond_replicate", "cluster_replicate")
+PLACED = ("bond_replicate", "cluster_replicate", "event_replicate")
 """Columns that count replicates."""
 
 Groups = dict[str, dict[str, np.ndarray]]
@@ -68,6 +69,7 @@ def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
     groups["snapshots"] = {
         "position": motion[..., :3], "velocity": motion[..., 3:], "cluster": labels,
     }  # fmt: skip
+    groups["events"] = events_of(labels)
     together = np.concatenate(bonds)
     together = together[np.lexsort(together.T[::-1])]
     groups["bonds"] = dict(zip(BONDS, together.T.copy(), strict=True))
@@ -115,6 +117,7 @@ def results_from(
         "axis": np.array(AXES), "point": np.arange(points),
         "bond": np.arange(len(groups["bonds"]["bond_kind"])),
         "row": np.arange(len(groups["clusters"]["cluster_bodies"])),
+        "event": np.arange(len(groups["events"]["event_time"])),
     }  # fmt: skip
     return SwarmResults(scales, groups, dict(run))
 

@@ -44,11 +44,15 @@ def facts_of(results: SwarmResults) -> Facts:
     free = bodies["floc"][0] != WALL
     radii = 1e6 * bodies["r_eq"][:, free]
     width, height = 1e6 * bodies["box"].mean(axis=0)
+    events = results.groups["events"]
+    before, after = events["event_before"], events["event_after"]
     return [
         ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
          f"{int(ends['finished'].sum())} were completed"),
         ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
         ("box [um]", f"{width:.5g} x {height:.5g}"),
+        ("mergers", f"{np.sum(after < before)} of clusters, between snapshots"),
+        ("break-ups", f"{np.sum(after > before)}"),
         ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
          f"{ends['rejected'].sum()} rejected"),
     ]  # fmt: skip

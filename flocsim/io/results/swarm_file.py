@@ -5,6 +5,7 @@
 - ``bodies``     the bodies of every replicate: sizes, masses, core points, and its box
 - ``bonds``      the pairs that touch, and what holds them, at every time
 - ``clusters``   every cluster at every time: size, radii, speed, porosity, bonds
+- ``events``     mergers and break-ups of clusters from one time to the next
 - ``ends``       how every replicate ended, and what it took
 - ``run``        scalars: config text, versions, machine
 """
@@ -26,9 +27,9 @@ from flocsim.io.opening import opened_file
 from flocsim.io.terminal import aligned
 
 FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 5
-WITHOUT_CLUSTERS = 4
-"""The version before, whose files have no group `clusters`."""
+SCHEMA_VERSION = 6
+ADDED = ("clusters", "events")
+"""Groups that came with versions 5 and 6, one with each."""
 
 WALL = -2
 """In `bodies/floc`: a wall."""
@@ -102,6 +103,18 @@ OF_CLUSTERS = tuple(name.removeprefix("cluster_") for name in [*CLUSTERS][4:])
 ENDLESS = ("cluster_gyration", "cluster_hydrodynamic", "cluster_porosity")
 """What one that percolates has not."""
 
+EVENTS = {
+    "event_replicate": ("i4", "1", "replicate of the clusters"),
+    "event_time": ("i4", "1", "place of the first snapshot after it among the times"),
+    "event_before": ("i4", "1", "clusters before"),
+    "event_after": ("i4", "1", "clusters after; fewer: they merged, more: they broke up"),
+    "event_bodies": ("i4", "1", "bodies of these clusters"),
+    "event_largest": ("i4", "1", "bodies of the largest of the clusters before, or of those after "
+                      "where these are more"),
+    "event_second": ("i4", "1", "bodies of the second largest of them"),
+}  # fmt: skip
+"""Columns (event,)."""
+
 BODIES = {
     "r_eq": ("f8", "m", "equivalent radius"),
     "spheroradius": ("f8", "m", "radius of the disk that sweeps the core, the least of its parts"),
@@ -141,6 +154,7 @@ SCALES = {
     "point": ("i8", "1", "number of the core point"),
     "bond": ("i8", "1", "number of the pair"),
     "row": ("i8", "1", "number of the row"),
+    "event": ("i8", "1", "number of the event"),
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
@@ -158,6 +172,7 @@ GROUPS = {
     ),
     "bonds": Group.of(declared(BONDS, ("bond",)), SCALES),
     "clusters": Group.of(declared(CLUSTERS, ("row",)), SCALES),
+    "events": Group.of(declared(EVENTS, ("event",)), SCALES),
     "ends": Group.of(declared(ENDS, ("replicate",)), SCALES),
 }  # fmt: skip
 
@@ -207,12 +222,9 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
         file,
         nodes,
     ):
-        known = dict(GROUPS)
-        if "clusters" in nodes:
-            check_format(file, nodes, FORMAT, SCHEMA_VERSION)
-        else:
-            check_format(file, nodes, FORMAT, WITHOUT_CLUSTERS)
-            del known["clusters"]
+        absent = [name for name in ADDED if name not in nodes]
+        check_format(file, nodes, FORMAT, SCHEMA_VERSION - len(absent))
+        known = {name: group for name, group in GROUPS.items() if name not in absent}
         wanted = {name: group.arrays for name, group in known.items()}
         hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*known, "run"])
         scales: dict[str, np.ndarray] = {}
@@ -225,10 +237,58 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
             for axis in group.scales:
                 if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):
                     raise ValueError(f"{name}/{axis} is not that of the other groups")
+        if "events" in absent:
+            groups["events"] = events_of(groups["snapshots"]["cluster"])
+            scales["event"] = np.arange(len(groups["events"]["event_time"]))
         scales.setdefault("row", np.zeros(0, dtype=np.int64))
         run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)
+
+
+def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
+    """The columns of EVENTS that follow from the clusters of all bodies, ``labels`` (replicates,
+    times, bodies), below 0 for a body that is of none: what left in between does not count.
+
+    Clusters of two snapshots that share bodies belong together, with all that these share bodies
+    with. What happened and was undone between two snapshots is not seen.
+    """
+    rows = [
+        (replicate, place, *event)
+        for replicate, own in enumerate(labels)
+        for place in range(1, len(own))
+        for event in between(own[place - 1], own[place])
+    ]
+    columns = np.array(rows, dtype=np.int32).reshape(-1, len(EVENTS)).T
+    return dict(zip(EVENTS, columns.copy(), strict=True))
+
+
+def between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...]]:
+    """(clusters before, after, bodies, largest, second) of every event from one snapshot to the
+    next, in the order of the first bodies."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    both = (before >= 0) & (after >= 0)
+    _, one = np.unique(before[both], return_inverse=True)
+    _, other = np.unique(after[both], return_inverse=True)
+    if not len(one):
+        return []
+    count = one.max() + 1
+    links = coo_array(
+        (np.ones(len(one)), (one, count + other)), shape=2 * (count + other.max() + 1,)
+    )
+    _, label = connected_components(links, directed=False)
+    events = []
+    for event in range(label.max() + 1):
+        inside = label[one] == event
+        sizes = [np.bincount(side[inside]) for side in (one, other)]
+        sizes = [np.sort(each[each > 0])[::-1] for each in sizes]
+        parts = max(sizes, key=len)
+        if len(parts) > 1:
+            found = len(sizes[0]), len(sizes[1]), inside.sum(), parts[0], parts[1]
+            events.append(tuple(map(int, found)))
+    return events
 
 
 def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:
@@ -257,6 +317,8 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
     replicates, times, many = groups["snapshots"]["cluster"].shape
     check_rows("bonds", groups["bonds"], (replicates, times, many, many, KIND_COUNT))
     check_rows("clusters", groups["clusters"], (replicates, times, many, many + 1))
+    sizes = (many + 1,) * (len(EVENTS) - 2)
+    check_rows("events", groups["events"], (replicates, times, *sizes))
     labels = groups["snapshots"]["cluster"]
     if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
         raise ValueError("snapshots/cluster has values that are not clusters")
