@@ -485,6 +485,25 @@ class PairView(NamedTuple):
     effective_mass: float
 
 
+class OrientedView(NamedTuple):
+    """Two bodies and how they are turned, as an OrientedForce kernel sees them.
+
+    i is the earlier of the two in the list of bodies. ``angle_i`` and ``angle_j`` [rad] are those
+    of the bodies, counted from the line that leads from the centroid of i to that of j; ``gap`` [m]
+    is d_c − r_i − r_j, and radii are equivalent radii.
+    """
+
+    time: float
+    gap: float
+    centre_distance: float
+    angle_i: float
+    angle_j: float
+    radius_i: float
+    radius_j: float
+    reduced_radius: float
+    effective_mass: float
+
+
 class OutlineView(NamedTuple):
     """A point of one outline beside another, as an OutlineForce kernel sees it.
 

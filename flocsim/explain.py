@@ -24,7 +24,7 @@ from flocsim.forces.check import (
     sample_pairs,
 )
 from flocsim.forces.codegen import PLACES, VELOCITIES
-from flocsim.forces.outline import layer_along
+from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
@@ -117,7 +117,9 @@ def about(system, force, implicit):
     else:
         centres = force.acts_on == "centres"
         place = "along the line of centres" if centres else "between the outlines"
-        if force.acts_on == "outlines":
+        if force.acts_on == "orientations":
+            place = "by the distance of centres and how both bodies are turned"
+        elif force.acts_on == "outlines":
             place = "all along the outlines"
             shapes = [body.shape for body in system.bodies]
             if layer_along([force], shapes) is not None:
@@ -145,7 +147,7 @@ def body_derivative(system, force):
 
 
 def pair_derivative(system, force):
-    if force.acts_on == "outlines":
+    if force.acts_on in ASK_FOR_BOTH:
         return "derivatives from differences of its sum"
     samples = sample_pairs(force.reach)
     damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
@@ -167,7 +169,8 @@ def reach_words(system, force):
 
 def least_gap(bodies, force):
     """The least gap [m] at the start: of equivalent spheres, or of bounding circles."""
-    size = "equivalent_radius" if force.acts_on == "centres" else "bounding_radius"
+    of_spheres = force.acts_on in ("centres", "orientations")
+    size = "equivalent_radius" if of_spheres else "bounding_radius"
     return min((gap_between(a, b, size) for a, b in counting(bodies)), default=math.inf)
 
 
@@ -253,6 +256,8 @@ def exerts_torque(system, force):
     if isinstance(force, PairResistance):
         return True
     if isinstance(force, PairForce):
+        if force.acts_on == "orientations":
+            return True
         return force.acts_on != "centres" and not system.spheres_only
     sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)
     return not system.spheres_only or any(result[1] != 0.0 for result in sideways)

@@ -15,7 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, OutlineView, PairView, PlainBodyView
+from flocsim.arrays import (
+    BodyView,
+    ContactView,
+    OrientedView,
+    OutlineView,
+    PairView,
+    PlainBodyView,
+)
 from flocsim.compiler.composer import compile_law
 from flocsim.compiler.constants import Intrinsic
 from flocsim.hooks import hook
@@ -24,7 +31,7 @@ LAWS = (
     "body_force", "velocity_derivatives", "position_derivatives",
     "centre_force", "centre_derivatives", "surface_force", "surface_derivatives",
     "contact_force", "contact_derivatives", "slip_limit", "contact_event",
-    "outline_pressure",
+    "outline_pressure", "oriented_energy",
 )  # fmt: skip
 """Names of the laws, in the order of ``scene.laws``."""
 
@@ -32,7 +39,7 @@ LAWS = (
     BODY_FORCE, VELOCITY_DERIVATIVES, POSITION_DERIVATIVES,
     CENTRE_FORCE, CENTRE_DERIVATIVES, SURFACE_FORCE, SURFACE_DERIVATIVES,
     CONTACT_FORCE, CONTACT_DERIVATIVES, SLIP_LIMIT, CONTACT_EVENT,
-    OUTLINE_PRESSURE,
+    OUTLINE_PRESSURE, ORIENTED_ENERGY,
 ) = range(len(LAWS))  # fmt: skip
 
 
@@ -113,15 +120,21 @@ def contact_event(scene, view, which):
 
 
 @hook
+def oriented_energy(scene, view):
+    """The energy of the two bodies of an OrientedView [J], of all oriented forces together."""
+    return scene.laws[ORIENTED_ENERGY](view, scene.parameters)
+
+
+@hook
 def outline_pressure(scene, view):
     """What pushes the outlines of two bodies apart at the point of an OutlineView [Pa]."""
     return scene.laws[OUTLINE_PRESSURE](view, scene.parameters)
 
 
-VIEWS = (BodyView,) * 3 + (PairView,) * 4 + (ContactView,) * 4 + (OutlineView,)
+VIEWS = *(BodyView,) * 3, *(PairView,) * 4, *(ContactView,) * 4, OutlineView, OrientedView
 """What each law is given, beside the parameters; those of bodies may be PlainBodyViews."""
 
-NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1
+NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1, 1
 """How many numbers each law returns."""
 
 

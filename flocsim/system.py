@@ -158,7 +158,8 @@ class System:
         """What its forces reach of an engine (flocsim.integrators.left_out): two systems of one
         family that reach the same share their compiled code."""
         return {
-            "outlines": "outline_pressure" in self.pieces.laws or self.pieces.layer[2] > 0.0,
+            "outlines": bool({"outline_pressure", "oriented_energy"} & self.pieces.laws.keys())
+            or self.pieces.layer[2] > 0.0,
             "charges": self.pieces.layer[2] > 0.0,
             "plain": self.pieces.plain_bodies,
             "water": resistance_of_pairs(self.forces) is not None,

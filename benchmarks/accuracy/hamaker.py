@@ -1,13 +1,14 @@
 """Aggregation against the Hamaker constant, by forces of spheres and by those of outlines.
 
-    python -m benchmarks.accuracy.hamaker [--preset clay] [--hamaker 1e-20 …] [--film] [--figure FILE]
+    python -m benchmarks.accuracy.hamaker [--preset clay] [--hamaker 1e-20 …] [--film clay]
+        [--figure FILE]
 
 runs flocs of N = 16 at δ = .5 under the presets tang2014 and clay, from H_A = 1e-23 to 1e-18 J,
 with both forces as the preset has them and with both by law = "outline". Pr[A] is here the share of
 all approaches that ends in contact for good, with its 95 % interval; held: those that attraction
 holds at a distance, in a secondary minimum, and that the figure adds with open markers. ``--film``:
-with the resistance of the water between (``[forces.lubrication]``), without which outlines that are
-held at a nanometre swing against each other a thousand times before they rest.
+presets whose bodies meet with the resistance of the water between (``[forces.lubrication]``),
+without which outlines that are held at a nanometre swing a thousand times before they rest.
 """
 
 import time
@@ -85,7 +86,7 @@ def main():
     parser.add_argument("--type", default="I")
     parser.add_argument("--preset", nargs="+", default=PRESETS)
     parser.add_argument("--hamaker", nargs="+", type=float, default=HAMAKER)
-    parser.add_argument("--film", action="store_true")
+    parser.add_argument("--film", nargs="*", default=())
     parser.add_argument("--figure", type=Path)
     args = parser.parse_args()
     if args.quick:
@@ -94,7 +95,9 @@ def main():
     columns = "preset", "law", "H_A [J]", "Pr[A]", "95 %", *OUTCOMES, "s"
     table, rows = Table("Aggregation against the Hamaker constant", columns), []
     for preset, law, hamaker in product(args.preset, LAWS, args.hamaker):
-        counts, spent = outcomes_of(preset, law, hamaker, args.replicates, args.type, args.film)
+        counts, spent = outcomes_of(
+            preset, law, hamaker, args.replicates, args.type, preset in args.film
+        )
         rows.append((preset, law, hamaker, counts))
         p, low, high = aggregated(counts)
         interval = f"{low:.2f} to {high:.2f}"

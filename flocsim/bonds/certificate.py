@@ -26,7 +26,7 @@ from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import effective_mass, pair_view
-from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 
 SAFETY = 3.0
 """Factor by which attraction must outweigh the load."""
@@ -165,7 +165,10 @@ def is_trapped(scene, work, time, bond, load):
 
 
 def is_certain(scene, work, time, bond, load):
-    """Whether no later load can open the bond, where nothing kicks."""
+    """Whether no later load can open the bond, where nothing kicks; not known where forces ask how
+    bodies are turned."""
+    if has(scene, ORIENTED_ENERGY):
+        return False
     return is_trapped(scene, work, time, bond, load) or is_held(scene, work, time, bond, load)
 
 

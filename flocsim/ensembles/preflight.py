@@ -37,6 +37,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
+from flocsim.integrators.rhs.orientation import oriented_view
 from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
 from flocsim.plausibility.doubts import Names, doubts_of
@@ -256,8 +257,13 @@ def check_numbers(system: System) -> None:
         OutlineView(0.0, gap, gap, max(gap, 1e-10), radii[0], *radii, reduced, mass)
         for gap in CLOSE_GAPS
     ]
+    oriented = [
+        oriented_view(scene, 0.0, 1, 0, sum(radii) + gap, angle, 1.0 - angle)
+        for gap in CLOSE_GAPS for angle in (0.0, 2.0)
+    ]  # fmt: skip
     views = {
         "body": bodies, "centre": pairs, "surface": pairs, "contact": contacts, "outline": points,
+        "oriented": oriented,
     }  # fmt: skip
     for name, force in system.pieces.used.items():
         pieces = laws_of([force], system.fluid)

@@ -1,10 +1,11 @@
-"""The forces between bodies and fluid; subclass one of the five kinds to add your own."""
+"""The forces between bodies and fluid; subclass one of the six kinds to add your own."""
 
 from flocsim.forces.base import (
     BodyForce,
     CentreForce,
     ContactForce,
     Force,
+    OrientedForce,
     OutlineForce,
     PairForce,
     SurfaceForce,
@@ -26,6 +27,7 @@ __all__ = [
     "Force",
     "Gravity",
     "Lubrication",
+    "OrientedForce",
     "OutlineForce",
     "PairForce",
     "PairResistance",

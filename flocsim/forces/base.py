@@ -1,4 +1,4 @@
-"""The four kinds of force. A force is a frozen attrs class around one plain kernel.
+"""The kinds of force. A force is a frozen attrs class around one plain kernel.
 
 The kernel is a static method on scalars: its first argument is the view of a body, a pair or a
 contact (flocsim.arrays), the others are the names of its own fields and properties, or of the
@@ -20,8 +20,8 @@ from flocsim.fields import word_or_quantity
 
 @attrs.frozen
 class Force(ABC):
-    """What all forces share; subclass one of the four kinds, BodyForce, CentreForce, SurfaceForce
-    and ContactForce, and give it a static method ``kernel``, its law."""
+    """What all forces share; subclass one of its kinds, BodyForce, CentreForce, SurfaceForce,
+    OutlineForce, OrientedForce or ContactForce, and give it a static method ``kernel``, its law."""
 
     @staticmethod
     @abstractmethod
@@ -61,7 +61,7 @@ class PairForce(Force):
     @abstractmethod
     def acts_on(self) -> str:
         """ "centres" (along the line of centres), "surfaces" (at the nearest points of the
-        outlines) or "outlines" (all along them)."""
+        outlines), "outlines" (all along them) or "orientations" (as both are turned)."""
 
     @property
     def reach(self) -> float:
@@ -104,6 +104,23 @@ class OutlineForce(PairForce):
     def acts_on(self) -> str:
         """Always the outlines."""
         return "outlines"
+
+
+@attrs.frozen
+class OrientedForce(PairForce):
+    """A PairForce of the distance of two bodies and of how both are turned:
+    ``kernel(pair, …) → energy`` [J].
+
+    ``pair`` is an OrientedView. Force and torques are minus the derivatives of the energy U, by
+    differences: F = −∂U/∂d along the line of centres, (∂U/∂α_i + ∂U/∂α_j)/d across it, and torques
+    −∂U/∂α, so that momentum, angular momentum and energy are kept. U must be smooth, of period 2π
+    in both angles, and have faded at ``reach``.
+    """
+
+    @property
+    def acts_on(self) -> str:
+        """Always as both bodies are turned: with torque."""
+        return "orientations"
 
 
 @attrs.frozen

@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, OutlineView, PairView
+from flocsim.arrays import BodyView, ContactView, OrientedView, OutlineView, PairView
 from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import globals_read, tell
 from flocsim.compiler.reads import names_in, refuse_closure, where
@@ -83,6 +83,15 @@ def sample_points(force: PairForce) -> tuple[OutlineView, ...]:
         OutlineView(1e-3, gap, gap, max(gap, 1e-10), 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
         for gap in gaps
     )
+
+
+def sample_orientations(force: PairForce) -> tuple[OrientedView, ...]:
+    """OrientedViews with gaps of either sign, within the reach of an oriented force [m]."""
+    gaps = [min(gap, 0.5 * reach_of(force)) for gap in SAMPLE_GAPS]
+    return tuple(
+        OrientedView(1e-3, gap, gap + 3e-6, angle, 1.0 - 2.0 * angle, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
+        for gap in gaps for angle in (-2.0, 0.0, 1.0)
+    )  # fmt: skip
 
 
 def refusal(force, function, finding):
@@ -293,6 +302,9 @@ def reach_of(force: PairForce) -> float:
 def check_pair_force(force, fluid):
     if force.acts_on == "outlines":
         check_results(force, fluid, force.kernel_in(fluid), sample_points(force), "pressure [Pa]")
+        return
+    if force.acts_on == "orientations":
+        check_results(force, fluid, force.kernel, sample_orientations(force), "energy [J]")
         return
     samples = sample_pairs(reach_of(force))
     check_results(force, fluid, force.kernel, samples, "repulsion [N]")

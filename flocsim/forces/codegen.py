@@ -102,7 +102,9 @@ def pressed_contact(view):
 
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
-PLACES_OF_PAIRS = {"centres": "centre", "surfaces": "surface", "outlines": "outline"}
+PLACES_OF_PAIRS = {
+    "centres": "centre", "surfaces": "surface", "outlines": "outline", "orientations": "oriented",
+}  # fmt: skip
 CHANGES = (
     body_change, changed_body, changed_plain_body, contact_change, changed_contact, pressed_contact,
 )  # fmt: skip
@@ -284,6 +286,16 @@ def write_outline_law(source, forces):
         source.functions.append(sum_function("outline_pressure", "point", terms, 1))
 
 
+def write_oriented_law(source, forces):
+    """The energy of two bodies as they are turned."""
+    terms = []
+    for force in forces:
+        call = source.call(force, force.kernel, "pair")
+        terms.append((f"pair.gap < {source.value(reach_of(force))}", call))
+    if terms:
+        source.functions.append(sum_function("oriented_energy", "pair", terms, 1))
+
+
 def write_contact_laws(source, forces):
     """Contact forces, the limit of their tangential displacement, and their events; how many."""
     terms, limits, events = [], [], []
@@ -322,7 +334,7 @@ def sort_forces(pieces, forces, fluid):
 
     UsageError for what is no force, KernelError for a force whose kernel cannot be used.
     """
-    kinds = {"body": [], "centre": [], "surface": [], "contact": [], "outline": []}
+    kinds = {"body": [], "centre": [], "surface": [], "contact": [], "outline": [], "oriented": []}
     forces = list(forces)
     for name, force in zip(names_of(forces), forces, strict=True):
         if not isinstance(force, Force):
@@ -343,8 +355,8 @@ def sort_forces(pieces, forces, fluid):
             kinds[PLACES_OF_PAIRS[force.acts_on]].append(force)
         else:
             raise UsageError(
-                f"{name} must subclass BodyForce, CentreForce, SurfaceForce, OutlineForce or "
-                "ContactForce"
+                f"{name} must subclass BodyForce, CentreForce, SurfaceForce, OutlineForce, "
+                "OrientedForce or ContactForce"
             )
     return kinds
 
@@ -367,8 +379,9 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
     write_pair_laws(sources["centre"], kinds["centre"], "centre")
     write_pair_laws(sources["surface"], kinds["surface"], "surface")
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
-    if kinds["centre"]:
-        pieces.centre_reach = max(map(reach_of, kinds["centre"]))
+    write_oriented_law(sources["oriented"], kinds["oriented"])
+    if of_centres := [*kinds["centre"], *kinds["oriented"]]:
+        pieces.centre_reach = max(map(reach_of, of_centres))
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
     water = [stand_in(each) for each in pieces.used.values() if isinstance(each, PairResistance)]

@@ -17,23 +17,28 @@ TOUCHING = 0.005
 pressure of double layers grows no more."""
 
 
-def act_along_outlines(forces: Iterable[Force]) -> bool:
-    """Whether any of some forces acts all along two outlines."""
-    return any(
-        isinstance(force, PairForce) and force.acts_on == "outlines" and not force.absent
-        for force in forces
-    )
+ASK_FOR_BOTH = {
+    "outlines": ("acts along outlines", 'give gap = "surface" in the place of law = "outline"'),
+    "orientations": ("asks how bodies are turned", "leave it out"),
+}
+"""{what a PairForce acts on: what to say of it, what to do}, where that takes both bodies as they
+are and not their distance alone."""
+
+
+def asks_for_both(force: Force) -> bool:
+    """Whether a force goes by both outlines, or by how both bodies are turned."""
+    return isinstance(force, PairForce) and force.acts_on in ASK_FOR_BOTH and not force.absent
 
 
 def refuse_outlines(forces: Iterable[Force], what: str) -> None:
-    """UsageError where a force acts all along two outlines, of ``what`` cannot have such."""
-    for force in forces:
-        if act_along_outlines([force]):
-            raise UsageError(
-                f"{type(force).__name__} acts along outlines, and {what} has forces between "
-                'spheres or nearest points alone: give gap = "surface" in the place of '
-                'law = "outline"'
-            )
+    """UsageError where a force asks for both bodies as they are, of ``what`` cannot have such."""
+    for force in filter(asks_for_both, forces):
+        assert isinstance(force, PairForce)
+        words, advice = ASK_FOR_BOTH[force.acts_on]
+        raise UsageError(
+            f"{type(force).__name__} {words}, and {what} has forces between spheres or nearest "
+            f"points alone: {advice}"
+        )
 
 
 def layer_along(forces: Iterable[PairForce], shapes: Sequence[Shape]) -> DoubleLayer | None:

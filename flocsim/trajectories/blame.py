@@ -19,6 +19,7 @@ from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.base import Status
+from flocsim.integrators.rhs.orientation import oriented_now
 from flocsim.integrators.rhs.surface_gap import flag_near, run_end, surface_view
 from flocsim.integrators.rhs.views import body_view, centre_view, contact_view
 from flocsim.run import Run
@@ -45,14 +46,12 @@ def locate(scene, work):
 
 def views_of(system, scene, work, time):
     """{first part of laws' names: [what they are shown]} in the state NOW."""
+    bodies = range(len(system.bodies))
+    pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
     views = {
-        "body": [body_view(scene, work, time, at.NOW, body) for body in range(len(system.bodies))],
-        "centre": [
-            centre_view(scene, work, time, at.NOW, a, b)
-            for a in range(len(system.bodies))
-            for b in range(a)
-            if counts_as_pair(scene.bodies, a, b)
-        ],
+        "body": [body_view(scene, work, time, at.NOW, body) for body in bodies],
+        "centre": [centre_view(scene, work, time, at.NOW, a, b) for a, b in pairs],
+        "oriented": [oriented_now(scene, work, time, a, b) for a, b in pairs],
     }
     if compose(locate, system.fillings(), jit=False)(scene, work):
         rows = range(work.tally[at.CANDIDATES])

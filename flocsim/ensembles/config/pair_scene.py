@@ -27,7 +27,7 @@ from flocsim.fields import (
     word_or_quantity,
 )
 from flocsim.forces.drag import shields_clusters
-from flocsim.forces.outline import act_along_outlines
+from flocsim.forces.outline import ASK_FOR_BOTH, asks_for_both
 from flocsim.forces.thermal import thermal_in
 
 LARGEST_LENGTH = 0.01
@@ -133,14 +133,17 @@ def uneven_points(parts: Mapping[str, Any], scrambles: int, of_what: str) -> Ite
 
 
 def outline_problems(parts: Mapping[str, Any], *, settles: bool) -> Iterator[Problem]:
-    """What does not go with forces along outlines; ``settles``: whether the scene is one of two
-    bodies that settle."""
-    if not act_along_outlines(parts["forces"]):
+    """What does not go with forces along outlines, or by how bodies are turned; ``settles``:
+    whether the scene is one of two bodies that settle."""
+    found = next(filter(asks_for_both, parts["forces"]), None)
+    if found is None:
         return
+    words, advice = ASK_FOR_BOTH[found.acts_on]
+    name = type(found).__name__
     if not settles:
-        yield ("forces",), 'law = "outline" is for pairs that settle: give gap = "surface" instead'
+        yield ("forces",), f"{name} {words}, which is for pairs that settle: {advice}"
     elif thermal_in(parts["forces"]):
-        text = 'cannot yet be combined with law = "outline": leave one of them out'
+        text = f"cannot yet be combined with {name}, which {words}: leave one of them out"
         yield ("forces", "thermal"), text
 
 

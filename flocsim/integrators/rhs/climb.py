@@ -10,7 +10,7 @@ import math
 import flocsim.arrays as at
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import pair_view
-from flocsim.laws import CENTRE_FORCE, centre_force, has, surface_force
+from flocsim.laws import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 
 BARRIER = 20.0
 """Thermal energies k_B T that hold a pair: by Kramers' rate kicks take e^20 = 5e8 times as long to
@@ -36,8 +36,9 @@ def repulsion_at(scene, work, time, a, b, distance, gap, way):
 
 def can_climb(scene, work, time, a, b, distance, gap, load, needed):
     """Whether less than the energy ``needed`` [J] leads out of the pair's attraction, a load [N]
-    helping: its work over the way out, at the highest place of it."""
-    if not load < math.inf:
+    helping: its work over the way out, at the highest place of it. Nothing is known where forces
+    ask how bodies are turned: another way may be lower."""
+    if not load < math.inf or has(scene, ORIENTED_ENERGY):
         return True
     sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
     centres = has(scene, CENTRE_FORCE)

@@ -20,7 +20,7 @@ from flocsim.hooks import hook
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
-from flocsim.integrators.rhs.outline_sum import acts_along, between_outlines
+from flocsim.integrators.rhs.outline_sum import acts_along, between_outlines, outline_reach
 from flocsim.integrators.rhs.pair_resistance import add_pair_damping
 from flocsim.integrators.rhs.stated_error import doubted
 from flocsim.integrators.rhs.surface_gap import (
@@ -286,11 +286,14 @@ def add_surfaces(scene, work, time):
 NUDGE = 1e-3
 """Of the gap of two outlines, by which they are moved to see how their forces change."""
 
+OF_SIZE = 1e-6
+"""The same of their size, where nothing acts along outlines."""
+
 
 @hook
 def add_outlines(scene, work, time):
-    """Derivatives of the forces between outlines by the places of both, from differences: all three
-    follow from those by j's place, forces going with the bodies."""
+    """Derivatives of the forces between outlines, and by how bodies are turned, by the places of
+    both, from differences: all three follow from those by j's place, forces going with them."""
     for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         x, y = separation(scene, work, at.NOW, a, b)
@@ -298,9 +301,11 @@ def add_outlines(scene, work, time):
         fx, fy, torque_a, torque_b = between_outlines(
             scene, work, time, a, b, x, y, angle_a, angle_b
         )
-        if fx == 0.0 and fy == 0.0:
+        if fx == 0.0 and fy == 0.0 and torque_a == 0.0 and torque_b == 0.0:
             continue
         by = NUDGE * scene.outlines[1]
+        if not outline_reach(scene) > 0.0:
+            by = OF_SIZE * scene.bodies[a, at.BOUNDING_RADIUS]
         turn = by / scene.bodies[a, at.BOUNDING_RADIUS]
         across = between_outlines(scene, work, time, a, b, x + by, y, angle_a, angle_b)
         up = between_outlines(scene, work, time, a, b, x, y + by, angle_a, angle_b)

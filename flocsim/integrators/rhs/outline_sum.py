@@ -23,8 +23,9 @@ from flocsim.geometry.surfaces.distances import (
 from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.charge_sum import sum_charges
+from flocsim.integrators.rhs.orientation import between_oriented
 from flocsim.integrators.rhs.views import effective_mass
-from flocsim.laws import OUTLINE_PRESSURE, has, outline_pressure
+from flocsim.laws import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, outline_pressure
 
 LENS = 100.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
@@ -210,8 +211,8 @@ def radii_of(scene, a, b):
 
 
 def acts_along(scene):
-    """Whether anything acts along outlines."""
-    return outline_reach(scene) > 0.0
+    """Whether anything acts along outlines, or by how bodies are turned."""
+    return outline_reach(scene) > 0.0 or has(scene, ORIENTED_ENERGY)
 
 
 def outline_reach(scene):
@@ -266,7 +267,19 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
 
 def between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b):
     """(fx, fy, torque on a, torque on b) of the forces on body a [N, N, N m], each torque about its
-    own centroid, a being seen from b at x, y [m]; b feels the reverse of fx, fy."""
+    own centroid, a being seen from b at x, y [m]; b feels the reverse of fx, fy. ``a``: the later
+    one of the two."""
+    fx, fy, torque_a, torque_b = 0.0, 0.0, 0.0, 0.0
+    if outline_reach(scene) > 0.0:
+        fx, fy, torque_a, torque_b = between_sized(scene, work, time, a, b, x, y, angle_a, angle_b)
+    if has(scene, ORIENTED_ENERGY):
+        more = between_oriented(scene, time, a, b, x, y, angle_a, angle_b)
+        return fx + more[0], fy + more[1], torque_a + more[2], torque_b + more[3]
+    return fx, fy, torque_a, torque_b
+
+
+def between_sized(scene, work, time, a, b, x, y, angle_a, angle_b):
+    """The same of forces along outlines alone."""
     # The smaller one is gone along.
     if scene.bodies[a, at.BOUNDING_RADIUS] > scene.bodies[b, at.BOUNDING_RADIUS]:
         fx, fy, torque_b, torque_a = between_in_order(

@@ -29,6 +29,32 @@ def test_it_goes_with_pairs_that_settle(tmp_path):
     assert (force.acts_on, force.depth, force.wavelength) == ("outlines", 5e-6, 1e-7)
 
 
+TURNED = """
+import attrs, math
+from flocsim.forces import OrientedForce
+
+@attrs.frozen
+class Faces(OrientedForce):
+    @staticmethod
+    def kernel(pair):
+        return 1e-19 * math.cos(pair.angle_i) / (1.0 + pair.centre_distance)
+"""
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [("", ""), ('meeting = "extension"\nrate = 10.0', "Faces asks how bodies are turned, which")],
+)
+def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
+    (tmp_path / "faces_turned.py").write_text(TURNED)
+    text = f'preset = "si"\n[scene]\n{scene}\n[forces.faces]\nclass = "faces_turned:Faces"\n'
+    if words:
+        with pytest.raises(ConfigError, match=words):
+            loaded(tmp_path, text)
+    else:
+        assert loaded(tmp_path, text).forces[-1].acts_on == "orientations"
+
+
 @pytest.mark.parametrize(
     ("scene", "more", "words"),
     [

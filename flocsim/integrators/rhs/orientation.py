@@ -1,0 +1,66 @@
+"""What two bodies do to each other by how they are turned: from an energy, by differences.
+
+The energy U is one of the distance d of the centroids and of both angles from the line between
+them, α_i and α_j. On j act −∂U/∂d along that line, and (∂U/∂α_i + ∂U/∂α_j)/d across it, as that
+line turns where j moves aside; torques are −∂U/∂α.
+"""
+
+import math
+
+import flocsim.arrays as at
+from flocsim.arrays import OrientedView
+from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.integrators.rhs.views import effective_mass
+from flocsim.laws import oriented_energy
+
+TURN = 1e-4
+"""Angle by which bodies are turned for a difference [rad]: its square is what differences leave."""
+
+SHARE, LEAST = 1e-4, 1e-12
+"""How far they are moved: a share of the gap, and this [m] at least."""
+
+
+def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
+    radius_i = scene.bodies[i, at.EQUIVALENT_RADIUS]
+    radius_j = scene.bodies[j, at.EQUIVALENT_RADIUS]
+    return OrientedView(
+        time, distance - radius_i - radius_j, distance, angle_i, angle_j, radius_i, radius_j,
+        radius_i * radius_j / (radius_i + radius_j), effective_mass(scene, j, i),
+    )  # fmt: skip
+
+
+def oriented_now(scene, work, time, j, i):
+    """The OrientedView of two bodies in the state NOW."""
+    x, y = separation(scene, work, at.NOW, j, i)
+    bearing = math.atan2(y, x)
+    angle_i = work.motion[at.NOW, i, at.ANGLE] - bearing
+    angle_j = work.motion[at.NOW, j, at.ANGLE] - bearing
+    return oriented_view(scene, time, j, i, length_of(x, y), angle_i, angle_j)
+
+
+def energy_at(scene, time, j, i, distance, angle_i, angle_j):
+    """U [J]."""
+    return oriented_energy(scene, oriented_view(scene, time, j, i, distance, angle_i, angle_j))
+
+
+def between_oriented(scene, time, j, i, x, y, angle_j, angle_i):
+    """(fx, fy, torque on j, torque on i) on body j, the later one, which is seen from i at x, y
+    [m]; i feels the reverse of fx, fy [N, N, N m, N m]. Nothing where centroids are at one place.
+    """
+    distance = length_of(x, y)
+    if distance == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    bearing = math.atan2(y, x)
+    one, other = angle_i - bearing, angle_j - bearing
+    gap = distance - scene.bodies[i, at.EQUIVALENT_RADIUS] - scene.bodies[j, at.EQUIVALENT_RADIUS]
+    by = SHARE * abs(gap) + LEAST
+    rise = energy_at(scene, time, j, i, distance + by, one, other)
+    rise -= energy_at(scene, time, j, i, distance - by, one, other)
+    of_i = energy_at(scene, time, j, i, distance, one + TURN, other)
+    of_i -= energy_at(scene, time, j, i, distance, one - TURN, other)
+    of_j = energy_at(scene, time, j, i, distance, one, other + TURN)
+    of_j -= energy_at(scene, time, j, i, distance, one, other - TURN)
+    along, torque_i, torque_j = -0.5 * rise / by, -0.5 * of_i / TURN, -0.5 * of_j / TURN
+    across = -(torque_i + torque_j) / distance
+    nx, ny = x / distance, y / distance
+    return along * nx - across * ny, along * ny + across * nx, torque_j, torque_i
