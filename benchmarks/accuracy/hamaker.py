@@ -74,6 +74,7 @@ def draw(rows, presets, path):
                 axes.plot(h, both, "o", mfc="none", ms=8, color=line[0].get_color())
             set_probability_axis(axes)
             axes.set(xscale="log", xlabel="Hamaker constant [J]", title=preset)
+        panels[0].plot([], [], "o", mfc="none", ms=8, color="grey", label="or held apart")
         panels[0].set_ylabel("Pr[A]")
         panels[0].legend(title="forces by", loc="center right")
         save(figure, path)
