@@ -115,7 +115,7 @@ def about(system, force, implicit):
         parts = ["at every overlapping pair", sliding(system, force)]
         derivative = "derivatives from differences of its kernel"
     else:
-        centres = force.acts_on == "centres"
+        centres, reach = force.acts_on == "centres", force.reach
         place = "along the line of centres" if centres else "between the outlines"
         if force.acts_on == "orientations":
             place = "by the distance of centres and how both bodies are turned"
@@ -124,7 +124,9 @@ def about(system, force, implicit):
             shapes = [body.shape for body in system.bodies]
             if layer_along([force], shapes) is not None:
                 place += ", between charges behind them, for it is thick beside their corners"
-        parts = [f"{place}, {reach_words(system, force)}"]
+                if force.boundary == "superposition":
+                    reach = system.pieces.layer[2]
+        parts = [f"{place}, {reach_words(system, force, reach)}"]
         derivative = pair_derivative(system, force)
     parts += force.remarks(system.fluid)
     return [*parts, derivative] if implicit else parts
@@ -156,13 +158,13 @@ def pair_derivative(system, force):
     return f"derivative by the gap {slope}{rate}"
 
 
-def reach_words(system, force):
-    """How far a pair force reaches, and whether it does so at the start."""
-    if not force.reach < math.inf:
+def reach_words(system, force, reach):
+    """How far a pair force reaches [m], and whether it does so at the start."""
+    if not reach < math.inf:
         return "at every gap"
-    words = f"not called at gaps above {force.reach:.3g} m"
+    words = f"not called at gaps above {reach:.3g} m"
     nearest = least_gap(system.bodies, force)
-    if nearest >= force.reach:
+    if nearest >= reach:
         words += f" (out of range at the start, where gaps are at least {nearest:.3g} m)"
     return words
 

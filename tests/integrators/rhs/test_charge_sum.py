@@ -221,3 +221,11 @@ def test_nothing_of_it_is_in_a_scene_without():
     for force, charged in ((thin, False), (layer(), True), (VanDerWaals(law="outline"), False)):
         pair = Pair(sphere, sphere, away, force)
         assert pair.system.reached["charges"] == (len(pair.scene.charges) > 0) == charged
+
+
+def test_explain_says_how_far_charges_are_seen():
+    """12/κ, not as far as plates at a gap."""
+    bodies = [Body(Sphere(1e-6), (x, 0.0), density=2000.0) for x in (0.0, 5e-6)]
+    thick = DoubleLayer(debye_length=1e-7, law="outline")
+    words = System(bodies, [thick]).explain()
+    assert "not called at gaps above 1.2e-06 m" in words
