@@ -1,14 +1,17 @@
-"""Aggregation against the Hamaker constant, by forces of spheres and by those of outlines.
+"""Aggregation against the Hamaker constant, or the potential, by forces of spheres and of outlines.
 
     python -m benchmarks.accuracy.hamaker [--preset clay] [--hamaker 1e-20 …] [--film clay]
         [--figure FILE]
+    python -m benchmarks.accuracy.hamaker --preset clay --potential 0.015 0.04 … --vertices 4 16 64
+        --film clay --figure FILE
 
-runs flocs of N = 16 at δ = .5 under the presets tang2014 and clay, from H_A = 1e-23 to 1e-18 J,
-with both forces as the preset has them and with both by law = "outline". Pr[A] is here the share of
-all approaches that ends in contact for good, with its 95 % interval; held: those that attraction
-holds at a distance, in a secondary minimum, and that the figure adds with open markers. ``--film``:
-presets whose bodies meet with the resistance of the water between (``[forces.lubrication]``),
-without which outlines that are held at a nanometre swing a thousand times before they rest.
+runs flocs at δ = .5 with both forces as the preset has them and with both by law = "outline": of
+N = 16 from H_A = 1e-23 to 1e-18 J, or with the preset's H_A at each ``--potential`` [V]. Pr[A] is
+here the share of all approaches that ends in contact for good, with its 95 % interval; held: those
+that attraction holds at a distance, in a secondary minimum, and that the figure adds with open
+markers. ``--film``: presets whose bodies meet with the resistance of the water between
+(``[forces.lubrication]``), without which outlines that are held at a nanometre swing a thousand
+times before they rest.
 """
 
 import time
@@ -28,20 +31,27 @@ QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
 PRESETS = ("tang2014", "clay")
 HAMAKER = (1e-23, 1e-22, 1e-21, 1e-20, 1e-19, 1e-18)
 LAWS = ("spheres", "outline")
+VARIED = {
+    "hamaker": ("van_der_waals", "Hamaker constant [J]", 1.0),
+    "potential": ("double_layer", "zeta potential [mV]", 1e3),
+}
+"""{key: (its force, label of the axis, factor of its unit)}."""
 
 
-def outcomes_of(preset, law, hamaker, replicates, kind, film):
+def outcomes_of(preset, vertices, law, varied, value, args):
     """({outcome: how many}, seconds)."""
-    forces = {"van_der_waals": {"hamaker": hamaker}}
+    forces = {"van_der_waals": {}, "double_layer": {}}
+    forces[VARIED[varied][0]][varied] = value
     if law == "outline":
-        forces = {"van_der_waals": {"hamaker": hamaker, "law": law}, "double_layer": {"law": law}}
-    if film:
+        for each in forces.values():
+            each["law"] = law
+    if preset in args.film:
         forces["lubrication"] = {}
     config = load_config(QUICKSTART, {
-        "preset": preset, "seed": 1, "replicates": replicates, "forces": forces,
+        "preset": preset, "seed": 1, "replicates": args.replicates, "forces": forces,
         # The zone divides outcomes, which is not asked for here; its root moves with H_A.
         "zone": {"distance": 5.925e-6 if preset == "tang2014" else 1e-8},
-        "scene": {"types": [kind], "delta": [0.5]}, "shapes": {"vertices": [16]},
+        "scene": {"types": [args.type], "delta": [0.5]}, "shapes": {"vertices": [vertices]},
         "integrator": {"check_share": 0.0},
     })  # fmt: skip
     start = time.perf_counter()
@@ -58,25 +68,32 @@ def aggregated(counts, *more):
     return found / max(known, 1), float(low), float(high)
 
 
-def draw(rows, presets, path):
-    """Both laws of each preset beside each other."""
+def draw(rows, varied, path):
+    """Both laws of each preset and N beside each other."""
+    _, label, unit = VARIED[varied]
+    panels = list(dict.fromkeys(row[:2] for row in rows))
+    several = len({vertices for _, vertices in panels}) > 1
     with house_style():
-        figure = new_figure(1.0 + 2.75 * len(presets), 3.0)
-        panels = figure.subplots(1, len(presets), sharey=True, squeeze=False)[0]
-        for axes, preset in zip(panels, presets, strict=True):
+        figure = new_figure(1.0 + 2.75 * len(panels), 3.0)
+        all_axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+        for axes, panel in zip(all_axes, panels, strict=True):
             for k, law in enumerate(LAWS):
-                here = [row for row in rows if row[:2] == (preset, law)]
-                h = [row[2] * (1.0 + 0.15 * k) for row in here]
-                p, low, high = np.array([aggregated(row[3]) for row in here]).T
+                here = [row for row in rows if row[:3] == (*panel, law)]
+                apart = 1.0 + (0.15 if varied == "hamaker" else 0.012) * k
+                x = [unit * row[3] * apart for row in here]
+                p, low, high = np.array([aggregated(row[4]) for row in here]).T
                 ends = [p - low, high - p]
-                line = axes.errorbar(h, p, yerr=ends, marker="o", capsize=2, label=law)
-                both = [aggregated(row[3], "held")[0] for row in here]
-                axes.plot(h, both, "o", mfc="none", ms=8, color=line[0].get_color())
+                line = axes.errorbar(x, p, yerr=ends, marker="o", capsize=2, label=law)
+                both = [aggregated(row[4], "held")[0] for row in here]
+                axes.plot(x, both, "o", mfc="none", ms=8, color=line[0].get_color())
             set_probability_axis(axes)
-            axes.set(xscale="log", xlabel="Hamaker constant [J]", title=preset)
-        panels[0].plot([], [], "o", mfc="none", ms=8, color="grey", label="or held apart")
-        panels[0].set_ylabel("Pr[A]")
-        panels[0].legend(title="forces by", loc="center right")
+            title = f"{panel[0]}, N = {panel[1]}" if several else panel[0]
+            axes.set(xlabel=label, title=title)
+            if varied == "hamaker":
+                axes.set_xscale("log")
+        all_axes[0].plot([], [], "o", mfc="none", ms=8, color="grey", label="or held apart")
+        all_axes[0].set_ylabel("Pr[A]")
+        all_axes[0].legend(title="forces by", loc="center right")
         save(figure, path)
 
 
@@ -86,26 +103,28 @@ def main():
     parser.add_argument("--replicates", type=int, default=30)
     parser.add_argument("--type", default="I")
     parser.add_argument("--preset", nargs="+", default=PRESETS)
+    parser.add_argument("--vertices", nargs="+", type=int, default=(16,))
     parser.add_argument("--hamaker", nargs="+", type=float, default=HAMAKER)
+    parser.add_argument("--potential", nargs="+", type=float)
     parser.add_argument("--film", nargs="*", default=())
     parser.add_argument("--figure", type=Path)
     args = parser.parse_args()
     if args.quick:
         args.replicates = 6
     print_heading()
-    columns = "preset", "law", "H_A [J]", "Pr[A]", "95 %", *OUTCOMES, "s"
-    table, rows = Table("Aggregation against the Hamaker constant", columns), []
-    for preset, law, hamaker in product(args.preset, LAWS, args.hamaker):
-        counts, spent = outcomes_of(
-            preset, law, hamaker, args.replicates, args.type, preset in args.film
-        )
-        rows.append((preset, law, hamaker, counts))
+    varied = "potential" if args.potential else "hamaker"
+    _, label, unit = VARIED[varied]
+    columns = "preset", "N", "law", label, "Pr[A]", "95 %", *OUTCOMES, "s"
+    table, rows = Table(f"Aggregation against the {label.partition(' [')[0]}", columns), []
+    for case in product(args.preset, args.vertices, LAWS, args.potential or args.hamaker):
+        counts, spent = outcomes_of(*case[:3], varied, case[3], args)
+        rows.append((*case, counts))
         p, low, high = aggregated(counts)
         interval = f"{low:.2f} to {high:.2f}"
-        table.add(preset, law, f"{hamaker:.0e}", p, interval, *counts.values(), spent)
+        table.add(*case[:3], f"{unit * case[3]:.3g}", p, interval, *counts.values(), spent)
     table.print(args.markdown)
     if args.figure:
-        draw(rows, args.preset, args.figure)
+        draw(rows, varied, args.figure)
 
 
 if __name__ == "__main__":
