@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 
@@ -28,12 +29,19 @@ def call(command, *words):
     return args.run(args)
 
 
-@pytest.fixture
-def study(tmp_path):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
     """A results file as an ensemble would leave it."""
+    path = tmp_path_factory.mktemp("written") / "study.h5"
     run = provenance(CONFIG, 3) | {"wall_time": 12.345678, "ranks": 2}
-    write_results(tmp_path / "study.h5", make_results(count=8, run=run))
-    return tmp_path / "study.h5"
+    write_results(path, make_results(count=8, run=run))
+    return path
+
+
+@pytest.fixture
+def study(written, tmp_path):
+    """A copy of it."""
+    return shutil.copy(written, tmp_path / "study.h5")
 
 
 def test_all_figures_are_drawn_into_a_new_folder(study, capsys, tmp_path):

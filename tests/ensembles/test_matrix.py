@@ -49,7 +49,7 @@ class Kind:
     read: object
 
 
-FEW = ("--count", "3", "--precision", "0.2")
+FEW = ("--count", "2", "--precision", "0.5")
 KINDS = {
     each.name: each
     for each in (

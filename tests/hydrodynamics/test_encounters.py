@@ -43,7 +43,7 @@ def test_settling(k, with_water, without):
 @pytest.mark.parametrize(("k", "with_water", "without"), rest_slow([
     (1e-2, 0.604, 1.51), (1e-3, 0.325, 1.19), (1e-4, 0.189, 1.07), (1e-5, 0.110, 1.03),
 ], lambda k, *_: k == 1e-3))  # fmt: skip
-def test_shear(k, with_water, without):
+def test_shear(long_steps, k, with_water, without):
     pair, force = SpherePair((1.0, 1.0)), attraction((1.0, 1.0), k)
     assert Meeting(pair, force, 1e-7).in_flow("shear", 1.0) == pytest.approx(with_water, rel=8e-3)
     alone = Meeting(pair, force, 1e-7, water=False).in_flow("shear", 1.0)

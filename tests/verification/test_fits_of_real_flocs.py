@@ -57,7 +57,7 @@ def test_claim_2_spheropolygons_beat_spheres():
 
 
 @pytest.mark.parametrize(
-    "counts", rest_slow([(8, 16), COUNTS[1:]], lambda counts: counts[-1] == 16)
+    "counts", rest_slow([[8, 16], [8, 16, 28, 64]], lambda counts: len(counts) == 2)
 )
 def test_claim_3_errors_rise_with_the_radius_from_eight_vertices_on(counts):
     means = [np.mean([large(n, r) for n in counts], axis=0) for r in RADII]
