@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
+from flocsim.commands import trajectory
 from flocsim.io.files import read_sealed, seal
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import write_small
@@ -48,14 +49,15 @@ def test_a_figure_can_be_written_in_several_formats(folder, capsys):
     assert (folder / "f.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_forces_and_an_animation(folder, capsys):
+def test_forces_and_an_animation(folder, monkeypatch, capsys):
     from PIL import Image
 
+    monkeypatch.setattr(trajectory, "ANIMATION_FRAMES", 12)
     words = ["--type", "III", "--vertices", 1, "--forces", "f.png", "--animation", "a.gif"]
     code, output, errors = call(capsys, "small.toml", *words, "--set", "scene.start_gap=1e-6")
     assert (code, errors, output[2:]) == (0, [], ["f.png", "a.gif"])
     with Image.open(folder / "a.gif") as animation:
-        assert animation.n_frames > 20
+        assert animation.n_frames == 12
         assert animation.info["loop"] == 0
 
 
