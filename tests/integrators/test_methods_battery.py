@@ -64,7 +64,7 @@ by_any = pytest.mark.parametrize("integrator", METHODS, ids=name_of)
 def is_quick(integrator, family, z):
     """Each method, family and damping, but not each with each; backward Euler takes long."""
     if isinstance(integrator, BackwardEuler):
-        return family == "spheres" and z == 0.4
+        return family == "compounds" and z == 0.4
     return z == (0.05 if family == "polygons" else 0.4)
 
 

@@ -57,7 +57,7 @@ def test_claim_2_spheropolygons_beat_spheres():
 
 
 @pytest.mark.parametrize(
-    "counts", rest_slow([[8, 16], [8, 16, 28, 64]], lambda counts: len(counts) == 2)
+    "counts", rest_slow([[8], [8, 16, 28, 64]], lambda counts: len(counts) == 1)
 )
 def test_claim_3_errors_rise_with_the_radius_from_eight_vertices_on(counts):
     means = [np.mean([large(n, r) for n in counts], axis=0) for r in RADII]
@@ -70,7 +70,7 @@ def test_claim_3_does_not_hold_for_four_vertices():
     assert interval(large(4, 4.0) - large(4, 1.0))[1] < 0
 
 
-@pytest.mark.parametrize("radius", RADII)
+@pytest.mark.parametrize("radius", rest_slow(RADII, lambda radius: radius == 1.0))
 def test_claim_4_errors_fall_with_n(radius):
     counts = COUNTS if radius == 1.0 else COUNTS[:4] if radius == 2.0 else COUNTS[:3]
     for fewer, more in itertools.pairwise(counts):
