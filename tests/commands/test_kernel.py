@@ -174,12 +174,18 @@ def test_a_replicate_can_be_looked_at(folder, capsys):
     assert np.isfinite(read_results("kernel.h5").kernel.arrays["beta3"]).all()
 
 
-def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def cut_short(tmp_path, monkeypatch):
+    """The current folder, with a study that has too few steps to decide anything."""
     monkeypatch.chdir(tmp_path)
     about = {"preset": "tang2014", "meeting": '["shear"]', "scene": 'rate = "10 1/s"',
              "sizes": '["5 um", "8 um"]', "more": "[integrator]\nmax_steps = 15",
              "replicates": 8, "scrambles": 2}  # fmt: skip
     (tmp_path / "kernel.toml").write_text(kernel_text(**about), "utf-8")
+    return tmp_path
+
+
+def test_rates_that_are_left_open_have_a_code_of_their_own(cut_short, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 65
     [line] = [each for each in capsys.readouterr().err.splitlines() if "undecided" in each]
     assert "rates have no estimate" in line and "raise integrator.max_steps" in line
@@ -188,8 +194,12 @@ def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch
     assert main(["export", "matrix", "kernel.h5"]) == 0
     assert (
         "an empty cell is unknown"
-        in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+        in (cut_short / "kernel-shear-N1-efficiency-spheres.csv").read_text()
     )
+
+
+@pytest.mark.slow
+def test_rates_that_are_left_open_are_warned_of(cut_short):
     with pytest.warns(flocsim.errors.PlausibilityWarning, match="rates have no estimate"):
         again = flocsim.Study("kernel.toml").run(output="again.h5")
     assert np.isnan(again.kernel.arrays["beta2"]).all()
