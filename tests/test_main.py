@@ -68,17 +68,17 @@ def test_the_path_of_a_new_user(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["strip.png", "study.toml"]
 
 
-def test_flocsim_ensemble_is_the_ensemble_command(tmp_path):
+def test_flocsim_ensemble_is_the_ensemble_command(tmp_path, monkeypatch, capsys):
     write_small(tmp_path, vertices="[1]")
     done = run_command(tmp_path, "ensemble", "small.toml", "--quiet", module="flocsim")
     assert (done.returncode, done.stdout) == (0, "")
     assert done.stderr == ""
-    done = run_command(tmp_path, "info", "small.h5", module="flocsim")
-    assert done.returncode == 0
-    assert "12 A, 0 B, 0 C, 0 D, 0 missed" in done.stdout
-    done = run_command(tmp_path, "plot", "small.h5", "--figures", "4,overview", module="flocsim")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert len(done.stdout.splitlines()) == 2
+    monkeypatch.chdir(tmp_path)
+    assert entry.main(["info", "small.h5"]) == 0
+    assert "12 A, 0 B, 0 C, 0 D, 0 missed" in capsys.readouterr().out
+    assert entry.main(["plot", "small.h5", "--figures", "4,overview"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "" and len(said.out.splitlines()) == 2
 
 
 @pytest.mark.parametrize(

@@ -20,14 +20,17 @@ def folder(tmp_path, monkeypatch):
 
 
 def call(capsys, *words):
-    """(exit code, lines of output, lines of errors) of `flocsim trajectory`."""
-    code = main(["trajectory", *map(str, words)])
+    """(exit code, lines of output, lines of errors) of `flocsim trajectory`; two frames where the
+    words name no number."""
+    few = [] if "--frames" in words else ["--frames", 2]
+    code = main(["trajectory", *map(str, [*words, *few])])
     output, errors = capsys.readouterr()
     return code, output.splitlines(), errors.splitlines()
 
 
 def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
     words = ["--distance", "d.svg", "--save", "motion.h5", "--type", "III", "--vertices", 4]
+    words += ["--frames", 5]
     code, output, errors = call(capsys, "small.toml", *words)
     assert (code, errors) == (0, [])
     assert output[0].startswith("type III, N = 4, delta = 0, replicate 0: A; collision at ")
