@@ -43,8 +43,9 @@ def locate(scene, work):
     return room
 
 
-def views_of(system, scene, work, time):
-    """{first part of laws' names: [what they are shown]} in the state NOW."""
+def views_of(system, scene, work, time, located):
+    """{first part of laws' names: [what they are shown]} in the state NOW; ``located(scene, work)``
+    lists the pairs there (see locate)."""
     views = {
         "body": [body_view(scene, work, time, at.NOW, body) for body in range(len(system.bodies))],
         "centre": [
@@ -54,7 +55,7 @@ def views_of(system, scene, work, time):
             if counts_as_pair(scene.bodies, a, b)
         ],
     }
-    if compose(locate, system.fillings(), jit=False)(scene, work):
+    if located(scene, work):
         rows = range(work.tally[at.CANDIDATES])
         touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
         flag_near(scene, work, at.NOW, 0.0)
@@ -138,10 +139,11 @@ def force_to_blame(system: Any, run: Run) -> str:
     used = system.pieces.used
     pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
     classes = [type(force) for force in used.values()]
+    located = compose(locate, system.fillings(), jit=False)
     for ahead in AHEAD:
         work.motion[at.NOW] = start
         work.motion[at.NOW, :, : at.VELOCITY] += ahead * start[:, at.VELOCITY :]
-        views = views_of(system, scene, work, run.clock[at.TIME] + ahead)
+        views = views_of(system, scene, work, run.clock[at.TIME] + ahead, located)
         for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)
             if words:
