@@ -38,6 +38,11 @@ gc.disable()
 def pytest_collection_finish():
     """What tests write and import themselves is left to the settings of Python."""
     sys.dont_write_bytecode = KEEPS_NO_BYTECODE
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop():
+    """From here on there is garbage, as in the process that hands out the tests."""
     gc.freeze()
     gc.enable()
 
