@@ -1,6 +1,7 @@
 """What every test run shares: one thread per process, no display, repeatable random examples."""
 
 import compileall
+import gc
 import math
 import os
 import sys
@@ -30,9 +31,20 @@ compileall.compile_dir(Path(__file__).parents[1] / "flocsim", quiet=2)
 sys.dont_write_bytecode = False
 
 
+# Nothing of what is collected is garbage, and a worker holds it to its end: it is not looked at.
+gc.disable()
+
+
 def pytest_collection_finish():
     """What tests write and import themselves is left to the settings of Python."""
     sys.dont_write_bytecode = KEEPS_NO_BYTECODE
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop():
+    """From here on there is garbage, as in the process that hands out the tests."""
+    gc.freeze()
+    gc.enable()
 
 
 # What a test's commands print must not depend on what was compiled before it.

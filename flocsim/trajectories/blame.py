@@ -44,16 +44,22 @@ def locate(scene, work):
     return room
 
 
+<<<<<<< HEAD
 def views_of(system, scene, work, time):
     """{first part of laws' names: [what they are shown]} in the state NOW."""
     bodies = range(len(system.bodies))
     pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
+=======
+def views_of(system, scene, work, time, located):
+    """{first part of laws' names: [what they are shown]} in the state NOW; ``located(scene, work)``
+    lists the pairs there (see locate)."""
+>>>>>>> h_29
     views = {
         "body": [body_view(scene, work, time, at.NOW, body) for body in bodies],
         "centre": [centre_view(scene, work, time, at.NOW, a, b) for a, b in pairs],
         "oriented": [oriented_now(scene, work, time, a, b) for a, b in pairs],
     }
-    if compose(locate, system.fillings(), jit=False)(scene, work):
+    if located(scene, work):
         rows = range(work.tally[at.CANDIDATES])
         touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
         flag_near(scene, work, at.NOW, 0.0)
@@ -137,10 +143,11 @@ def force_to_blame(system: Any, run: Run) -> str:
     used = system.pieces.used
     pieces = [(name, force, laws_of([force], system.fluid)) for name, force in used.items()]
     classes = [type(force) for force in used.values()]
+    located = compose(locate, system.fillings(), jit=False)
     for ahead in AHEAD:
         work.motion[at.NOW] = start
         work.motion[at.NOW, :, : at.VELOCITY] += ahead * start[:, at.VELOCITY :]
-        views = views_of(system, scene, work, run.clock[at.TIME] + ahead)
+        views = views_of(system, scene, work, run.clock[at.TIME] + ahead, located)
         for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)
             if words:

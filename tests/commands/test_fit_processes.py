@@ -126,7 +126,7 @@ def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
     assert len(ids()) == 3 and "b.png: no such picture" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("jobs", JOBS)
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=[needs_fork, pytest.mark.slow])])
 def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, jobs):
     strange = os.fsencode(folder / "frames") + b"/caf\xe9.png"
     try:

@@ -5,13 +5,14 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.hydrodynamics import encounters
 from flocsim.io.results.file import read_results
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.results_files import same_data
 from tests.helpers.tiers import rest_slow
 
 SHEAR = {
-    "meeting": '["settling", "shear"]',
+    "meeting": '["shear"]',
     "scene": 'rate = "10 1/s"',
     "more": "[forces]\nvan_der_waals = false\ndouble_layer = false",
     "replicates": 8,
@@ -27,6 +28,8 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
+    both = SHEAR | {"meeting": '["settling", "shear"]'}
+    (folder / "kernel.toml").write_text(kernel_text(**both), "utf-8")
     assert main(["kernel", "kernel.toml"]) == 0
     told = capsys.readouterr().out
     assert "settling, N = 1" in told and "shear, N = 1" in told
@@ -84,8 +87,10 @@ def test_a_mechanism_without_a_factor_is_named(folder, capsys):
         lambda meeting, sizes, known: len(sizes) == 1,
     ),
 )  # fmt: skip
-def test_equivalent_spheres_are_known_in_water(folder, capsys, meeting, sizes, known):
-    """``known``: alpha of quartz in water at 10 1/s."""
+def test_equivalent_spheres_are_known_in_water(folder, monkeypatch, capsys, meeting, sizes, known):
+    """``known``: alpha of quartz in water at 10 1/s; by steps as long as 2 % allow."""
+    monkeypatch.setattr(encounters, "STEP", 3.0 * encounters.STEP)
+    monkeypatch.setattr(encounters, "SMOOTH", 3.0 * encounters.SMOOTH)
     changes = {"more": "[forces]\ndouble_layer = false", "meeting": meeting, "sizes": sizes}
     (folder / "kernel.toml").write_text(kernel_text(**SHEAR | changes), "utf-8")
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
@@ -163,18 +168,24 @@ def test_a_replicate_can_be_looked_at(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     words = ["trajectory", "kernel.toml", "--scene", "shear:10um-20um,1,1", "--replicate", "3"]
     assert main([*words, "-o", "a.png"]) == 0
-    row = read_results("kernel.h5").replicates["outcome"][2, 0, 0, 3]
+    row = read_results("kernel.h5").replicates["outcome"][1, 0, 0, 3]
     told = capsys.readouterr().out
     assert ("missed" in told) == (row == 4)
     assert np.isfinite(read_results("kernel.h5").kernel.arrays["beta3"]).all()
 
 
-def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def cut_short(tmp_path, monkeypatch):
+    """The current folder, with a study that has too few steps to decide anything."""
     monkeypatch.chdir(tmp_path)
     about = {"preset": "tang2014", "meeting": '["shear"]', "scene": 'rate = "10 1/s"',
              "sizes": '["5 um", "8 um"]', "more": "[integrator]\nmax_steps = 15",
              "replicates": 8, "scrambles": 2}  # fmt: skip
     (tmp_path / "kernel.toml").write_text(kernel_text(**about), "utf-8")
+    return tmp_path
+
+
+def test_rates_that_are_left_open_have_a_code_of_their_own(cut_short, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 65
     [line] = [each for each in capsys.readouterr().err.splitlines() if "undecided" in each]
     assert "rates have no estimate" in line and "raise integrator.max_steps" in line
@@ -183,8 +194,12 @@ def test_rates_that_are_left_open_have_a_code_of_their_own(tmp_path, monkeypatch
     assert main(["export", "matrix", "kernel.h5"]) == 0
     assert (
         "an empty cell is unknown"
-        in (tmp_path / "kernel-shear-N1-efficiency-spheres.csv").read_text()
+        in (cut_short / "kernel-shear-N1-efficiency-spheres.csv").read_text()
     )
+
+
+@pytest.mark.slow
+def test_rates_that_are_left_open_are_warned_of(cut_short):
     with pytest.warns(flocsim.errors.PlausibilityWarning, match="rates have no estimate"):
         again = flocsim.Study("kernel.toml").run(output="again.h5")
     assert np.isnan(again.kernel.arrays["beta2"]).all()

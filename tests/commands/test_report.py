@@ -24,6 +24,7 @@ from tests.helpers.browser import browser, open_page
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_small
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 HOSTILE = "<script>document.title='taken'</script><img src=x onerror=alert(1)>'\"&"
 
@@ -74,13 +75,21 @@ def made_up(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory):
-    """(results file, text of its page) with all figures and no motion."""
+FEW = ("4", "overview", "size")
+
+
+@pytest.fixture(
+    scope="module", params=rest_slow([[*FEW], [*FIGURES]], lambda names: len(names) == 3)
+)
+def whole(request, tmp_path_factory):
+    """(results file, text of its page, how many figures it has) without motion; the page of every
+    figure in the slow run."""
     path = tmp_path_factory.mktemp("whole") / "r.h5"
     write_made_up(path)
-    assert call(path, "--no-motion", "--output", path.with_suffix(".html")) == 0
-    return path, path.with_suffix(".html").read_text("utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contents, "FIGURES", {name: FIGURES[name] for name in request.param})
+        assert call(path, "--no-motion", "--output", path.with_suffix(".html")) == 0
+    return path, path.with_suffix(".html").read_text("utf-8"), len(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -93,18 +102,18 @@ def real(tmp_path_factory):
 
 
 def test_the_page_needs_nothing_else_and_has_all_figures(whole):
-    _, text = whole
+    _, text, count = whole
     found = Page(text)
     assert all(link.startswith(("data:image/svg+xml;base64,", "#")) for link in found.links)
     assert {link[1:] for link in found.links if link.startswith("#")} <= found.ids
     pictures = [link for link in found.links if link.startswith("data:")]
-    assert len(pictures) == len(FIGURES)
+    assert len(pictures) == count
     assert all(b"<svg" in base64.b64decode(each.partition(",")[2]) for each in pictures)
     assert "@import" not in text and "url(" not in text
 
 
 def test_sizes_and_efficiencies_stand_in_the_page(whole):
-    path, text = whole
+    path, text, _ = whole
     results, rows = read_results(path), Page(text).rows
     names = {row[0] for row in rows if row}
     assert {"D_0 [um]", "steps"} <= names
@@ -113,7 +122,7 @@ def test_sizes_and_efficiencies_stand_in_the_page(whole):
 
 
 def test_tables_have_both_errors_of_every_condition(whole):
-    path, text = whole
+    path, text, _ = whole
     results = read_results(path)
     rows = [row for row in Page(text).rows if len(row) > 15]
     head, *rows = rows
@@ -130,7 +139,7 @@ def test_tables_have_both_errors_of_every_condition(whole):
 
 
 def test_what_a_file_says_of_itself_cannot_become_code(whole):
-    _, text = whole
+    _, text, _ = whole
     assert HOSTILE not in text and html.escape(HOSTILE) in text
     assert Page(text).tags.count("script") == 1 and "onerror" not in re.sub("&lt;.*", "", text)
     assert re.search(r"default-src 'none'; .* script-src 'sha256-[\w+/=]{44}'\"", text)

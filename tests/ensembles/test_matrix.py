@@ -19,6 +19,7 @@ from flocsim.__main__ import main
 from flocsim.io.results.file import read_results
 from flocsim.io.results.strength_file import read_strengths
 from flocsim.io.results.swarm_file import read_swarm
+from tests.helpers import parts_here
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import mpirun
 from tests.helpers.swarm_study import SWARM
@@ -48,7 +49,7 @@ class Kind:
     read: object
 
 
-FEW = ("--count", "3", "--precision", "0.2")
+FEW = ("--count", "2", "--precision", "0.5")
 KINDS = {
     each.name: each
     for each in (
@@ -184,6 +185,12 @@ def study(cell):
 
 
 def swept(cell):
+    with pytest.MonkeyPatch.context() as patch:
+        parts_here.use(patch)
+        return swept_here(cell)
+
+
+def swept_here(cell):
     words = ["sweep", cell.kind.words[1], "-o", "swept.h5"]
     code = main([*words, "--over", "fluid.viscosity=1e-3"])
     if code == 0:

@@ -8,8 +8,11 @@ import pytest
 
 from flocsim import SpheroPolygon
 from tests.helpers.fast_scene import FORCES, FastScene, random_case, silenced
+from tests.helpers.tiers import rest_slow
 from tests.reference.samples import SEEDS
 from tests.reference.shapes import Scene, rotation
+
+by_scene = pytest.mark.parametrize("seed", rest_slow(SEEDS, lambda seed: seed < 12))
 
 BETWEEN_BODIES = [name for name in FORCES if name not in ("gravity", "drag")]
 
@@ -33,7 +36,7 @@ def renamed(slips, vertex, edge, body=lambda b: b):
     }
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_action_equals_reaction_and_turns_nothing(seed):
     case = random_case(seed)
     loads = pair_loads(case)
@@ -44,7 +47,7 @@ def test_action_equals_reaction_and_turns_nothing(seed):
     assert abs(moments.sum()) <= 1e-11 * scale * np.abs(case.plain.positions[:, :2]).max()
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_loads_of_three_bodies_are_those_of_every_two(seed):
     case = random_case(seed)
     total = np.zeros((len(case.plain.bodies), 3))
@@ -60,7 +63,7 @@ def test_loads_of_three_bodies_are_those_of_every_two(seed):
     assert_same_loads(pair_loads(case), total)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_turning_and_shifting_the_scene_turns_the_forces(seed):
     case, turn = random_case(seed), rotation(2.1)
     positions, velocities = case.plain.positions.copy(), case.plain.velocities.copy()
@@ -82,7 +85,7 @@ def backwards(count):
     return lambda v: -v % count, edge
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_the_mirrored_scene_has_mirrored_forces(seed):
     case = random_case(seed)
     flip, turn = np.array([-1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
@@ -97,7 +100,7 @@ def test_the_mirrored_scene_has_mirrored_forces(seed):
     assert_same_loads(pair_loads(replace(case, plain=plain, slips=slips)), pair_loads(case) * turn)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_the_order_of_bodies_does_not_matter(seed):
     case = random_case(seed)
     last = len(case.plain.bodies) - 1
@@ -106,7 +109,7 @@ def test_the_order_of_bodies_does_not_matter(seed):
     assert_same_loads(pair_loads(replace(case, plain=plain, slips=slips))[::-1], pair_loads(case))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_the_first_vertex_does_not_matter(seed):
     case = random_case(seed)
     # A segment's one edge would run backwards, which its shape does not know as renumbering.
@@ -125,7 +128,7 @@ def test_the_first_vertex_does_not_matter(seed):
     assert_same_loads(pair_loads(replace(case, plain=plain, slips=slips)), pair_loads(case))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@by_scene
 def test_vertices_given_clockwise_make_the_same_shape(seed):
     for body in random_case(seed).plain.bodies:
         if len(body.vertices) > 2:

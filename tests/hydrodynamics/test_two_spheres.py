@@ -126,7 +126,9 @@ def test_point_forces_say_the_same(ratio):
         assert known_strain[0] == pytest.approx(strain[places, column], abs=2e-4 * largest)
 
 
-@pytest.mark.parametrize("ratio", [0.02, 0.1, *RATIOS, 50.0])
+@pytest.mark.parametrize(
+    "ratio", rest_slow([0.02, 0.1, *RATIOS, 50.0], lambda ratio: ratio in (0.02, 0.5))
+)
 def test_the_resistance_is_positive_and_reciprocal(ratio):
     pair = SpherePair((1.0, ratio))
     gap = np.geomspace(1e-7, 1e3, 60) * (1.0 + ratio)
@@ -137,7 +139,7 @@ def test_the_resistance_is_positive_and_reciprocal(ratio):
         assert np.linalg.eigvalsh(scaled).min() > 0.0
 
 
-@pytest.mark.parametrize("ratio", [0.1, *RATIOS])
+@pytest.mark.parametrize("ratio", rest_slow([0.1, *RATIOS], lambda ratio: ratio == 0.5))
 def test_spheres_change_places(ratio):
     pair, other = SpherePair((1.0, ratio)), SpherePair((ratio, 1.0))
     gap = np.array([1e-4, 0.1, 2.0])
@@ -148,7 +150,7 @@ def test_spheres_change_places(ratio):
     assert first.shear == pytest.approx(second.shear, rel=1e-9)
 
 
-@pytest.mark.parametrize("ratio", [0.1, *RATIOS])
+@pytest.mark.parametrize("ratio", rest_slow([0.1, *RATIOS], lambda ratio: ratio == 0.5))
 def test_turning_as_one_squeezes_nothing(ratio):
     pair = SpherePair((1.0, ratio))
     gap = np.array([1e-8, 1e-5])
@@ -158,7 +160,7 @@ def test_turning_as_one_squeezes_nothing(ratio):
     assert loads[0] == pytest.approx(loads[1], rel=1e-4, abs=1e-3)
 
 
-@pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("ratio", rest_slow([0.1, 0.5, 1.0], lambda ratio: ratio == 0.5))
 def test_what_is_left_of_lubrication_falls_as_it_should(ratio):
     # Σ k² |rest| converges for each function where its singular terms are those of the series.
     for (family, on, of), each in functions_of(ratio).items():

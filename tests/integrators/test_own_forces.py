@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from flocsim import Body, Sphere, SpheroPolygon, run
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-from tests.helpers.methods import by_method, by_setting
+from tests.helpers.methods import METHODS, name_of
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import (
     WATER_VISCOSITY,
@@ -42,6 +42,14 @@ def crowd(n):
     ]
 
 
+def is_quick(integrator, *_):
+    """One method: with forces that read the numbers of shapes, each is an engine of its own."""
+    return isinstance(integrator, Implicit)
+
+
+by_method = pytest.mark.parametrize("integrator", rest_slow(METHODS, is_quick), ids=name_of)
+
+
 @by_method
 @pytest.mark.parametrize(
     ("n", "until"),
@@ -61,7 +69,7 @@ def test_compiled_and_uncompiled_runs_agree(n, until, integrator):
 
 
 @by_method
-@pytest.mark.parametrize("n", [1, 3, 5])
+@pytest.mark.parametrize("n", rest_slow([1, 3, 5], lambda n: n > 1))
 def test_crowds_reach_the_end_with_few_steps(n, integrator):
     """Bodies that come within the reach of a surface force do not creep up to it."""
     few = 50_000 if np.isinf(integrator.tolerance) else 5_000
@@ -87,7 +95,7 @@ def test_trap_and_its_torque_against_closed_forms():
     linear, turning = math.sqrt(0.02 / body.mass), math.sqrt(1e-13 / body.inertia)
     system_ = PolygonSystem([body], own(), Implicit(1e-12))
     t = 2.0 / linear
-    found = system_.run(t)
+    found = system_.run(t, jit=False)
     assert found.position[-1, 0, 0] == pytest.approx(3e-6 * math.cos(linear * t), abs=1e-9)
     assert found.position[-1, 0, 1] == pytest.approx(2e-3 / linear * math.sin(linear * t), abs=1e-9)
     # Small angles: sin is straight to 2e-7.
@@ -105,7 +113,13 @@ def film_and_contact(t, state, mass, reduced, film):
     return [rate, force / mass]
 
 
-@by_setting((VelocityVerlet(2e-9), 1e-9), (DormandPrince54(1e-12), 1e-11), (Implicit(1e-12), 1e-11))
+@pytest.mark.parametrize(
+    ("integrator", "allowed"),
+    rest_slow(
+        [(VelocityVerlet(2e-9), 1e-9), (DormandPrince54(1e-12), 1e-11), (Implicit(1e-12), 1e-11)],
+        is_quick,
+    ),
+)
 def test_film_and_hertzian_contact_against_an_independent_solver(integrator, allowed):
     speed, gap, until = 0.5, 1e-6, 6e-5
     bodies = head_on(speed, gap)
@@ -116,7 +130,9 @@ def test_film_and_hertzian_contact_against_an_independent_solver(integrator, all
     )  # fmt: skip
     assert exact.y[0].min() < -1e-7
     forces = own(trap=0.0, upright=0.0, spring=0.0, film=film)
-    found = PolygonSystem(bodies, forces, integrator).run(until)
+    # Of two bodies it is an engine of its own.
+    jit = not isinstance(integrator, Implicit)
+    found = PolygonSystem(bodies, forces, integrator).run(until, jit=jit)
     ended = found.position[-1, 1, 0] - found.position[-1, 0, 0] - 1e-5
     assert ended == pytest.approx(exact.y[0, -1], abs=allowed)
 
@@ -133,6 +149,7 @@ def test_a_record_in_pieces_equals_one_in_one_piece(integrator, monkeypatch):
     assert (whole.steps, whole.evaluations) == (pieces.steps, pieces.evaluations)
 
 
+@pytest.mark.slow
 def test_more_rows_than_the_record_holds():
     found = PolygonSystem(crowd(3), own(), VelocityVerlet(5e-8)).run(5e-4)
     assert found.steps > 2 * run.RECORD_ROWS

@@ -16,6 +16,7 @@ from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import SMALL, load_text, write_star_library
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 CHANGED = "has changed since it was opened"
 LATER = {
@@ -26,13 +27,20 @@ LATER = {
 }
 
 
-@pytest.fixture
-def two(tmp_path):
-    """A results file r.h5, which is to be replaced by the other."""
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A results file r.h5 and another."""
+    folder = tmp_path_factory.mktemp("held")
     few = {"vertices": (1, 4), "delta": (0.0, 1.0), "count": 12}
-    write_results(tmp_path / "r.h5", make_results(**few))
-    write_results(tmp_path / "other.h5", make_results(types=("I", "II"), seed=8, **few))
-    return tmp_path / "r.h5", tmp_path / "other.h5"
+    write_results(folder / "r.h5", make_results(**few))
+    write_results(folder / "other.h5", make_results(types=("I", "II"), seed=8, **few))
+    return folder / "r.h5", folder / "other.h5"
+
+
+@pytest.fixture
+def two(written, tmp_path):
+    """Copies of them, of which the first is to be replaced by the other."""
+    return tuple(shutil.copy(path, tmp_path / path.name) for path in written)
 
 
 @pytest.mark.parametrize("how", ["another file", "in place", "copied again"])
@@ -66,9 +74,10 @@ COMMANDS = {
     "report in motion": ["report", "r.h5", "--overwrite"],
     "compare": ["compare", "r.h5", "r.h5"],
 }
+QUICK = ("info", "report", "compare")
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", rest_slow(COMMANDS, lambda name: name in QUICK))
 def test_a_command_reads_one_file(two, name, monkeypatch, capsys):
     """Another takes its place between two looks: all is of the one, of the other, or refused."""
     path, other = two

@@ -139,7 +139,8 @@ def test_polygons_pile_up_as_cheaply_as_those_that_stick(friction):
     assert steps[False] <= 3.0 * steps[True]
 
 
-@pytest.mark.parametrize("friction", [pytest.param("none", marks=pytest.mark.slow), 0.4])
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", ["none", 0.4])
 def test_fifty_polygons_come_to_rest_though_nothing_holds_them(friction):
     run = pile_of(50, friction, False, 1e-9).run(2.5, max_steps=20_000)
     assert run.status == Status.FINISHED

@@ -192,7 +192,7 @@ def test_overlaps_at_the_start_are_refused_of_free_bodies_alone():
     far = Body(Sphere(R), (0.0, 5.0 * R), density=2650.0)
     inside = attrs.evolve(far, position=(0.2 * R, 0.5 * R))
     for together in (System, Swarm):
-        assert together([*held, far], laws()).run(1e-6).status == Status.FINISHED
+        assert run_of(together, [*held, far], 1e-6).status == Status.FINISHED
         with pytest.raises(UsageError, match=r"bodies \d and \d start"):
-            together([*held, inside], laws()).run(1e-6)
-    assert System(held, laws()).run(1.0).status == Status.FINISHED
+            run_of(together, [*held, inside], 1e-6)
+    assert run_of(System, held, 1.0).status == Status.FINISHED

@@ -32,6 +32,7 @@ def furthest(a, b):
     return np.hypot(*(a - b)[:, :2].T).max()
 
 
+@pytest.mark.slow
 def test_islands_end_as_one_run_does():
     bodies, _ = crowd(16, 1)
     swarm = ends(bodies)

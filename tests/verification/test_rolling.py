@@ -16,6 +16,7 @@ from shapely.affinity import translate
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.forces import BodyForce, Contact
 from flocsim.integrators import Implicit, VelocityVerlet
+from tests.helpers.tiers import rest_slow
 
 OUTER, RADIUS, CORNERS = 10e-6, 1e-6, 64
 PRESS, LOAD = 5e-8, 5e-8
@@ -54,6 +55,7 @@ def height(shape, angles):
 
 
 METHODS = {"verlet": VelocityVerlet(2e-8), "implicit": Implicit(tolerance=1e-12)}
+by_method = pytest.mark.parametrize("method", rest_slow(METHODS, lambda name: name == "implicit"))
 
 
 @cache
@@ -98,7 +100,7 @@ SETTLED = slice(200, None)
 """Windows after which the sudden load has died out."""
 
 
-@pytest.mark.parametrize("method", METHODS)
+@by_method
 def test_the_outlines_slide_no_further_than_circles(method):
     circles, polygons = rolled(0, method), rolled(CORNERS, method)
     elastic = LOAD / K_T
@@ -108,14 +110,14 @@ def test_the_outlines_slide_no_further_than_circles(method):
     assert apart[SETTLED].max() < 0.05 * elastic
 
 
-@pytest.mark.parametrize("method", METHODS)
+@by_method
 def test_the_contact_carries_the_load_of_circles(method):
     circles, polygons = rolled(0, method), rolled(CORNERS, method)
     assert carried(circles)[SETTLED].mean() == pytest.approx(LOAD, rel=0.01)
     assert carried(polygons)[SETTLED].mean() == pytest.approx(LOAD, rel=0.01)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@by_method
 def test_the_force_does_not_jump_where_pairs_hand_over(method):
     torques = mean_torques(rolled(CORNERS, method))
     assert np.abs(np.diff(torques))[SETTLED].max() < 0.1 * LOAD * OUTER

@@ -40,11 +40,14 @@ def drawn(pair, sizes=SIZES, count=100):
 
 
 @pytest.mark.parametrize(
-    ("weight", "power"),
-    rest_slow([("number", 0), ("area", 2), ("volume", 3)], lambda weight, power: weight == "area"),
+    ("weight", "power", "count"),
+    rest_slow(
+        [("area", 2, 100), ("number", 0, 300), ("area", 2, 300), ("volume", 3, 300)],
+        lambda weight, power, count: count == 100,
+    ),
 )
-def test_two_flocs_are_drawn_independently_but_for_one_size(weight, power):
-    found, _ = drawn(pair_of(weight=weight), count=300)
+def test_two_flocs_are_drawn_independently_but_for_one_size(weight, power, count):
+    found, _ = drawn(pair_of(weight=weight), count=count)
     weights = np.array(SIZES) ** power / np.sum(np.array(SIZES) ** power)
     wanted = {
         (i, j): 2.0 * weights[i] * weights[j]

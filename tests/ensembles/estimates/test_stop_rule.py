@@ -1,5 +1,7 @@
 """The rule that ends a study early: at the same replicate whoever runs it, and narrow enough."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -81,18 +83,24 @@ def ended_at(outcome, stop):
     return next(look for look in borders(stop, len(outcome)) if rule(look) or look == len(outcome))
 
 
-@pytest.mark.parametrize("share", rest_slow([0.1, 0.5, 0.8], lambda share: share == 0.8))
-def test_intervals_of_a_study_that_was_ended_still_cover(share):
+@pytest.mark.parametrize(
+    ("share", "studies"),
+    rest_slow(
+        [(0.8, 100), (0.1, 400), (0.5, 400), (0.8, 400)], lambda share, studies: studies < 400
+    ),
+)
+def test_intervals_of_a_study_that_was_ended_still_cover(share, studies):
     rng = np.random.default_rng(11)
     stop = StopConfig(half_width=0.08)
     covered = 0
-    for _ in range(400):
+    for _ in range(studies):
         outcome = (rng.random(1000) >= share).astype(int)
         number = ended_at(outcome, stop)
         assert number < 1000
         table = tabulate(outcome[:number], np.ones(number, int), bonds_of(outcome[:number]))
         covered += table["pr_a_low"] <= share <= table["pr_a_high"]
-    assert 0.91 < covered / 400 < 0.985
+    spread = math.sqrt(0.95 * 0.05 / studies)
+    assert -3.7 * spread < covered / studies - 0.95 < 3.2 * spread
 
 
 def test_a_condition_without_events_holds_nothing_up():

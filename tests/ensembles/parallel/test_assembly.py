@@ -155,7 +155,8 @@ def test_parts_make_up_the_whole():
         assert all(first < stop for first, stop in found)
 
 
-@pytest.mark.parametrize("words", rest_slow([["--jobs", 3], [], None], bool))
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [["--jobs", 3], [], None])
 def test_the_command_writes_the_same_bytes(folders, reference, tmp_path, words):
     folder = copied(folders["extended file"], tmp_path)
     more = {"ranks": 3} if words == [] else {}

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import threading
 import time
 from pathlib import Path
@@ -60,12 +61,21 @@ def finished(tmp_path, whole):
     return tmp_path
 
 
-@pytest.fixture
-def stopped(tmp_path, monkeypatch):
-    """A folder with a study that was stopped after 50 of its 80 replicates."""
-    with monkeypatch.context() as patch:
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    """The journal of a study that was stopped after 50 of its 80 replicates."""
+    folder = tmp_path_factory.mktemp("left")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
         stop_after(patch, 50)
-        assert go_on(tmp_path, NEW).code == STOPPED
+        assert go_on(folder, NEW).code == STOPPED
+    return folder / "r.h5.journal"
+
+
+@pytest.fixture
+def stopped(tmp_path, left):
+    """A folder with that journal."""
+    shutil.copy(left, tmp_path)
     return tmp_path
 
 

@@ -212,10 +212,11 @@ def start(folder, *words):
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(signal.SIGKILL, marks=pytest.mark.slow), signal.SIGTERM]
+    ("number", "jobs"),
+    [pytest.param(signal.SIGKILL, 2, marks=pytest.mark.slow), (signal.SIGTERM, 1)],
 )
 def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
-    finished, tmp_path, monkeypatch, capsys, number
+    finished, tmp_path, monkeypatch, capsys, number, jobs
 ):
     write_swarm_study(tmp_path)
     with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
@@ -231,11 +232,11 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
     if number == signal.SIGTERM:
         assert process.returncode == 75 and "continue with --resume" in said
     monkeypatch.chdir(tmp_path)
-    assert main(["info", "swarm.h5"]) == 0 == main(["plot", "swarm.h5", "--figures", "clusters"])
+    assert main(["info", "swarm.h5"]) == 0
     assert re.search(r"unfinished: \d of 8 snapshots so far", capsys.readouterr().out)
-    with start(tmp_path, "--resume", "--jobs", "2") as process:
-        said, _ = process.communicate(timeout=240)
-    assert process.returncode == 0 and "left out" not in said, said
+    assert main(["swarm", "swarm.toml", "--resume", "--jobs", str(jobs)]) == 0
+    said = capsys.readouterr()
+    assert "left out" not in said.out + said.err
     assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
     assert not journal.exists()
 
@@ -283,7 +284,7 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     write_swarm_study(tmp_path)
     shutil.copy(finished / "swarm.h5", tmp_path / "swarm.h5")
-    more = ["--replicates", "5", "--quiet"]
+    more = ["--replicates", "3", "--quiet"]
     assert main(["swarm", "swarm.toml", "--resume", *more]) == 0
     assert main(["swarm", "swarm.toml", "-o", "fresh.h5", *more]) == 0
     assert same(tmp_path / "swarm.h5", tmp_path / "fresh.h5")

@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flocsim.arrays as at
@@ -30,6 +29,7 @@ from flocsim.geometry.contact.circle_tree import (
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+from tests.helpers.tiers import given_often
 
 COUNTS = (1, 2, 3, 4, 5, 7, 16, 33, 64, 512)
 
@@ -117,8 +117,7 @@ def listed(scene, work, cutoff, a=1, b=0):
     ]
 
 
-@given(numbers, st.floats(0.0, 1.0))
-@settings(max_examples=100)
+@given_often(25, 100, numbers, st.floats(0.0, 1.0))
 def test_just_the_pairs_nearer_than_the_cut_off_are_listed(drawn, share):
     shapes, places = placed(drawn)
     distances = all_distances(shapes, places)
@@ -138,8 +137,7 @@ def test_just_the_pairs_nearer_than_the_cut_off_are_listed(drawn, share):
         assert np.all(chosen | (table >= contact + cutoff - grain))
 
 
-@given(fewer, st.floats(0.0, 1e-6))
-@settings(max_examples=60)
+@given_often(20, 60, fewer, st.floats(0.0, 1e-6))
 def test_the_list_does_not_depend_on_which_body_is_named_first(drawn, cutoff):
     shapes, places = placed(drawn)
     scene, work = arrays(shapes, places, capacity=ROOM)
@@ -150,8 +148,7 @@ def test_the_list_does_not_depend_on_which_body_is_named_first(drawn, cutoff):
     assert len(one) == len(other)
 
 
-@given(fewer, fewer)
-@settings(max_examples=60)
+@given_often(20, 60, fewer, fewer)
 def test_the_order_of_the_list_does_not_depend_on_the_place(drawn, other):
     shapes, places = placed(drawn)
     elsewhere = placed((*drawn[:2], *other[2:]))[1]
@@ -160,8 +157,7 @@ def test_the_order_of_the_list_does_not_depend_on_the_place(drawn, other):
     assert [key for key in lists[0] if key in common] == [key for key in lists[1] if key in common]
 
 
-@given(numbers)
-@settings(max_examples=250)
+@given_often(50, 250, numbers)
 def test_the_gap_is_that_of_all_pairs(drawn):
     shapes, places = placed(drawn)
     scene, work = arrays(shapes, places)
@@ -172,8 +168,7 @@ def test_the_gap_is_that_of_all_pairs(drawn):
         assert gap(scene, work, a, b) == pytest.approx(expected, rel=1e-12, abs=10 * grain)
 
 
-@given(numbers)
-@settings(max_examples=100)
+@given_often(25, 100, numbers)
 def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
     scene, work = arrays(*placed(drawn))
     pose = pose_of(scene, work, 0, 1)

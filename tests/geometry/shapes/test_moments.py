@@ -53,7 +53,7 @@ def test_convex_outlines_obey_steiner(count, radius):
 
 
 @pytest.mark.parametrize(
-    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is c_shape)
 )
 @given(seed=st.integers(0, 40), radius=st.floats(0.02, 0.4))
 def test_the_area_grows_with_the_radius_by_the_length_of_the_outline(make_core, seed, radius):
@@ -103,7 +103,7 @@ def test_a_hole_that_the_sweep_fills_is_gone():
 
 
 @pytest.mark.parametrize(
-    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is c_shape)
 )
 @given(seed=st.integers(0, 50), scale=st.floats(1e-3, 1e3), angle=st.floats(-7.0, 7.0))
 def test_scaling_turning_and_moving(make_core, seed, scale, angle):

@@ -47,7 +47,7 @@ def test_what_makes_no_body_is_refused_in_one_line(case):
 
 
 @pytest.mark.parametrize(
-    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is not spiral)
+    "make_core", rest_slow([convex, star, c_shape, spiral], lambda make: make is c_shape)
 )
 @given(seed=st.integers(0, 30), radius=st.floats(0.3e-6, 4e-6))
 def test_moments_agree_with_the_reference(make_core, seed, radius):

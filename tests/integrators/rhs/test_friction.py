@@ -140,7 +140,9 @@ def test_stiffness_while_it_slides():
     assert abs(found[0, 0]) < 1e-3 * 20.0
 
 
-@pytest.mark.parametrize("method", [Implicit(1e-9), DormandPrince54(1e-10)])
+@pytest.mark.parametrize(
+    "method", [Implicit(1e-9), pytest.param(DormandPrince54(1e-10), marks=pytest.mark.slow)]
+)
 def test_a_pushed_ball_slides_as_coulomb_says(method):
     """Thrown along a floor in water without rolling resistance it slides until it rolls: the same
     for both methods, and the same mirrored."""

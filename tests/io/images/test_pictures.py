@@ -1,5 +1,7 @@
 """Pictures → flocs: synthetic pictures with known outlines, damaged files, the real pictures."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -7,6 +9,7 @@ from PIL import Image
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.pictures import read_grey, segment
 from tests.helpers.real_images import real_image
+from tests.helpers.tiers import rest_slow
 
 PLACES = [(60, 70, 24), (170, 80, 15), (250, 180, 30), (90, 190, 10), (330, 60, 18), (170, 230, 12)]
 """x, y and mean radius [px] of the synthetic flocs."""
@@ -204,10 +207,11 @@ def agreement(found, true):
     return (found.foreground & true).sum() / (found.foreground | true).sum()
 
 
-def test_the_soot_agrees_with_a_human_mask_at_every_noise_scale():
+@pytest.mark.parametrize("scales", rest_slow([[1, 4], [1, 2, 3, 4]], lambda each: len(each) == 2))
+def test_the_soot_agrees_with_a_human_mask_at_every_noise_scale(scales):
     grey = read_grey(real_image("soot_tem/201805A_A6_004_half.png"))
     human = read_grey(real_image("soot_tem/201805A_A6_004_half_mask.png")) > 0.5
-    shares = [agreement(segment(grey, noise_scale=scale), human) for scale in (1, 2, 3, 4)]
+    shares = [agreement(segment(grey, noise_scale=scale), human) for scale in scales]
     assert min(shares) >= 0.9 and max(shares) - min(shares) <= 0.035
     assert len(segment(grey).regions) < 10 and segment(grey).alarms == []
 
@@ -240,8 +244,12 @@ def test_a_sharp_floc_is_cut_out_of_its_halo():
     assert low <= 10 <= high
 
 
-@pytest.mark.parametrize("sigma", [0.0, 1.0, 2.0, 3.0])
-@pytest.mark.parametrize("noise", [0.0, 0.02])
+@pytest.mark.parametrize(
+    ("sigma", "noise"),
+    rest_slow(
+        product([0.0, 1.0, 2.0, 3.0], [0.0, 0.02]), lambda sigma, noise: sigma == 100 * noise
+    ),
+)
 def test_focus_does_not_select_by_size_and_bands_hold_the_size(sigma, noise):
     radii = np.linspace(4.6, 16.0, 40)
     shape = (420, 660)
@@ -385,7 +393,7 @@ def test_a_stack_of_pictures_is_refused(tmp_path):
         read_grey(tmp_path / "stack.tif")
 
 
-@pytest.mark.parametrize("frame", ["023", "024", "025"])
+@pytest.mark.parametrize("frame", rest_slow(["023", "024", "025"], lambda frame: frame == "024"))
 def test_camera_frames_with_a_strong_vignette(frame):
     found = segment(read_grey(real_image(f"flocpy/{frame}.png")))
     assert found.flocs == "dark"
@@ -395,7 +403,7 @@ def test_camera_frames_with_a_strong_vignette(frame):
 
 @pytest.mark.parametrize(
     ("name", "flocs", "least", "most"),
-    [
+    rest_slow([
         ("safas/brightfield_flocs.png", "bright", 4, 9),
         ("safas/clayflocs.png", "dark", 4, 6),
         ("safas/clearfloc.png", "dark", 1, 1),
@@ -404,8 +412,8 @@ def test_camera_frames_with_a_strong_vignette(frame):
         ("sandi/FlocCAM-image2.jpg", "dark", 10, 20),
         ("sandi/Stereomicroscope-image1.jpg", "bright", 12, 25),
         ("soot_tem/201805A_A6_004_half.png", "dark", 5, 9),
-    ],
-)
+    ], lambda name, *_: name.endswith(("brightfield_flocs.png", "clayflocs.png", "image2.jpg"))),
+)  # fmt: skip
 def test_every_real_picture_gives_flocs(name, flocs, least, most):
     found = segment(read_grey(real_image(name)))
     assert found.flocs == flocs

@@ -8,6 +8,7 @@ import pytest
 from flocsim.io.plots.shapes import POPULATION_FIGURES, figure_2, figure_3, shape, sizes
 from flocsim.io.plots.style import save
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
+from tests.helpers.tiers import rest_slow
 
 
 def ring(count, radius):
@@ -24,11 +25,14 @@ def entry(radius, errors, spheroradius=1.0):
 
 @pytest.mark.parametrize(
     "entries",
-    [
-        [entry(4.0, {1: 30.0, 4: 10.0})],
-        [entry(9.0, {1: 30.0})],
-        [entry(r, {1: 35.0, 4: 9.0, 64: 1.0}, s) for r in (4.0, 8.0, 20.0) for s in (1.0, 2.0)],
-    ],
+    rest_slow(
+        [
+            [entry(4.0, {1: 30.0, 4: 10.0})],
+            [entry(9.0, {1: 30.0})],
+            [entry(r, {1: 35.0, 4: 9.0, 64: 1.0}, s) for r in (4.0, 8.0, 20.0) for s in (1.0, 2.0)],
+        ],
+        lambda entries: entries[0].equivalent_radius == 9.0,
+    ),
 )
 def test_populations_of_any_size_are_drawn(entries, tmp_path):
     for name, draw in POPULATION_FIGURES.items():

@@ -4,6 +4,7 @@ import errno
 import io
 import os
 import re
+import shutil
 
 import attrs
 import h5py
@@ -26,12 +27,18 @@ def replace(_):
     return files.Old.REPLACED
 
 
+@pytest.fixture(scope="module")
+def once(tmp_path_factory):
+    """A small results file."""
+    path = tmp_path_factory.mktemp("once") / "results.h5"
+    write_results(path, make_results(**SMALL))
+    return path
+
+
 @pytest.fixture
-def written(tmp_path):
-    """A small results file and what is in it."""
-    results = make_results(**SMALL)
-    write_results(tmp_path / "results.h5", results)
-    return tmp_path / "results.h5", results
+def written(once, tmp_path):
+    """A copy of it and what is in it."""
+    return shutil.copy(once, tmp_path / "results.h5"), make_results(**SMALL)
 
 
 def reseal(path, change):
