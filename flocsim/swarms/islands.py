@@ -106,10 +106,10 @@ def put_slips(swarm, scene, work, members, first):
                 return False
             work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = body, other
             work.kept[count, at.KEPT_VERTEX] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, sw.AT_VERTEX], body, other
+                swarm, scene, members, first, swarm.links[link, sw.AT_VERTEX], body, other
             )
             work.kept[count, at.KEPT_EDGE] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, sw.AT_EDGE], body, other
+                swarm, scene, members, first, swarm.links[link, sw.AT_EDGE], body, other
             )
             work.kept[count, at.KEPT_MODE] = swarm.links[link, sw.MODE]
             for kind in range(sw.SLIP_COLUMNS):
@@ -126,7 +126,7 @@ def touch_plainly(work):
         work.slip[at.KEPT_GAP, kept] = 0.0
 
 
-def local_point(swarm, scene, members, first, size, point, body, other):
+def local_point(swarm, scene, members, first, point, body, other):
     """The number in an island of a core point of one of two bodies."""
     member = members[first + body]
     if not swarm.first[member] <= point < swarm.first[member + 1]:

@@ -339,14 +339,6 @@ def arc_nodes(parts, found):
     return met.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
 
 
-def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarray, float]:
-    """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴].
-
-    ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
-    """
-    return all_moments((Part((vertices,), radius),))[:3]
-
-
 def area_and_growth(parts: Sequence[Part]) -> tuple[float, float]:
     """Area [m²] of what parts of one radius cover together, and by how much it grows with that
     radius [m]: the length of the outline, holes included."""
@@ -371,8 +363,9 @@ def outline_nodes(parts):
 
 
 def all_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float, np.ndarray]:
-    """The same of all that some parts cover together, outer rings counter-clockwise, those of holes
-    clockwise; and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+    """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴], of all that
+    some parts cover together, outer rings counter-clockwise, those of holes clockwise; and how the
+    area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
 
     With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
     (M₁ − M₂)(cos 2ψ, sin 2ψ).
