@@ -221,7 +221,7 @@ def covered(points, normals, after, part):
     counts: ``after`` says by how many parts that of each point comes after this one. Where they
     share it back to back, both count, in opposite senses."""
     later = after > 0
-    away = from_rings(points, part.rings)
+    away = np.concatenate([away_from(points, ring) for ring in part.rings], axis=1)
     distance = np.hypot(away[..., 0], away[..., 1])
     nearest = distance.argmin(axis=1)
     least = distance[np.arange(len(points)), nearest]
@@ -234,12 +234,8 @@ def covered(points, normals, after, part):
     return found
 
 
-def from_rings(points, rings):
-    """Vectors (k, edges, 2) from the nearest place of each edge of some rings to the points."""
-    return np.concatenate([away_from(points, ring) for ring in rings], axis=1)
-
-
 def away_from(points, ring):
+    """Vectors (k, edges, 2) from the nearest place of each edge of a ring to the points."""
     if len(ring) == 1:
         return points[:, None] - ring
     return from_edges(points, *edges_of(ring))
