@@ -128,8 +128,11 @@ def quantity(
         return checked_field(check, allowed, default, **more)
     return checked_field(
         lambda value: check(value) or (isinstance(value, str) and value == word),
-        f"{word!r} or {allowed}", default, choices=(word,), **more,
-    )  # fmt: skip
+        f"{word!r} or {allowed}",
+        default,
+        choices=(word,),
+        **more,
+    )
 
 
 def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
