@@ -105,7 +105,7 @@ def brownian_meetings(
                          observed=np.array([far]))  # fmt: skip
     codes, times, steps = [], [], 0
     for replicate in range(replicates):
-        run = placed(first, system, near, seed, replicate)
+        run = placed(first, near, seed, replicate)
         status = run.to_end()
         codes.append(run.code if status == Status.STOPPED else 0)
         times.append(run.time)
@@ -114,7 +114,7 @@ def brownian_meetings(
     return Meetings(touched, escaped, neither, np.array(times), steps)
 
 
-def placed(first: Run, system: System, near: float, seed: int, replicate: int) -> Run:
+def placed(first: Run, near: float, seed: int, replicate: int) -> Run:
     """A replicate's Run that has yet to take its first step."""
     run = first.copy()
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))

@@ -114,14 +114,25 @@ def quantity(
     at_most: float | None = None,
     default: Any = attrs.NOTHING,
     help: str = "",
+    word: str | None = None,
     **metadata: Any,
 ) -> Any:
     """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``.
 
-    It takes numbers in that unit, and texts with any of the same dimension: 5e-21 or "5 zJ".
+    It takes numbers in that unit, and texts with any of the same dimension: 5e-21 or "5 zJ"; and
+    one special ``word``, where there is one.
     """
     check, allowed = number_range(above, at_least, at_most)
-    return checked_field(check, allowed, default, unit=unit, help=help, **metadata)
+    more = {"unit": unit, "help": help, **metadata}
+    if word is None:
+        return checked_field(check, allowed, default, **more)
+    return checked_field(
+        lambda value: check(value) or (isinstance(value, str) and value == word),
+        f"{word!r} or {allowed}",
+        default,
+        choices=(word,),
+        **more,
+    )
 
 
 def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
@@ -156,28 +167,9 @@ def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **metada
     return checked_field(lambda value: value in options, list_words(options), default, **metadata)
 
 
-def word_or_quantity(
-    word: str,
-    unit: str,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    at_most: float | None = None,
-    default: Any = attrs.NOTHING,
-    help: str = "",
-    **metadata: Any,
-) -> Any:
-    """A field that takes one special word or a quantity, e.g. ``"critical"`` or a number."""
-    check, allowed = number_range(above, at_least, at_most)
-    return checked_field(
-        lambda value: check(value) or (isinstance(value, str) and value == word),
-        f"{word!r} or {allowed}",
-        default,
-        unit=unit,
-        choices=(word,),
-        help=help,
-        **metadata,
-    )
+def word_or_quantity(word: str, unit: str, **more: Any) -> Any:
+    """A field that takes one special word, e.g. ``"critical"``, or a quantity: else as that."""
+    return quantity(unit, word=word, **more)
 
 
 def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:

@@ -65,33 +65,19 @@ def shielded_by(body, x, y):
     return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
 
 
-def general_drag(body, x, y, viscosity, density, with_inertia, permeability):
-    """Force on the equivalent sphere, shielded and permeable, at a velocity against the flow."""
-    x, y = shielded_by(body, x, y)
+def sphere_load(body, x, y, spin, numbers):
+    """Force and torque on the equivalent sphere that moves and turns so against the flow;
+    ``numbers``: viscosity, density, rotational, with_inertia, permeability."""
+    viscosity, density, rotational, with_inertia, permeability = numbers
     translation = 6.0 * math.pi * viscosity * body.radius
+    rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
     if permeability > 0.0:
         translation *= drag_factor(body.radius, permeability)
+        rotation *= turning_factor(body.radius, permeability)
     if with_inertia:
         reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
         translation *= inertial_factor(reynolds)
-    return shielded_by(body, -translation * x, -translation * y)
-
-
-def general_turning(body, viscosity, rotational, permeability):
-    """How much the equivalent sphere, permeable, resists turning."""
-    rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-    if permeability > 0.0:
-        rotation *= turning_factor(body.radius, permeability)
-    return rotation
-
-
-def shielded_shape(body, x, y, spin, viscosity):
-    """The same on a shape that turns against the flow, too, and its torque."""
-    c, s = math.cos(body.angle), math.sin(body.angle)
-    x, y = shielded_by(body, x, y)
-    x, y, turn = resisted(body, c, s, x, y, spin)
-    x, y = shielded_by(body, c * x - s * y, s * x + c * y)
-    return -viscosity * x, -viscosity * y, -viscosity * turn
+    return -translation * x, -translation * y, -rotation * spin
 
 
 def resisted_in(body, flow):
@@ -198,21 +184,16 @@ class StokesDrag(BodyForce):
     def kernel_in(self, fluid: Fluid) -> Callable:
         """Still water needs no flow, and no derivative by the place; a flow without strain, none by
         the angle."""
-        stokes = self.law == "stokes"
-        if self.clusters or self.permeability > 0.0:
-            moves = any(fluid.flow)
-            if self.law == "shape":
-                return self.general_shape if moves else self.general_shape_still
-            return self.general if moves else self.general_still
+        moves, strains = any(fluid.flow), any(strain_of(fluid.flow))
         if self.law == "shape":
-            if not any(fluid.flow):
-                return self.shape_still
-            return self.shape_strained if any(strain_of(fluid.flow)) else self.shape
-        if not any(fluid.flow):
-            return self.still if stokes else self.inertial_still
-        if self.strain and any(strain_of(fluid.flow)):
-            return self.strained if stokes else self.inertial_strained
-        return self.kernel if stokes else self.inertial
+            if self.clusters:
+                return self.shielded_shape
+            return self.shape_strained if strains else self.shape
+        if self.clusters:
+            return self.shielded if moves else self.shielded_still
+        if self.strain and strains:
+            return self.strained
+        return self.kernel if moves else self.still
 
     @property
     def with_inertia(self) -> bool:
@@ -232,20 +213,45 @@ class StokesDrag(BodyForce):
         return [words, *others]
 
     @staticmethod
-    def kernel(body, viscosity, flow, rotational):
+    def kernel(body, viscosity, density, flow, rotational, with_inertia, permeability):
         """Force and torque on the equivalent sphere in the flow."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        translation = 6.0 * math.pi * viscosity * body.radius
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-        spin = body.spin - turning
-        return -translation * (body.vx - u), -translation * (body.vy - v), -rotation * spin
+        numbers = viscosity, density, rotational, with_inertia, permeability
+        return sphere_load(body, body.vx - u, body.vy - v, body.spin - turning, numbers)
 
     @staticmethod
-    def shape_still(body, viscosity):
-        """Force and torque on the shape in still water."""
-        c, s = math.cos(body.angle), math.sin(body.angle)
-        x, y, turn = resisted(body, c, s, body.vx, body.vy, body.spin)
-        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
+    def strained(body, viscosity, density, flow, rotational, with_inertia, permeability):
+        """The same, with the torque of the flow's strain on the shape."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        spin = body.spin - turning - strained_spin(body, flow)
+        numbers = viscosity, density, rotational, with_inertia, permeability
+        return sphere_load(body, body.vx - u, body.vy - v, spin, numbers)
+
+    @staticmethod
+    def still(body, viscosity, density, rotational, with_inertia, permeability):
+        """Force and torque on the equivalent sphere in still water."""
+        numbers = viscosity, density, rotational, with_inertia, permeability
+        return sphere_load(body, body.vx, body.vy, body.spin, numbers)
+
+    @staticmethod
+    def shielded(body, viscosity, density, flow, rotational, with_inertia, strain, permeability):
+        """Force and torque on the equivalent sphere in a cluster, which strain may turn."""
+        u, v, turning = flow_at(flow, body.x, body.y)
+        spin = body.spin - turning - strain * strained_spin(body, flow)
+        x, y = shielded_by(body, body.vx - u, body.vy - v)
+        numbers = viscosity, density, rotational, with_inertia, permeability
+        fx, fy, torque = sphere_load(body, x, y, spin, numbers)
+        fx, fy = shielded_by(body, fx, fy)
+        return fx, fy, torque
+
+    @staticmethod
+    def shielded_still(body, viscosity, density, rotational, with_inertia, permeability):
+        """The same in still water."""
+        x, y = shielded_by(body, body.vx, body.vy)
+        numbers = viscosity, density, rotational, with_inertia, permeability
+        fx, fy, torque = sphere_load(body, x, y, body.spin, numbers)
+        fx, fy = shielded_by(body, fx, fy)
+        return fx, fy, torque
 
     @staticmethod
     def shape(body, viscosity, flow):
@@ -262,84 +268,16 @@ class StokesDrag(BodyForce):
         return c * x - s * y, s * x + c * y, turn
 
     @staticmethod
-    def strained(body, viscosity, flow):
-        """The same, with the torque of the flow's strain on the shape."""
+    def shielded_shape(body, viscosity, flow):
+        """Force and torque on the shape in a cluster."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        translation = 6.0 * math.pi * viscosity * body.radius
-        rotation = 8.0 * math.pi * viscosity * body.radius**3
-        spin = body.spin - turning - strained_spin(body, flow)
-        return -translation * (body.vx - u), -translation * (body.vy - v), -rotation * spin
-
-    @staticmethod
-    def still(body, viscosity, rotational):
-        """Force and torque on the equivalent sphere in still water."""
-        translation = 6.0 * math.pi * viscosity * body.radius
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-        return -translation * body.vx, -translation * body.vy, -rotation * body.spin
-
-    @staticmethod
-    def inertial(body, viscosity, density, flow, rotational):
-        """The same in the flow, by the law of Schiller and Naumann."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        vx, vy = body.vx - u, body.vy - v
-        reynolds = reynolds_number(math.hypot(vx, vy), body.radius, viscosity, density)
-        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-        return -translation * vx, -translation * vy, -rotation * (body.spin - turning)
-
-    @staticmethod
-    def inertial_strained(body, viscosity, density, flow):
-        """The same, with the torque of the flow's strain on the shape."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        vx, vy = body.vx - u, body.vy - v
-        reynolds = reynolds_number(math.hypot(vx, vy), body.radius, viscosity, density)
-        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
-        rotation = 8.0 * math.pi * viscosity * body.radius**3
-        spin = body.spin - turning - strained_spin(body, flow)
-        return -translation * vx, -translation * vy, -rotation * spin
-
-    @staticmethod
-    def inertial_still(body, viscosity, density, rotational):
-        """The same in still water, by the law of Schiller and Naumann."""
-        speed = math.hypot(body.vx, body.vy)
-        reynolds = reynolds_number(speed, body.radius, viscosity, density)
-        translation = 6.0 * math.pi * viscosity * body.radius * inertial_factor(reynolds)
-        rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
-        return -translation * body.vx, -translation * body.vy, -rotation * body.spin
-
-    @staticmethod
-    def general_still(body, viscosity, density, rotational, with_inertia, permeability):
-        """Force and torque on the equivalent sphere, shielded and permeable, in still water."""
-        fx, fy = general_drag(
-            body, body.vx, body.vy, viscosity, density, with_inertia, permeability
-        )
-        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * body.spin
-
-    @staticmethod
-    def general(body, viscosity, density, flow, rotational, with_inertia, strain, permeability):
-        """The same in the flow, whose strain may turn the body."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        fx, fy = general_drag(
-            body, body.vx - u, body.vy - v, viscosity, density, with_inertia, permeability
-        )
-        spin = body.spin - turning - strain * strained_spin(body, flow)
-        return fx, fy, -general_turning(body, viscosity, rotational, permeability) * spin
-
-    @staticmethod
-    def general_shape_still(body, viscosity):
-        """Force and torque on the shape in a cluster, in still water."""
-        return shielded_shape(body, body.vx, body.vy, body.spin, viscosity)
-
-    @staticmethod
-    def general_shape(body, viscosity, flow):
-        """The same in the flow."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        x, y, spin = body.vx - u, body.vy - v, body.spin - turning
-        fx, fy, torque = shielded_shape(body, x, y, spin, viscosity)
         c, s = math.cos(body.angle), math.sin(body.angle)
-        x, y, turn = strained_load(body, c, s, flow)
+        x, y = shielded_by(body, body.vx - u, body.vy - v)
+        x, y, turn = resisted(body, c, s, x, y, body.spin - turning)
+        more_x, more_y, more = strained_load(body, c, s, flow)
+        x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
         x, y = shielded_by(body, c * x - s * y, s * x + c * y)
-        return fx + viscosity * x, fy + viscosity * y, torque + viscosity * turn
+        return x, y, turn
 
 
 def shields_clusters(forces: Iterable[Force]) -> bool:

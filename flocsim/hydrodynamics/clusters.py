@@ -56,35 +56,37 @@ def push(x, y, a, b):
     return across + more * x * x, more * x * y, across + more * y * y
 
 
+def add_push(moved, one, other, found, of_one, of_other):
+    """Add what two shares of a force do to each other's bodies, or cells, pushed by ``found``."""
+    for k in range(3):
+        moved[k, one] += found[k] * of_other
+        moved[k, other] += found[k] * of_one
+
+
 def pushed_by(c, cells, starts, grid, places, radii, own, shares, moved, sums):
-    """``moved``: how fast shares of a force move the bodies of cluster c, in the mean of two
-    directions."""
-    for i in range(starts[cells[c]], starts[cells[c + 1]]):
-        moved[i] = own[i] * shares[i]
+    """``moved`` (3, n): xx, xy, yy of how fast shares of a force move the bodies of cluster c."""
     for one in range(cells[c], cells[c + 1]):
-        sums[0, one] = sums[1, one] = 0.0
+        for k in range(4):
+            sums[k, one] = 0.0
         for i in range(starts[one], starts[one + 1]):
-            sums[0, one] += shares[i]
+            sums[3, one] += shares[i]
+            for k in range(3):
+                moved[k, i] = own[k, i] * shares[i]
     for one in range(cells[c], cells[c + 1]):
         for other in range(cells[c], one + 1):
             if not are_near(grid, one, other):
-                xx, _, yy = push(grid[one, 2] - grid[other, 2], grid[one, 3] - grid[other, 3], 0, 0)
-                mean = 0.5 * (xx + yy)
-                sums[1, one] += mean * sums[0, other]
-                sums[1, other] += mean * sums[0, one]
+                far = push(grid[one, 2] - grid[other, 2], grid[one, 3] - grid[other, 3], 0.0, 0.0)
+                add_push(sums, one, other, far, sums[3, one], sums[3, other])
                 continue
             for i in range(starts[one], starts[one + 1]):
                 for j in range(starts[other], min(i, starts[other + 1])):
-                    xx, _, yy = push(
-                        places[i, 0] - places[j, 0], places[i, 1] - places[j, 1],
-                        radii[i], radii[j],
-                    )  # fmt: skip
-                    mean = 0.5 * (xx + yy)
-                    moved[i] += mean * shares[j]
-                    moved[j] += mean * shares[i]
+                    x, y = places[i, 0] - places[j, 0], places[i, 1] - places[j, 1]
+                    near = push(x, y, radii[i], radii[j])
+                    add_push(moved, i, j, near, shares[i], shares[j])
     for one in range(cells[c], cells[c + 1]):
         for i in range(starts[one], starts[one + 1]):
-            moved[i] += sums[1, one]
+            for k in range(3):
+                moved[k, i] += sums[k, one]
 
 
 def are_near(grid, one, other):
@@ -93,23 +95,28 @@ def are_near(grid, one, other):
     return max(abs(grid[one, 0] - grid[other, 0]), abs(grid[one, 1] - grid[other, 1])) < 1.5
 
 
-def find_shares(c, cells, starts, grid, places, radii, own, scratch, sums):
+def mean_of(moved, i):
+    """Of a body in the two directions."""
+    return 0.5 * (moved[0, i] + moved[2, i])
+
+
+def find_shares(c, cells, starts, grid, places, radii, own, scratch, moved, sums):
     """The shares of a force by which all bodies of cluster c move alike: conjugate gradients, by
     the drag of each, from shares that go by their radii."""
-    shares, left, way, moved = scratch[0], scratch[1], scratch[2], scratch[3]
+    shares, left, way = scratch[0], scratch[1], scratch[2]
     first, last = starts[cells[c]], starts[cells[c + 1]]
     for i in range(first, last):
         shares[i] = radii[i]
     pushed_by(c, cells, starts, grid, places, radii, own, shares, moved, sums)
     speed = total = size = alike = 0.0
     for i in range(first, last):
-        speed += shares[i] * moved[i]
+        speed += shares[i] * mean_of(moved, i)
         total += shares[i]
-        alike += 1.0 / own[i]
+        alike += 1.0 / mean_of(own, i)
     for i in range(first, last):
         shares[i] *= total / speed
-        left[i] = 1.0 - moved[i] * total / speed
-        way[i] = left[i] / own[i]
+        left[i] = 1.0 - mean_of(moved, i) * total / speed
+        way[i] = left[i] / mean_of(own, i)
         size += left[i] * way[i]
     for _ in range(MOST_CHANGES):
         if size <= SHARE_ERROR * SHARE_ERROR * alike:
@@ -117,14 +124,14 @@ def find_shares(c, cells, starts, grid, places, radii, own, scratch, sums):
         pushed_by(c, cells, starts, grid, places, radii, own, way, moved, sums)
         against = 0.0
         for i in range(first, last):
-            against += way[i] * moved[i]
+            against += way[i] * mean_of(moved, i)
         before, size = size, 0.0
         for i in range(first, last):
             shares[i] += before / against * way[i]
-            left[i] -= before / against * moved[i]
-            size += left[i] * left[i] / own[i]
+            left[i] -= before / against * mean_of(moved, i)
+            size += left[i] * left[i] / mean_of(own, i)
         for i in range(first, last):
-            way[i] = left[i] / own[i] + size / before * way[i]
+            way[i] = left[i] / mean_of(own, i) + size / before * way[i]
     total = 0.0
     for i in range(first, last):
         total += shares[i]
@@ -132,48 +139,23 @@ def find_shares(c, cells, starts, grid, places, radii, own, scratch, sums):
         shares[i] /= total
 
 
-def cluster_mobilities(cells, starts, grid, places, radii, own, mean, scratch, sums, found):
+def cluster_mobilities(cells, starts, grid, places, radii, own, scratch, moved, sums, found):
     """``found`` (c, 3): (xx, xy, yy) [1/m], the velocity of a cluster by a force on it, over the
     viscosity.
 
     The cells of cluster c are those from ``cells[c]`` to before ``cells[c + 1]``, the bodies of
     cell k those from ``starts[k]`` to before ``starts[k + 1]``; ``grid`` (k, 4): column and row of
     a cell, and the middle of its bodies [m]. Of the bodies: ``places`` (n, 2) [m], whole across the
-    seams of a box, ``radii`` [m] of the spheres that stand for them, ``own`` (n, 3) [1/m], their
-    mobilities alone, and the ``mean`` of those. ``scratch`` (4, n) and ``sums`` (2, k).
+    seams of a box, ``radii`` [m] of the spheres that stand for them, ``own`` (3, n) [1/m], their
+    mobilities alone. ``scratch`` and ``moved`` (3, n), ``sums`` (4, k).
     """
     shares = scratch[0]
     for c in range(cells.shape[0] - 1):
-        find_shares(c, cells, starts, grid, places, radii, mean, scratch, sums)
-        sum_xx = sum_xy = sum_yy = 0.0
-        for one in range(cells[c], cells[c + 1]):
-            sums[0, one] = 0.0
-            for i in range(starts[one], starts[one + 1]):
-                sums[0, one] += shares[i]
-                sum_xx += shares[i] * shares[i] * own[i, 0]
-                sum_xy += shares[i] * shares[i] * own[i, 1]
-                sum_yy += shares[i] * shares[i] * own[i, 2]
-            for other in range(cells[c], one + 1):
-                if not are_near(grid, one, other):
-                    xx, xy, yy = push(
-                        grid[one, 2] - grid[other, 2], grid[one, 3] - grid[other, 3], 0, 0
-                    )
-                    share = 2.0 * sums[0, one] * sums[0, other]
-                    sum_xx += share * xx
-                    sum_xy += share * xy
-                    sum_yy += share * yy
-                    continue
-                for i in range(starts[one], starts[one + 1]):
-                    for j in range(starts[other], min(i, starts[other + 1])):
-                        xx, xy, yy = push(
-                            places[i, 0] - places[j, 0], places[i, 1] - places[j, 1],
-                            radii[i], radii[j],
-                        )  # fmt: skip
-                        share = 2.0 * shares[i] * shares[j]
-                        sum_xx += share * xx
-                        sum_xy += share * xy
-                        sum_yy += share * yy
-        found[c, 0], found[c, 1], found[c, 2] = sum_xx, sum_xy, sum_yy
+        find_shares(c, cells, starts, grid, places, radii, own, scratch, moved, sums)
+        pushed_by(c, cells, starts, grid, places, radii, own, shares, moved, sums)
+        for i in range(starts[cells[c]], starts[cells[c + 1]]):
+            for k in range(3):
+                found[c, k] += shares[i] * moved[k, i]
 
 
 @functools.cache
@@ -211,7 +193,6 @@ def mobilities(
     compiled()(
         np.searchsorted(known[starts, 0], np.arange(len(count) + 1)).astype(np.int64),
         np.append(starts, len(label)), np.hstack([known[starts, 1:], middle]), places, radii,
-        own[order], 0.5 * (own[order, 0] + own[order, 2]), np.zeros((4, len(label))),
-        np.zeros((2, len(starts))), found,
+        own[order].T.copy(), *np.zeros((2, 3, len(label))), np.zeros((4, len(starts))), found,
     )  # fmt: skip
     return found

@@ -142,7 +142,10 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
 
 def stored_trajectory(file):
     """The StoredTrajectory of an open file; ValueError where it is none."""
-    facts = {name: plain_fact(value) for name, value in file.attrs.items()}
+    facts = {
+        name: value.item() if hasattr(value, "item") else value
+        for name, value in file.attrs.items()
+    }
     if facts.pop("kind", "") != KIND or facts.pop("schema_version", 0) != SCHEMA_VERSION:
         raise ValueError(f"it is not a {KIND} of version {SCHEMA_VERSION}")
     time, *arrays = (file[name][()] for name in ("time", "position", "velocity"))
@@ -165,8 +168,3 @@ def stored_trajectory(file):
         else:
             shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))
     return StoredTrajectory(time, *arrays, tuple(shapes), facts)
-
-
-def plain_fact(value):
-    """An attribute as a Python number or text."""
-    return value.item() if hasattr(value, "item") else value

@@ -176,8 +176,3 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
         "no terminal velocity: a binary collision starts from steady settling, which needs a drag "
         f"(forces {', '.join(pieces.used) or 'none'} do not balance); add [forces.drag]"
     )
-
-
-def turn_time(radius_i: float, radius_j: float, drift: np.ndarray) -> float:
-    """(r_i + r_j)/|relative drift| [s]: how long the pair takes to pass or to turn over."""
-    return (radius_i + radius_j) / math.hypot(*drift)

@@ -30,15 +30,8 @@ ERROR_COLUMNS = 6
     LINK_COLUMNS,
 ) = range(6)
 
-# Columns of ``slips``, of the same contacts.
-(
-    SLIP,  # the displacement [m]
-    OFFSET,  # the error that it is carried with [m]
-    HELD_FORCE,  # the tangential force with which it grazes [N]
-    HELD_GAP,  # the gap that counts as none [m]
-    MICRO_FLIGHTS,  # how often it was apart by next to nothing (events.grazes)
-    SLIP_COLUMNS,
-) = range(6)
+SLIP_COLUMNS = 5
+"""Columns of ``slips``, of the same contacts: from KEPT_SLIP to KEPT_FLIGHTS of a run."""
 
 # Columns of ``costs``, of every island.
 (

@@ -106,17 +106,14 @@ def put_slips(swarm, scene, work, members, first):
                 return False
             work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = body, other
             work.kept[count, at.KEPT_VERTEX] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, sw.AT_VERTEX], body, other
+                swarm, scene, members, first, swarm.links[link, sw.AT_VERTEX], body, other
             )
             work.kept[count, at.KEPT_EDGE] = local_point(
-                swarm, scene, members, first, size, swarm.links[link, sw.AT_EDGE], body, other
+                swarm, scene, members, first, swarm.links[link, sw.AT_EDGE], body, other
             )
             work.kept[count, at.KEPT_MODE] = swarm.links[link, sw.MODE]
-            work.slip[at.KEPT_GAP, count] = swarm.slips[link, sw.HELD_GAP]
-            work.slip[at.KEPT_FORCE, count] = swarm.slips[link, sw.HELD_FORCE]
-            work.slip[at.KEPT_FLIGHTS, count] = swarm.slips[link, sw.MICRO_FLIGHTS]
-            work.slip[at.KEPT_SLIP, count] = swarm.slips[link, sw.SLIP]
-            work.slip[at.KEPT_OFFSET, count] = swarm.slips[link, sw.OFFSET]
+            for kind in range(sw.SLIP_COLUMNS):
+                work.slip[at.KEPT_SLIP + kind, count] = swarm.slips[link, kind]
             count += 1
     work.tally[at.KEPT] = count + 1
     return True
@@ -129,7 +126,7 @@ def touch_plainly(work):
         work.slip[at.KEPT_GAP, kept] = 0.0
 
 
-def local_point(swarm, scene, members, first, size, point, body, other):
+def local_point(swarm, scene, members, first, point, body, other):
     """The number in an island of a core point of one of two bodies."""
     member = members[first + body]
     if not swarm.first[member] <= point < swarm.first[member + 1]:
@@ -192,11 +189,8 @@ def take_slips(swarm, scene, work, found, members, first):
             swarm, scene, members, first, work.kept[kept, at.KEPT_EDGE], later, earlier
         )
         found.links[row, sw.MODE] = work.kept[kept, at.KEPT_MODE]
-        found.slips[row, sw.HELD_GAP] = work.slip[at.KEPT_GAP, kept]
-        found.slips[row, sw.HELD_FORCE] = work.slip[at.KEPT_FORCE, kept]
-        found.slips[row, sw.MICRO_FLIGHTS] = work.slip[at.KEPT_FLIGHTS, kept]
-        found.slips[row, sw.SLIP] = work.slip[at.KEPT_SLIP, kept]
-        found.slips[row, sw.OFFSET] = work.slip[at.KEPT_OFFSET, kept]
+        for kind in range(sw.SLIP_COLUMNS):
+            found.slips[row, kind] = work.slip[at.KEPT_SLIP + kind, kept]
     found.filled[0] = begin + count
     return True
 

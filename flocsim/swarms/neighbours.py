@@ -10,6 +10,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.compounds import ONWARD, SWELL
+from flocsim.geometry.contact.separation import nearest_way
 from flocsim.geometry.contact.sweep import (
     MOVES,
     PLACE_X,
@@ -18,9 +19,9 @@ from flocsim.geometry.contact.sweep import (
     WAY_X,
     WAY_Y,
     near_pairs,
-    nearest_way,
 )
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.integrators.radau.contact_frames import unite
 
 
 def set_discs(swarm, span, reach):
@@ -80,13 +81,6 @@ def reaches_wall(swarm, body, wall, span, reach, width, height):
     return core_distance2(swarm, wall, x, y) < near * near
 
 
-def first_of(labels, body):
-    while labels[body] != body:
-        labels[body] = labels[labels[body]]
-        body = labels[body]
-    return body
-
-
 def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
     """Name every free body by the first one of its island, fixed ones by −1, and note in
     ``touches`` (n, k) which of the fixed bodies ``walls`` (k,) it can reach.
@@ -103,8 +97,7 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     for pair in range(total):
         a, b = pairs[pair, 0], pairs[pair, 1]
         if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
-            one, other = first_of(labels, a), first_of(labels, b)
-            labels[max(one, other)] = min(one, other)
+            unite(labels, a, b)
     for body in range(n):
         labels[body] = labels[labels[body]]
         free = swarm.bodies[body, at.FREE] == 1.0

@@ -10,7 +10,7 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
-from flocsim.plausibility.settling import terminal_motion, turn_time
+from flocsim.plausibility.settling import terminal_motion
 
 G, VISCOSITY = 9.81, 8.9e-4
 
@@ -91,7 +91,3 @@ def test_a_drag_that_is_not_linear(more):
     fall = -velocity[1]
     linear = 6.0 * math.pi * VISCOSITY * 5e-6 if more else 0.0
     assert 1e-6 * fall**2 + linear * fall == pytest.approx(body.mass * G, rel=1e-8)
-
-
-def test_turn_time():
-    assert turn_time(1e-6, 2e-6, np.array([3e-6, 4e-6])) == pytest.approx(0.6)

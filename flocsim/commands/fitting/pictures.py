@@ -333,7 +333,7 @@ def find_background(paths, options):
     """The median of the frames, or None where a surface is fitted to each."""
     if options.background == "surface" or options.masks:
         return None
-    from flocsim.io.images.background import FEWEST_FRAMES, median_frame
+    from flocsim.io.images.background import FEWEST_FRAMES
     from flocsim.io.images.reading import grey_of, read_pixels
     from flocsim.io.images.recognition import is_mask
 
@@ -352,4 +352,4 @@ def find_background(paths, options):
             f"--background median needs at least {FEWEST_FRAMES} frames of the same size, found "
             f"{len(frames)} ({sizes}); use --background surface"
         )
-    return median_frame(frames)
+    return np.median(np.stack(frames), axis=0)

@@ -40,7 +40,6 @@ from flocsim.plausibility.settling import (
     largest_mobility,
     least_mobility,
     terminal_motion,
-    turn_time,
 )
 from flocsim.system import System
 
@@ -168,8 +167,7 @@ class Encounter:
         """Settling velocity of j relative to i (2,) [m/s]; in a flow one of about the speed at
         which they meet, its rate times r_i + r_j, and in thermal motion D/(r_i + r_j)."""
         if self.meeting != SETTLING:
-            size = sum(shape.equivalent_radius for shape in self.shapes)
-            speed = self.diffusion / size if self.rate is None else self.rate * size
+            speed = self.diffusion / self.size if self.rate is None else self.rate * self.size
             return np.array([0.0, -speed])
         return self.settling[1][0] - self.settling[0][0]
 
@@ -248,8 +246,7 @@ class Encounter:
     @property
     def turn_time(self) -> float:
         """(r_i + r_j)/|drift| [s]."""
-        radius_i, radius_j = (shape.equivalent_radius for shape in self.shapes)
-        return turn_time(radius_i, radius_j, self.drift)
+        return self.size / math.hypot(*self.drift)
 
     @functools.cached_property
     def mobilities(self) -> tuple[float, ...]:
@@ -363,7 +360,7 @@ class Encounter:
         place = place_pair(shapes, angles, offset, self.start_gap)
         if isinstance(self.options.start_gap, str):
             # Forces between the centres do not know how thin the outlines are.
-            clear = sum(shape.equivalent_radius for shape in shapes) + self.start_gap
+            clear = self.size + self.start_gap
             x = float(place[1, 0])
             place[1, 1] = max(place[1, 1], math.sqrt(max(clear * clear - x * x, 0.0)))
         velocity = np.zeros((2, 3))

@@ -71,15 +71,11 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
     return FAILED, FAILURES.index(FAILED_ENDS[status])
 
 
-def collided(observed: np.ndarray) -> bool:
-    return bool(observed[COLLIDED] == 1.0)
-
-
 def replicate_row(status, angles, run):
     """What the table of replicates holds of a Run that has ended."""
     observed = run.observed
     outcome, failure = outcome_of(status, run.code, observed)
-    touched = collided(observed)
+    touched = bool(observed[COLLIDED] == 1.0)
     zone = observed[outcomes.ZONE]
     return {
         "angle_i": angles[0],

@@ -63,11 +63,6 @@ def has_not_touched(observed):
     return observed[COLLIDED] == 0.0
 
 
-def outline_gap(scene, work):
-    """Distance between the two outlines now [m], negative where they overlap."""
-    return gap_between(scene, work, BODY_J, BODY_I)
-
-
 def note_collision(observed, time, distance):
     observed[COLLIDED] = 1.0
     observed[INSIDE] = 1.0 if distance < observed[ZONE] else 0.0

@@ -38,7 +38,7 @@ RETURN_SHARE = 1e-4
 """Of the pairs that are said to have parted, so many may come back at most."""
 
 
-def drift_from(scene, work, observed, outer):
+def drift_from(work, observed, outer):
     """(how far j is beyond i along the drift [m], the least drift at half of what is more than
     ``outer`` of that [m/s], the speed of j besides the drift)."""
     v = work.motion
@@ -70,7 +70,7 @@ def return_bound(scene, work, observed, time):
         scene.bodies[seen.BODY_I, at.BOUNDING_RADIUS]
         + scene.bodies[seen.BODY_J, at.BOUNDING_RADIUS]
     )
-    along, drift, besides = drift_from(scene, work, observed, outer)
+    along, drift, besides = drift_from(work, observed, outer)
     if along - outer <= observed[seen.ESCAPE]:
         return 1.0
     half = 0.5 * (along - outer)

@@ -34,7 +34,7 @@ from flocsim.ensembles.storage.plan import (
     write_plan,
 )
 from flocsim.ensembles.studies.study import WAYS, Study
-from flocsim.ensembles.studies.sweep_contents import all_joined, joined_of, read_joined
+from flocsim.ensembles.studies.sweep_contents import joined_of, kinds_joined, read_joined
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import make_folder
@@ -186,7 +186,7 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     lengths = [len(values) for values in over.values()]
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        taken = [*GROUPS.values(), *all_joined().values()]
+        taken = [*GROUPS.values(), *(g for each in kinds_joined() for g in each.groups.values())]
         clash = lasts.count(last) > 1 or any(last in group.index for group in taken)
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))

@@ -5,7 +5,6 @@ from typing import Any
 
 from flocsim.ensembles.config.kinds import STUDIES, contents_of
 from flocsim.ensembles.contents import Contents, Facts, Figures, Joined, Summary, in_words, studies
-from flocsim.io.groups import Group
 from flocsim.io.results.sweep_file import SweepResults, read_sweep
 from flocsim.io.terminal import aligned
 
@@ -13,11 +12,6 @@ from flocsim.io.terminal import aligned
 def kinds_joined() -> list[Joined]:
     """What is joined of each kind that sweeps can run."""
     return [each.joined for each in studies() if each.joined is not None]
-
-
-def all_joined() -> dict[str, Group]:
-    """The groups that are joined, of all kinds."""
-    return {name: group for each in kinds_joined() for name, group in each.groups.items()}
 
 
 def joined_of(results: Any) -> Joined | None:

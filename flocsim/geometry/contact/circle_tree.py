@@ -136,9 +136,11 @@ def circles_met(tree, pose, plan, walk):
 
 
 def within(tree, pose, plan, walk, distance):
-    """Whether the runs of the two nodes can be nearer to each other than a distance."""
+    """Whether the runs of the two nodes can be nearer to each other than a distance, which is below
+    0 where swollen cores overlap (compounds.py)."""
     distance2, radii = circles_met(tree, pose, plan, walk)
-    return distance2 < (radii + distance) ** 2
+    reach = radii + distance
+    return reach > 0.0 and distance2 < reach * reach
 
 
 def at_leaves(plan, walk):
@@ -174,12 +176,14 @@ def passed(plan, walk):
     return 0, 0, 1, 1
 
 
-def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """The smaller of ``least`` and the squared distances from a's points to b's edges."""
+@hook
+def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
+    """The smaller of ``least`` and the distances from a's points to b's edges [m]."""
     first_b, points_b, _, _ = side_b
     edges = first_b + max(edge_count(points_b), 1)
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
+    least2 = math.inf
     for point in range(start_a, end_a):
         x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
@@ -192,15 +196,15 @@ def run_distance2(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
                 vertices[end, at.X],
                 vertices[end, at.Y],
             )
-            least = min(least, distance2)
-    return least
+            least2 = min(least2, distance2)
+    return min(least, math.sqrt(least2))
 
 
-def leaf_distance2(vertices, pose, side_a, side_b, walk, least):
-    """The smaller of ``least`` and the squared distance of the runs of two leaves."""
+def leaf_distance(vertices, pose, side_a, side_b, walk, least):
+    """The smaller of ``least`` and the distance of the runs of two leaves [m]."""
     i, j, _, _ = walk
-    least = run_distance2(vertices, pose, side_a, i, side_b, j, least)
-    return run_distance2(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
+    least = run_distance(vertices, pose, side_a, i, side_b, j, least)
+    return run_distance(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
 
 
 def nearer_child(tree, pose, plan, walk):
@@ -216,9 +220,9 @@ def nearer_child(tree, pose, plan, walk):
     return sibling
 
 
-@hook
 def core_distance(outlines, a, b, pose):
-    """Smallest distance [m] between a core point of one body and the core of the other.
+    """Smallest distance [m] between a core point of one body and the core of the other; of swollen
+    cores below 0 where they overlap.
 
     ``pose`` takes a's points into b's frame. Branch and bound: straight down to two runs that are
     near, then through all that can be nearer.
@@ -229,15 +233,13 @@ def core_distance(outlines, a, b, pose):
     walk = START
     while not at_leaves(plan, walk):
         walk = nearer_child(tree, pose, plan, walk)
-    least2 = leaf_distance2(vertices, pose, side_a, side_b, walk, math.inf)
-    least = math.sqrt(least2)
+    least = leaf_distance(vertices, pose, side_a, side_b, walk, math.inf)
     walk = START
     while goes_on(walk):
         if not within(tree, pose, plan, walk, least):
             walk = passed(plan, walk)
         elif at_leaves(plan, walk):
-            least2 = leaf_distance2(vertices, pose, side_a, side_b, walk, least2)
-            least = math.sqrt(least2)
+            least = leaf_distance(vertices, pose, side_a, side_b, walk, least)
             walk = passed(plan, walk)
         else:
             walk = descended(plan, walk)

@@ -19,22 +19,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.circle_tree import (
-    ROUNDING,
-    START,
-    at_leaves,
-    circles_met,
-    descended,
-    goes_on,
-    leaves_of,
-    nearer_child,
-    passed,
-    plan_of,
-    posed,
-    reversed_pose,
-    run_of,
-    side_of,
-)
+from flocsim.geometry.contact.circle_tree import ROUNDING, leaves_of, posed, run_of
 from flocsim.geometry.contact.near_pairs import add_pair
 from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.geometry.shapes.shape import Shape
@@ -123,51 +108,14 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     return room
 
 
-def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """The smaller of ``least`` and the distances from a's points to b's edges, both swollen."""
+def swollen_run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
+    """circle_tree.run_distance of points and edges swept by the SWELL of their points."""
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
         for start in range(start_b, end_b):
             apart = math.sqrt(feature_distance2(vertices, pose, point, start))
             least = min(least, apart - vertices[point, SWELL] - vertices[start, SWELL])
-    return least
-
-
-def leaf_distance(vertices, pose, side_a, side_b, walk, least):
-    """The smaller of ``least`` and the distance of the runs of two leaves."""
-    i, j, _, _ = walk
-    least = run_distance(vertices, pose, side_a, i, side_b, j, least)
-    return run_distance(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
-
-
-def can_be_nearer(tree, pose, plan, walk, least):
-    """Whether the runs of the two nodes can be nearer to each other than a distance, which is below
-    0 where swollen cores overlap."""
-    distance2, radii = circles_met(tree, pose, plan, walk)
-    reach = radii + least
-    return reach > 0.0 and distance2 < reach * reach
-
-
-def swollen_distance(outlines, a, b, pose):
-    """circle_tree.core_distance of two cores, each swept by the SWELL of its points [m]; below 0
-    where they overlap."""
-    vertices, tree = outlines.vertices, outlines.tree
-    side_a, side_b = side_of(outlines, a), side_of(outlines, b)
-    plan = plan_of(tree, side_a, side_b)
-    walk = START
-    while not at_leaves(plan, walk):
-        walk = nearer_child(tree, pose, plan, walk)
-    least = leaf_distance(vertices, pose, side_a, side_b, walk, math.inf)
-    walk = START
-    while goes_on(walk):
-        if not can_be_nearer(tree, pose, plan, walk, least):
-            walk = passed(plan, walk)
-        elif at_leaves(plan, walk):
-            least = leaf_distance(vertices, pose, side_a, side_b, walk, least)
-            walk = passed(plan, walk)
-        else:
-            walk = descended(plan, walk)
     return least
 
 
@@ -191,7 +139,7 @@ def same_corner(scene, body, point, other):
 
 FILLINGS: dict[Callable, Callable] = {
     near_pairs.list_one_way: list_one_way,
-    circle_tree.core_distance: swollen_distance,
+    circle_tree.run_distance: swollen_run_distance,
     contacts.row_radii: swollen_radii,
     slip_transfer.same_corner: same_corner,
 }

@@ -17,23 +17,22 @@ def length_of(x, y):
 @hook
 def separation(scene, work, state, a, b):
     """(x, y) of body a as seen from body b, in a state [m]."""
-    motion = work.motion
-    return motion[state, a, at.X] - motion[state, b, at.X], motion[state, a, at.Y] - motion[
-        state, b, at.Y
-    ]
+    m = work.motion
+    return m[state, a, at.X] - m[state, b, at.X], m[state, a, at.Y] - m[state, b, at.Y]
+
+
+def nearest_way(length, period):
+    """A way along an axis, by the nearest image [m]."""
+    if period < math.inf:
+        return length - period * math.floor(length / period + 0.5)
+    return length
 
 
 def nearest_image(scene, work, state, a, b):
     """The same where space repeats itself: of a's image that is nearest to b."""
-    motion = work.motion
-    x = motion[state, a, at.X] - motion[state, b, at.X]
-    y = motion[state, a, at.Y] - motion[state, b, at.Y]
-    width, height = scene.box
-    if width < math.inf:
-        x -= width * math.floor(x / width + 0.5)
-    if height < math.inf:
-        y -= height * math.floor(y / height + 0.5)
-    return x, y
+    m, (width, height) = work.motion, scene.box
+    x = nearest_way(m[state, a, at.X] - m[state, b, at.X], width)
+    return x, nearest_way(m[state, a, at.Y] - m[state, b, at.Y], height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}

@@ -93,11 +93,6 @@ def same_corner(scene, body, point, other):
     return apart <= 1 or apart == count - 1
 
 
-def same_end(start, end, other_start, other_end):
-    """Whether two edges of a body are the same one or meet."""
-    return start in (other_start, other_end) or end in (other_start, other_end)
-
-
 def rolls_on_to(scene, work, row, other):
     """Whether a pair of features of the same two bodies neighbours another, either way round."""
     pairs = work.candidates
@@ -109,7 +104,7 @@ def rolls_on_to(scene, work, row, other):
     )
     if pairs[row, at.VERTEX_BODY] == pairs[other, at.VERTEX_BODY]:
         near = same_corner(scene, pairs[row, at.VERTEX_BODY], point, on)
-        return near and same_end(start, end, first, last)
+        return near and (start in (first, last) or end in (first, last))
     return on in (start, end) and point in (first, last)
 
 

@@ -7,6 +7,8 @@ space repeats itself, the sweep goes on round the seam.
 
 import math
 
+from flocsim.geometry.contact.separation import nearest_way
+
 PLACE_X, PLACE_Y, WAY_X, WAY_Y, REACH, MOVES, LEFT, RIGHT, DISC_COLUMNS = range(9)
 """Columns of ``discs``: where a disc begins, the way that it goes [m], its radius [m]; 1 where it
 moves, 0 where it is fixed: no two fixed ones are near; its left end, inside the box, and its right
@@ -37,13 +39,6 @@ def sort_discs(discs, order):
             order[free] = other
             free -= 1
         order[free] = disc
-
-
-def nearest_way(length, period):
-    """A way along an axis, by the nearest image [m]."""
-    if period < math.inf:
-        return length - period * math.floor(length / period + 0.5)
-    return length
 
 
 def come_near(discs, a, b, width, height):

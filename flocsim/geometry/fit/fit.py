@@ -210,7 +210,7 @@ def _fit_with_holes(mask, holes, count, radius, method, preserve_area, inscribed
     rings = [outer.vertices]
     for hole in holes:
         # Rings that go round clockwise where y is up.
-        ring = hole_ring(mask, hole, radius, weights, method != "even", rings)
+        ring = hole_ring(hole, radius, weights, method != "even", rings)
         if ring is not None:
             rings.append(ring)
     spare = count - sum(map(len, rings))

@@ -60,7 +60,7 @@ def find_holes(mask: np.ndarray, count: int) -> list[Hole]:
 
 
 def hole_ring(
-    mask: np.ndarray, hole: Hole, radius: float, weights: tuple[int, int], search: bool,
+    hole: Hole, radius: float, weights: tuple[int, int], search: bool,
     rings: Sequence[np.ndarray],
 ) -> np.ndarray | None:  # fmt: skip
     """The ring (k, 2) [px], y up, of a hole, beside the outline and other ``rings``; None where

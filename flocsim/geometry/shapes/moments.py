@@ -221,7 +221,7 @@ def covered(points, normals, after, part):
     counts: ``after`` says by how many parts that of each point comes after this one. Where they
     share it back to back, both count, in opposite senses."""
     later = after > 0
-    away = from_rings(points, part.rings)
+    away = np.concatenate([away_from(points, ring) for ring in part.rings], axis=1)
     distance = np.hypot(away[..., 0], away[..., 1])
     nearest = distance.argmin(axis=1)
     least = distance[np.arange(len(points)), nearest]
@@ -234,12 +234,8 @@ def covered(points, normals, after, part):
     return found
 
 
-def from_rings(points, rings):
-    """Vectors (k, edges, 2) from the nearest place of each edge of some rings to the points."""
-    return np.concatenate([away_from(points, ring) for ring in rings], axis=1)
-
-
 def away_from(points, ring):
+    """Vectors (k, edges, 2) from the nearest place of each edge of a ring to the points."""
     if len(ring) == 1:
         return points[:, None] - ring
     return from_edges(points, *edges_of(ring))
@@ -339,14 +335,6 @@ def arc_nodes(parts, found):
     return met.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
 
 
-def swept_moments(vertices: np.ndarray, radius: float) -> tuple[float, np.ndarray, float]:
-    """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴].
-
-    ``vertices`` (N, 2): a point, a segment, or a simple counter-clockwise polygon; ``radius`` > 0.
-    """
-    return all_moments((Part((vertices,), radius),))[:3]
-
-
 def area_and_growth(parts: Sequence[Part]) -> tuple[float, float]:
     """Area [m²] of what parts of one radius cover together, and by how much it grows with that
     radius [m]: the length of the outline, holes included."""
@@ -371,8 +359,9 @@ def outline_nodes(parts):
 
 
 def all_moments(parts: Sequence[Part]) -> tuple[float, np.ndarray, float, np.ndarray]:
-    """The same of all that some parts cover together, outer rings counter-clockwise, those of holes
-    clockwise; and how the area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
+    """Area [m²], centroid (2,) [m] and second moment of area about it, ∫ρ² dA [m⁴], of all that
+    some parts cover together, outer rings counter-clockwise, those of holes clockwise; and how the
+    area is stretched: (∫(x² − y²) dA, 2 ∫xy dA) about the centroid [m⁴].
 
     With the principal moments M₁ ≥ M₂ and the long axis at the angle ψ that is
     (M₁ − M₂)(cos 2ψ, sin 2ψ).

@@ -97,7 +97,7 @@ def friction_share(scene, work, share, step, resolution):
 def law_share(scene, work, clock, step):
     """The share of the step at which the first closed contact passes a kink of its law, or begins
     or ends to slide; above 1 where none does. Expects the geometry of all pairs in NEW."""
-    share = grazing_share(scene, work, clock, step, law_event_share(scene, work, NEVER))
+    share = grazing_share(work, clock, step, law_event_share(scene, work, NEVER))
     if has(scene, SLIP_LIMIT):
         resolution, _ = resolutions_of(work, clock)
         share = friction_share(scene, work, share, step, resolution)

@@ -302,7 +302,7 @@ def settle(scene, work, clock, step):
     return changed or entered
 
 
-def share_left(scene, work, clock, step, row):
+def share_left(work, clock, step, row):
     """The share of the step at which a pair that grazes ceases to; above 1 where it does not, or
     where it matters little: its force goes through nothing there.
 
@@ -331,7 +331,7 @@ def leave_early(scene, work, clock, step):
     for row in range(work.tally[at.CANDIDATES]):
         if (
             work.candidates[row, at.CLOSED] == at.GRAZES
-            and share_left(scene, work, clock, step, row) < AT_ONCE
+            and share_left(work, clock, step, row) < AT_ONCE
         ):
             if work.slip[at.GRAZING_FORCE, row] * grazing_force(work, at.NEW, row) < 0.0:
                 leave(work, row, at.OPEN, 0.0)
@@ -341,9 +341,9 @@ def leave_early(scene, work, clock, step):
     return changed
 
 
-def grazing_share(scene, work, clock, step, share):
+def grazing_share(work, clock, step, share):
     """The share of the step at which the first pair ceases to graze, or the given one before."""
     for row in range(work.tally[at.CANDIDATES]):
         if work.candidates[row, at.CLOSED] == at.GRAZES:
-            share = min(share, BEHIND * share_left(scene, work, clock, step, row))
+            share = min(share, BEHIND * share_left(work, clock, step, row))
     return share

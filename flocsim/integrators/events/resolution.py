@@ -6,9 +6,8 @@ on damping until g behind its end, by that force's acceleration times g/speed.
 
 import math
 
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, memory_of, normal_rate, pressed_view
-from flocsim.laws import CONTACT_FORCE, contact_force, has
+from flocsim.integrators.rhs.stated_error import pressed, pressed_stiffness
+from flocsim.integrators.rhs.views import contact_view, memory_of, normal_rate
 
 SHARE_OF_DEPTH = 0.02
 """Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
@@ -31,14 +30,6 @@ COARSEST_ROUNDING = 2e-15
 
 TINY = 1e-300
 """Keeps a quotient finite."""
-
-
-def pressed(scene, view, overlap, overlap_rate):
-    """The normal force of a contact with such an overlap [N]."""
-    if not has(scene, CONTACT_FORCE):
-        return 0.0
-    force, _ = contact_force(scene, pressed_view(view, overlap, overlap_rate))
-    return force
 
 
 def bounces(scene, view, speed, frequency):

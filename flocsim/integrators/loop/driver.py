@@ -122,7 +122,7 @@ def record_row(work, clock, counts, record):
     counts[at.RECORDED] = row + 1
 
 
-def pause_reason(clock, counts, record):
+def pause_reason(counts, record):
     """The Status that ends the loop before the next step; 0 to go on."""
     if counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED] >= counts[at.MAX_STEPS]:
         return STEP_BUDGET
@@ -199,7 +199,7 @@ def advance(scene, work, observed, clock, counts, record):
     lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
     limit, trials = math.inf, 0
     while clock[at.TIME] < clock[at.UNTIL]:
-        status = pause_reason(clock, counts, record)
+        status = pause_reason(counts, record)
         if status != 0:
             return status
         if lists and trials == 0 and not keep_lists(scene, work, counts, clock[at.STEP]):

@@ -31,12 +31,18 @@ def leads(work, row):
     )
 
 
-def first_of(work, body):
+def first_of(labels, body):
     """The first body of the cluster so far, by those that bodies have been joined to."""
-    while work.cluster[body] != body:
-        work.cluster[body] = work.cluster[work.cluster[body]]
-        body = work.cluster[body]
+    while labels[body] != body:
+        labels[body] = labels[labels[body]]
+        body = labels[body]
     return body
+
+
+def unite(labels, a, b):
+    """Make one cluster of those of two bodies."""
+    one, other = first_of(labels, a), first_of(labels, b)
+    labels[max(one, other)] = min(one, other)
 
 
 def join(scene, work, pair):
@@ -44,8 +50,7 @@ def join(scene, work, pair):
     a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
     work.pairs[pair, at.ACTING] = 1
     if scene.bodies[a, at.FREE] * scene.bodies[b, at.FREE] == 1.0:
-        one, other = first_of(work, a), first_of(work, b)
-        work.cluster[max(one, other)] = min(one, other)
+        unite(work.cluster, a, b)
 
 
 def gather_clusters(scene, work):

@@ -115,14 +115,14 @@ def copy_block(target, to, source, slot, both):
                 target[to, part, i, j] = source[slot, part, i, j]
 
 
-def write_product(target, to, left, one, right, other, both):
-    """A product of two blocks, of the real system or of both."""
+def take_product(target, to, left, one, right, other, both, subtracts):
+    """Write a product of two blocks, of the real system or of both, or subtract it."""
     for i in range(3):
         for j in range(3):
             real = 0.0
             for k in range(3):
                 real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
-            target[to, REAL_PART, i, j] = real
+            put_number(target, to, REAL_PART, i, j, real, subtracts)
             if not both:
                 continue
             re, im = 0.0, 0.0
@@ -131,28 +131,12 @@ def write_product(target, to, left, one, right, other, both):
                 c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
                 re += a * c - b * d
                 im += a * d + b * c
-            target[to, PAIR_RE, i, j] = re
-            target[to, PAIR_IM, i, j] = im
+            put_number(target, to, PAIR_RE, i, j, re, subtracts)
+            put_number(target, to, PAIR_IM, i, j, im, subtracts)
 
 
-def subtract_product(target, to, left, one, right, other, both):
-    """Subtract a product of two blocks, of the real system or of both."""
-    for i in range(3):
-        for j in range(3):
-            real = 0.0
-            for k in range(3):
-                real += left[one, REAL_PART, i, k] * right[other, REAL_PART, k, j]
-            target[to, REAL_PART, i, j] -= real
-            if not both:
-                continue
-            re, im = 0.0, 0.0
-            for k in range(3):
-                a, b = left[one, PAIR_RE, i, k], left[one, PAIR_IM, i, k]
-                c, d = right[other, PAIR_RE, k, j], right[other, PAIR_IM, k, j]
-                re += a * c - b * d
-                im += a * d + b * c
-            target[to, PAIR_RE, i, j] -= re
-            target[to, PAIR_IM, i, j] -= im
+def put_number(target, to, part, i, j, number, subtracts):
+    target[to, part, i, j] = target[to, part, i, j] - number if subtracts else number
 
 
 def inverse(a, b, c, d, e, f, g, h, i):
@@ -205,9 +189,9 @@ def factorise_row(e, row, both):
     copy_block(e.row, row, e.pivot, row, both)
     for slot in range(e.lower[row], e.upper[row]):
         above = e.column[slot]
-        write_product(e.blocks, slot, e.row, above, e.pivot, above, both)
+        take_product(e.blocks, slot, e.row, above, e.pivot, above, both, False)
         for each in range(e.upper[above], e.lower[above + 1]):
-            subtract_product(e.row, e.column[each], e.blocks, slot, e.blocks, each, both)
+            take_product(e.row, e.column[each], e.blocks, slot, e.blocks, each, both, True)
     for slot in range(e.upper[row], e.lower[row + 1]):
         copy_block(e.blocks, slot, e.row, e.column[slot], both)
     copy_block(e.pivot, row, e.row, row, both)
@@ -266,27 +250,28 @@ def divide_pair(e, loads, place, row):
         loads[PAIR, row + i] = total + entry(e.pivot, place, i, 2) * z
 
 
+def subtract_others(e, loads, place, first, last, both):
+    """Subtract the shares of a row's blocks from ``first`` to before ``last``."""
+    row = 3 * e.body[place]
+    for slot in range(first, last):
+        other = 3 * e.body[e.column[slot]]
+        subtract_real(e, loads, slot, row, other)
+        if both:
+            subtract_pair(e, loads, slot, row, other)
+
+
 @hook
 def solve_sparse(work, both):
     """Replace the load of the real system, or of ``both``, by the solution."""
     e, loads = work.elimination, work.loads
     n = work.bodies.shape[0]
     for place in range(n):
-        body = e.body[place]
-        if body != NONE:
-            for slot in range(e.lower[place], e.upper[place]):
-                other = 3 * e.body[e.column[slot]]
-                subtract_real(e, loads, slot, 3 * body, other)
-                if both:
-                    subtract_pair(e, loads, slot, 3 * body, other)
+        if e.body[place] != NONE:
+            subtract_others(e, loads, place, e.lower[place], e.upper[place], both)
     for place in range(n - 1, -1, -1):
         body = e.body[place]
         if body != NONE:
-            for slot in range(e.upper[place], e.lower[place + 1]):
-                other = 3 * e.body[e.column[slot]]
-                subtract_real(e, loads, slot, 3 * body, other)
-                if both:
-                    subtract_pair(e, loads, slot, 3 * body, other)
+            subtract_others(e, loads, place, e.upper[place], e.lower[place + 1], both)
             divide_real(e, loads, place, 3 * body)
             if both:
                 divide_pair(e, loads, place, 3 * body)

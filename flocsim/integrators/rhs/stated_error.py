@@ -243,12 +243,17 @@ def doubtful_time(work, row, step, doubt, resolved):
     return step if -deepest < gap < 0.0 else 0.0
 
 
-def pressed_stiffness(scene, view, overlap):
-    """The normal force of a contact pressed so far, over that [N/m]; 0 without a contact law."""
+def pressed(scene, view, overlap, overlap_rate):
+    """The normal force of a contact with such an overlap [N]; 0 without a contact law."""
     if not has(scene, CONTACT_FORCE):
         return 0.0
-    force, _ = contact_force(scene, pressed_view(view, overlap, 0.0))
-    return force / overlap
+    force, _ = contact_force(scene, pressed_view(view, overlap, overlap_rate))
+    return force
+
+
+def pressed_stiffness(scene, view, overlap):
+    """The normal force of a contact pressed so far, over that [N/m]."""
+    return pressed(scene, view, overlap, 0.0) / overlap
 
 
 def unresolved(scene, work, clock, step, row):

@@ -1,7 +1,5 @@
 """Noise and uneven light: what a picture would show without flocs."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 SURFACE_ROUNDS = 15
@@ -46,11 +44,6 @@ def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
         gain = np.exp(-0.5 * (wavenumber * scale) ** 2)
         spectrum *= np.expand_dims(gain, 1 - axis)
     return fft.idctn(spectrum, norm="ortho")
-
-
-def median_frame(frames: Sequence[np.ndarray]) -> np.ndarray:
-    """The light of a fixed camera: per pixel the median of frames (h, w) of one shape."""
-    return np.median(np.stack(frames), axis=0)
 
 
 def robust_deviation(values: np.ndarray) -> float:

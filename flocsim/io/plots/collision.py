@@ -78,9 +78,7 @@ def draw_strip(
         figure = new_figure(1.65 * len(times) + 0.1, (2.4 if title else 2.15) + 0.3)
         row = figure.subplots(1, len(times), squeeze=False)[0]
         for number, axes in enumerate(row):
-            draw_paths(axes, paths)
-            draw_bodies(axes, outlines_per_frame[number])
-            draw_contacts(axes, contacts[number])
+            draw_frame(axes, paths, outlines_per_frame[number], contacts[number])
             frame_axes(axes, centres[number], half)
             axes.set_title(f"{times[number] * factor:.4g} {unit}", loc="center", fontsize=8)
             axes.set_xlabel(labels[number])
@@ -278,9 +276,7 @@ def picture_of(frames, place, motion, zone_distance, title):
     with house_style():
         figure = new_figure(6.4, 3.0)
         bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-        draw_paths(bodies, frames.paths)
-        draw_bodies(bodies, frames.outlines[place])
-        draw_contacts(bodies, frames.contacts[place])
+        draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
         frame_axes(bodies, centres[place], half)
         draw_scale_bar(bodies, centres[place], half)
         bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
@@ -366,9 +362,13 @@ def time_unit(times):
     return "µs", 1e6
 
 
-def draw_bodies(axes, frame):
+def draw_frame(axes, paths, frame, contacts):
+    """The bodies, the paths of their centres, and the points where they touch."""
     from matplotlib.patches import PathPatch, Polygon
 
+    for number, path in enumerate(map(np.asarray, paths)):
+        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
+        axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
     for number, body in enumerate(frame):
         colour = BODY_COLOURS[number % len(BODY_COLOURS)]
         style = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
@@ -376,6 +376,8 @@ def draw_bodies(axes, frame):
             axes.add_patch(Polygon(body[0], **style))
         else:
             axes.add_patch(PathPatch(rings_path(body), **style))
+    points = np.asarray(contacts, dtype=float).reshape(-1, 2)
+    axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 
 
 def rings_path(rings):
@@ -390,18 +392,6 @@ def closed(rings):
     for ring in rings:
         ring = np.asarray(ring)
         yield ring if np.array_equal(ring[0], ring[-1]) else np.concatenate([ring, ring[:1]])
-
-
-def draw_paths(axes, paths):
-    for number, path in enumerate(paths):
-        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
-        path = np.asarray(path)
-        axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
-
-
-def draw_contacts(axes, points):
-    points = np.asarray(points, dtype=float).reshape(-1, 2)
-    axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 
 
 def frame_axes(axes, centre, half):

@@ -46,14 +46,14 @@ def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
         for m, (axes, mechanism) in enumerate(zip(panels, kernel.mechanisms, strict=True)):
             for v in range(len(kernel.vertices)):
                 for larger in chosen:
-                    draw_line(axes, kernel, name, (m, v, larger), colours[larger], len(chosen))
+                    draw_line(axes, kernel, name, (m, v, larger), colours[larger])
             axes.set_title(plain(mechanism))
             axes.set_xlabel("r of the smaller over r of the larger")
             axes.set_ylim(bottom=0.0)
             axes.set_xlim(0.0, 1.05)
             axes.grid(axis="y", color="0.9", linewidth=0.6)
         panels[0].set_ylabel(label)
-        legend(figure, panels[-1], kernel, colours)
+        legend(panels[-1], kernel, colours)
         words = WATER_WORDS if kernel.water else BOUND_WORDS
         figure.supxlabel(words, fontsize=7, color="0.4")
         return figure
@@ -69,7 +69,7 @@ def chosen_sizes(count: int) -> list[int]:
     )
 
 
-def draw_line(axes, kernel, name, place, colour, lines):
+def draw_line(axes, kernel, name, place, colour):
     """One larger class against all that are not above it."""
     m, v, larger = place
     smaller = np.arange(larger + 1)
@@ -90,7 +90,7 @@ def draw_line(axes, kernel, name, place, colour, lines):
     )  # fmt: skip
 
 
-def legend(figure, axes, kernel, colours):
+def legend(axes, kernel, colours):
     """Colours for sizes, markers for N, beside the last panel."""
     for place, colour in colours.items():
         axes.plot([], [], color=colour, label=f"larger: {MICRO * kernel.radii[place]:.3g} µm")

@@ -160,9 +160,6 @@ def box_meets(box):
     )
 
 
-if TYPE_CHECKING:
-    from flocsim.geometry.fit.fit import Fit
-
 MASK, CORE, DISK = "#c7c7c7", "#0072B2", "#D55E00"
 MISSED, ADDED = "#0072B2", "#D55E00"
 """Pixels of the mask that the shape leaves out; pixels beside it that it takes in."""
@@ -173,6 +170,7 @@ ROUND_POINTS = 64
 def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     """The fit of a mask (h, w) bool in four panels, as in the paper's Fig. 1: the mask; the core
     polygon; the disk along it and the outline that it sweeps; the pixels that differ."""
+    from matplotlib.colors import to_rgb
     from matplotlib.patches import Polygon
 
     mask = np.asarray(mask, bool)
@@ -202,7 +200,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
             (inside & ~mask, ADDED),
             (mask & inside, MASK),
         ):
-            colours[wrong] = rgb(colour)
+            colours[wrong] = to_rgb(colour)
         panels[3].imshow(colours, interpolation="nearest")
         words = (
             f"mask: {int(mask.sum())} px", f"core: N = {count}",
@@ -236,7 +234,3 @@ def covered_by(rings, shape):
     for ring in rings:
         inside ^= Path(ring).contains_points(points)
     return inside.reshape(shape)
-
-
-def rgb(colour):
-    return [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]

@@ -27,10 +27,13 @@ from flocsim.io.plots.style import (
     CROWDED,
     MARKERS,
     Figure,
+    add_line_legend,
     dodge,
     graded_colours,
     house_style,
     new_figure,
+    note,
+    place_legend,
     plain,
     set_probability_axis,
     set_share_axis,
@@ -45,7 +48,6 @@ from flocsim.io.results.file import Results
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
 LEGEND_WIDTH = 1.15
-LEGEND_ROWS = 9
 BARS = "\n(bars: 95 %;\nthin: plus numerical error)"
 BARS_OF_BANDS = BARS.replace(" error)", "\nand shape error)")
 """What bars mean, where outlines were cut closer and wider as well."""
@@ -293,17 +295,6 @@ def room_for(sizes):
     return low / margin, high * margin
 
 
-def add_line_legend(axes, words, colours, title):
-    """A legend of lines by their words."""
-    from matplotlib.lines import Line2D
-
-    handles = [
-        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=word)
-        for index, (word, colour) in enumerate(zip(words, colours, strict=False))
-    ]
-    place_legend(axes, handles, title)
-
-
 def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
     """(a figure with equal panels of these titles, at most three a row, and room for a legend, the
     panels, the last one of the first row, beside which the legend stands)."""
@@ -461,28 +452,13 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
 
 def note_if_empty(axes, values, text):
     if not np.any(np.isfinite(values)):
-        place = {"ha": "center", "va": "center", "transform": axes.transAxes}
-        axes.text(0.5, 0.5, text, color="0.4", **place)
+        note(axes, text)
 
 
 def add_delta_legend(axes, results, marked=frozenset()):
-    from matplotlib.lines import Line2D
-
-    delta = results.delta
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            marker=MARKERS[index % len(MARKERS)],
-            label=f"{share:g}" + (" (grazes)" if share == 1.0 else ""),
-        )
-        for index, (share, colour) in enumerate(
-            zip(delta, graded_colours(len(delta))[: len(delta)], strict=True)
-        )
-    ]
+    words = [f"{share:g}" + (" (grazes)" if share == 1.0 else "") for share in results.delta]
     title = r"$\delta\,/\,\delta_{\max}$" + bars_of(results) + HOLLOW + words_of(marked)
-    place_legend(axes, handles, title)
+    add_line_legend(axes, words, graded_colours(len(words)), title)
 
 
 def bars_of(results):
@@ -491,26 +467,10 @@ def bars_of(results):
 
 
 def add_shares_legend(axes, name, results):
-    from matplotlib.lines import Line2D
-
     words, title = (CLASS_WORDS, "class") if name == "classes" else (BOND_WORDS, "bond")
-    handles = [
-        Line2D([], [], color=colour, marker=MARKERS[index], label=plain(words[each]))
-        for index, (each, colour) in enumerate(SHARES[name][-1].items())
-    ]
-    place_legend(axes, handles, title + bars_of(results))
-
-
-def place_legend(axes, handles, title):
-    axes.legend(
-        handles=handles,
-        title=title,
-        loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
-        borderaxespad=0.0,
-        ncols=-(-len(handles) // LEGEND_ROWS),
-        alignment="left",
-    )
+    colours = SHARES[name][-1]
+    told = [plain(words[each]) for each in colours]
+    add_line_legend(axes, told, colours.values(), title + bars_of(results))
 
 
 FIGURES: dict[str, Callable[[Results], Figure]] = {

@@ -12,8 +12,10 @@ from flocsim.io.plots.style import (
     CLASS_WORDS,
     MARKERS,
     Figure,
+    add_line_legend,
     house_style,
     new_figure,
+    note,
     plain,
     set_probability_axis,
     type_titles,
@@ -159,10 +161,6 @@ def draw_effect(axes, effect):
         note(axes, "no decided collision\nof known shapes")
 
 
-def note(axes, words):
-    axes.text(0.5, 0.5, words, color="0.4", ha="center", va="center", transform=axes.transAxes)
-
-
 def share_words(subject, share):
     """A share of variance in words."""
     value, low, high = (100.0 * each for each in share)
@@ -172,12 +170,6 @@ def share_words(subject, share):
 
 
 def add_legend(axes, vertices):
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=ALL_COLOUR, marker=MARKERS[0], label=r"$\Pr[A]$")]
-    handles += [
-        Line2D([], [], color=colour, marker=MARKERS[1 + index], label=plain(CLASS_WORDS[name]))
-        for index, (name, colour) in enumerate(CLASS_COLOURS.items())
-    ]
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), alignment="left",
-                title=f"$N$ = {vertices}\n(bars: 95 %)", borderaxespad=0.0)  # fmt: skip
+    words = [r"$\Pr[A]$", *(plain(CLASS_WORDS[name]) for name in CLASS_COLOURS)]
+    title = f"$N$ = {vertices}\n(bars: 95 %)"
+    add_line_legend(axes, words, [ALL_COLOUR, *CLASS_COLOURS.values()], title)

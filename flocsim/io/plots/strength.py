@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.plots.results import add_line_legend, note_if_empty, panel_grid
+from flocsim.io.plots.results import note_if_empty, panel_grid
 from flocsim.io.plots.style import (
     MARKERS,
     Figure,
+    add_line_legend,
     graded_colours,
     house_style,
     set_log_axis,

@@ -60,6 +60,7 @@ PLAIN = (1e-3, 2e5)
 """Numbers that are written out."""
 LEAST_LETTERS = 8
 """Of a line of a title that is broken."""
+LEGEND_ROWS = 9
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -213,6 +214,34 @@ def number_words(value):
     factor, power = f"{value:.3e}".split("e")
     times = "" if float(factor) == 1.0 else rf"{float(factor):g}\times"
     return f"${times}10^{{{int(power)}}}$"
+
+
+def note(axes, words):
+    """Say in the middle of a panel why nothing is drawn in it."""
+    axes.text(0.5, 0.5, words, color="0.4", ha="center", va="center", transform=axes.transAxes)
+
+
+def add_line_legend(axes, words, colours, title):
+    """A legend of lines by their words."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=word)
+        for index, (word, colour) in enumerate(zip(words, colours, strict=False))
+    ]
+    place_legend(axes, handles, title)
+
+
+def place_legend(axes, handles, title):
+    axes.legend(
+        handles=handles,
+        title=title,
+        loc="upper left",
+        bbox_to_anchor=(1.02, 1.0),
+        borderaxespad=0.0,
+        ncols=-(-len(handles) // LEGEND_ROWS),
+        alignment="left",
+    )
 
 
 def dodge(number, count):

@@ -232,20 +232,19 @@ def tail_of(name: str) -> tuple[int, ...]:
     return tuple(len(LAST_AXES[axis]) for axis in last_axis(name))
 
 
+def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Declared]:
+    """Arrays with a value, or one for each word of a last axis, for every condition."""
+    return {
+        name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
+        for name, (kind, unit, text) in schema.items()
+    }
+
+
 SIZES = declared(RADII, AXES[:1])
 GROUPS = {
-    "probabilities": Group.of(
-        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
-         for name, (kind, unit, text) in TABLE.items()}, COORDINATES, SIZES,
-    ),
-    "numerics": Group.of(
-        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
-         for name, (kind, unit, text) in NUMERICS.items()}, COORDINATES,
-    ),
-    "outlines": Group.of(
-        {name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
-         for name, (kind, unit, text) in OUTLINES.items()}, COORDINATES,
-    ),
+    "probabilities": Group.of(of_conditions(TABLE), COORDINATES, SIZES),
+    "numerics": Group.of(of_conditions(NUMERICS), COORDINATES),
+    "outlines": Group.of(of_conditions(OUTLINES), COORDINATES),
     "pooled": Group.of(declared(POOLED, AXES[:2]), COORDINATES, SIZES),
     "differences": Group.of(declared(DIFFERENCES, ("against", "event", *AXES)), COORDINATES),
     "replicates": Group.of(declared(REPLICATES, (*AXES, "replicate"), FLAGS), COORDINATES),

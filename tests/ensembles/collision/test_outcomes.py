@@ -22,7 +22,6 @@ from flocsim.ensembles.collision.outcomes import (
     MISSED,
     can_meet_again,
     left_over,
-    outline_gap,
     turn_left,
     watch_pair,
 )
@@ -31,6 +30,7 @@ from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
@@ -83,7 +83,7 @@ def go_on(study, condition, vertices, share, replicate, factor=11.0):
         if status == Status.STOPPED:
             decisions.append((int(counts[at.CODE]), float(clock[at.TIME])))
             widest = max(widest, least_listed_gap(work))
-    last = outline_gap(encounter.scene, work)
+    last = gap_between(encounter.scene, work, 1, 0)
     return row, Continued(*decisions[0], widest, last, status)
 
 
@@ -258,7 +258,7 @@ def test_the_gap_of_the_outlines_is_that_of_shapely(study):
             work = work_of(encounter.scene, places, np.zeros((2, 3)))
             touching = sum(shape.radius for shape in encounter.shapes)
             expected = 1e-6 * cores[0].distance(cores[1]) - touching
-            assert outline_gap(encounter.scene, work) == pytest.approx(expected, rel=1e-9)
+            assert gap_between(encounter.scene, work, 1, 0) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_pair_apart_and_parting_has_departed(study):
@@ -399,7 +399,7 @@ def test_a_body_that_drifts_on_to_a_lower_arm_has_not_gone(ball, collided, gone)
     """It is far from what it has touched, and moves away from the centre, all the way down."""
     for y in np.linspace(-16e-6, -34e-6, 7):
         assert ball.seen(12e-6, y, collided=collided) == 0
-        assert outline_gap(ball.scene, ball.work) > ball.escape
+        assert gap_between(ball.scene, ball.work, 1, 0) > ball.escape
     # Further right it passes the tip, as far as the drift goes by its outline.
     past = ARM + 1e-6 + 5e-6
     assert ball.seen(past - 0.1e-6, -25e-6, collided=collided) == 0
@@ -459,7 +459,7 @@ def test_the_way_along_the_drift_is_looked_at_without_gaps(ball):
         answers = set()
         for y in np.linspace(-14e-6, -36e-6, 12):
             ball.seen(x, y)
-            if outline_gap(ball.scene, ball.work) > ball.escape:
+            if gap_between(ball.scene, ball.work, 1, 0) > ball.escape:
                 known = ball.scene, ball.work, ball.observed
                 answers.add(can_meet_again(*known, 0.0))
         assert len(answers) <= 1

@@ -7,13 +7,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.geometry.shapes.cores import distance_to_edges, edges_of, inside_polygon
-from flocsim.geometry.shapes.moments import area_and_growth, swept_moments
+from flocsim.geometry.shapes.moments import all_moments, area_and_growth
 from flocsim.geometry.shapes.parts import Part
 from tests.helpers.tiers import rest_slow
 from tests.reference.outline import area_centroid_inertia
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, convex, spiral, star
 from tests.reference.shapes import rotation
+
+
+def swept_moments(vertices, radius):
+    """Area, centroid and second moment of one swept ring (N, 2)."""
+    return all_moments((Part((vertices,), radius),))[:3]
+
 
 SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
 

@@ -9,8 +9,8 @@ from scipy.integrate import quad
 import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.constants import LARGEST_BIAS
-from flocsim.ensembles.collision.outcomes import outline_gap
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.integrators.rhs.surface_gap import gap_of, length_at, measure_of, soften
 from flocsim.integrators.rhs.views import pair_view
 from tests.helpers.fast_scene import FastScene
@@ -55,7 +55,7 @@ class Pair:
         while True:
             place = (distance * math.cos(way), distance * math.sin(way), turn)
             self.place(*place)
-            further = outline_gap(self.scene, self.work) - gap
+            further = gap_between(self.scene, self.work, 1, 0) - gap
             if further < 0.1 * gap:
                 return place
             distance -= further
@@ -99,7 +99,7 @@ def test_the_smooth_gap_and_its_force_are_close_to_those_of_the_least(force):
         pair.loads(*place)
         soft, gaps = pair.gaps()
         least, room = gaps.min(), 1e-15
-        assert least == pytest.approx(outline_gap(pair.scene, pair.work), abs=room)
+        assert least == pytest.approx(gap_between(pair.scene, pair.work, 1, 0), abs=room)
         several += len(gaps) > 1
         lowest = least - length_at(pair.scene, least) * math.log(len(gaps))
         assert lowest - room <= soft <= least + room
