@@ -44,16 +44,11 @@ def locate(scene, work):
     return room
 
 
-<<<<<<< HEAD
-def views_of(system, scene, work, time):
-    """{first part of laws' names: [what they are shown]} in the state NOW."""
-    bodies = range(len(system.bodies))
-    pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
-=======
 def views_of(system, scene, work, time, located):
     """{first part of laws' names: [what they are shown]} in the state NOW; ``located(scene, work)``
     lists the pairs there (see locate)."""
->>>>>>> h_29
+    bodies = range(len(system.bodies))
+    pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
     views = {
         "body": [body_view(scene, work, time, at.NOW, body) for body in bodies],
         "centre": [centre_view(scene, work, time, at.NOW, a, b) for a, b in pairs],
