@@ -29,6 +29,10 @@ CORE = 2.0
 AROUND = 4
 """Pixels around one of several parts of an island that tell its own level."""
 
+FRINGE, FAR = 8, 24
+"""Pixels around an island between which the light beside it is told: not where the edge itself is
+soft, or has a bright fringe, as under an electron microscope."""
+
 CUT_OFF = 0.1
 """Share of an outline that may lie where its zone ends."""
 
@@ -186,10 +190,11 @@ class Search:
 
     def island(self, mask, box):
         """The outlines in a region of the floor."""
-        mask, box = widened(mask, box, 12, self.contrast.shape)
+        mask, box = widened(mask, box, FAR + 4, self.contrast.shape)
         near = self.contrast[box]
         if near[mask].max() < 2.0 * self.floor:
             return []
+        mask, base = self.down_to_light(mask, near)
         focus = Focus(near, self.slope, self.scale)
         here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
         offset = box[0].start, box[1].start
@@ -197,8 +202,29 @@ class Search:
             attrs.evolve(each, box=tuple(
                 slice(s.start + o, s.stop + o) for s, o in zip(each.box, offset, strict=True)
             ))
-            for each in self.walk(focus, mask, here, 0.0)
+            for each in self.walk(focus, mask, here, base)
         ]  # fmt: skip
+
+    def down_to_light(self, mask, near):
+        """An island as far down as the light beside it, and the contrast there: in a crowd the
+        light that all of a picture has may be too dark for one of its corners."""
+        from scipy.ndimage import distance_transform_edt, gaussian_filter, label
+
+        from flocsim.io.images.background import robust_deviation
+
+        away = distance_transform_edt(~mask)
+        lit = near <= self.floor
+        beside = lit & (away > FRINGE) & (away <= FAR)
+        base = float(np.median(near[beside])) if beside.any() else 0.0
+        if base > -self.floor:
+            return mask, 0.0
+        fine = (near - gaussian_filter(near, self.scale + 2.0))[beside]
+        floor = max(self.floor, FLOOR * robust_deviation(fine))  # more noise where it is dark
+        if base > -floor:
+            return mask, 0.0
+        wider = mask | (lit & (near > base + floor) & (away <= FRINGE))
+        parts = label(wider, EIGHT)[0]
+        return np.isin(parts, np.unique(parts[mask])), base
 
     def walk(self, focus, mask, box, base):
         """The outlines in a component that stands above a base, boxes in the island."""
