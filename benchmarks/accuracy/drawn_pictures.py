@@ -5,6 +5,7 @@
 Layered: aggregates of overlapping discs, each of which takes a share of the light; IoU of the
 foreground, regions for bodies. Blurred: real silhouettes of 4 to 20 px under one blur: kept of
 put, mean r_eq kept over put, r_eq found over known, share of known sizes within the bands.
+Crowded: the same flocs before halos, discs so blurred that none is in focus.
 """
 
 import numpy as np
@@ -19,6 +20,9 @@ SOOT = "soot_tem/201805A_A6_004_half"
 FRAME = (600, 800)
 BLURS = (0.0, 1.0, 1.5, 2.0, 2.5, 3.0)
 NOISES = (0.0, 0.02, 0.04, 0.06, 0.1)
+FALSE = 0.3
+"""Share of known flocs in a region below which it is of something else."""
+HALOS = (100, 300, 600)
 
 
 def aggregate(rng, discs, radius, spread):
@@ -96,19 +100,60 @@ def blurred_table(masks):
     for blur in BLURS:
         for noise, vignette in ((0.0, 0.0), (0.02, 0.6), (0.05, 0.6)):
             grey, labels = blurred_frame(masks, blur, noise, vignette)
-            areas = np.bincount(labels.ravel())[1:]
-            put, kept = np.sqrt(areas / np.pi), []
-            for region in segment(grey).regions:
-                top, left, bottom, right = region.bbox
-                under = labels[top:bottom, left:right][region.mask[1:-1, 1:-1]]
-                if under.any():
-                    known = put[np.bincount(under[under > 0]).argmax() - 1]
-                    kept.append((known, region.equivalent_radius, *region.radius_band))
+            put, kept, _ = compared(segment(grey).regions, labels)
             known, found, low, high = np.array(kept).T
             ratio = found / known
             within = 100 * np.mean((low <= known) & (known <= high))
             table.add(blur, noise, vignette, len(put), len(known), known.mean() / put.mean(),
                       ratio.mean(), ratio.std(), within)  # fmt: skip
+    return table
+
+
+def compared(regions, labels):
+    """Of regions and known flocs: r_eq of all known, [(known, found, band low, high)] of those
+    found, and the number of regions that are not mainly of known flocs."""
+    put, kept, false = np.sqrt(np.bincount(labels.ravel())[1:] / np.pi), [], 0
+    for region in regions:
+        top, left, bottom, right = region.bbox
+        under = labels[top:bottom, left:right][region.mask[1:-1, 1:-1]]
+        if np.mean(under > 0) < FALSE:
+            false += 1
+            continue
+        known = put[np.bincount(under[under > 0]).argmax() - 1]
+        kept.append((known, region.equivalent_radius, *region.radius_band))
+    return put, kept, false
+
+
+def crowded_frame(masks, halos, noise, seed):
+    """(grey, labels) of the masks before so many halos."""
+    rng = np.random.default_rng(seed)
+    _, labels = blurred_frame([masks[k] for k in rng.permutation(len(masks))], 0.0, 0.0, 0.0)
+    grey = 0.8 * (1.0 - 0.6 * gaussian_filter((labels > 0).astype(float), 1.2))
+    for _ in range(halos):
+        (y, x), radius = rng.uniform(0, 1000, 2), rng.uniform(8.0, 35.0)
+        blur, taken = max(rng.uniform(5.0, 20.0), 0.35 * radius), rng.uniform(0.05, 0.5)
+        reach = int(radius + 4 * blur) + 2
+        box = tuple(slice(max(0, int(c) - reach), int(c) + reach) for c in (y, x))
+        row, column = np.mgrid[:1000, :1000][(slice(None), *box)]
+        disc = np.hypot(row - y, column - x) < radius
+        grey[box] *= 1.0 - taken * gaussian_filter(disc.astype(float), blur)
+    return np.clip(grey + noise * rng.standard_normal(grey.shape), 0.0, 1.0), labels
+
+
+def crowded_table(masks, seeds):
+    """What is found of sharp flocs before halos."""
+    columns = ("halos", "noise", "put", "kept", "false", "r_eq found/known", "deviation",
+               "off by > 10 %", "within bands %")  # fmt: skip
+    table = Table("Silhouettes of 4 to 20 px before halos", columns)
+    for halos in HALOS:
+        for noise in (0.0, 0.02):
+            frames = [crowded_frame(masks, halos, noise, seed) for seed in seeds]
+            each = [compared(segment(g, flocs="dark").regions, found) for g, found in frames]
+            known, found, low, high = np.array([row for _, kept, _ in each for row in kept]).T
+            ratio, put = found / known, sum(len(all_put) for all_put, _, _ in each)
+            table.add(halos, noise, put, len(known), sum(false for *_, false in each),
+                      ratio.mean(), ratio.std(), np.sum(np.abs(ratio - 1.0) > 0.1),
+                      100 * np.mean((low <= known) & (known <= high)))  # fmt: skip
     return table
 
 
@@ -131,6 +176,7 @@ def main():
     layered_table(range(2 if arguments.quick else 8)).print(arguments.markdown)
     masks = [mask for mask, _ in silhouettes(images) if max(mask.shape) < 72][:80]
     blurred_table(masks).print(arguments.markdown)
+    crowded_table(masks, range(1 if arguments.quick else 3)).print(arguments.markdown)
 
 
 if __name__ == "__main__":

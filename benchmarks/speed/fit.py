@@ -17,8 +17,9 @@ from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.fit import paper as fit_paper
-from flocsim.geometry.fit.coverage import compiled, padded
-from flocsim.geometry.fit.search import count_errors, searched
+from flocsim.geometry.fit.coverage import compiled, cover, move_vertex, neighbours, padded
+from flocsim.geometry.fit.search import count_errors, leaves_room, searched
+from flocsim.geometry.fit.simple import stays_simple
 from flocsim.geometry.fit.starts import even_start, inset, trace_outline
 
 COUNTS = (4, 8, 16, 28, 64)
@@ -29,6 +30,8 @@ GOALS = {
     ("4 to 5 px", 4): 12.5, ("4 to 5 px", 8): 5.1, ("4 to 5 px", 16): 1.5,
 }  # fmt: skip
 REPEATS = 5
+MOVES = 1000
+"""Moves of each vertex that an annealer tries."""
 STEPS = np.array([8.0, 4.0, 2.0, 1.0, 0.5, 0.25])
 
 
@@ -148,6 +151,45 @@ def radius_table(fits, method):
     return table
 
 
+def annealed(mask, vertices, radius, draws, hot):
+    """Simulated annealing of V over the vertices, changed in place.
+
+    draws (moves, 4): two normal numbers, two from 0 to 1; hot [px]: the temperature, which falls
+    to a hundredth with the size of moves, 4 to 0.25 px.
+    """
+    odd, near = cover(vertices, radius, mask.shape)
+    count, moves = len(vertices), len(draws)
+    for move in range(moves):
+        done = move / moves
+        size, heat = 4.0 * 0.0625**done, hot * 0.01**done
+        k = int(draws[move, 2] * count)
+        before, here, after = neighbours(vertices, k)
+        new = here[0] + size * draws[move, 0], here[1] + size * draws[move, 1]
+        if not leaves_room(mask.shape, new, radius + 1.0):
+            continue
+        change, _ = move_vertex(mask, odd, near, before, here, after, new, radius, False)
+        if change > 0 and draws[move, 3] >= np.exp(-change / heat):
+            continue
+        if stays_simple(vertices, k, new[0], new[1]):
+            move_vertex(mask, odd, near, before, here, after, new, radius, True)
+            vertices[k, 0], vertices[k, 1] = new
+
+
+def best_of_annealer(mask, vertices, starts, rng):
+    """The least RE [%] that an annealer comes to from random points of the outline."""
+    room, _ = padded(mask, vertices, 1.0)
+    outline, least = trace_outline(room), np.inf
+    hot = 0.01 * mask.sum() / vertices
+    for _ in range(starts):
+        points = outline[np.sort(rng.choice(len(outline), vertices, replace=False))]
+        place = np.array(inset(points, room, 1.0))
+        moves = MOVES * vertices
+        draws = np.column_stack([rng.standard_normal((moves, 2)), rng.uniform(size=(moves, 2))])
+        compiled(annealed)(room, place, 1.0, draws, hot)
+        least = min(least, searched(room, place, 1.0, STEPS)[1])
+    return 100 * least / mask.sum()
+
+
 def best_of_random(mask, vertices, starts, rng):
     """The least RE [%] that pattern searches from random points of the outline come to."""
     room, _ = padded(mask, vertices, 1.0)
@@ -174,6 +216,26 @@ def least_table(fits, starts):
     return table
 
 
+def annealer_table(fits, starts):
+    """The default against the best that an annealer comes to."""
+    table = Table(
+        f"RE [%] against the best of {starts} starts of an annealer, r = 1 px, 14 to 26 px",
+        ("N", "flocs", "default", "annealer", "the lower of both", "default above that %",
+         "s default", "s annealer"),
+    )  # fmt: skip
+    bounds = CLASSES["14 to 26 px"]
+    for count in (4, 8, 16, 32, 64):
+        rng, began = np.random.default_rng(count), time.process_time()
+        masks = fits.masks(*bounds)
+        least = np.array([best_of_annealer(m, count, starts, rng) for m in masks])
+        spent = time.process_time() - began
+        found, times = fits.measure(*bounds, count)
+        both = np.minimum(found, least).mean()
+        table.add(count, len(masks), found.mean(), least.mean(), both,
+                  100 * (found.mean() / both - 1), 1e-3 * times.sum(), spent)  # fmt: skip
+    return table
+
+
 def main():
     """Print the tables."""
     arguments = parse_arguments(__doc__, images=PICTURES)
@@ -184,6 +246,7 @@ def main():
     error_table(fits).print(arguments.markdown)
     time_table(fits).print(arguments.markdown)
     least_table(fits, 30 if arguments.quick else 150).print(arguments.markdown)
+    annealer_table(Fits(flocs, every=8), 15 if arguments.quick else 150).print(arguments.markdown)
     method_table(fits).print(arguments.markdown)
     sample = Fits(flocs, every=8 if arguments.quick else 3)
     for method in ("pattern", "paper"):

@@ -29,6 +29,10 @@ CORE = 2.0
 AROUND = 4
 """Pixels around one of several parts of an island that tell its own level."""
 
+FRINGE, FAR = 8, 24
+"""Pixels around an island between which the light beside it is told: not where the edge itself is
+soft, or has a bright fringe, as under an electron microscope."""
+
 CUT_OFF = 0.1
 """Share of an outline that may lie where its zone ends."""
 
@@ -186,10 +190,13 @@ class Search:
 
     def island(self, mask, box):
         """The outlines in a region of the floor."""
+        if self.contrast[box][mask].max() < 2.0 * self.floor:
+            return []
+        base, floor = self.light_beside(*widened(mask, box, FAR, self.contrast.shape))
         mask, box = widened(mask, box, 12, self.contrast.shape)
         near = self.contrast[box]
-        if near[mask].max() < 2.0 * self.floor:
-            return []
+        if base < 0.0:
+            mask = self.down_to(base + floor, mask, near)
         focus = Focus(near, self.slope, self.scale)
         here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
         offset = box[0].start, box[1].start
@@ -197,8 +204,35 @@ class Search:
             attrs.evolve(each, box=tuple(
                 slice(s.start + o, s.stop + o) for s, o in zip(each.box, offset, strict=True)
             ))
-            for each in self.walk(focus, mask, here, 0.0)
+            for each in self.walk(focus, mask, here, base)
         ]  # fmt: skip
+
+    def light_beside(self, mask, box):
+        """The contrast of the light beside an island, and three times its noise: in a crowd the
+        light that all of a picture has may be too dark for one of its corners. 0 where it is as
+        bright, or the noise hides it."""
+        from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+        from flocsim.io.images.background import robust_deviation
+
+        near = self.contrast[box]
+        lit = near <= self.floor
+        away = distance_transform_edt(~mask)
+        beside = lit & (away > FRINGE) & (away <= FAR)
+        base = float(np.median(near[beside])) if beside.any() else 0.0
+        if base > -self.floor:
+            return 0.0, self.floor
+        fine = (near - gaussian_filter(near, self.scale + 2.0))[beside]
+        floor = max(self.floor, FLOOR * robust_deviation(fine))  # more noise where it is dark
+        return (base if base <= -floor else 0.0), floor
+
+    def down_to(self, level, mask, near):
+        """An island with what stands above a lower level beside it."""
+        from scipy.ndimage import distance_transform_edt, label
+
+        beside = (near <= self.floor) & (near > level) & (distance_transform_edt(~mask) <= FRINGE)
+        parts = label(mask | beside, EIGHT)[0]
+        return np.isin(parts, np.unique(parts[mask]))
 
     def walk(self, focus, mask, box, base):
         """The outlines in a component that stands above a base, boxes in the island."""

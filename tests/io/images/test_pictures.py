@@ -419,3 +419,16 @@ def test_every_real_picture_gives_flocs(name, flocs, least, most):
     assert found.flocs == flocs
     assert least <= len(found.regions) <= most
     assert found.foreground_share < 0.2
+
+
+def test_a_floc_where_the_light_is_brighter_than_the_surface_keeps_its_size():
+    rows, columns = np.mgrid[:300, :300]
+    cover, radius = wavy_disk(150, 150, 15, (300, 300))
+    bright = 1.0 + 0.12 * np.exp(-0.5 * (np.hypot(rows - 150, columns - 150) / 40.0) ** 2)
+    grey = 0.7 * bright * (1.0 - 0.4 * blurred(cover, 1.0))
+    surface = np.full(grey.shape, 0.7)
+    (region,) = segment(grey, background=surface, flocs="dark").regions
+    assert region.base < -0.05
+    assert region.equivalent_radius == pytest.approx(radius, rel=0.01)
+    low, high = region.radius_band
+    assert low < radius < high
