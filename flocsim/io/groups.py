@@ -125,7 +125,7 @@ def write_labelled(
     scales = {name: each for name, each in labelled.axes.items() if name not in inner}
     if inner:
         place.attrs["coordinates"] = " ".join(inner)
-    datasets = []
+    datasets: dict[str, Any] = {}
     for name, column in (scales | inner | labelled.columns).items():
         if create is not None and name in created:
             dataset = create(place, name, column.values)
@@ -134,14 +134,14 @@ def write_labelled(
             values = column.values.tolist() if words else column.values
             kind = h5py.string_dtype() if words else None
             dataset = place.create_dataset(name, data=values, dtype=kind)
-        datasets.append(dataset)
+        datasets[name] = dataset
         if name in scales:
             dataset.make_scale(name)
         dataset.attrs.update(column.about)
         for number, axis in enumerate(column.axes):
             if name not in scales and axis in scales:
-                dataset.dims[number].attach_scale(place[axis])
-    return datasets
+                dataset.dims[number].attach_scale(datasets[axis])
+    return list(datasets.values())
 
 
 def write_groups(

@@ -130,6 +130,7 @@ def test_more_points_extend_a_study_as_if_run_at_once(folder):
     assert read_results("b.h5").count == 16
 
 
+@pytest.mark.slow
 def test_the_number_of_processes_changes_nothing(folder):
     assert main(["ensemble", "kernel.toml", "--quiet"]) == 0
     assert main(["kernel", "kernel.toml", "--quiet", "--jobs", "2", "-o", "b.h5"]) == 0
@@ -185,6 +186,7 @@ def cut_short(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_rates_that_are_left_open_have_a_code_of_their_own(cut_short, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 65
     [line] = [each for each in capsys.readouterr().err.splitlines() if "undecided" in each]

@@ -94,6 +94,7 @@ def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     assert main(["plot", "study.h5", "--figures", "overview"]) == 0
 
 
+@pytest.mark.slow
 def test_a_study_that_grows_has_the_bytes_of_one_run_at_once(folder, monkeypatch):
     monkeypatch.chdir(folder)
     text = STUDY.format(outlines="band", scene=SCENES["resized"])

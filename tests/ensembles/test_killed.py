@@ -54,7 +54,7 @@ def wait_until(holds, seconds):
 )  # fmt: skip
 def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
     monkeypatch.chdir(tmp_path)
-    more = "replicates = 600" if text is PAIRS else "replicates = 40"
+    more = "replicates = 200" if text is PAIRS else "replicates = 40"
     changed = text.replace("replicates = 6", more).replace("replicates = 2", more)
     (tmp_path / "study.toml").write_text(changed, "utf-8")
     first, shows, then = RUNS[name]

@@ -71,6 +71,7 @@ def test_permeable_bodies_fall_faster_and_turn_more_easily(law):
     assert rates[1] / rates[0] == pytest.approx(turning_factor(R, k), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_permeable_doublet_is_one_of_smaller_spheres():
     k = (R / 3.0) ** 2
     forces = [Gravity(), StokesDrag(clusters=True, permeability=k), Contact()]

@@ -85,6 +85,7 @@ def test_what_was_stopped_goes_on_with_the_choice_it_had(first, monkeypatch):
     assert again.run["accuracy"] == found.run["accuracy"]
 
 
+@pytest.mark.slow
 def test_a_file_of_another_choice_is_not_extended(first):
     folder, _ = first
     before = (folder / "one.h5").read_bytes()

@@ -22,6 +22,7 @@ def config(tmp_path_factory):
     return write_small(folder, replicates=6, types='["III"]', delta="[0.0]", vertices="[1]")
 
 
+@pytest.mark.slow
 def test_an_elasticity_is_the_paired_difference_over_the_logarithm(config, tmp_path, monkeypatch):
     parts_here.use(monkeypatch)
     found = elasticities(Study(config), KEYS, tmp_path / "e.png", ratio=4.0)

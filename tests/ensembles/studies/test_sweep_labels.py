@@ -82,7 +82,7 @@ EDITS += [(edit_library, (8.0, 16.0), at) for at in (0, 1, 2)]
 
 @pytest.mark.parametrize(
     ("edit", "ratios", "at"),
-    rest_slow(EDITS, lambda edit, ratios, at: at == (2 if edit is edit_module else 1)),
+    rest_slow(EDITS, lambda edit, ratios, at: edit is edit_module and at == 2),
 )
 def test_an_edit_ends_the_sweep_before_its_next_part(edits, edit, ratios, at):
     folder, done = edits

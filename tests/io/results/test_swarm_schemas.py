@@ -9,11 +9,12 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from tests.helpers.tiers import rest_slow
 
 STORED = Path(__file__).parents[2] / "data"
 
 
-@pytest.mark.parametrize("schema", [4, 5, 6])
+@pytest.mark.parametrize("schema", rest_slow([4, 5, 6], lambda schema: schema == 4))
 def test_files_of_all_schemas_are_opened_described_and_drawn(tmp_path, monkeypatch, capsys, schema):
     monkeypatch.chdir(tmp_path)
     Path("old.h5").write_bytes(gzip.decompress((STORED / f"swarm_{schema}.h5.gz").read_bytes()))
