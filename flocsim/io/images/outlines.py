@@ -119,9 +119,12 @@ def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
 
 def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
     """A mask in a box that is wider by some pixels, as far as the picture goes."""
-    room = [(min(by, s.start), min(by, n - s.stop)) for s, n in zip(box, shape, strict=True)]
-    wide = [slice(s.start - a, s.stop + b) for s, (a, b) in zip(box, room, strict=True)]
-    return np.pad(mask, room), (wide[0], wide[1])
+    wide = [slice(max(s.start - by, 0), min(s.stop + by, n))
+            for s, n in zip(box, shape, strict=True)]  # fmt: skip
+    found = np.zeros([s.stop - s.start for s in wide], mask.dtype)
+    y, x = (s.start - w.start for s, w in zip(box, wide, strict=True))
+    found[y : y + mask.shape[0], x : x + mask.shape[1]] = mask
+    return found, (wide[0], wide[1])
 
 
 def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
