@@ -93,7 +93,8 @@ def draw(rows, varied, path):
                 axes.set_xscale("log")
         all_axes[0].plot([], [], "o", mfc="none", ms=8, color="grey", label="or held apart")
         all_axes[0].set_ylabel("Pr[A]")
-        all_axes[0].legend(title="forces by", loc="center right")
+        side = "center right" if varied == "hamaker" else "lower left"
+        all_axes[0].legend(title="forces by", loc=side)
         save(figure, path)
 
 
