@@ -120,9 +120,11 @@ def pairs_at_random(count, forces):
 @pytest.mark.parametrize("forces", FORCES.values(), ids=FORCES)
 @pytest.mark.parametrize("count", [12, pytest.param(2_000, marks=pytest.mark.slow)])
 def test_the_sum_is_the_integral(count, forces):
+    """Both parts of the second force are far larger than what is left of them."""
     off = np.array([off_by(*each) for each in pairs_at_random(count, forces)])
     assert np.median(off) < 2e-5
-    assert off.max() < 3e-3
+    assert np.quantile(off, 0.99) < 1e-3
+    assert off.max() < 0.03
 
 
 def comb(long, short):
