@@ -91,8 +91,8 @@ def first_swarm(found: SwarmResults) -> tuple:
     position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
     if not np.isfinite(position).all():
         raise UsageError(
-            "bodies have left the first swarm, and a GSD file has the same bodies at all times: "
-            "flocsim plot --animation shows it"
+            "bodies have left the first swarm, and exported motion has the same bodies at all "
+            "times: flocsim plot --animation shows it"
         )
     shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
     return found.scales["time"][known], position, velocity, shapes
