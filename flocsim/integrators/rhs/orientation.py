@@ -29,13 +29,18 @@ def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
     )  # fmt: skip
 
 
-def oriented_now(scene, work, time, j, i):
-    """The OrientedView of two bodies in the state NOW."""
-    x, y = separation(scene, work, at.NOW, j, i)
+def oriented_from(scene, time, j, i, x, y, angle_j, angle_i):
+    """The OrientedView of two bodies, j being seen from i at x, y [m]."""
     bearing = math.atan2(y, x)
-    angle_i = work.motion[at.NOW, i, at.ANGLE] - bearing
-    angle_j = work.motion[at.NOW, j, at.ANGLE] - bearing
-    return oriented_view(scene, time, j, i, length_of(x, y), angle_i, angle_j)
+    one, other = angle_i - bearing, angle_j - bearing
+    return oriented_view(scene, time, j, i, length_of(x, y), one, other)
+
+
+def oriented_now(scene, work, time, j, i):
+    """The same in the state NOW."""
+    x, y = separation(scene, work, at.NOW, j, i)
+    angle_j, angle_i = work.motion[at.NOW, j, at.ANGLE], work.motion[at.NOW, i, at.ANGLE]
+    return oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
 
 
 def energy_at(scene, time, j, i, distance, angle_i, angle_j):
@@ -47,13 +52,11 @@ def between_oriented(scene, time, j, i, x, y, angle_j, angle_i):
     """(fx, fy, torque on j, torque on i) on body j, the later one, which is seen from i at x, y
     [m]; i feels the reverse of fx, fy [N, N, N m, N m]. Nothing where centroids are at one place.
     """
-    distance = length_of(x, y)
+    view = oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
+    distance, one, other = view.centre_distance, view.angle_i, view.angle_j
     if distance == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    bearing = math.atan2(y, x)
-    one, other = angle_i - bearing, angle_j - bearing
-    gap = distance - scene.bodies[i, at.EQUIVALENT_RADIUS] - scene.bodies[j, at.EQUIVALENT_RADIUS]
-    by = SHARE * abs(gap) + LEAST
+    by = SHARE * abs(view.gap) + LEAST
     rise = energy_at(scene, time, j, i, distance + by, one, other)
     rise -= energy_at(scene, time, j, i, distance - by, one, other)
     of_i = energy_at(scene, time, j, i, distance, one + TURN, other)

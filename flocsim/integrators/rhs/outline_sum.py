@@ -156,11 +156,10 @@ def way_to_gap(scene, work, piece, foot, way, wanted):
     return way
 
 
-def add_side(scene, work, total, piece, foot, end, numbers):
-    """(fx, fy, torque about the origin) of a piece from a foot to an end, added to a total."""
+def add_side(scene, work, total, piece, foot, there, end, numbers):
+    """(fx, fy, torque about the origin) of a piece from a foot, where the gap is that ``there``, to
+    an end, added to a total."""
     inset, lens, _ = numbers
-    x, y, _, _, _ = at_parameter(piece, foot)
-    there = gap_from(scene, work, x, y)
     reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
     scale = way_to_gap(scene, work, piece, foot, reach, 3.0 * there + 2.0 * inset)
     near = abs(scale) < abs(reach)
@@ -228,26 +227,33 @@ def depth_of(scene, a, b):
     return 4.0 / 3.0 * min(radius_a, radius_b)
 
 
+def look_around(scene, work, time, a, b, pose):
+    """(inset, lens, OutlineView of the two) of body a in a Pose, the pieces within the lens being
+    listed; a lens of 0 where nothing acts along the outlines."""
+    reach, floor, _, steady = scene.outlines
+    list_near(scene, work, a, b, pose, reach)
+    least = gap_listed(scene, work, pose)
+    inset, lens = max(0.0, floor - least), 0.0
+    if least < reach:
+        lens = max(LENS * math.sqrt((least + inset) * floor), steady)
+        list_near(scene, work, a, b, pose, lens)
+    radius_a, radius_b = radii_of(scene, a, b)
+    view = OutlineView(
+        time, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
+        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
+    )  # fmt: skip
+    return inset, lens, view
+
+
 @apart
 def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     """(fx, fy, torque about b's centroid) on body a [N, N, N m], in the frame of b, where a lies at
     x, y [m] turned by an angle of that cosine and sine."""
     pose = Pose(x, y, cosine, sine)
-    reach, floor, _, steady = scene.outlines
-    list_near(scene, work, a, b, pose, reach)
-    least = gap_listed(scene, work, pose)
-    if not least < reach:
+    numbers = look_around(scene, work, time, a, b, pose)
+    inset, lens, view = numbers
+    if lens == 0.0:
         return 0.0, 0.0, 0.0
-    inset = max(0.0, floor - least)
-    lens = max(LENS * math.sqrt((least + inset) * floor), steady)
-    list_near(scene, work, a, b, pose, lens)
-    depth = depth_of(scene, a, b)
-    radius_a, radius_b = radii_of(scene, a, b)
-    view = OutlineView(
-        time, least, least, least, depth, radius_a, radius_b,
-        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
-    )  # fmt: skip
-    numbers = inset, lens, view
     total = 0.0, 0.0, 0.0
     for i in range(work.near[0]):
         piece = placed(scene.pieces, work.near[1 + i], pose)
@@ -255,14 +261,16 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
         first, last = ends_of(piece)
         for k in range(feet):
             foot = work.feet[k]
+            x_foot, y_foot, _, _, _ = at_parameter(piece, foot)
+            there = gap_from(scene, work, x_foot, y_foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
             if low < foot:
-                total = add_side(scene, work, total, piece, foot, low, numbers)
+                total = add_side(scene, work, total, piece, foot, there, low, numbers)
             if foot < high:
-                total = add_side(scene, work, total, piece, foot, high, numbers)
+                total = add_side(scene, work, total, piece, foot, there, high, numbers)
     fx, fy, torque = total
-    return depth * fx, depth * fy, depth * torque
+    return view.depth * fx, view.depth * fy, view.depth * torque
 
 
 def between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b):

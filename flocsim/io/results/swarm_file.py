@@ -257,13 +257,13 @@ def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
         (replicate, place, *event)
         for replicate, own in enumerate(labels)
         for place in range(1, len(own))
-        for event in between(own[place - 1], own[place])
+        for event in events_between(own[place - 1], own[place])
     ]
     columns = np.array(rows, dtype=np.int32).reshape(-1, len(EVENTS)).T
     return dict(zip(EVENTS, columns.copy(), strict=True))
 
 
-def between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...]]:
+def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...]]:
     """(clusters before, after, bodies, largest, second) of every event from one snapshot to the
     next, in the order of the first bodies."""
     from scipy.sparse import coo_array

@@ -6,22 +6,12 @@ import numpy as np
 import pytest
 
 from flocsim import SpheroPolygon
-from flocsim.arrays import OutlineView
 from flocsim.compiler.composer import compose
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.geometry.surfaces.attraction import EIGHT
 from flocsim.geometry.surfaces.distances import Pose, placed
 from flocsim.geometry.surfaces.nodes import ends_of
-from flocsim.integrators.rhs.outline_sum import (
-    LENS,
-    add_node,
-    depth_of,
-    gap_listed,
-    list_near,
-    radii_of,
-    sum_along,
-)
-from flocsim.integrators.rhs.views import effective_mass
+from flocsim.integrators.rhs.outline_sum import add_node, look_around, sum_along
 from tests.integrators.rhs.test_outline_sum import SIZE, Pair, at_gap, rough
 
 D_MIN, PARTS = 3e-10, 64
@@ -50,19 +40,8 @@ def between(scene, work, piece, low, high, numbers):
 def halved(scene, work, a, b, x, y, cosine, sine, parts, error):
     """(fx, fy) of sum_along by halving: it knows of no feet. ``parts``: scratch."""
     pose = Pose(x, y, cosine, sine)
-    reach, floor, _, steady = scene.outlines
-    list_near(scene, work, a, b, pose, reach)
-    least = gap_listed(scene, work, pose)
-    inset = max(0.0, floor - least)
-    lens = max(LENS * math.sqrt((least + inset) * floor), steady)
-    list_near(scene, work, a, b, pose, lens)
-    depth = depth_of(scene, a, b)
-    radius_a, radius_b = radii_of(scene, a, b)
-    view = OutlineView(
-        0.0, least, least, least, depth, radius_a, radius_b,
-        radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
-    )  # fmt: skip
-    numbers = inset, lens, view
+    numbers = look_around(scene, work, 0.0, a, b, pose)
+    depth = numbers[2].depth
     fx, fy = 0.0, 0.0
     for i in range(work.near[0]):
         piece = placed(scene.pieces, work.near[1 + i], pose)
