@@ -18,7 +18,8 @@ from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.fit import paper as fit_paper
 from flocsim.geometry.fit.coverage import compiled, cover, move_vertex, neighbours, padded
-from flocsim.geometry.fit.search import count_errors, leaves_room, searched
+from flocsim.geometry.fit.edge_errors import leaves_room
+from flocsim.geometry.fit.search import count_errors, searched
 from flocsim.geometry.fit.simple import stays_simple
 from flocsim.geometry.fit.starts import even_start, inset, trace_outline
 
@@ -190,32 +191,6 @@ def best_of_annealer(mask, vertices, starts, rng):
     return 100 * least / mask.sum()
 
 
-def best_of_random(mask, vertices, starts, rng):
-    """The least RE [%] that pattern searches from random points of the outline come to."""
-    room, _ = padded(mask, vertices, 1.0)
-    outline, least = trace_outline(room), np.inf
-    for _ in range(starts):
-        points = outline[np.sort(rng.choice(len(outline), vertices, replace=False))]
-        least = min(least, searched(room, inset(points, room, 1.0), 1.0, STEPS)[1])
-    return 100 * least / mask.sum()
-
-
-def least_table(fits, starts):
-    """The default against the best of many random starts, where starts matter most."""
-    table = Table(
-        f"How much lower RE [%] can be: the best of {starts} random starts, r = 1 px, 14 to 26 px",
-        ("N", "default", "random starts", "the lower of both", "every 4th"),
-    )
-    bounds = CLASSES["14 to 26 px"]
-    for count in (4, 8):
-        rng = np.random.default_rng(count)
-        found = fits.measure(*bounds, count)[0]
-        least = np.array([best_of_random(m, count, starts, rng) for m in fits.masks(*bounds)])
-        both = np.minimum(found, least)
-        table.add(count, found.mean(), least.mean(), both.mean(), both[::4].mean())
-    return table
-
-
 def annealer_table(fits, starts):
     """The default against the best that an annealer comes to."""
     table = Table(
@@ -245,8 +220,7 @@ def main():
     fits = Fits(flocs, every=4 if arguments.quick else 1)
     error_table(fits).print(arguments.markdown)
     time_table(fits).print(arguments.markdown)
-    least_table(fits, 30 if arguments.quick else 150).print(arguments.markdown)
-    annealer_table(Fits(flocs, every=8), 15 if arguments.quick else 150).print(arguments.markdown)
+    annealer_table(Fits(flocs, every=4), 15 if arguments.quick else 150).print(arguments.markdown)
     method_table(fits).print(arguments.markdown)
     sample = Fits(flocs, every=8 if arguments.quick else 3)
     for method in ("pattern", "paper"):

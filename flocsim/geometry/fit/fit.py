@@ -82,9 +82,9 @@ def fit_mask(
     spheroradius of its boundary.
 
     mask: (h, w) bool or 0/1, one 8-connected region; vertices: N ≥ 1; radius: spheroradius [px].
-    method: "pattern" starts from the best splits of the outline into N segments, moves each vertex
-    in eight directions by shrinking steps (8 … 0.25 px) while V falls, then takes vertices from
-    where they count least to where they lower V; "paper" lets the vertices move as damped
+    method: "pattern" starts from the best N of points along the outline, moves all vertices at
+    once while V falls, anneals them, and moves one after the other by shrinking steps
+    (1 … 0.25 px) while V falls; "paper" lets the vertices move as damped
     particles down the gradient of V (paper, section 2.3), from even spacing; "even" spaces N points
     evenly on the outline, drawn in by the radius, and leaves them there (the plain baseline).
     preserve_area: the swept area is exactly the mask's; "pattern" then also minimises the

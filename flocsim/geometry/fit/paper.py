@@ -9,7 +9,7 @@ than a fraction of a pixel, even spacing, and no lower V for a while.
 import numpy as np
 
 from flocsim.geometry.fit.coverage import compiled, count_wrong, cover, move_vertex, neighbours
-from flocsim.geometry.fit.search import leaves_room
+from flocsim.geometry.fit.edge_errors import leaves_room
 from flocsim.geometry.fit.simple import stays_simple
 
 FORCE = 0.5

@@ -1,28 +1,29 @@
-"""From a mask to N vertices: starts, pattern search, and moving vertices to where they are needed.
+"""From a mask to N vertices: starts, steps of all vertices at once, annealing, pattern search.
 
-1. Starts: the corners of the best split of the outline into N segments, for small N from several
-   first breaks; the points that tell most; even spacing.
-2. Each start is searched by coarse steps, the best few by fine ones.
-3. The vertices of the best that count least go to where they lower V. A polygon that no single step
-   improves can still have its vertices in the wrong places: taking vertex k out costs so many
-   pixels, one more vertex in edge e gains so many. Both are estimated by single moves; the pairs
-   that promise most are tried in earnest, with a search around both places.
+1. Starts: the best N of points along the outline (splits.py); the points that tell most; even
+   spacing; where vertices are crowded, a search with half as many.
+2. The best two are lowered by steps of all their vertices at once, and the better one annealed
+   (annealing.py).  Both take V as a sum over edges (edge_errors.py).
+3. The best of all these, by the pixels counted, is searched vertex by vertex.
 
-Every start passes through the same search, so that V never ends above that of even spacing.
+The starts are among those, so that V never ends above that of even spacing.
 
 A search lowers V + balance·|excess| + outside·(V + excess): V the wrong pixels, excess those
 covered less those of the mask, so that V + excess is twice the pixels covered outside of the mask.
+Sums over edges have no balance, which is left to the last search.
 """
 
 import numpy as np
 
+from flocsim.geometry.fit.annealing import annealed_runs
 from flocsim.geometry.fit.coverage import compiled, count_wrong, cover, move_vertex, neighbours
+from flocsim.geometry.fit.edge_errors import leaves_room, running_sums
 from flocsim.geometry.fit.simple import is_simple, stays_simple
+from flocsim.geometry.fit.splits import descend, split_outline
 from flocsim.geometry.fit.starts import (
     even_points,
     inset,
     ring_inside,
-    split_corners,
     telling_points,
     trace_outline,
 )
@@ -33,31 +34,19 @@ COARSE = np.array([8.0, 4.0, 2.0, 1.0])
 FINE = np.array([1.0, 0.5, 0.25])
 """Last steps [px], below a pixel."""
 
-FINALISTS = 3
-"""So many starts are searched by fine steps."""
+FEW_VERTICES = 12
+"""Up to so many a search finds their places from any start."""
 
-FEW = 12
-"""Up to so many vertices a search ends in many different places: more starts are tried."""
-
-FIRST_BREAKS = 8
-"""Splits into few segments that are tried, from first breaks spread over one segment."""
-
-CRAMPED = 3.0
+CRAMPED = 1.5
 """Vertices are many for a floc if they are nearer than so many radii along the outline."""
 
-OUTLINE_POINTS = 96
-"""An outline of more points than this and 4 N is thinned out before it is split."""
+LOWERED = 2
+"""So many starts are lowered by steps of all their vertices at once."""
 
-MOVE_STEPS = np.array([4.0, 2.0, 1.0, 0.5, 0.25])
-"""Steps [px] of a vertex that was moved elsewhere, and of those beside it."""
+DESCENT = np.array([2.0, 1.0, 0.5])
+"""Steps [px] of all vertices at once."""
 
-TRIALS = 8
-"""Pairs (vertex, edge) that are tried before vertices stay where they are."""
-
-COMPASS = 8
-"""Directions in which a vertex is tried."""
-
-ANGLES = np.pi / 4.0 * np.arange(COMPASS)
+ANGLES = np.pi / 4.0 * np.arange(8)
 DIRECTIONS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 NO_STEPS = np.zeros(0)
 
@@ -84,13 +73,6 @@ def stepped(vertices, k, directions, direction, step):
     x, y = vertices[k]
     across, down = directions[direction]
     return x + step * across, y + step * down
-
-
-def leaves_room(shape, new, margin):
-    """Whether a place is at least `margin` from the array's rim: pixels off it are not counted."""
-    x, y = new
-    height, width = shape
-    return min(x, y) >= margin and x <= width - 1 - margin and y <= height - 1 - margin
 
 
 def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
@@ -181,110 +163,48 @@ def count_errors(mask: np.ndarray, vertices: np.ndarray, radius: float) -> int:
     return searched(mask, vertices, radius, NO_STEPS)[1]
 
 
-def insertion_gain(mask, odd, near, vertices, k, radius, steps):
-    """Fall of V by a vertex one step away from the middle of edge k, the best of all steps."""
-    _, before, after = neighbours(vertices, k)
-    (ax, ay), (bx, by) = before, after
-    x, y = 0.5 * (ax + bx), 0.5 * (ay + by)
-    length = np.hypot(bx - ax, by - ay)
-    gain = 0
-    for step in steps:
-        for direction in range(COMPASS if step < length + 1.0 else 0):
-            angle = 2.0 * np.pi * direction / COMPASS
-            new = x + step * np.cos(angle), y + step * np.sin(angle)
-            change, _ = move_vertex(mask, odd, near, before, (x, y), after, new, radius, False)
-            gain = max(gain, -change)
-    return gain
-
-
-def estimates(mask, vertices, radius, steps, found):
-    """Growth of V when a vertex is left out, and insertion_gain of the edge after it [px], into
-    ``found`` (N, 2)."""
-    odd, near = cover(vertices, radius, mask.shape)
-    for k in range(len(vertices)):
-        before, here, after = neighbours(vertices, k)
-        cost, _ = move_vertex(mask, odd, near, before, here, after, before, radius, False)
-        found[k, 0] = cost
-        found[k, 1] = insertion_gain(mask, odd, near, vertices, k, radius, steps)
-
-
-def promising_pairs(costs, gains):
-    """The TRIALS pairs (vertex, edge) of least cost − gain, the best first."""
-    count = len(costs)
-    cheap = np.argsort(costs, kind="stable")[:TRIALS].tolist()
-    rich = np.argsort(-gains, kind="stable")[:TRIALS].tolist()
-    pairs = [(k, e) for k in cheap for e in rich if e not in (k, (k - 1) % count)]
-    return sorted(pairs, key=lambda pair: costs[pair[0]] - gains[pair[1]])[:TRIALS]
-
-
-def moved(vertices, removed, edge):
-    """The polygon without a vertex, with one in the middle of an edge; (N,) bool: those nearby."""
-    middle = 0.5 * (vertices[edge] + vertices[(edge + 1) % len(vertices)])
-    trial = np.delete(np.insert(vertices, edge + 1, middle, axis=0), removed + (removed > edge), 0)
-    nearby = np.zeros(len(trial), bool)
-    for place in (edge + 1 - (removed <= edge), removed + (removed > edge)):
-        nearby[np.arange(place - 2, place + 3) % len(trial)] = True
-    return trial, nearby
-
-
-def relocate(mask, vertices, objective, radius, weights):
-    """Take the first promising move of a vertex that lowers the objective, again and again."""
-    while len(vertices) > 2 and objective > 0:
-        found = np.empty((len(vertices), 2))
-        compiled(estimates)(mask, vertices, radius, MOVE_STEPS, found)
-        costs, gains = found.T
-        for removed, edge in promising_pairs(costs, gains):
-            start, nearby = moved(vertices, removed, edge)
-            if not is_simple(start):
-                continue
-            trial, reached = searched(mask, start, radius, MOVE_STEPS, weights, nearby)
-            if reached < objective:
-                vertices, objective = trial, reached
-                break
-        else:
-            break
-    return vertices
-
-
 def pattern_fit(
     mask: np.ndarray, count: int, radius: float, weights: tuple[int, int] = PLAIN
 ) -> np.ndarray:
-    """The best of several pattern searches, refined: (N, 2) as x, y-down [px].
+    """The best of several searches: (N, 2) as x, y-down [px].
 
     mask: with room around it (coverage.padded); weights: what counts beside V.
     """
-    starts = _starts(mask, count, radius)
-    if weights == INSCRIBED:
-        starts.append(ring_inside(mask, count))
-    coarse = [searched(mask, start, radius, COARSE, weights) for start in starts]
-    coarse.sort(key=lambda found: found[1])
-    fine = [searched(mask, s, radius, FINE, weights) for s, _ in coarse[:FINALISTS]]
-    best, objective = min(fine, key=lambda found: found[1])
-    vertices = relocate(mask, best, objective, radius, weights)
+    sums = running_sums(mask, weights[1])
+    trials = _starts(mask, sums, count, radius)
+    if count > 2:
+        for start in _lowest(mask, trials, radius, weights)[:LOWERED]:
+            vertices = np.array(start)
+            compiled(descend)(sums, vertices, radius, DIRECTIONS, DESCENT)
+            trials.append(vertices)
+        best = _lowest(mask, trials, radius, weights)[0]
+        for vertices in annealed_runs(sums, best, radius, int(mask.sum())):
+            compiled(descend)(sums, vertices, radius, DIRECTIONS, FINE)
+            trials.append(vertices)
+    else:
+        trials += [searched(mask, start, radius, COARSE, weights)[0] for start in trials]
+    best = _lowest(mask, trials, radius, weights)[0]
+    vertices = searched(mask, best, radius, FINE, weights)[0]
     if weights == INSCRIBED:
         vertices = searched(mask, vertices, radius, np.append(COARSE, FINE[1:]), INSIDE)[0]
     return vertices
 
 
-def _starts(mask, count, radius):
+def _lowest(mask, trials, radius, weights):
+    """The trials, those of the lowest objective first."""
+    return sorted(trials, key=lambda trial: searched(mask, trial, radius, NO_STEPS, weights)[1])
+
+
+def _starts(mask, sums, count, radius):
     outline = trace_outline(mask)
-    choices = [*_splits(outline, count), _telling(outline, count), even_points(outline, count)]
-    starts = [inset(points, mask, radius) for points in choices]
+    split = split_outline(sums, outline, count, radius) if count > 2 else None
+    starts = [] if split is None else [inset(split, mask, 0.0)]
+    starts += [
+        inset(p, mask, radius) for p in (_telling(outline, count), even_points(outline, count))
+    ]
     if CRAMPED * count * radius > len(outline):
-        cramped = _split_coarser(mask, outline, count, radius)
-        starts += [start for start in (cramped, ring_inside(mask, count)) if is_simple(start)]
-    return starts
-
-
-def _splits(outline, count):
-    """Corners of the best split, the first break free; of more, with other first breaks, if few."""
-    size = max(min(len(outline), OUTLINE_POINTS), 4 * count)
-    points = even_points(outline, size)
-    farthest = int(np.argmax(np.hypot(*(points - points.mean(axis=0)).T)))
-    yield split_corners(points, count, farthest, 2)
-    for k in range(1, FIRST_BREAKS if count <= FEW else 1):
-        shift = k * size // (count * FIRST_BREAKS)
-        yield split_corners(points, count, (farthest + shift) % size, 0)
+        starts += [_split_coarser(mask, outline, count, radius), ring_inside(mask, count)]
+    return [start for start in starts if is_simple(start)]
 
 
 def _telling(outline, count):
@@ -298,7 +218,7 @@ def _split_coarser(mask, outline, count, radius):
     Where vertices are many for the floc's size, starts on the outline are cramped; this is not.
     """
     half = max(2, (count + 1) // 2)
-    if half < FEW:
+    if half < FEW_VERTICES:
         start = inset(_telling(outline, half), mask, radius)
     else:
         start = inset(_split_coarser(mask, outline, half, radius), mask, 0.0)

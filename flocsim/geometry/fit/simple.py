@@ -53,6 +53,61 @@ def all_clear(vertices):
     return True
 
 
+def edge_is_open(vertices, k, gap):
+    """Whether edge k keeps clear of all others, and by `gap` of those that face it outside.
+
+    The polygon lies on the right hand of its walk.  Edges that meet are not facing each other.
+    """
+    count = len(vertices)
+    before, after = (k - 1) % count, (k + 1) % count
+    clear, limit = CLEARANCE * CLEARANCE, gap * gap
+    ax, ay = vertices[k, 0], vertices[k, 1]
+    bx, by = vertices[after, 0], vertices[after, 1]
+    nx, ny = by - ay, ax - bx
+    if nx * nx + ny * ny < clear:
+        return False
+    left, right = min(ax, bx) - gap, max(ax, bx) + gap
+    top, bottom = min(ay, by) - gap, max(ay, by) + gap
+    for i in range(count):
+        j = i + 1 if i < count - 1 else 0
+        cx, cy = vertices[i, 0], vertices[i, 1]
+        dx, dy = vertices[j, 0], vertices[j, 1]
+        if i == k or max(cx, dx) < left or min(cx, dx) > right:
+            continue
+        if max(cy, dy) < top or min(cy, dy) > bottom:
+            continue
+        c, d = segment_distance2(cx, cy, ax, ay, bx, by), segment_distance2(dx, dy, ax, ay, bx, by)
+        a, b = segment_distance2(ax, ay, cx, cy, dx, dy), segment_distance2(bx, by, cx, cy, dx, dy)
+        if i in (before, after):
+            # Of two neighbours the far ends; in a triangle all edges are neighbours.
+            far = min(b, c) if i == before else min(a, d)
+            if far < clear:
+                return False
+            continue
+        if min(min(a, b), min(c, d)) < clear or segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
+            return False
+        mx, my = dy - cy, cx - dx
+        if nx * mx + ny * my >= 0.0:
+            continue
+        ends_in_front = (
+            (c < limit and nx * (cx - ax) + ny * (cy - ay) > 0.0)
+            or (d < limit and nx * (dx - ax) + ny * (dy - ay) > 0.0)
+            or (a < limit and mx * (ax - cx) + my * (ay - cy) > 0.0)
+            or (b < limit and mx * (bx - cx) + my * (by - cy) > 0.0)
+        )
+        if ends_in_front:
+            return False
+    return True
+
+
+def is_open(vertices, gap):
+    """Whether the polygon is simple, and no two of its edges face each other outside by < gap."""
+    for k in range(len(vertices)):  # noqa: SIM110
+        if not edge_is_open(vertices, k, gap):
+            return False
+    return True
+
+
 def reverse(vertices, first, last):
     while first < last:
         for axis in range(2):
