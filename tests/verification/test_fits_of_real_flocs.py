@@ -57,17 +57,18 @@ def test_claim_2_spheropolygons_beat_spheres():
 
 
 @pytest.mark.parametrize(
-    "counts", rest_slow([[28], [8, 16, 28, 64]], lambda counts: len(counts) == 1)
+    "counts", rest_slow([[64], [16, 28, 64]], lambda counts: len(counts) == 1)
 )
-def test_claim_3_errors_rise_with_the_radius_from_eight_vertices_on(counts):
+def test_claim_3_errors_rise_with_the_radius_from_sixteen_vertices_on(counts):
     means = [np.mean([large(n, r) for n in counts], axis=0) for r in RADII]
     assert interval(means[1] - means[0])[0] > 0
     assert interval(means[2] - means[1])[0] > 0
 
 
-def test_claim_3_does_not_hold_for_four_vertices():
-    """Four sharp corners suit a round floc less than four round ones."""
-    assert interval(large(4, 4.0) - large(4, 1.0))[1] < 0
+@pytest.mark.parametrize("vertices", [4, 8])
+def test_claim_3_does_not_hold_for_few_vertices(vertices):
+    """Few sharp corners suit a round floc less than few round ones."""
+    assert interval(large(vertices, 4.0) - large(vertices, 1.0))[1] < 0
 
 
 @pytest.mark.parametrize("radius", rest_slow(RADII, lambda radius: radius == 1.0))

@@ -40,6 +40,9 @@ FEW_VERTICES = 12
 CRAMPED = 1.5
 """Vertices are many for a floc if they are nearer than so many radii along the outline."""
 
+FINALISTS = 3
+"""So many of all trials are searched vertex by vertex."""
+
 LOWERED = 2
 """So many starts are lowered by steps of all their vertices at once."""
 
@@ -183,8 +186,11 @@ def pattern_fit(
             trials.append(vertices)
     else:
         trials += [searched(mask, start, radius, COARSE, weights)[0] for start in trials]
-    best = _lowest(mask, trials, radius, weights)[0]
-    vertices = searched(mask, best, radius, FINE, weights)[0]
+    fine = [
+        searched(mask, trial, radius, FINE, weights)
+        for trial in _lowest(mask, trials, radius, weights)[:FINALISTS]
+    ]
+    vertices, _ = min(fine, key=lambda found: found[1])
     if weights == INSCRIBED:
         vertices = searched(mask, vertices, radius, np.append(COARSE, FINE[1:]), INSIDE)[0]
     return vertices
