@@ -26,7 +26,7 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.errors import UsageError
 from flocsim.forces import VanDerWaals
-from flocsim.forces.drag import is_permeable
+from flocsim.forces.drag import solid_radius
 from flocsim.forces.thermal import thermal_in
 from flocsim.hydrodynamics import Meeting, SpherePair
 
@@ -86,24 +86,25 @@ def share_in(pair: Encounter, water: bool) -> float:
     if words := unknown_in_water(pair):
         raise UsageError(f"how often spheres touch in water cannot be computed {words}")
     first, second = (shape.equivalent_radius for shape in pair.shapes)
-    spheres = SpherePair((first, second), system.fluid.viscosity)
+    # Of flocs that water passes through the solid spheres that resist as much.
+    inner = tuple(solid_radius(radius, system.forces) for radius in (first, second))
+    spheres = SpherePair(inner, system.fluid.viscosity)
+    passed = first + second - sum(inner)
     force = repulsion(system.forces, (first, second), system.fluid)
     cuts = [each.d_min for each in system.forces if isinstance(each, VanDerWaals)]
-    meeting = Meeting(spheres, force, min(cuts, default=MINIMUM_GAP), water)
+    meeting = Meeting(spheres, force, min(cuts, default=MINIMUM_GAP), water, passed)
     if pair.rate is not None:
         return meeting.in_flow(pair.meeting, pair.rate)
     # The weights of spheres that settle alone, by Stokes's law, as fast as these do.
     speeds = [-float(velocity[1]) for velocity, _ in pair.settling]
     drag = 6.0 * math.pi * system.fluid.viscosity
-    return meeting.settling((drag * first * speeds[0], drag * second * speeds[1]))
+    return meeting.settling((drag * inner[0] * speeds[0], drag * inner[1] * speeds[1]))
 
 
 def unknown_in_water(pair: Encounter) -> str:
     """Why what water does to two spheres cannot be said of a pair; "" where it can."""
     if thermal_in(pair.system.forces):
         return "with thermal kicks: leave [forces.thermal] out"
-    if is_permeable(pair.system.forces):
-        return "of flocs that water passes through: leave the permeability of [forces.drag] out"
     if any(body.fixed for body in pair.system.bodies):
         return "with a fixed receiver: choose scene.receiver = 'free'"
     if pair.meeting == SETTLING and any(pair.system.fluid.flow):

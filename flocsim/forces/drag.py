@@ -285,6 +285,15 @@ def shields_clusters(forces: Iterable[Force]) -> bool:
     return any(isinstance(force, StokesDrag) and force.clusters for force in forces)
 
 
+def solid_radius(radius: float, forces: Iterable[Force]) -> float:
+    """Radius [m] of the solid sphere that resists as one of ``radius`` under the drag among
+    ``forces``: smaller where water passes through it."""
+    for force in forces:
+        if isinstance(force, StokesDrag) and force.permeability > 0.0:
+            radius *= drag_factor(radius, force.permeability)
+    return radius
+
+
 def is_permeable(forces: Iterable[Force]) -> bool:
     """Whether a drag among the forces is that of bodies which water passes through."""
     return any(isinstance(force, StokesDrag) and force.permeability > 0.0 for force in forces)

@@ -60,13 +60,16 @@ class Meeting:
     """Two spheres of a ``pair`` and the ``force`` between them.
 
     They touch at the gap ``touch`` [m], where attraction has taken over. ``water``: whether one
-    moves the water around the other.
+    moves the water around the other. ``passed`` [m]: where water passes through what is outermost,
+    by how much the sum of the radii is larger than that of the ``pair``, which are those of solid
+    spheres with the same drag; gaps are those of what is outermost.
     """
 
     pair: SpherePair
     force: Force
     touch: float
     water: bool = True
+    passed: float = 0.0
 
     def __attrs_post_init__(self) -> None:
         if not 0.0 < self.touch < 0.1 * self.reach:
@@ -78,10 +81,11 @@ class Meeting:
     @property
     def reach(self) -> float:
         """r₁ + r₂ [m]."""
-        return sum(self.pair.radii)
+        return sum(self.pair.radii) + self.passed
 
     def motion(self, gap: np.ndarray) -> Relative:
         """How they move against each other."""
+        gap = gap + self.passed
         return self.pair.relative(gap) if self.water else self.pair.alone(gap)
 
     def spline(self, columns: Callable[[np.ndarray, Relative], list[np.ndarray]]) -> Any:

@@ -40,6 +40,15 @@ def test_more_attraction_lets_more_touch(tmp_path):
     assert weak < 0.7 * strong
 
 
+def test_more_touch_where_water_passes_through(tmp_path):
+    [solid], [nearly], [open_] = (
+        facts(tmp_path, more=f'[forces.drag]\npermeability = "{each} m^2"')
+        for each in ("0", "1e-18", "1e-12")
+    )
+    assert nearly["water"] == pytest.approx(solid["water"], rel=0.1)
+    assert 1.5 * solid["water"] < open_["water"] < open_["alone"]
+
+
 @pytest.mark.parametrize(("scene", "more", "words"), [
     ('receiver = "fixed"', "", "with a fixed receiver: choose scene.receiver = 'free'"),
     ("", '[forces.thermal]\ntemperature = "293 K"', "with thermal kicks"),

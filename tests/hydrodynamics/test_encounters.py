@@ -5,6 +5,7 @@ import pytest
 
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import Meeting, SpherePair, encounters
+from flocsim.hydrodynamics.permeable import drag_factor
 from tests.helpers.tiers import rest_slow
 
 
@@ -144,3 +145,34 @@ def test_other_flows_are_refused(flow, rate):
 def test_alike_ones_never_meet():
     with pytest.raises(UsageError, match="settle at the same speed"):
         Meeting(SpherePair((1.0, 1.0)), np.zeros_like, 1e-6).settling((1.0, 1.0))
+
+
+def permeable(radii, k, flow, water=True):
+    """The share that touches of spheres of permeability 1/25 of the larger one's r²."""
+    inner = tuple(r * drag_factor(r, 0.04) for r in radii)
+    passed = sum(radii) - sum(inner)
+    meeting = Meeting(SpherePair(inner), attraction(radii, k), 1e-7, water, passed)
+    if flow:
+        return meeting.in_flow(flow, 1.0)
+    return meeting.settling(weights_of(radii))
+
+
+def test_what_water_passes_through_touches_as_its_solid_inside_does_at_a_distance():
+    inner, passed, touch = (0.6, 1.0), 0.05, 1e-3
+    pair, weights = SpherePair(inner), weights_of(inner)
+    solid = Meeting(pair, np.zeros_like, passed + touch).settling(weights)
+    found = Meeting(pair, np.zeros_like, touch, passed=passed).settling(weights)
+    assert found * (1.6 + passed) ** 2 == pytest.approx(solid * 1.6**2, rel=2e-3)
+
+
+@pytest.mark.parametrize("flow", ["", pytest.param("shear", marks=pytest.mark.slow)])
+def test_permeable_spheres_touch_more_often_than_solid_ones(long_steps, flow):
+    radii = (0.5, 1.0)
+    found = permeable(radii, 1e-4, flow)
+    meeting = Meeting(SpherePair(radii), attraction(radii, 1e-4), 1e-7)
+    solid = meeting.in_flow(flow, 1.0) if flow else meeting.settling(weights_of(radii))
+    assert 1.5 * solid < found < 0.9 * permeable(radii, 1e-4, flow, water=False)
+
+
+def weights_of(radii):
+    return tuple(6.0 * np.pi * radius**3 for radius in radii)
