@@ -87,7 +87,7 @@ def share_in(pair: Encounter, water: bool) -> float:
         raise UsageError(f"how often spheres touch in water cannot be computed {words}")
     first, second = (shape.equivalent_radius for shape in pair.shapes)
     # Of flocs that water passes through the solid spheres that resist as much.
-    inner = tuple(solid_radius(radius, system.forces) for radius in (first, second))
+    inner = solid_radius(first, system.forces), solid_radius(second, system.forces)
     spheres = SpherePair(inner, system.fluid.viscosity)
     passed = first + second - sum(inner)
     force = repulsion(system.forces, (first, second), system.fluid)
