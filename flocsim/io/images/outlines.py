@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
 from flocsim.io.images.focus import Focus, rim
 
 EIGHT = np.ones((3, 3), int)
@@ -133,18 +134,30 @@ def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[f
     fine: the deviation that white noise would leave; grain, which is coarser, is told by what goes
     with a little more blur.
     """
-    from scipy.ndimage import gaussian_filter
-
-    from flocsim.io.images.background import noise_deviation
-
-    grain = noise_deviation(contrast - gaussian_filter(contrast, scale + 2.0))
-    noise = max(fine, grain)
+    noise = max(fine, robust_deviation(sampled(contrast) - sampled_blur(contrast, scale + 2.0)))
     if min(contrast.shape) < 2:
         return noise, 0.0
-    down, across = np.gradient(contrast)
-    square = (down * down + across * across)[np.abs(contrast) < FLOOR * noise]
+    squares = []
+    for rows in strips(contrast):
+        above = max(rows.start - 1, 0)
+        down, across = np.gradient(contrast[above : rows.stop + 1])
+        square = (down * down + across * across)[rows.start - above : rows.stop - above]
+        quiet = np.abs(contrast[rows]) < FLOOR * noise
+        squares.append(square[quiet].astype(np.float32))
+    square = np.concatenate(squares)
     # The square of two normal numbers of deviation s has the median 2 ln 2 s².
-    return noise, float(np.median(square) / np.log(2.0)) if square.size else 0.0
+    middle = np.median(square, overwrite_input=True) if square.size else 0.0
+    return noise, float(middle / np.log(2.0))
+
+
+def sampled_blur(contrast, blur):
+    """`sampled` of a contrast that is blurred by so many pixels."""
+    from scipy.ndimage import gaussian_filter1d
+
+    stride = stride_of(contrast.shape)
+    across = [gaussian_filter1d(contrast[rows], blur, axis=1)[:, ::stride]
+              for rows in strips(contrast)]  # fmt: skip
+    return gaussian_filter1d(np.concatenate(across), blur, axis=0)[::stride]
 
 
 def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndarray, float]:
@@ -215,8 +228,6 @@ class Search:
         light that all of a picture has may be too dark for one of its corners. 0 where it is as
         bright, or the noise hides it."""
         from scipy.ndimage import distance_transform_edt, gaussian_filter
-
-        from flocsim.io.images.background import robust_deviation
 
         near = self.contrast[box]
         lit = near <= self.floor
