@@ -6,6 +6,7 @@ import numpy as np
 from flocsim.io.images.focus import rim
 from flocsim.io.images.outlines import (
     BAND,
+    EIGHT,
     PIXEL,
     SHARP,
     filled,
@@ -261,20 +262,43 @@ def bodies(mask, neck, min_radius):
     """The mask's pixels numbered by body, from 1, 0 outside; and the width of the widest neck that
     is cut, as a share of the smaller body's."""
     from scipy.ndimage import distance_transform_edt
-    from skimage.feature import peak_local_max
     from skimage.segmentation import watershed
 
     depth = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
-    peaks = peak_local_max(
-        depth, min_distance=max(1, int(0.5 * min_radius)), labels=mask.astype(int),
-        exclude_border=False,
-    )  # fmt: skip
-    if len(peaks) < 2:
+    peaks = peaks_of(depth, max(1, int(0.5 * min_radius)))
+    if not has_neck(depth, peaks, neck):
         return mask.astype(int), 1.0
     markers = np.zeros(mask.shape, int)
     markers[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
     basins = watershed(-depth, markers, connectivity=2, mask=mask)
     return joined(basins, depth, neck, min_radius)
+
+
+def peaks_of(depth, apart):
+    """(n, 2) the pixels that are as high as all within a distance, the highest first, and no two of
+    them nearer than that: as scikit-image's peak_local_max has them."""
+    from scipy.ndimage import maximum_filter
+
+    highest = (depth == maximum_filter(depth, 2 * apart + 1)) & (depth > depth.min())
+    left = np.argwhere(highest)
+    left = left[np.argsort(-depth[highest], kind="stable")]
+    found = []
+    while len(left):
+        found.append(left[0])
+        left = left[np.abs(left - left[0]).max(axis=1) >= apart]
+    return np.array(found, int).reshape(-1, 2)
+
+
+def has_neck(depth, peaks, neck):
+    """Whether any peak is cut off from all higher ones, where depth is no more than `neck` of its
+    own.  Where none is, `joined` would join all basins."""
+    from scipy.ndimage import label
+
+    for count, height in enumerate(depth[tuple(peaks.T)][1:].tolist(), start=1):
+        parts = label(depth > neck * height, EIGHT)[0][tuple(peaks.T)]
+        if parts[count] == 0 or parts[count] not in parts[:count]:
+            return True
+    return False
 
 
 def passes(basins, depth):
