@@ -13,6 +13,7 @@ import numpy as np
 
 from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
 from flocsim.io.images.focus import Focus, rim
+from flocsim.io.images.slopes import around
 
 EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""
@@ -118,14 +119,25 @@ def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
         yield parts[inner] == number, (place[0], place[1])
 
 
-def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
-    """A mask in a box that is wider by some pixels, as far as the picture goes."""
-    wide = [slice(max(s.start - by, 0), min(s.stop + by, n))
-            for s, n in zip(box, shape, strict=True)]  # fmt: skip
+def beyond(box: Box, by: int) -> Box:
+    """A box that is wider by some pixels on every side, be they in the picture or not."""
+    rows, columns = box
+    return slice(rows.start - by, rows.stop + by), slice(columns.start - by, columns.stop + by)
+
+
+def placed(mask: np.ndarray, box: Box, wide: Box) -> np.ndarray:
+    """A mask in a wider box."""
     found = np.zeros([s.stop - s.start for s in wide], mask.dtype)
     y, x = (s.start - w.start for s, w in zip(box, wide, strict=True))
     found[y : y + mask.shape[0], x : x + mask.shape[1]] = mask
-    return found, (wide[0], wide[1])
+    return found
+
+
+def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
+    """A mask in a box that is wider by some pixels, as far as the picture goes."""
+    rows, columns = (slice(max(s.start, 0), min(s.stop, size))
+                     for s, size in zip(beyond(box, by), shape, strict=True))  # fmt: skip
+    return placed(mask, box, (rows, columns)), (rows, columns)
 
 
 def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
@@ -191,12 +203,16 @@ class Search:
         """All regions, in focus or not, that are not fainter than a share of the typical one."""
         from scipy.ndimage import find_objects, label
 
-        labels = label(self.contrast > self.floor, EIGHT)[0]
-        large = np.bincount(labels.ravel()) >= max(SMALLEST * self.area, 1.0)
+        above = self.contrast > self.floor
+        labels, count = label(above, EIGHT)
+        numbers, boxes = labels[above], find_objects(labels)
+        highest = np.zeros(count + 1)
+        np.maximum.at(highest, numbers, self.contrast[above])
+        large = np.bincount(numbers, minlength=count + 1) >= max(SMALLEST * self.area, 1.0)
         found: list[Outline] = []
-        for number, box in enumerate(find_objects(labels), start=1):
-            if large[number]:
-                found += self.island(labels[box] == number, box)
+        for number in np.flatnonzero(large & (highest >= 2.0 * self.floor)).tolist():
+            box = boxes[number - 1]
+            found += self.island(labels[box] == number, box)
         return without_faint(found, self.in_focus)
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
@@ -206,9 +222,7 @@ class Search:
 
     def island(self, mask, box):
         """The outlines in a region of the floor."""
-        if self.contrast[box][mask].max() < 2.0 * self.floor:
-            return []
-        base, floor = self.light_beside(*widened(mask, box, FAR, self.contrast.shape))
+        base, floor = self.light_beside(mask, box)
         mask, box = widened(mask, box, 12, self.contrast.shape)
         near = self.contrast[box]
         if base < 0.0:
@@ -229,9 +243,12 @@ class Search:
         bright, or the noise hides it."""
         from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-        near = self.contrast[box]
+        wide, place = widened(mask, box, FAR, self.contrast.shape)
+        near = self.contrast[place]
         lit = near <= self.floor
-        away = distance_transform_edt(~mask)
+        if 2 * np.count_nonzero(near <= -self.floor) < lit_at_ends(lit, wide):
+            return 0.0, self.floor
+        away = distance_transform_edt(~wide)
         beside = lit & (away > FRINGE) & (away <= FAR)
         base = float(np.median(near[beside])) if beside.any() else 0.0
         if base > -self.floor:
@@ -317,27 +334,40 @@ class Search:
 
     def level(self, focus, mask, box, base):
         """The level in the middle of those of the lowest edge."""
-        from scipy.ndimage import binary_dilation
-
-        near = binary_dilation(mask, iterations=2)
-        values = focus.contrast[box][near] - base
-        top = float(np.quantile(values, 1.0 - self.saturated)) if self.saturated else values.max()
+        values, square_slopes = around(focus.contrast, mask, (box[0].start, box[1].start))
+        values -= base
+        place = (1.0 - self.saturated) * (len(values) - 1)
+        top = float(np.interp(place, np.arange(len(values)), np.sort(values)))
         least = max(1e-3, 0.01 * top)
         if top <= least:
             return base
-        edges = np.geomspace(least, top, int(np.log(top / least) / np.log(RATIO)) + 2)
+        count = int(np.log(top / least) / np.log(RATIO)) + 2
+        edges = least * (top / least) ** (np.arange(count) / (count - 1))
+        edges[-1] = top
         place, size = np.searchsorted(edges, values), len(edges) + 1
         pixels = np.bincount(place, minlength=size)[1:-1]
-        squares = np.bincount(place, focus.slope(0.0)[box][near] ** 2, minlength=size)[1:-1]
+        squares = np.bincount(place, square_slopes, minlength=size)[1:-1]
         few = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
-        count = np.maximum(smoothed(pixels, few), 1.0)
-        steep = np.sqrt(np.maximum(smoothed(squares, few) / count - focus.noise, 0.0))
+        mean = smoothed(squares, few) / np.maximum(smoothed(pixels, few), 1.0)
+        steep = np.sqrt(np.maximum(mean - focus.noise, 0.0))
         above = np.cumsum(pixels[::-1])[::-1]
         middles = np.sqrt(edges[1:] * edges[:-1])
         first, last = edge_of(steep, (middles >= self.floor) & (above >= LARGE * mask.sum()))
         if last < first:
             return base
         return base + 0.5 * float(middles[first] + min(middles[last], SPAN * middles[first]))
+
+
+def lit_at_ends(lit, mask):
+    """How many lit pixels there are, at least, from FRINGE to FAR beside a mask, both (h, w): those
+    above its highest pixel and below its lowest, in squares that lie within FAR of it."""
+    rows, across = np.flatnonzero(mask.any(axis=1))[[0, -1]].tolist(), int(FAR / np.sqrt(2.0))
+    count = 0
+    for row, near, far in ((rows[0], -FRINGE, -across), (rows[1], across + 1, FRINGE + 1)):
+        column = int(mask[row].argmax())
+        beside = lit[max(row + far, 0) : max(row + near, 0)]
+        count += np.count_nonzero(beside[:, max(column - across, 0) : column + across + 1])
+    return count
 
 
 def edge_of(steep, told):
@@ -388,7 +418,9 @@ def filled(foreground: np.ndarray) -> np.ndarray:
     """The foreground with its holes filled: background that no way leads to from the border."""
     from scipy.ndimage import label
 
-    outside = label(np.pad(~foreground, 1, constant_values=True))[0]
+    wide = np.ones([size + 2 for size in foreground.shape], bool)
+    np.logical_not(foreground, out=wide[1:-1, 1:-1])
+    outside = label(wide)[0]
     return (outside != outside[0, 0])[1:-1, 1:-1]
 
 
