@@ -125,6 +125,20 @@ def beyond(box: Box, by: int) -> Box:
     return slice(rows.start - by, rows.stop + by), slice(columns.start - by, columns.stop + by)
 
 
+def clipped(box: Box, shape: tuple[int, ...]) -> Box:
+    """The part of a box that lies in a picture."""
+    rows, columns = (slice(max(s.start, 0), min(s.stop, size))
+                     for s, size in zip(box, shape, strict=True))  # fmt: skip
+    return rows, columns
+
+
+def moved(box: Box, down: int, right: int) -> Box:
+    """A box that begins so many rows and columns further on."""
+    rows, columns = box
+    return (slice(rows.start + down, rows.stop + down),
+            slice(columns.start + right, columns.stop + right))  # fmt: skip
+
+
 def placed(mask: np.ndarray, box: Box, wide: Box) -> np.ndarray:
     """A mask in a wider box."""
     found = np.zeros([s.stop - s.start for s in wide], mask.dtype)
@@ -135,9 +149,8 @@ def placed(mask: np.ndarray, box: Box, wide: Box) -> np.ndarray:
 
 def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
     """A mask in a box that is wider by some pixels, as far as the picture goes."""
-    rows, columns = (slice(max(s.start, 0), min(s.stop, size))
-                     for s, size in zip(beyond(box, by), shape, strict=True))  # fmt: skip
-    return placed(mask, box, (rows, columns)), (rows, columns)
+    wide = clipped(beyond(box, by), shape)
+    return placed(mask, box, wide), wide
 
 
 def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
@@ -223,19 +236,12 @@ class Search:
     def island(self, mask, box):
         """The outlines in a region of the floor."""
         base, floor = self.light_beside(mask, box)
-        mask, box = widened(mask, box, 12, self.contrast.shape)
-        near = self.contrast[box]
+        place = clipped(beyond(box, 12), self.contrast.shape)
+        near, top, left = self.contrast[place], place[0].start, place[1].start
         if base < 0.0:
-            mask = self.down_to(base + floor, mask, near)
-        focus = Focus(near, self.slope, self.scale)
-        here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
-        offset = box[0].start, box[1].start
-        return [
-            attrs.evolve(each, box=tuple(
-                slice(s.start + o, s.stop + o) for s, o in zip(each.box, offset, strict=True)
-            ))
-            for each in self.walk(focus, mask, here, base)
-        ]  # fmt: skip
+            mask, box = self.down_to(base + floor, placed(mask, box, place), near), place
+        found = self.walk(Focus(near, self.slope, self.scale), mask, moved(box, -top, -left), base)
+        return [attrs.evolve(each, box=moved(each.box, top, left)) for each in found]
 
     def light_beside(self, mask, box):
         """The contrast of the light beside an island, and three times its noise: in a crowd the
@@ -243,12 +249,13 @@ class Search:
         bright, or the noise hides it."""
         from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-        wide, place = widened(mask, box, FAR, self.contrast.shape)
+        place = clipped(beyond(box, FAR), self.contrast.shape)
         near = self.contrast[place]
         lit = near <= self.floor
-        if 2 * np.count_nonzero(near <= -self.floor) < lit_at_ends(lit, wide):
+        corner = box[0].start - place[0].start, box[1].start - place[1].start
+        if 2 * np.count_nonzero(near <= -self.floor) < lit_at_ends(lit, mask, corner):
             return 0.0, self.floor
-        away = distance_transform_edt(~wide)
+        away = distance_transform_edt(~placed(mask, box, place))
         beside = lit & (away > FRINGE) & (away <= FAR)
         base = float(np.median(near[beside])) if beside.any() else 0.0
         if base > -self.floor:
@@ -358,14 +365,13 @@ class Search:
         return base + 0.5 * float(middles[first] + min(middles[last], SPAN * middles[first]))
 
 
-def lit_at_ends(lit, mask):
-    """How many lit pixels there are, at least, from FRINGE to FAR beside a mask, both (h, w): those
-    above its highest pixel and below its lowest, in squares that lie within FAR of it."""
-    rows, across = np.flatnonzero(mask.any(axis=1))[[0, -1]].tolist(), int(FAR / np.sqrt(2.0))
-    count = 0
-    for row, near, far in ((rows[0], -FRINGE, -across), (rows[1], across + 1, FRINGE + 1)):
-        column = int(mask[row].argmax())
-        beside = lit[max(row + far, 0) : max(row + near, 0)]
+def lit_at_ends(lit, mask, corner):
+    """How many of the lit pixels (h, w) lie from FRINGE to FAR beside a mask, at least: those above
+    its first row and below its last, in squares within FAR of it; corner: where its box begins."""
+    across, count = int(FAR / np.sqrt(2.0)), 0
+    for end, first, last in ((0, -across, -FRINGE), (len(mask) - 1, FRINGE + 1, across + 1)):
+        row, column = corner[0] + end, corner[1] + int(mask[end].argmax())
+        beside = lit[max(row + first, 0) : max(row + last, 0)]
         count += np.count_nonzero(beside[:, max(column - across, 0) : column + across + 1])
     return count
 
