@@ -134,10 +134,11 @@ RUN = """
 import resource, sys, time
 from flocsim.__main__ import main
 began = time.perf_counter()
-main(sys.argv[1:])
+failed = main(sys.argv[1:])
 wall = time.perf_counter() - began
 spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
 print(wall, *(usage.ru_utime + usage.ru_stime for usage in spent))
+sys.exit(failed)
 """
 
 
@@ -157,8 +158,8 @@ def jobs_table(images, rounds):
         ("wall, 1 job", "wall, 2 jobs", "ratio", "CPU, 1 job", "CPU, 2 jobs: parent", "workers",
          "ratio on free cores", "same bytes", "load average"),
     )  # fmt: skip
-    with tempfile.TemporaryDirectory() as folder:
-        for _ in range(rounds):
+    for _ in range(rounds):
+        with tempfile.TemporaryDirectory() as folder:
             one, two = (fit_seconds(images, jobs, folder) for jobs in (1, 2))
             same = Path(folder, "1.h5").read_bytes() == Path(folder, "2.h5").read_bytes()
             load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
