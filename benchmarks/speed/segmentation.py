@@ -3,9 +3,11 @@
     python -m benchmarks.speed.segmentation [--quick] [--markdown] [--images DIR]
 
 Known outlines: real silhouettes put on a 1920×1080 frame with a vignette, blurred by 1 px, with
-noise.  --jobs: wall times in alternate runs, load of the machine beside them; where others keep the
-cores busy, two processes get no more of them than one.  The ratio on free cores is what does not
-depend on that: CPU time of one process / (CPU of the parent + half of the two workers').
+noise; large frames: the same on 20 megapixels, with specks of one to three pixels.
+
+--jobs: wall times in alternate runs, load of the machine beside them; where others keep the cores
+busy, two processes get no more of them than one.  The ratio on free cores is what does not depend
+on that: CPU time of one process / (CPU of the parent + half of the two workers').
 """
 
 import os
@@ -32,6 +34,7 @@ HUMAN = "soot_tem/201805A_A6_004_half_mask.png"
 FRAME = (1080, 1920)
 CELL = 150
 BLUR = 1.0
+LARGE = (4000, 5000)
 
 
 def picture_table(images):
@@ -57,14 +60,18 @@ def picture_table(images):
     return table
 
 
-def known_frame(masks, seed):
-    """A cover (0 … 1) of masks on a grid of cells, and the place of each."""
+def known_frame(masks, seed, shape=FRAME, cell=CELL, specks=0):
+    """A cover (0 … 1) of masks on a grid of cells and of specks, and the place of each mask."""
     rng = np.random.default_rng(seed)
-    cover, places = np.zeros(FRAME), []
+    cover, places = np.zeros(shape), []
+    for top, left in rng.integers(4, np.array(shape) - 4, (specks, 2)):
+        reach = np.arange(-3, 4)
+        disc = np.hypot(*np.meshgrid(reach, reach)) <= rng.uniform(1.0, 3.5)
+        cover[top - 3 : top + 4, left - 3 : left + 4][disc] = rng.uniform(0.1, 1.0)
     for number, mask in enumerate(masks):
-        row, column = divmod(number, FRAME[1] // CELL)
-        spare = CELL - np.array(mask.shape) - 8
-        top, left = (row, column) * np.array(CELL) + 4 + rng.integers(0, spare + 1)
+        row, column = divmod(number, shape[1] // cell)
+        spare = cell - np.array(mask.shape) - 8
+        top, left = (row, column) * np.array(cell) + 4 + rng.integers(0, spare + 1)
         cover[top : top + mask.shape[0], left : left + mask.shape[1]] = mask
         places.append((left + mask.shape[1] / 2, top + mask.shape[0] / 2))
     return gaussian_filter(cover, BLUR), np.array(places)
@@ -72,10 +79,10 @@ def known_frame(masks, seed):
 
 def known_grey(cover, flocs, vignette, noise, seed):
     """The frame as a camera would see it."""
-    y, x = np.mgrid[-1 : 1 : FRAME[0] * 1j, -1 : 1 : FRAME[1] * 1j]
+    y, x = np.ogrid[-1 : 1 : cover.shape[0] * 1j, -1 : 1 : cover.shape[1] * 1j]
     light = 1.0 - 0.5 * vignette * (x**2 + y**2)
     grey = 0.8 * light * (1 - 0.8 * cover) if flocs == "dark" else 0.1 * light + 0.7 * cover
-    return grey + noise * np.random.default_rng(seed).standard_normal(FRAME)
+    return grey + noise * np.random.default_rng(seed).standard_normal(cover.shape)
 
 
 def known_table(flocs):
@@ -99,14 +106,39 @@ def known_table(flocs):
     return table
 
 
+def large_frames(flocs):
+    """(name, grey) of frames of 20 megapixels: many flocs, and few among specks."""
+    small = [mask for mask, _ in flocs if max(mask.shape) < 96]
+    many = [small[k % len(small)] for k in range(1600)]
+    few = [mask for mask, _ in flocs if max(mask.shape) < 292]
+    for masks, cell, specks in ((many, 105, 0), (few, 300, 8000)):
+        cover, _ = known_frame(masks, 1, LARGE, cell, specks)
+        name = f"{len(masks):,} flocs, {specks:,} specks"
+        yield name, known_grey(cover, "dark", 0.6, 0.02, 2)
+
+
+def large_table(flocs):
+    """CPU time of frames of 20 megapixels."""
+    table = Table(
+        "Frames of 20 megapixels at the default options", ("frame", "CPU s", "flocs", "left out")
+    )
+    for name, grey in large_frames(flocs):
+        began = time.process_time()
+        found = segment(grey)
+        spent = time.process_time() - began
+        table.add(name, spent, len(found.regions), len(found.rejected))
+    return table
+
+
 RUN = """
 import resource, sys, time
 from flocsim.__main__ import main
 began = time.perf_counter()
-main(sys.argv[1:])
+failed = main(sys.argv[1:])
 wall = time.perf_counter() - began
 spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
 print(wall, *(usage.ru_utime + usage.ru_stime for usage in spent))
+sys.exit(failed)
 """
 
 
@@ -126,8 +158,8 @@ def jobs_table(images, rounds):
         ("wall, 1 job", "wall, 2 jobs", "ratio", "CPU, 1 job", "CPU, 2 jobs: parent", "workers",
          "ratio on free cores", "same bytes", "load average"),
     )  # fmt: skip
-    with tempfile.TemporaryDirectory() as folder:
-        for _ in range(rounds):
+    for _ in range(rounds):
+        with tempfile.TemporaryDirectory() as folder:
             one, two = (fit_seconds(images, jobs, folder) for jobs in (1, 2))
             same = Path(folder, "1.h5").read_bytes() == Path(folder, "2.h5").read_bytes()
             load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
@@ -143,7 +175,9 @@ def main():
     images = checked(arguments.images)
     print_heading(["scikit-image"])
     picture_table(images).print(arguments.markdown)
-    known_table(silhouettes(images)).print(arguments.markdown)
+    known = silhouettes(images)
+    known_table(known).print(arguments.markdown)
+    large_table(known).print(arguments.markdown)
     jobs_table(images, 1 if arguments.quick else 3).print(arguments.markdown)
 
 

@@ -37,27 +37,28 @@ def without_annotations(grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     grey: (h, w) in [0, 1]. The picture itself, and nothing replaced, where there is none.
     """
-    from scipy.ndimage import binary_dilation
+    from scipy.ndimage import binary_dilation, label
 
     found = np.zeros(grey.shape, bool)
-    for level in (float(grey.min()), float(grey.max())):
-        found |= burnt_in(grey, np.abs(grey - level) <= SAME)
+    labels = np.empty(grey.shape, np.int32)
+    for flat in (grey <= grey.min() + SAME, grey >= grey.max() - SAME):
+        label(flat, np.ones((3, 3), int), output=labels)
+        found |= burnt_in(grey, labels)
     if not found.any():
         return grey, found
     found = binary_dilation(found, np.ones((3, 3), bool), iterations=MARGIN)
     return filled_from_around(grey, found), found
 
 
-def burnt_in(grey, flat):
-    """What of the pixels ``flat``, all of one grey, is a bar or writing beside it."""
-    from scipy.ndimage import binary_fill_holes, find_objects, label
+def burnt_in(grey, labels):
+    """What of the numbered pieces (h, w), all of one grey, is a bar or writing beside it."""
+    from scipy.ndimage import binary_fill_holes, find_objects
 
-    labels, _ = label(flat, np.ones((3, 3), int))
     boxes = find_objects(labels)
-    found = np.zeros(flat.shape, bool)
+    found = np.zeros(grey.shape, bool)
     for number, box in enumerate(boxes, 1):
         height, width = (side.stop - side.start for side in box)
-        if max(height, width) < LONG or height * width > LARGEST * flat.size:
+        if max(height, width) < LONG or height * width > LARGEST * grey.size:
             continue
         part = labels[box] == number
         if part.sum() < 0.3 * part.size:
@@ -71,7 +72,7 @@ def burnt_in(grey, flat):
             continue
         found[box] |= whole
         if slender:
-            found |= writing(labels, boxes, box, flat.shape)
+            found |= writing(labels, boxes, box, grey.shape)
     return found
 
 

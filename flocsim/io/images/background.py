@@ -29,6 +29,13 @@ NOISE_SAMPLES = 500
 DARKEST = 0.01
 """Added before taking logarithms: about the black level of 8-bit cameras."""
 
+ONE_THREAD = 2**18
+"""Multiplications of a matrix product up to which OpenBLAS starts no threads: on a machine where
+others keep the cores busy these wait for each other, and take thirty times as long as one alone."""
+
+STRIP = 64
+"""Rows of a picture that are worked on at once: what is made of them stays in the cache."""
+
 
 def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
     """`grey` with detail finer than `scale` [px] removed: exp(−½ (k·scale)²) in Fourier space.
@@ -43,7 +50,7 @@ def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
         wavenumber = np.pi * np.arange(size) / size
         gain = np.exp(-0.5 * (wavenumber * scale) ** 2)
         spectrum *= np.expand_dims(gain, 1 - axis)
-    return fft.idctn(spectrum, norm="ortho")
+    return fft.idctn(spectrum, norm="ortho", overwrite_x=True)
 
 
 def robust_deviation(values: np.ndarray) -> float:
@@ -51,14 +58,25 @@ def robust_deviation(values: np.ndarray) -> float:
     return 1.4826 * float(np.median(np.abs(values - np.median(values))))
 
 
-def noise_deviation(fine: np.ndarray) -> float:
-    """robust_deviation of a sample of the detail that the low pass took out."""
-    stride = max(1, max(fine.shape) // NOISE_SAMPLES)
-    return robust_deviation(fine[::stride, ::stride])
+def stride_of(shape: tuple[int, ...]) -> int:
+    """Which pixels, along both sides, tell the noise of a picture: every so many."""
+    return max(1, max(shape) // NOISE_SAMPLES)
 
 
-def smooth_surface(grey: np.ndarray, degree: int) -> np.ndarray:
-    """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`.
+def sampled(picture: np.ndarray) -> np.ndarray:
+    """The pixels of a picture that tell its noise."""
+    stride = stride_of(picture.shape)
+    return picture[::stride, ::stride]
+
+
+def strips(picture: np.ndarray) -> list[slice]:
+    """The rows of a picture, STRIP at a time."""
+    return [slice(top, min(top + STRIP, len(picture))) for top in range(0, len(picture), STRIP)]
+
+
+def smooth_surface(grey: np.ndarray, degree: int, logarithmic: bool = False) -> np.ndarray:
+    """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`,
+    or of its logarithm.
 
     Least squares over products of Legendre polynomials of total degree ≤ `degree`, reweighted
     w = 1/(1 + (residual/1.5σ)²)² so that pixels of flocs lose their say; σ is the robust deviation.
@@ -67,6 +85,8 @@ def smooth_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     rows, columns = (np.polynomial.legendre.legvander(along, degree) for along in places)
     step = max(1, -(-max(grey.shape) // SURFACE_SAMPLES))
     values = grey[::step, ::step]
+    if logarithmic:
+        values = np.log(np.maximum(values, 0.0) + DARKEST)
     basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
     orders = np.add.outer(np.arange(degree + 1), np.arange(degree + 1))
     coefficients = np.zeros(orders.shape)
@@ -79,7 +99,10 @@ def smooth_surface(grey: np.ndarray, degree: int) -> np.ndarray:
 
 def light_surface(grey: np.ndarray, degree: int) -> np.ndarray:
     """As smooth_surface, for light that falls off by a factor: fitted to the logarithm of grey."""
-    return np.exp(smooth_surface(np.log(np.maximum(grey, 0.0) + DARKEST), degree)) - DARKEST
+    surface = smooth_surface(grey, degree, logarithmic=True)
+    np.exp(surface, out=surface)
+    surface -= DARKEST
+    return surface
 
 
 def _rim_of(shape):
@@ -122,9 +145,12 @@ def _weights(residual, told):
 
 
 def _reweighted_fit(basis, values, told, weights):
+    size = max(1, ONE_THREAD // basis.shape[1] ** 2)
+    blocks = [slice(first, first + size) for first in range(0, len(basis), size)]
     for _ in range(SURFACE_ROUNDS):
         weighted = basis * (weights * weights)[:, None]
         # Legendre products are near orthogonal: the normal equations are safe, and fast.
-        solution = np.linalg.lstsq(weighted.T @ basis, weighted.T @ values, rcond=None)[0]
-        weights = _weights(values - basis @ solution, told)
+        normal = sum(weighted[block].T @ basis[block] for block in blocks)
+        solution = np.linalg.lstsq(normal, np.einsum("nk,n->k", weighted, values), rcond=None)[0]
+        weights = _weights(values - np.einsum("nk,k->n", basis, solution), told)
     return solution

@@ -6,7 +6,11 @@ the radius of the outline alone, not on how high the step is, nor on what lies f
 a floc before a halo as sharp as its own edge.
 """
 
+from functools import lru_cache
+
 import numpy as np
+
+from flocsim.io.images.slopes import along
 
 STEPS = np.array([2.0, 3.0, 4.5, 6.0])
 """Blur that is added to tell softness [px]: of these the least above STEP r_eq."""
@@ -41,22 +45,15 @@ def rim(mask):
     return mask & ~binary_erosion(mask)
 
 
-def slope_of(contrast, blur):
-    """|∇c| of a contrast that is blurred by so many pixels."""
-    from scipy.ndimage import gaussian_filter
-
-    if min(contrast.shape) < 2:
-        return np.zeros_like(contrast)
-    smooth = gaussian_filter(contrast, blur, mode="nearest") if blur else contrast
-    down, across = np.gradient(smooth)
-    down *= down
-    across *= across
-    down += across
-    return np.sqrt(down, out=down)
+@lru_cache(maxsize=1000)
+def left_by_blur(radius, blur, more):
+    """Slopes at the rim of a disk blurred by each of SPREADS and `blur`, over those with `more`."""
+    before, after = (disk_slope(radius, np.hypot(SPREADS, s)) for s in (blur, more))
+    return before / after
 
 
 class Focus:
-    """The slopes of a piece of a picture, more and more blurred.
+    """A piece of a picture, more and more blurred.
 
     contrast: (h, w); noise: mean square slope of the background's noise [1/px²]; scale: the blur
     that it has already [px].
@@ -65,27 +62,23 @@ class Focus:
     def __init__(self, contrast: np.ndarray, noise: float, scale: float):
         self.contrast = contrast.astype(np.float32)
         self.noise, self.scale = noise, max(scale, 1.0)
-        self.slopes: dict[float, np.ndarray] = {}
+        self.blurred = {0.0: self.contrast}
 
-    def slope(self, blur: float) -> np.ndarray:
-        """|∇c| (h, w) of the contrast blurred by so many pixels more."""
-        if blur not in self.slopes:
-            self.slopes[blur] = slope_of(self.contrast, blur)
-        return self.slopes[blur]
+    def slopes(self, blur: float, mask: np.ndarray, box: tuple[slice, slice]) -> np.ndarray:
+        """Along a mask's outline, |∇c| of the contrast blurred by so many pixels more: the greatest
+        of nine pixels.  Only what is around a small box is blurred."""
+        from scipy.ndimage import gaussian_filter
 
-    def slope_in(self, blur: float, box: tuple[slice, slice]) -> np.ndarray:
-        """The same in a box of it, which is computed alone where it is small."""
-        from math import prod
-
-        size = prod(s.stop - s.start for s in box)
-        if blur in self.slopes or 2 * size > self.contrast.size:
-            return self.slope(blur)[box]
-        margin = int(4.0 * blur) + 2
-        wide = tuple(slice(max(s.start - margin, 0), s.stop + margin) for s in box)
-        inner = tuple(
-            slice(s.start - w.start, s.stop - w.start) for s, w in zip(box, wide, strict=True)
-        )
-        return slope_of(self.contrast[wide], blur)[inner]
+        rows, columns = box
+        if blur not in self.blurred and 2 * mask.size <= self.contrast.size:
+            margin = int(4.0 * blur) + 2
+            top, left = max(rows.start - margin, 0), max(columns.start - margin, 0)
+            piece = self.contrast[top : rows.stop + margin, left : columns.stop + margin]
+            smooth = gaussian_filter(piece, blur, mode="nearest")
+            return along(smooth, mask, (rows.start - top, columns.start - left), 1)
+        if blur not in self.blurred:
+            self.blurred[blur] = gaussian_filter(self.contrast, blur, mode="nearest")
+        return along(self.blurred[blur], mask, (rows.start, columns.start), 1)
 
     def noise_slope(self, blur: float) -> float:
         """Root mean square slope of the noise after so much more blur: ∝ 1/(scale² + blur²)."""
@@ -94,23 +87,17 @@ class Focus:
     def softness(self, mask: np.ndarray, box: tuple[slice, slice]) -> float:
         """Softness σ [px] that half of a region's outline does not exceed; mask: bool array of the
         box.  inf where the outline is not clear of noise."""
-        from scipy.ndimage import maximum_filter
-
         radius = np.sqrt(mask.sum() / np.pi)
         step = float(STEPS[min(np.searchsorted(STEPS, STEP * radius), len(STEPS) - 1)])
-        edge = rim(mask)
         for blur in SMOOTHINGS:
             if blur > WIDEST * radius:
                 break
             noise, more = self.noise_slope(blur), float(np.hypot(blur, step))
-            slope = maximum_filter(self.slope_in(blur, box), 3)[edge]
+            slope = self.slopes(blur, mask, box)
             if np.median(slope) <= CLEAR * noise:
                 continue
             # Of noise alone, the steepest of nine pixels has some √2 times its slope.
             clean = np.sqrt(np.maximum(slope**2 - 2.0 * noise**2, 0.0))
-            ratio = np.median(
-                clean / np.maximum(maximum_filter(self.slope_in(more, box), 3)[edge], 1e-12)
-            )
-            before, after = (disk_slope(radius, np.hypot(SPREADS, s)) for s in (blur, more))
-            return float(np.interp(-ratio, -before / after, SPREADS))
+            ratio = np.median(clean / np.maximum(self.slopes(more, mask, box), 1e-12))
+            return float(np.interp(-ratio, -left_by_blur(float(radius), blur, more), SPREADS))
         return float("inf")

@@ -11,7 +11,7 @@ import numpy as np
 from flocsim.errors import ImageError
 
 MOST_PIXELS = 2**27
-"""134 million: some 8 GB while its flocs are looked for."""
+"""134 million: some 4 GB while its flocs are looked for."""
 
 PIXELS_PER_BYTE = 10_000
 """More than any packing makes of a byte of the file: the pixels are not there."""

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
 from flocsim.io.images.focus import Focus, rim
+from flocsim.io.images.slopes import around
 
 EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""
@@ -117,14 +119,38 @@ def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
         yield parts[inner] == number, (place[0], place[1])
 
 
-def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
-    """A mask in a box that is wider by some pixels, as far as the picture goes."""
-    wide = [slice(max(s.start - by, 0), min(s.stop + by, n))
-            for s, n in zip(box, shape, strict=True)]  # fmt: skip
+def beyond(box: Box, by: int) -> Box:
+    """A box that is wider by some pixels on every side, be they in the picture or not."""
+    rows, columns = box
+    return slice(rows.start - by, rows.stop + by), slice(columns.start - by, columns.stop + by)
+
+
+def clipped(box: Box, shape: tuple[int, ...]) -> Box:
+    """The part of a box that lies in a picture."""
+    rows, columns = (slice(max(s.start, 0), min(s.stop, size))
+                     for s, size in zip(box, shape, strict=True))  # fmt: skip
+    return rows, columns
+
+
+def moved(box: Box, down: int, right: int) -> Box:
+    """A box that begins so many rows and columns further on."""
+    rows, columns = box
+    return (slice(rows.start + down, rows.stop + down),
+            slice(columns.start + right, columns.stop + right))  # fmt: skip
+
+
+def placed(mask: np.ndarray, box: Box, wide: Box) -> np.ndarray:
+    """A mask in a wider box."""
     found = np.zeros([s.stop - s.start for s in wide], mask.dtype)
     y, x = (s.start - w.start for s, w in zip(box, wide, strict=True))
     found[y : y + mask.shape[0], x : x + mask.shape[1]] = mask
-    return found, (wide[0], wide[1])
+    return found
+
+
+def widened(mask: np.ndarray, box: Box, by: int, shape: tuple[int, ...]) -> tuple[np.ndarray, Box]:
+    """A mask in a box that is wider by some pixels, as far as the picture goes."""
+    wide = clipped(beyond(box, by), shape)
+    return placed(mask, box, wide), wide
 
 
 def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[float, float]:
@@ -133,18 +159,30 @@ def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[f
     fine: the deviation that white noise would leave; grain, which is coarser, is told by what goes
     with a little more blur.
     """
-    from scipy.ndimage import gaussian_filter
-
-    from flocsim.io.images.background import noise_deviation
-
-    grain = noise_deviation(contrast - gaussian_filter(contrast, scale + 2.0))
-    noise = max(fine, grain)
+    noise = max(fine, robust_deviation(sampled(contrast) - sampled_blur(contrast, scale + 2.0)))
     if min(contrast.shape) < 2:
         return noise, 0.0
-    down, across = np.gradient(contrast)
-    square = (down * down + across * across)[np.abs(contrast) < FLOOR * noise]
+    squares = []
+    for rows in strips(contrast):
+        above = max(rows.start - 1, 0)
+        down, across = np.gradient(contrast[above : rows.stop + 1])
+        square = (down * down + across * across)[rows.start - above : rows.stop - above]
+        quiet = np.abs(contrast[rows]) < FLOOR * noise
+        squares.append(square[quiet].astype(np.float32))
+    square = np.concatenate(squares)
     # The square of two normal numbers of deviation s has the median 2 ln 2 s².
-    return noise, float(np.median(square) / np.log(2.0)) if square.size else 0.0
+    middle = np.median(square, overwrite_input=True) if square.size else 0.0
+    return noise, float(middle / np.log(2.0))
+
+
+def sampled_blur(contrast, blur):
+    """`sampled` of a contrast that is blurred by so many pixels."""
+    from scipy.ndimage import gaussian_filter1d
+
+    stride = stride_of(contrast.shape)
+    across = [gaussian_filter1d(contrast[rows], blur, axis=1)[:, ::stride]
+              for rows in strips(contrast)]  # fmt: skip
+    return gaussian_filter1d(np.concatenate(across), blur, axis=0)[::stride]
 
 
 def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndarray, float]:
@@ -178,12 +216,16 @@ class Search:
         """All regions, in focus or not, that are not fainter than a share of the typical one."""
         from scipy.ndimage import find_objects, label
 
-        labels = label(self.contrast > self.floor, EIGHT)[0]
-        large = np.bincount(labels.ravel()) >= max(SMALLEST * self.area, 1.0)
+        above = self.contrast > self.floor
+        labels, count = label(above, EIGHT)
+        numbers, boxes = labels[above], find_objects(labels)
+        highest = np.zeros(count + 1)
+        np.maximum.at(highest, numbers, self.contrast[above])
+        large = np.bincount(numbers, minlength=count + 1) >= max(SMALLEST * self.area, 1.0)
         found: list[Outline] = []
-        for number, box in enumerate(find_objects(labels), start=1):
-            if large[number]:
-                found += self.island(labels[box] == number, box)
+        for number in np.flatnonzero(large & (highest >= 2.0 * self.floor)).tolist():
+            box = boxes[number - 1]
+            found += self.island(labels[box] == number, box)
         return without_faint(found, self.in_focus)
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
@@ -193,22 +235,13 @@ class Search:
 
     def island(self, mask, box):
         """The outlines in a region of the floor."""
-        if self.contrast[box][mask].max() < 2.0 * self.floor:
-            return []
-        base, floor = self.light_beside(*widened(mask, box, FAR, self.contrast.shape))
-        mask, box = widened(mask, box, 12, self.contrast.shape)
-        near = self.contrast[box]
+        base, floor = self.light_beside(mask, box)
+        place = clipped(beyond(box, 12), self.contrast.shape)
+        near, top, left = self.contrast[place], place[0].start, place[1].start
         if base < 0.0:
-            mask = self.down_to(base + floor, mask, near)
-        focus = Focus(near, self.slope, self.scale)
-        here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
-        offset = box[0].start, box[1].start
-        return [
-            attrs.evolve(each, box=tuple(
-                slice(s.start + o, s.stop + o) for s, o in zip(each.box, offset, strict=True)
-            ))
-            for each in self.walk(focus, mask, here, base)
-        ]  # fmt: skip
+            mask, box = self.down_to(base + floor, placed(mask, box, place), near), place
+        found = self.walk(Focus(near, self.slope, self.scale), mask, moved(box, -top, -left), base)
+        return [attrs.evolve(each, box=moved(each.box, top, left)) for each in found]
 
     def light_beside(self, mask, box):
         """The contrast of the light beside an island, and three times its noise: in a crowd the
@@ -216,11 +249,13 @@ class Search:
         bright, or the noise hides it."""
         from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-        from flocsim.io.images.background import robust_deviation
-
-        near = self.contrast[box]
+        place = clipped(beyond(box, FAR), self.contrast.shape)
+        near = self.contrast[place]
         lit = near <= self.floor
-        away = distance_transform_edt(~mask)
+        corner = box[0].start - place[0].start, box[1].start - place[1].start
+        if 2 * np.count_nonzero(near <= -self.floor) < lit_at_ends(lit, mask, corner):
+            return 0.0, self.floor
+        away = distance_transform_edt(~placed(mask, box, place))
         beside = lit & (away > FRINGE) & (away <= FAR)
         base = float(np.median(near[beside])) if beside.any() else 0.0
         if base > -self.floor:
@@ -306,27 +341,39 @@ class Search:
 
     def level(self, focus, mask, box, base):
         """The level in the middle of those of the lowest edge."""
-        from scipy.ndimage import binary_dilation
-
-        near = binary_dilation(mask, iterations=2)
-        values = focus.contrast[box][near] - base
-        top = float(np.quantile(values, 1.0 - self.saturated)) if self.saturated else values.max()
+        values, square_slopes = around(focus.contrast, mask, (box[0].start, box[1].start))
+        values -= base
+        place = (1.0 - self.saturated) * (len(values) - 1)
+        top = float(np.interp(place, np.arange(len(values)), np.sort(values)))
         least = max(1e-3, 0.01 * top)
         if top <= least:
             return base
-        edges = np.geomspace(least, top, int(np.log(top / least) / np.log(RATIO)) + 2)
+        count = int(np.log(top / least) / np.log(RATIO)) + 2
+        edges = least * (top / least) ** (np.arange(count) / (count - 1))
+        edges[-1] = top
         place, size = np.searchsorted(edges, values), len(edges) + 1
         pixels = np.bincount(place, minlength=size)[1:-1]
-        squares = np.bincount(place, focus.slope(0.0)[box][near] ** 2, minlength=size)[1:-1]
+        squares = np.bincount(place, square_slopes, minlength=size)[1:-1]
         few = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
-        count = np.maximum(smoothed(pixels, few), 1.0)
-        steep = np.sqrt(np.maximum(smoothed(squares, few) / count - focus.noise, 0.0))
+        mean = smoothed(squares, few) / np.maximum(smoothed(pixels, few), 1.0)
+        steep = np.sqrt(np.maximum(mean - focus.noise, 0.0))
         above = np.cumsum(pixels[::-1])[::-1]
         middles = np.sqrt(edges[1:] * edges[:-1])
         first, last = edge_of(steep, (middles >= self.floor) & (above >= LARGE * mask.sum()))
         if last < first:
             return base
         return base + 0.5 * float(middles[first] + min(middles[last], SPAN * middles[first]))
+
+
+def lit_at_ends(lit, mask, corner):
+    """How many of the lit pixels (h, w) lie from FRINGE to FAR beside a mask, at least: those above
+    its first row and below its last, in squares within FAR of it; corner: where its box begins."""
+    across, count = int(FAR / np.sqrt(2.0)), 0
+    for end, first, last in ((0, -across, -FRINGE), (len(mask) - 1, FRINGE + 1, across + 1)):
+        row, column = corner[0] + end, corner[1] + int(mask[end].argmax())
+        beside = lit[max(row + first, 0) : max(row + last, 0)]
+        count += np.count_nonzero(beside[:, max(column - across, 0) : column + across + 1])
+    return count
 
 
 def edge_of(steep, told):
@@ -377,7 +424,9 @@ def filled(foreground: np.ndarray) -> np.ndarray:
     """The foreground with its holes filled: background that no way leads to from the border."""
     from scipy.ndimage import label
 
-    outside = label(np.pad(~foreground, 1, constant_values=True))[0]
+    wide = np.ones([size + 2 for size in foreground.shape], bool)
+    np.logical_not(foreground, out=wide[1:-1, 1:-1])
+    outside = label(wide)[0]
     return (outside != outside[0, 0])[1:-1, 1:-1]
 
 

@@ -8,7 +8,8 @@ from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
     light_surface,
     low_pass,
-    noise_deviation,
+    robust_deviation,
+    sampled,
     smooth_surface,
 )
 from flocsim.io.images.focus import Focus
@@ -201,19 +202,24 @@ def _guess_polarity(smooth, light):
     step = COARSE if coarse is not smooth else 1
     surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]
     # From the light, not from their median: flocs may cover most of the picture.
-    return "dark" if np.mean((coarse - surface) ** 3) < 0 else "bright"
+    beside = coarse - surface
+    return "dark" if np.mean(beside * beside * beside) < 0 else "bright"
 
 
 def _contrast(grey, smooth, light, flocs, noise_scale, degree):
-    """Contrast against the background, and the standard deviation of its noise."""
+    """Contrast against the background, in the place of `smooth`, and the standard deviation of its
+    noise."""
     # White noise of deviation s is left with s/(2√π·scale) by the low pass, and the part that is
     # taken out has nearly all of s.
     left_over = 1.0 / max(2.0 * np.sqrt(np.pi) * noise_scale, 1.0)
+    fine = sampled(grey) - sampled(smooth)
     if flocs == "bright":
-        surface = smooth_surface(smooth, degree) if light is None else light
-        return smooth - surface, left_over * noise_deviation(grey - smooth)
+        smooth -= smooth_surface(smooth, degree) if light is None else light
+        return smooth, left_over * robust_deviation(fine)
     light = light_surface(smooth, degree) if light is None else light
     floor = max(UNLIT * light.max(), np.finfo(float).tiny)
-    lit = np.maximum(light, floor)
-    contrast = np.where(light > floor, 1.0 - smooth / lit, 0.0)
-    return contrast, left_over * noise_deviation((grey - smooth) / lit)
+    np.maximum(light, floor, out=light)
+    smooth /= light
+    np.subtract(1.0, smooth, out=smooth)
+    smooth[light <= floor] = 0.0
+    return smooth, left_over * robust_deviation(fine / sampled(light))

@@ -3,15 +3,18 @@
 import attrs
 import numpy as np
 
-from flocsim.io.images.focus import rim
 from flocsim.io.images.outlines import (
     BAND,
+    EIGHT,
     PIXEL,
     SHARP,
+    beyond,
     filled,
     pieces,
+    placed,
     widened,
 )
+from flocsim.io.images.slopes import along
 
 NECK = 0.5
 SURE = 0.65
@@ -112,8 +115,8 @@ def sorted_out(outlines, shape, filters, numbers=None):
         reason = reason_to_reject(box, shape, size[1], each.softness, filters)
         bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
         number = len(accepted) + 1 if numbers is None else numbers[place]
-        about = (number, centroid_of(mask, box), bbox, *size, np.pad(mask, 1), each.softness,
-                 each.level, each.base, each.parted)  # fmt: skip
+        about = (number, centroid_of(mask, box), bbox, *size, placed(mask, box, beyond(box, 1)),
+                 each.softness, each.level, each.base, each.parted)  # fmt: skip
         if reason:
             rejected.append(Rejection(*about, reason=reason))
         else:
@@ -160,16 +163,14 @@ def with_band(region, taken, contrast):
     reach = int(np.ceil(2.0 + region.blur)) if np.isfinite(region.blur) else 2
     wide, place = widened(mask, box, reach, contrast.shape)
     near = contrast[place]
-    edge = rim(wide)
-    slope = float(np.median(np.hypot(*np.gradient(near))[edge]))
+    slope = float(np.median(along(near.astype(np.float32), wide, (0, 0), 0)))
     change = np.hypot(BAND * (region.level - region.base), PIXEL * slope)
     inner = largest_piece(filled(wide & (near > region.level + change)), wide)
     around = within(wide, reach) & ~(taken[place] & ~wide)
     outer = largest_piece(filled(wide | (around & (near > region.level - change))), wide)
     # What the picture's edge has cut off is given back, so that the margin is the same all around.
-    lost = [(reach - (s.start - p.start), reach - (p.stop - s.stop))
-            for s, p in zip(box, place, strict=True)]  # fmt: skip
-    return attrs.evolve(region, band=(np.pad(inner, lost), np.pad(outer, lost)))
+    whole = beyond(box, reach)
+    return attrs.evolve(region, band=(placed(inner, place, whole), placed(outer, place, whole)))
 
 
 def within(mask, reach):
@@ -181,13 +182,12 @@ def within(mask, reach):
 
 def largest_piece(mask, otherwise):
     """The largest 8-connected part of a mask; the other one where there is none."""
-    here = slice(0, mask.shape[0]), slice(0, mask.shape[1])
-    best = max(pieces(mask, here), key=lambda part: part[0].sum(), default=None)
-    if best is None:
-        return otherwise
-    alone = np.zeros_like(mask)
-    alone[best[1]] = best[0]
-    return alone
+    from scipy.ndimage import label
+
+    parts, count = label(mask, EIGHT)
+    if count < 2:
+        return mask if count else otherwise
+    return parts == 1 + np.bincount(parts.ravel())[1:].argmax()
 
 
 def with_holes(region: Region, holes: np.ndarray) -> Region:
@@ -261,20 +261,43 @@ def bodies(mask, neck, min_radius):
     """The mask's pixels numbered by body, from 1, 0 outside; and the width of the widest neck that
     is cut, as a share of the smaller body's."""
     from scipy.ndimage import distance_transform_edt
-    from skimage.feature import peak_local_max
     from skimage.segmentation import watershed
 
     depth = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
-    peaks = peak_local_max(
-        depth, min_distance=max(1, int(0.5 * min_radius)), labels=mask.astype(int),
-        exclude_border=False,
-    )  # fmt: skip
-    if len(peaks) < 2:
+    peaks = peaks_of(depth, max(1, int(0.5 * min_radius)))
+    if not has_neck(depth, peaks, neck):
         return mask.astype(int), 1.0
     markers = np.zeros(mask.shape, int)
     markers[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
     basins = watershed(-depth, markers, connectivity=2, mask=mask)
     return joined(basins, depth, neck, min_radius)
+
+
+def peaks_of(depth, apart):
+    """(n, 2) the pixels that are as high as all within a distance, the highest first, and no two of
+    them nearer than that: as scikit-image's peak_local_max has them."""
+    from scipy.ndimage import maximum_filter
+
+    highest = (depth == maximum_filter(depth, 2 * apart + 1)) & (depth > depth.min())
+    left = np.argwhere(highest)
+    left = left[np.argsort(-depth[highest], kind="stable")]
+    found = []
+    while len(left):
+        found.append(left[0])
+        left = left[np.abs(left - left[0]).max(axis=1) >= apart]
+    return np.array(found, int).reshape(-1, 2)
+
+
+def has_neck(depth, peaks, neck):
+    """Whether any peak is cut off from all higher ones, where depth is no more than `neck` of its
+    own.  Where none is, `joined` would join all basins."""
+    from scipy.ndimage import label
+
+    for count, height in enumerate(depth[tuple(peaks.T)][1:].tolist(), start=1):
+        parts = label(depth > neck * height, EIGHT)[0][tuple(peaks.T)]
+        if parts[count] == 0 or parts[count] not in parts[:count]:
+            return True
+    return False
 
 
 def passes(basins, depth):

@@ -61,14 +61,14 @@ def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | No
     ragged. Source: B. B. Mandelbrot, The Fractal Geometry of Nature (1982), ch. 12.
     """
     from scipy.special import stdtrit
-    from scipy.stats import linregress
 
     x, y = np.log(areas), np.log(perimeters)
     if len(np.unique(x)) < FEWEST:
         return None
-    found = linregress(x, y)
-    wide = float(stdtrit(len(x) - 2, 0.975)) * float(found.stderr)
-    return Slope(2.0 * float(found.slope), 2.0 * wide)
+    x, y, free = x - x.mean(), y - y.mean(), len(x) - 2
+    slope = np.sum(x * y) / np.sum(x * x)
+    error = np.sqrt(np.sum((y - slope * x) ** 2) / (free * np.sum(x * x)))
+    return Slope(2.0 * float(slope), 2.0 * float(stdtrit(free, 0.975) * error))
 
 
 def population_lines(entries: Sequence[ShapeEntry]) -> list[str]:
