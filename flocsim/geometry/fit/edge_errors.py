@@ -26,11 +26,12 @@ POSSIBLE = BARRED // 2
 SHORTEST = 1e-9
 """Edges are longer than this [px]."""
 
-STRAIGHTEST = 0.05
-"""Cosine of the largest angle between an edge's normal and the directions at its ends: 87°."""
+STRAIGHTEST = 0.001
+"""Cosine of the largest angle between an edge's normal and the directions at its ends: a right
+angle belongs to a needle without width."""
 
-REFLEX = 0.5
-"""The same at a reflex vertex, 60°: a narrower one is a slit that the disk closes."""
+REFLEX = 0.3
+"""The same at a reflex vertex, 73°: a narrower one is a slit that the disk closes."""
 
 AROUND = 1e-7
 """The radius is larger by this [px], so that centres just at the spheroradius are covered."""
