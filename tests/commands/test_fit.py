@@ -153,6 +153,7 @@ def test_several_spheroradii_go_to_one_library(tmp_path, frame, capsys):
     assert "r = 1 px" in printed and "r = 2 px" in printed
 
 
+@pytest.mark.slow
 def test_the_library_is_drawn_and_described(tmp_path, frame, capsys):
     run(frame, "--pixel-size", "1e-6", "--vertices", "4,8", "-o", tmp_path / "s.h5")
     for command, words in ((plot, ["--output-dir", tmp_path]), (info, [])):
@@ -291,6 +292,7 @@ def test_areas_are_kept_on_request(tmp_path, frame):
         assert entry.fits[4].shape.area == pytest.approx(entry.area * 1e-12, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_holes_are_kept_on_request(tmp_path, capsys):
     """In pictures and in masks, from there to figures, tables and the list of flocs."""
     y, x = np.mgrid[:300, :400]
@@ -469,6 +471,7 @@ def test_the_overlay_of_masks_is_drawn_over_their_pictures(tmp_path, frame, caps
     assert sides[0][0] == sides[0][1] and sides[1][0] < sides[1][1] - 50.0
 
 
+@pytest.mark.slow
 def test_masks_without_a_picture_are_told_and_drawn_by_themselves(tmp_path, frame, capsys):
     assert run(frame, *QUICK, "--masks-out", tmp_path / "labels", "-o", tmp_path / "s.h5") == 0
     (tmp_path / "labels/a.png").rename(tmp_path / "labels/b.png")
@@ -500,6 +503,7 @@ def test_pictures_beneath_that_cannot_be_used_are_refused(
         run(frame / "a.png", *QUICK, *options, "-o", tmp_path / "m.h5")
 
 
+@pytest.mark.slow
 def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, capsys):
     import tifffile
 

@@ -111,6 +111,7 @@ def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):
     assert not (folder / "s.h5").exists()
 
 
+@pytest.mark.slow
 def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
     original = fit_pictures.find_flocs
 

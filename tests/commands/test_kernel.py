@@ -137,6 +137,7 @@ def test_the_number_of_processes_changes_nothing(folder):
     assert not same_data("kernel.h5", "b.h5"), "nothing differs"
 
 
+@pytest.mark.slow
 def test_another_scramble_is_another_study(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     words = ["kernel", "kernel.toml", "--quiet", "--resume", "--set", "scene.scrambles=8"]

@@ -15,6 +15,7 @@ from flocsim.errors import ConfigError
 from flocsim.io.shapes.library import read_library, write_library
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
+from tests.helpers.tiers import rest_slow
 
 STUDY = """\
 preset = "tang2014"
@@ -58,7 +59,7 @@ def config(folder, outlines, scene="measured"):
     return load_text(folder, STUDY.format(outlines=outlines, scene=SCENES[scene]))
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", rest_slow(SCENES, lambda scene: scene == "measured"))
 def test_further_runs_are_those_of_a_study_of_that_outline(folder, scene):
     """Radii included: they are drawn as the flocs that were cut, whose places do not change."""
     found = run(config(folder, "band", scene)).replicates

@@ -57,7 +57,7 @@ LEAST = {"kernel": 8, "settling_kernel": 8}
 
 @pytest.mark.parametrize(
     "path",
-    rest_slow(EXAMPLES, lambda path: path.stem in ("quickstart", "own_shape")),
+    rest_slow(EXAMPLES, lambda path: path.stem == "quickstart"),
     ids=lambda path: path.stem,
 )
 def test_a_reduced_example_runs(path, examples, monkeypatch, capsys):

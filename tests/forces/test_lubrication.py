@@ -101,6 +101,7 @@ def gaps_of(run, times):
     return run.at(times).position[:, 1, 1] - 2.0 * RADIUS
 
 
+@pytest.mark.slow
 def test_a_constant_push_closes_the_gap_exponentially():
     """h = h₀ exp(−F t/(6πγ r*²)), over four orders of the gap."""
     push, start = 1e-12, 4e-6

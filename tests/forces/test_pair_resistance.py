@@ -109,7 +109,7 @@ def resistance_at(shapes, places, law):
     return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])
 
 
-@pytest.mark.parametrize("law", ["stokes", "shape"])
+@pytest.mark.parametrize("law", rest_slow(["stokes", "shape"], lambda law: law == "shape"))
 def test_the_resistance_of_shapes_is_symmetric_positive_and_the_derivative(law):
     rng, shapes = np.random.default_rng(3), [SpheroPolygon(L_SHAPE, 1e-6), Sphere(4e-6)]
     scale = np.array([1.0, 1.0, 5e-6] * 2)

@@ -50,6 +50,7 @@ def is_quick(integrator, *_):
 by_method = pytest.mark.parametrize("integrator", rest_slow(METHODS, is_quick), ids=name_of)
 
 
+@pytest.mark.slow
 @by_method
 @pytest.mark.parametrize(
     ("n", "until"),

@@ -97,6 +97,7 @@ def test_tangential_history_and_damping_lose_energy_but_no_momentum():
     assert_same_momenta(motion)
 
 
+@pytest.mark.slow
 def test_motion_does_not_depend_on_tolerance_or_order_of_bodies():
     law, scene = Contact(20.0, 2.0, 1e4), ragged_encounter()
     fine = simulate(scene, [law], 2e-4, max_step=1e-6, rtol=1e-11)

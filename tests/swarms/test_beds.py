@@ -66,6 +66,7 @@ def test_steps_across_switches_are_taken_and_change_no_bit_with_threads():
     assert runs[0] == runs[1]
 
 
+@pytest.mark.slow
 def test_a_bed_goes_on_from_a_state_to_the_same_bytes():
     swarm, _ = falling(30, 2)
     progress = swarm.begin(1.0)

@@ -63,6 +63,7 @@ def test_cases_depend_on_their_index_alone():
     assert first.until == again.until
 
 
+@pytest.mark.slow
 def test_draws_cover_their_ranges():
     drawn = [case_of(index)[1] for index in range(300)]
     for name in RANGES:

@@ -282,6 +282,7 @@ def test_kinds_count_for_as_many_as_there_are():
     assert high[0, 0] <= 0.0
 
 
+@pytest.mark.slow
 def test_tables_from_sums_are_those_of_all_replicates_together():
     results = make_results(count=40)
     columns = [results.replicates[name] for name in COUNTED]

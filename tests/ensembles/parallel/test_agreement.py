@@ -134,7 +134,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize("other", rest_slow(OTHERS, lambda other: other in (OTHERS[0], OTHERS[-1])))
+@pytest.mark.parametrize("other", rest_slow(OTHERS, lambda other: other == OTHERS[-1]))
 def test_ranks_with_other_words_are_refused(tmp_path, other):
     write_small(tmp_path, vertices="[1]")
     done = mixed(tmp_path, ["small.toml"], ["small.toml", *other])
@@ -204,7 +204,7 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(DIFFERS)
     env = os.environ | {}
     env["PYTHONPATH"] = os.pathsep.join([str(tmp_path), env.get("PYTHONPATH", "")])
-    done = run_command(tmp_path, "small.toml", ranks=3, env=env, timeout=60)
+    done = run_command(tmp_path, "small.toml", ranks=2, env=env, timeout=60)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
@@ -219,6 +219,7 @@ FACTOR = -1.0 if FIRST else -2.0
 """
 
 
+@pytest.mark.slow
 def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
     write_own(tmp_path)
     (tmp_path / "neighbour.py").write_text(DEPENDS)

@@ -77,6 +77,7 @@ def test_results_of_another_study_are_kept_under_another_name(finished, capsys):
     assert results_in(finished).keys() == {"r.h5", "r.1.h5", "r.2.h5"}
 
 
+@pytest.mark.slow
 def test_resume_and_overwrite_extends_what_is_of_this_study(finished):
     ended = go(finished, RESUME, overwrite=True, replicates=5)
     assert ended.computed == 4 and results_in(finished).keys() == {"r.h5"}

@@ -251,6 +251,7 @@ def test_the_outline_lies_in_the_middle_of_its_play():
         assert fit.shape.area == pytest.approx(mask.sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_turned_and_mirrored_masks_fit_as_well():
     for seed in range(2):
         masks = [blob(seed), np.rot90(blob(seed)), blob(seed)[::-1]]

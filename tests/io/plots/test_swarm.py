@@ -85,6 +85,7 @@ def test_holes_stay_open_in_a_picture():
     assert colour(10.0, 14.0) < 3 * 250
 
 
+@pytest.mark.slow
 def test_what_has_left_is_not_drawn():
     results = make_swarm_results()
     results.groups["snapshots"]["cluster"][0, 1:, 0] = GONE

@@ -47,6 +47,7 @@ def velocity(bodies, forces=FORCES, **options):
     return swarm_of(bodies, forces, **options).run("1 ms").velocity[-1, :, :2].mean(axis=0)
 
 
+@pytest.mark.slow
 def test_a_doublet_settles_as_two_spheres_do():
     alone = velocity(row(1))[1]
     apart = velocity(row(2), [Gravity(), StokesDrag(), Contact()])[1]
