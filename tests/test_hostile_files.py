@@ -12,7 +12,7 @@ from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
 from tests.helpers import hostile_files
 from tests.helpers.tiers import rest_slow
 
-EXAMPLES = 40
+EXAMPLES = settings().max_examples // 2
 
 
 @pytest.fixture(scope="module")

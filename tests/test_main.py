@@ -81,7 +81,7 @@ def test_flocsim_ensemble_is_the_ensemble_command(tmp_path, monkeypatch, capsys)
 
 
 @pytest.mark.parametrize(
-    "words", rest_slow([["--dry-run"], ["--output", "a.h5"]], lambda words: words[0] == "--output")
+    "words", rest_slow([["--dry-run"], ["--output", "a.h5"]], lambda words: False)
 )
 def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     write_small(tmp_path, vertices="[1]", types='["III"]')  # the others settle implausibly fast
@@ -132,7 +132,7 @@ STREAMS = [
 
 
 @pytest.mark.parametrize(
-    ("line", "code", "said"), rest_slow(STREAMS, lambda *case: STREAMS.index(case) % 2 == 0)
+    ("line", "code", "said"), rest_slow(STREAMS, lambda *case: STREAMS.index(case) % 4 == 0)
 )
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
 def test_streams_that_are_closed_or_full_cost_one_line(study, line, code, said):

@@ -557,6 +557,7 @@ def test_parts_that_a_picture_has_not_are_told(tmp_path, frame, capsys, words, s
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_fit_is_drawn(tmp_path, frame):
     options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
     assert run(frame, *options, "--fits", tmp_path / "f") == 0
@@ -564,6 +565,7 @@ def test_every_fit_is_drawn(tmp_path, frame):
     assert names == ["a.png-1.png", "a.png-2.png", "a.png-3.png"]
 
 
+@pytest.mark.slow
 def test_both_ends_of_bands_are_fitted_on_request(tmp_path, frame, capsys):
     """Closer ones are smaller, wider ones larger; the flocs themselves are as without."""
     options = ("--pixel-size", "1e-6", "--vertices", "4,16")

@@ -166,6 +166,7 @@ def test_a_dry_run_says_what_would_be_run(folder, capsys):
     assert "shear:10um-20um" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     words = ["trajectory", "kernel.toml", "--scene", "shear:10um-20um,1,1", "--replicate", "3"]

@@ -69,6 +69,7 @@ def test_further_runs_are_those_of_a_study_of_that_outline(folder, scene):
             np.testing.assert_array_equal(found[column], other[same], err_msg=column)
 
 
+@pytest.mark.slow
 def test_first_runs_are_those_of_a_study_without(folder):
     one, other = (run(config(folder, outlines)).replicates for outlines in ("band", "cut"))
     for name in ("outcome", "r_i", "d_c_last", "steps", "checked_outcome"):

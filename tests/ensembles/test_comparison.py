@@ -143,6 +143,7 @@ def test_tables_have_the_numbers(files):
     np.testing.assert_array_equal(frame["difference"].to_numpy(), data["difference"].values.ravel())
 
 
+@pytest.mark.slow
 def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_path):
     first, a, _ = files
     outcome, inside = (first.replicates[name].copy() for name in ("outcome", "inside"))

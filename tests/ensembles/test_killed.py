@@ -55,7 +55,7 @@ def wait_until(holds, seconds):
 def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
     monkeypatch.chdir(tmp_path)
     # As many as take longer than it is until the first are seen.
-    few, more = ("= 6", "= 2000") if text is PAIRS else ("= 2", "= 40")
+    few, more = ("= 6", "= 1000") if text is PAIRS else ("= 2", "= 40")
     assert f"replicates {few}\n" in text
     changed = text.replace(f"replicates {few}\n", f"replicates {more}\n")
     (tmp_path / "study.toml").write_text(changed, "utf-8")

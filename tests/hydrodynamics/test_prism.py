@@ -115,6 +115,7 @@ def test_a_deeper_prism_sinks_more_slowly():
     assert deep < shallow
 
 
+@pytest.mark.slow
 def test_real_flocs():
     found = []
     for mask, _ in silhouettes()[:8]:

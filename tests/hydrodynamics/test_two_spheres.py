@@ -81,9 +81,7 @@ def test_a_rigid_doublet_in_shear():
     assert attraction / (0.5 * pair.doublet(1e-9)[0][0]) == pytest.approx(4.58e4, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "ratio", rest_slow([0.02, 0.1, *RATIOS], lambda ratio: ratio in (0.02, 0.5))
-)
+@pytest.mark.parametrize("ratio", rest_slow([0.02, 0.1, *RATIOS], lambda ratio: ratio == 0.5))
 def test_an_unequal_doublet(ratio):
     first, second = SpherePair((1.0, ratio)), SpherePair((ratio, 1.0))
     for own, other in zip(first.doublet([1e-6, 0.1]), second.doublet([1e-6, 0.1]), strict=True):
@@ -171,6 +169,7 @@ def test_what_is_left_of_lubrication_falls_as_it_should(ratio):
         assert late < 0.35 * early, (family, on, of)
 
 
+@pytest.mark.slow
 def test_more_terms_change_nothing():
     few, many = functions_of(0.2, 150), functions_of(0.2, 300)
     for xi in (1e-6, 1e-2, 1.0):

@@ -80,6 +80,7 @@ def assert_same_momenta(motion):
     assert np.all(np.abs(momenta(motion.scene()) - momenta(motion.scene(0))) < 1e-12 * scale)
 
 
+@pytest.mark.slow
 def test_ragged_bodies_conserve_energy_and_momenta():
     law = Contact(20.0, 0.0, damping_n=0.0)
     motion = simulate(ragged_encounter(), [law], 2e-4, max_step=2e-6)

@@ -38,7 +38,7 @@ def assert_right_or_typed(index):
     assert verdict.kind != "typed" or verdict.detail.split()[0] in TYPED
 
 
-@pytest.mark.parametrize("index", rest_slow(SHORT, lambda index: index < 26))
+@pytest.mark.parametrize("index", rest_slow(SHORT, lambda index: index < 14))
 def test_cases_of_few_scenes(index):
     assert_right_or_typed(index)
 

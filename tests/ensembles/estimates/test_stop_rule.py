@@ -84,6 +84,7 @@ def ended_at(outcome, stop):
     return next(look for look in borders(stop, len(outcome)) if rule(look) or look == len(outcome))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "studies"),
     rest_slow(

@@ -72,6 +72,7 @@ def imports_of(path):
         yield from (file_of(name) for name in names if name.partition(".")[0] == "flocsim")
 
 
+@functools.cache
 def reached():
     """Every file of flocsim that a replicate imports, directly or through others."""
     found, todo = set(), [PACKAGE / entry for entry in ENTRIES]

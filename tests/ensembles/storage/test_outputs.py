@@ -13,6 +13,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config, write_small
+from tests.helpers.tiers import rest_slow
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}
 
@@ -112,7 +113,7 @@ def stop_at_the_end(monkeypatch, folder):
             go(folder)
 
 
-@pytest.mark.parametrize("mode", [NEW, RESUME])
+@pytest.mark.parametrize("mode", rest_slow([NEW, RESUME], lambda mode: mode == RESUME))
 def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
     ready, tmp_path, monkeypatch, mode
 ):

@@ -118,6 +118,7 @@ def test_two_spheres_hold_below_their_rate_and_open_above(flow):
     assert pair.opens_at(1.02 * CRITICAL) is True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("h_min", "flow", "jit"),
     rest_slow(

@@ -157,6 +157,7 @@ def test_scripts_get_no_words_of_the_command():
     assert "killed" in str(error_of(-9, []))
 
 
+@pytest.mark.slow
 def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = flocsim.Study(write_small(tmp_path)).with_(

@@ -168,7 +168,7 @@ def test_the_gap_is_that_of_all_pairs(drawn):
         assert gap(scene, work, a, b) == pytest.approx(expected, rel=1e-12, abs=10 * grain)
 
 
-@given_often(25, 100, numbers)
+@given_often(8, 100, numbers)
 def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
     scene, work = arrays(*placed(drawn))
     pose = pose_of(scene, work, 0, 1)

@@ -169,7 +169,7 @@ def test_damping_of_lubrication_is_that_of_the_gaps_rate():
 
 def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
     """Newton's third law in every column of both matrices."""
-    for seed in SCENES:
+    for seed in SCENES[:10]:
         found = differences(seed, ("contact",), True)
         found.assemble(found.scene, found.work)
         for which in (at.STIFFNESS, at.DAMPING):

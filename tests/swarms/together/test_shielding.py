@@ -145,6 +145,7 @@ def test_a_drag_in_a_cluster_is_that_alone_or_less_and_takes_energy(law, fluid):
         assert fx * vx + fy * vy + torque * spin < 0.0
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_from_its_state_to_the_same_bytes():
     bodies, side = crowd(20, 1, fraction=0.45)
     swarm = Swarm(bodies, FORCES, fluid=WATER, box=(side, side))
