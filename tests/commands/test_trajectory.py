@@ -65,6 +65,7 @@ def test_forces_and_an_animation(folder, monkeypatch, capsys):
         assert animation.info["loop"] == 0
 
 
+@pytest.mark.slow
 def test_set_changes_the_scene(folder, capsys):
     lines = [call(capsys, "small.toml", "--vertices", 4, *more)[1][0]
              for more in ([], ["--set", "zone.root=inner"])]  # fmt: skip
@@ -91,6 +92,7 @@ def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
         ]
 
 
+@pytest.mark.slow
 def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
     one = call(capsys, "small.toml", "--scene", "III,4,1.0", "-o", "a.png")
     words = ["--type", "III", "--vertices", 4, "--delta", 1, "-o", "a.png"]

@@ -93,7 +93,6 @@ def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     assert (table["pr_a_shape_low"] <= 0.0).all() and (table["pr_a_shape_high"] >= 0.0).all()
     assert main(["report", "study.h5"]) == 0
     assert "shape −" in (folder / "study.html").read_text("utf-8")
-    assert main(["plot", "study.h5", "--figures", "overview"]) == 0
 
 
 @pytest.mark.slow

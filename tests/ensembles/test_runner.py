@@ -104,6 +104,7 @@ def test_results_hold_what_was_run(study, alone, tmp_path):
     assert same_arrays(again.pooled, results.pooled)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
     xarray = pytest.importorskip("xarray")

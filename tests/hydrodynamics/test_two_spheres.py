@@ -207,6 +207,7 @@ def test_spheres_that_touch_are_refused(gap):
         EQUAL.along(gap)
 
 
+@pytest.mark.slow
 def test_units():
     pair, unit = SpherePair((3e-6, 6e-6), 1e-3), SpherePair((1.0, 2.0))
     resistance, strain = pair.across(3e-7)

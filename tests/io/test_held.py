@@ -76,7 +76,7 @@ COMMANDS = {
     "report in motion": ["report", "r.h5", "--overwrite"],
     "compare": ["compare", "r.h5", "r.h5"],
 }
-QUICK = ("info", "report", "compare")
+QUICK = ("info", "compare")
 
 
 @pytest.mark.parametrize("name", rest_slow(COMMANDS, lambda name: name in QUICK))

@@ -56,6 +56,7 @@ def test_claim_2_spheropolygons_beat_spheres():
     assert np.all(large(8) < large(1)) and np.mean(large(4) < large(1)) > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "counts", rest_slow([[28], [8, 16, 28, 64]], lambda counts: len(counts) == 1)
 )
@@ -65,6 +66,7 @@ def test_claim_3_errors_rise_with_the_radius_from_eight_vertices_on(counts):
     assert interval(means[2] - means[1])[0] > 0
 
 
+@pytest.mark.slow
 def test_claim_3_does_not_hold_for_four_vertices():
     """Four sharp corners suit a round floc less than four round ones."""
     assert interval(large(4, 4.0) - large(4, 1.0))[1] < 0

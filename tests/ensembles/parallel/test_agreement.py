@@ -113,6 +113,7 @@ def mixed(folder, *jobs, timeout=60):
     return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=timeout)
 
 
+@pytest.mark.slow
 def test_ranks_with_two_configs_are_refused(tmp_path):
     write_small(tmp_path, name="a.toml", vertices="[1]")
     write_small(tmp_path, name="b.toml", vertices="[1]", seed="2")
@@ -243,6 +244,7 @@ def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monk
     assert not library.exists()
 
 
+@pytest.mark.slow
 def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
     write_small(tmp_path, vertices="[1]")
     words = command("small.toml", "--quiet")

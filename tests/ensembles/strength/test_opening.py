@@ -111,7 +111,7 @@ def doublet(forces, flow="shear", jit=False, angle=1.0, held=False):
     return Doublet(start, flow, jit=jit)
 
 
-@pytest.mark.parametrize("flow", ["shear", "extension"])
+@pytest.mark.parametrize("flow", rest_slow(["shear", "extension"], lambda flow: flow == "shear"))
 def test_two_spheres_hold_below_their_rate_and_open_above(flow):
     pair = doublet(bond(), flow)
     assert pair.opens_at(0.98 * CRITICAL) is False

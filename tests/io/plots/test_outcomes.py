@@ -90,6 +90,7 @@ def test_every_value_is_on_the_axis_whatever_has_no_value(values, scale, tmp_pat
     assert "h: held" in title and "missed" not in title
 
 
+@pytest.mark.slow
 def test_words_and_one_value_alone_have_an_axis(tmp_path):
     results = make_results(types=("I",), vertices=(4,), delta=(0.0,))
     for values in (("inner", "outer"), (5.0,), (0.0,)):
