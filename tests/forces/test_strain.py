@@ -69,7 +69,9 @@ def period_of(method, angle=0.2, shape=THREE_TO_ONE, until=2.5):
 
 @pytest.mark.parametrize(
     "method",
-    rest_slow([Implicit(1e-9), Overdamped(1e-9)], lambda method: isinstance(method, Implicit)),
+    rest_slow(
+        [Implicit(1e-9), Overdamped(1e-9)], lambda method: not isinstance(method, Overdamped)
+    ),
     ids=lambda method: type(method).__name__,
 )
 def test_an_ellipse_turns_once_in_jefferys_period(method):

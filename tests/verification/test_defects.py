@@ -54,6 +54,7 @@ def test_a_hanging_doublet_comes_to_rest():
     assert row["steps"] < 500
 
 
+@pytest.mark.slow
 def test_a_floc_in_the_cavity_of_another_comes_to_rest():
     """Its centre lies at the other's, where the line between them has no direction."""
     outcome, row = replicate(766, TYPE_II, 8, 0.133)
