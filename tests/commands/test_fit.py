@@ -153,7 +153,6 @@ def test_several_spheroradii_go_to_one_library(tmp_path, frame, capsys):
     assert "r = 1 px" in printed and "r = 2 px" in printed
 
 
-@pytest.mark.slow
 def test_the_library_is_drawn_and_described(tmp_path, frame, capsys):
     run(frame, "--pixel-size", "1e-6", "--vertices", "4,8", "-o", tmp_path / "s.h5")
     for command, words in ((plot, ["--output-dir", tmp_path]), (info, [])):
@@ -453,7 +452,6 @@ def overlay_of_masks(tmp_path, *options):
         return code, np.asarray(picture.convert("L")).astype(float)
 
 
-@pytest.mark.slow
 def test_the_overlay_of_masks_is_drawn_over_their_pictures(tmp_path, frame, capsys):
     """A picture brighter at one side says which of both is beneath."""
     with Image.open(frame / "a.png") as picture:

@@ -92,7 +92,6 @@ def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
         ]
 
 
-@pytest.mark.slow
 def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
     one = call(capsys, "small.toml", "--scene", "III,4,1.0", "-o", "a.png")
     words = ["--type", "III", "--vertices", 4, "--delta", 1, "-o", "a.png"]

@@ -91,7 +91,6 @@ def test_other_draws_are_independent_samples(files, tmp_path):
     )
 
 
-@pytest.mark.slow
 def test_conditions_that_both_have_are_found_by_their_names(files, tmp_path):
     first, a, _ = files
     fewer = attrs.evolve(

@@ -297,7 +297,6 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     assert command("--jobs", "0") == 2
 
 
-@pytest.mark.slow
 def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
     fake, command, tmp_path, monkeypatch, capsys
 ):
