@@ -51,8 +51,14 @@ def pytest_runtestloop():
 waiting.WORTH_SAYING = math.inf
 
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
-settings.register_profile("repeatable", deadline=None, derandomize=True)
-settings.load_profile("repeatable")
+for profile, examples in (("few", 30), ("many", 100)):
+    settings.register_profile(profile, deadline=None, derandomize=True, max_examples=examples)
+
+
+def pytest_configure(config):
+    """A property is tried for fewer examples where slow tests are left out."""
+    settings.load_profile("few" if "not slow" in config.option.markexpr else "many")
+
 
 # pytest.approx allows 1e-12 whatever it compares; in SI units that is more than most lengths,
 # forces and masses of a floc are, and no test of them could fail. What is allowed is what a test

@@ -20,7 +20,7 @@ from tests.reference.samples import scene_of
 SCENES = range(220)
 ONE_BY_ONE = range(50)
 UNCOMPILED = range(20)
-FEW_QUICKLY = rest_slow(SCENES, lambda seed: seed < 60)
+FEW_QUICKLY = rest_slow(SCENES, lambda seed: seed < 25)
 
 TOGETHER = {gap: tuple(name for name in FORCES if not name.endswith(other))
             for gap, other in zip(GAPS, GAPS[::-1], strict=True)}  # fmt: skip
@@ -89,7 +89,7 @@ def test_contact_pairs(seed):
 
 
 @pytest.mark.parametrize("name", FORCES)
-@pytest.mark.parametrize("seed", rest_slow(ONE_BY_ONE, lambda seed: seed < 20))
+@pytest.mark.parametrize("seed", rest_slow(ONE_BY_ONE, lambda seed: seed < 10))
 def test_every_force_alone(seed, name):
     # Uncompiled, each scene is made of this one force's code, all other forces left out.
     case = random_case(seed)

@@ -12,7 +12,7 @@ from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
 from tests.helpers import hostile_files
 from tests.helpers.tiers import rest_slow
 
-EXAMPLES = 40
+EXAMPLES = settings().max_examples // 2
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def test_any_file_is_read_or_refused_in_one_line(readers, kind):
     throw()
 
 
-@pytest.mark.parametrize("files", rest_slow([30, 60], lambda files: files == 30))
+@pytest.mark.parametrize("files", rest_slow([15, 60], lambda files: files == 15))
 @pytest.mark.parametrize("kind", KINDS)
 def test_some_are_read_and_some_are_refused(readers, kind, files):
     """Else the files would be so wrong, or so right, that they test nothing."""

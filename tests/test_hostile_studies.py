@@ -13,6 +13,7 @@ import pytest
 
 from tests.helpers import hostile_studies
 from tests.helpers.hostile_studies import KINDS, MARK, Hostile, commands, judged
+from tests.helpers.tiers import rest_slow
 
 COUNT = int(os.environ.get("FLOCSIM_HOSTILE", "154"))
 """Files of each kind; the number of a file is its seed."""
@@ -76,7 +77,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("wrong", rest_slow(WRONG, lambda wrong: wrong != "memory"))
 def test_whatever_a_command_does_wrong_is_seen(tmp_path, monkeypatch, wrong):
     """Or no file could fail."""
     monkeypatch.chdir(tmp_path)

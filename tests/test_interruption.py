@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+from tests.helpers.tiers import rest_slow
+
 WAITS = """\
 import sys, time
 from flocsim import interruption
@@ -87,7 +89,7 @@ run(1.0)
 """
 
 
-@pytest.mark.parametrize("jit", [True, False])
+@pytest.mark.parametrize("jit", rest_slow([True, False], bool))
 def test_a_kernel_that_never_ends_is_ended_by_a_signal(jit):
     process = started(ENDLESS.replace("JIT", str(jit)))
     time.sleep(0.2)

@@ -10,6 +10,7 @@ import pytest
 from flocsim import limits
 from flocsim.compiler.composer import compose
 from flocsim.errors import FlocsimError
+from tests.helpers.tiers import rest_slow
 
 
 def limited(size, *words):
@@ -22,7 +23,7 @@ def limited(size, *words):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("size", [150e6, 300e6, 500e6])
+@pytest.mark.parametrize("size", rest_slow([150e6, 300e6, 500e6], lambda size: size == 300e6))
 @pytest.mark.parametrize("words", [["flocsim.ensemble", "none.toml"], ["flocsim", "info", "none"]])
 def test_too_little_to_load_the_libraries_is_one_line(size, words):
     done = limited(int(size), "-m", *words)

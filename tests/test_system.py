@@ -12,6 +12,7 @@ from flocsim.geometry.contact import spheres_only
 from flocsim.hooks import HOOKS
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from flocsim.laws import compiled_calls
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 
 BALL = Body(Sphere(5e-6), surface_density=2.0)
@@ -243,7 +244,11 @@ CLOSE_FORCES = [
 
 
 @pytest.mark.parametrize(
-    "integrator", [VelocityVerlet(4e-8), DormandPrince54(1e-10), Implicit(1e-10)]
+    "integrator",
+    rest_slow(
+        [VelocityVerlet(4e-8), DormandPrince54(1e-10), Implicit(1e-10)],
+        lambda integrator: isinstance(integrator, Implicit),
+    ),
 )
 def test_spheres_by_their_own_code_and_by_that_of_polygons(integrator):
     bodies = [attrs.evolve(b, spin=300.0) for b in head_on(1e-2)]

@@ -140,7 +140,7 @@ def write_labelled(
         dataset.attrs.update(column.about)
         for number, axis in enumerate(column.axes):
             if name not in scales and axis in scales:
-                dataset.dims[number].attach_scale(datasets[axis])
+                h5py.h5ds.attach_scale(dataset.id, datasets[axis].id, number)
     return list(datasets.values())
 
 

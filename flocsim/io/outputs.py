@@ -141,22 +141,23 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]
     UsageError for an output that is one of the ``inputs`` or of the other outputs, and for a file
     in the way; FileError for what cannot be written.
     """
-    sources = {mark: source for source in inputs for mark in marks_of(source)}
+    sources = {mark_of(source): source for source in inputs}
+    sources.pop(None, None)
     seen: dict[object, Output] = {}
     for output in outputs:
         target = ordinary_target(output.path)
         for name in (target, target.with_name(target.name + output.suffix)):
-            for source in (sources[mark] for mark in marks_of(name) if mark in sources):
+            if (source := sources.get(mark_of(name))) is not None:
                 raise UsageError(
                     f"writing {output.path} would replace {source}, which is an input: name another"
                 )
-        marks = marks_of(target)
-        for other in (seen[mark].path for mark in marks if mark in seen):
+        if (mark := mark_of(target)) in seen:
             raise UsageError(
-                f"{output.path} and {other} are the same file, but two outputs are to be written: "
-                "name another file for one of them"
+                f"{output.path} and {seen[mark].path} are the same file, but two outputs are to be "
+                "written: name another file for one of them"
             )
-        seen |= dict.fromkeys(marks, output)
+        if mark is not None:
+            seen[mark] = output
         if os.path.lexists(target) and output.rule(target) is Old.KEPT:
             raise in_the_way(output.path, output.ways)
         check_writable(output.path, output.suffix)
@@ -167,15 +168,15 @@ def in_the_way(path: str | os.PathLike, ways: str = WAYS) -> UsageError:
     return UsageError(f"{path} already exists and is left as it is: name another output, or {ways}")
 
 
-def marks_of(path):
-    """What all paths of a file have in common: the resolved path and, once there, the inode."""
-    marks: list[object] = []
-    # A name that the system cannot take is told by whoever opens it.
+def mark_of(path):
+    """What all paths of a file have in common: its inode, or the resolved path of what is not
+    there; None for a name that the system cannot take, of which whoever opens it tells."""
     with contextlib.suppress(OSError, ValueError):
-        marks.append(os.path.realpath(path))
         about = os.stat(path)
-        marks.append((about.st_dev, about.st_ino))
-    return marks
+        return about.st_dev, about.st_ino
+    with contextlib.suppress(OSError, ValueError):
+        return os.path.realpath(path)
+    return None
 
 
 def loaded_sources() -> list[str]:

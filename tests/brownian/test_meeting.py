@@ -27,6 +27,7 @@ def run(way, replicates, **more):
     return brownian_meetings([HALF, HALF], forces, "2 um", "4 um", replicates, fluid=WATER, **more)
 
 
+@pytest.mark.slow
 def test_each_replicate_goes_by_its_number_alone():
     some, more = run(5e-7, 4, seed=3, jit=False), run(5e-7, 7, seed=3, jit=False)
     assert some.touched + some.escaped == 4 and more.touched + more.escaped == 7

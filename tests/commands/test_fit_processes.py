@@ -18,6 +18,7 @@ from flocsim.commands.fitting.processes import Lost, workers
 from flocsim.errors import UsageError
 from flocsim.io.shapes.library import read_library
 from tests.helpers.small_study import ROOT
+from tests.helpers.tiers import rest_slow
 
 needs_fork = pytest.mark.skipif(sys.platform != "linux", reason="needs fork")
 JOBS = [1, pytest.param(2, marks=needs_fork)]
@@ -67,7 +68,9 @@ def use_up_memory():
 
 
 @needs_fork
-@pytest.mark.parametrize("function", ["find_flocs", "fit_region"])
+@pytest.mark.parametrize(
+    "function", rest_slow(["find_flocs", "fit_region"], lambda name: name == "fit_region")
+)
 def test_a_picture_that_kills_its_process_is_lost_and_no_other(
     folder, monkeypatch, capsys, function
 ):
@@ -95,7 +98,9 @@ def test_a_process_that_is_killed_once_costs_nothing(folder, monkeypatch, capsys
 
 
 @pytest.mark.parametrize("jobs", JOBS)
-@pytest.mark.parametrize("function", ["find_flocs", "fit_region"])
+@pytest.mark.parametrize(
+    "function", rest_slow(["find_flocs", "fit_region"], lambda name: name == "fit_region")
+)
 def test_a_picture_too_large_for_the_memory_is_lost_and_no_other(
     folder, monkeypatch, capsys, jobs, function
 ):
@@ -111,6 +116,7 @@ def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):
     assert not (folder / "s.h5").exists()
 
 
+@pytest.mark.slow
 def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
     original = fit_pictures.find_flocs
 
@@ -126,6 +132,7 @@ def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
     assert len(ids()) == 3 and "b.png: no such picture" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=[needs_fork, pytest.mark.slow])])
 def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, jobs):
     strange = os.fsencode(folder / "frames") + b"/caf\xe9.png"

@@ -29,6 +29,7 @@ def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", rest_slow(["kernel", "brownian"], lambda kind: kind == "kernel"))
 def test_few_spheres_of_it_come_to_results(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -84,7 +84,7 @@ def test_a_mechanism_without_a_factor_is_named(folder, capsys):
                  "shear:10um-10um": 0.159},
             ),
         ],
-        lambda meeting, sizes, known: len(sizes) == 1,
+        lambda meeting, sizes, known: False,
     ),
 )  # fmt: skip
 def test_equivalent_spheres_are_known_in_water(folder, monkeypatch, capsys, meeting, sizes, known):
@@ -137,6 +137,7 @@ def test_the_number_of_processes_changes_nothing(folder):
     assert not same_data("kernel.h5", "b.h5"), "nothing differs"
 
 
+@pytest.mark.slow
 def test_another_scramble_is_another_study(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     words = ["kernel", "kernel.toml", "--quiet", "--resume", "--set", "scene.scrambles=8"]
@@ -165,6 +166,7 @@ def test_a_dry_run_says_what_would_be_run(folder, capsys):
     assert "shear:10um-20um" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
     words = ["trajectory", "kernel.toml", "--scene", "shear:10um-20um,1,1", "--replicate", "3"]

@@ -171,6 +171,7 @@ def test_a_library_or_its_table_is_replaced_on_request_and_kept(folder, capsys):
     assert "table.csv already exists" in refused(folder, capsys, *words)
 
 
+@pytest.mark.slow
 def test_plots_are_drawn_again_and_photographs_spared(folder, capsys):
     results = make_results(types=("I",), count=4)
     write_results(folder / "study.h5", results)

@@ -59,6 +59,7 @@ def test_all_figures_are_drawn_into_a_new_folder(study, monkeypatch, capsys, tmp
     assert sorted(os.listdir(tmp_path / "a" / "b")) == sorted(names)
 
 
+@pytest.mark.slow
 def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert call(plot, "study.h5", "--figures", "overview, 8,8") == 0

@@ -14,6 +14,7 @@ from flocsim.ensembles.preflight import check_study
 from flocsim.errors import KernelError
 from flocsim.forces import CentreForce
 from tests.helpers.small_study import SMALL, write_small
+from tests.helpers.tiers import rest_slow
 
 say = print
 
@@ -79,7 +80,10 @@ def test_a_call_of_python_is_refused_by_file_and_line(function, line, name):
     assert f"in line {first + (line or 2)}:" in str(caught.value)
 
 
-@pytest.mark.parametrize("function", [printing_by_a_module, raising_numbers])
+@pytest.mark.parametrize(
+    "function",
+    rest_slow([printing_by_a_module, raising_numbers], lambda each: each is raising_numbers),
+)
 def test_what_the_names_do_not_tell_the_compiled_code_does(function):
     line = function.__code__.co_firstlineno
     where = rf"test_interpreter_calls\.py:{line}: it calls Python while it runs"

@@ -15,6 +15,7 @@ from flocsim.errors import ConfigError
 from flocsim.io.shapes.library import read_library, write_library
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
+from tests.helpers.tiers import rest_slow
 
 STUDY = """\
 preset = "tang2014"
@@ -58,7 +59,7 @@ def config(folder, outlines, scene="measured"):
     return load_text(folder, STUDY.format(outlines=outlines, scene=SCENES[scene]))
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", rest_slow(SCENES, lambda scene: scene == "measured"))
 def test_further_runs_are_those_of_a_study_of_that_outline(folder, scene):
     """Radii included: they are drawn as the flocs that were cut, whose places do not change."""
     found = run(config(folder, "band", scene)).replicates
@@ -68,6 +69,7 @@ def test_further_runs_are_those_of_a_study_of_that_outline(folder, scene):
             np.testing.assert_array_equal(found[column], other[same], err_msg=column)
 
 
+@pytest.mark.slow
 def test_first_runs_are_those_of_a_study_without(folder):
     one, other = (run(config(folder, outlines)).replicates for outlines in ("band", "cut"))
     for name in ("outcome", "r_i", "d_c_last", "steps", "checked_outcome"):
@@ -91,7 +93,6 @@ def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     assert (table["pr_a_shape_low"] <= 0.0).all() and (table["pr_a_shape_high"] >= 0.0).all()
     assert main(["report", "study.h5"]) == 0
     assert "shape −" in (folder / "study.html").read_text("utf-8")
-    assert main(["plot", "study.h5", "--figures", "overview"]) == 0
 
 
 @pytest.mark.slow

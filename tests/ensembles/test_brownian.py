@@ -193,6 +193,7 @@ def test_a_pair_that_a_secondary_minimum_holds_never_touches(folder, capsys):
     assert table["n_held"].sum() + table["n_missed"].sum() == 4
 
 
+@pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
     words = ["trajectory", "study.toml", "--scene", "0.5um-0.5um,1,0", "--replicate", "1"]
     assert main([*words, "-o", "a.png"]) == 0

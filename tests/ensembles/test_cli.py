@@ -57,8 +57,6 @@ def test_options_replace_the_configs_values(folder, capsys):
     write_small(folder, name="same.toml", vertices="[1]", seed=9, replicates=2)
     assert call(capsys, "same.toml", "--quiet")[0] == 0
     assert same_data(folder / "small.h5", folder / "other.h5") == []
-    assert call(capsys, "small.toml", "--quiet", "--output", "seed1.h5")[0] == 0
-    assert "replicates/angle_i" in same_data(folder / "seed1.h5", folder / "other.h5")
 
 
 def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):

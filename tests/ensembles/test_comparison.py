@@ -15,6 +15,7 @@ from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 
 def test_independent_samples_as_published():
@@ -75,6 +76,7 @@ def test_pairs_are_used_where_the_draws_are_common(files):
     assert not comparison.arrays["pr_inside"]["difference"].any()
 
 
+@pytest.mark.slow
 def test_other_draws_are_independent_samples(files, tmp_path):
     first, a, _ = files
     other = changed(tmp_path / "c.h5", first, angle_i=first.replicates["angle_i"] + 1e-9)
@@ -141,6 +143,7 @@ def test_tables_have_the_numbers(files):
     np.testing.assert_array_equal(frame["difference"].to_numpy(), data["difference"].values.ravel())
 
 
+@pytest.mark.slow
 def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_path):
     first, a, _ = files
     outcome, inside = (first.replicates[name].copy() for name in ("outcome", "inside"))
@@ -157,7 +160,10 @@ def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_pat
     assert "Pr[aggregation | decided approach]" in comparison.table("pr_a_per_approach")
 
 
-@pytest.mark.parametrize("identity", ['{"seed": 1e999}', '{"seed": 99999999999999999999}', "["])
+@pytest.mark.parametrize(
+    "identity",
+    rest_slow(['{"seed": 1e999}', '{"seed": 99999999999999999999}', "["], lambda each: each == "["),
+)
 def test_what_no_flocsim_wrote_is_refused_in_one_line(tmp_path, monkeypatch, capsys, identity):
     monkeypatch.chdir(tmp_path)
     made = make_results(vertices=(1, 4), delta=(0.0, 1.0), count=12)

@@ -81,6 +81,7 @@ def test_a_pilot_that_fails_is_one_line_among_the_others(tmp_path, monkeypatch, 
     assert any(line.startswith("stiffness:") for line in lines)
 
 
+@pytest.mark.slow
 def test_a_machine_without_a_compiler_is_told_the_rest(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     write_small(tmp_path, vertices="[1]")

@@ -57,7 +57,7 @@ LEAST = {"kernel": 8, "settling_kernel": 8}
 
 @pytest.mark.parametrize(
     "path",
-    rest_slow(EXAMPLES, lambda path: path.stem in ("quickstart", "own_shape")),
+    rest_slow(EXAMPLES, lambda path: path.stem == "quickstart"),
     ids=lambda path: path.stem,
 )
 def test_a_reduced_example_runs(path, examples, monkeypatch, capsys):
@@ -78,7 +78,9 @@ def test_a_reduced_example_runs(path, examples, monkeypatch, capsys):
     assert table["n_collided"].sum() > 0
 
 
-@pytest.mark.parametrize("path", SWARMS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", rest_slow(SWARMS, lambda path: path.stem == "swarm"), ids=lambda path: path.stem
+)
 def test_a_swarm_describes_itself(path, examples, capsys):
     check_swarms(load_any_config(examples / path.name))
     assert main(["swarm", str(examples / path.name), "--dry-run"]) == 0

@@ -221,11 +221,11 @@ ABILITIES = {
     "dry run": lambda cell: cell.run("--dry-run"),
 }
 LONG = {
-    "jobs": "strengths", "mpirun": "swarms", "resume": "pairs", "read while running": "swarms",
-    "sweep": "rates", "extend": "pairs", "Study": "swarms", "report": "rates", "plot": "rates",
+    "jobs": None, "mpirun": "swarms", "resume": "pairs", "read while running": "swarms",
+    "sweep": "rates", "extend": "pairs", "Study": None, "report": "rates", "plot": "rates",
 }  # fmt: skip
-"""Abilities that take long → the kind that shows them in the default run. Pairs under mpirun and in
-processes, swarms and rates that are resumed and extended, have files of tests of their own."""
+"""Abilities that take long → the kind that shows them in the default run. Pairs under mpirun, in
+processes and by Study, swarms and rates that are resumed and extended, have tests of their own."""
 
 
 def is_quick(ability, kind):

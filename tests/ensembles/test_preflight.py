@@ -25,7 +25,7 @@ from flocsim.errors import ConfigError, KernelError
 from flocsim.fields import quantity
 from flocsim.forces import ContactForce
 from flocsim.io.results.file import read_results
-from tests.helpers.small_study import run_command, small_config, write_small
+from tests.helpers.small_study import small_config, write_small
 
 HEAVY = {"bodies": {"surface_density": 20.0}}
 
@@ -143,12 +143,13 @@ def test_a_law_that_gives_no_number_is_refused_as_that(tmp_path):
         check_study(with_law(small_config(tmp_path, HEAVY), Singular()))
 
 
-def test_the_command_refuses_before_it_runs(tmp_path):
+def test_the_command_refuses_before_it_runs(tmp_path, monkeypatch, capsys):
     write_small(tmp_path)
+    monkeypatch.chdir(tmp_path)
     for words in ((), ("--dry-run",)):
-        done = run_command(tmp_path, "small.toml", "--set", "bodies.surface_density=20", *words)
-        assert (done.returncode, done.stdout) == (2, "")
-        assert "forces.contact.k_n 90 N/m or more" in done.stderr
+        assert cli.main(["small.toml", "--set", "bodies.surface_density=20", *words]) == 2
+        said = capsys.readouterr()
+        assert said.out == "" and "forces.contact.k_n 90 N/m or more" in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
 
 

@@ -16,6 +16,7 @@ from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results
 from tests.helpers.small_study import small_study
+from tests.helpers.tiers import rest_slow
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,7 @@ def alone(study):
     return results_of(study).replicates
 
 
-@pytest.mark.parametrize("size", [2, 5, 40])
+@pytest.mark.parametrize("size", rest_slow([2, 5, 40], lambda size: size == 5))
 def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone, size):
     from flocsim.ensembles.estimates.summary import Reader
 
@@ -103,6 +104,7 @@ def test_results_hold_what_was_run(study, alone, tmp_path):
     assert same_arrays(again.pooled, results.pooled)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
     xarray = pytest.importorskip("xarray")

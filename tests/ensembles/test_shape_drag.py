@@ -9,6 +9,7 @@ from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import StokesDrag
+from tests.helpers.tiers import rest_slow
 
 STUDY = """\
 preset = "tang2014"
@@ -48,7 +49,7 @@ def test_a_spin_without_drag_is_refused(tmp_path):
         written(tmp_path, 'meeting = "shear"\nrate = "10 1/s"', "rotational = false")
 
 
-@pytest.mark.parametrize("meeting", ["shear", "extension"])
+@pytest.mark.parametrize("meeting", rest_slow(["shear", "extension"], lambda each: each == "shear"))
 def test_pairs_in_a_flow_are_drawn_with_it(tmp_path, meeting):
     config = written(tmp_path, f'meeting = "{meeting}"\nrate = "10 1/s"')
     check_study(config)

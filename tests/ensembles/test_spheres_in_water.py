@@ -25,6 +25,7 @@ def facts(folder, scene="", more=""):
     return water_facts(load_any_config(path))
 
 
+@pytest.mark.slow
 def test_a_pair_that_settles(tmp_path):
     [found] = facts(tmp_path)
     assert found["water"] == pytest.approx(0.03085, rel=2e-3)

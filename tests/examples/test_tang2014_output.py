@@ -24,6 +24,7 @@ def example(monkeypatch):
             del sys.modules[name]
 
 
+@pytest.mark.slow
 def test_pages_and_figures_are_made_again_and_notes_are_kept(example, tmp_path):
     output = example("output")
     figure = draw_distance([0.0, 1.0], [1e-5, 2e-5])

@@ -101,6 +101,7 @@ def gaps_of(run, times):
     return run.at(times).position[:, 1, 1] - 2.0 * RADIUS
 
 
+@pytest.mark.slow
 def test_a_constant_push_closes_the_gap_exponentially():
     """h = h₀ exp(−F t/(6πγ r*²)), over four orders of the gap."""
     push, start = 1e-12, 4e-6
@@ -124,6 +125,7 @@ def test_attraction_alone_closes_it_as_a_root():
     np.testing.assert_allclose(gaps_of(run, times), wanted, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_least_gap_lets_bodies_touch_in_a_known_time():
     """From h₀ to h_min takes 6πγ r*²/F ln(h₀/h_min), from there to touching 6πγ r*²/F more."""
     push, start, least = 1e-10, 1e-6, 1e-8

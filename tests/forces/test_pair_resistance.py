@@ -109,7 +109,7 @@ def resistance_at(shapes, places, law):
     return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])
 
 
-@pytest.mark.parametrize("law", ["stokes", "shape"])
+@pytest.mark.parametrize("law", rest_slow(["stokes", "shape"], lambda law: law == "shape"))
 def test_the_resistance_of_shapes_is_symmetric_positive_and_the_derivative(law):
     rng, shapes = np.random.default_rng(3), [SpheroPolygon(L_SHAPE, 1e-6), Sphere(4e-6)]
     scale = np.array([1.0, 1.0, 5e-6] * 2)
@@ -155,6 +155,7 @@ def least_of_real_pairs(pairs, poses, law, jit):
     return min(found)
 
 
+@pytest.mark.slow
 def test_no_motion_of_two_real_flocs_gets_work_back():
     assert least_of_real_pairs(3, 100, "shape", jit=False) > 0.3
 
@@ -180,7 +181,7 @@ def check_against_multiblobs(pairs, gap):
         assert off.max() < 0.12
 
 
-@pytest.mark.parametrize("gap", [0.25, 1.0])
+@pytest.mark.parametrize("gap", rest_slow([0.25, 1.0], lambda gap: gap == 1.0))
 def test_two_real_flocs_move_as_rigid_multiblobs_do(gap):
     check_against_multiblobs(3, gap)
 

@@ -23,6 +23,7 @@ from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityV
 from flocsim.plausibility.reynolds import all_settled
 from flocsim.plausibility.settling import free_mobilities, held_mobility, terminal_motion
 from tests.forces.test_strain import SHEAR, ellipse
+from tests.helpers.tiers import rest_slow
 
 DRAG = StokesDrag(law="shape")
 WATER = Fluid(viscosity=1e-3, buoyancy=True)
@@ -175,7 +176,11 @@ def test_its_derivatives_are_laws_of_the_scene():
             assert slope == pytest.approx(wanted, rel=1e-3, abs=1e-5 * np.abs(wanted).max())
 
 
-@pytest.mark.parametrize("method", [Implicit(1e-9), Overdamped(1e-9)], ids=["inertia", "none"])
+@pytest.mark.parametrize(
+    "method",
+    rest_slow([Implicit(1e-9), Overdamped(1e-9)], lambda method: isinstance(method, Overdamped)),
+    ids=["inertia", "none"],
+)
 def test_an_ellipse_goes_round_as_jeffery_with_the_elongation_of_its_prism(method):
     flow = Fluid(viscosity=1e-3, gradient=(0.0, SHEAR, 0.0, 0.0))
     body = Body(TWO_TO_ONE, angle=0.2, spin=-1.0, surface_density=1e-3)

@@ -11,6 +11,7 @@ from flocsim.forces import StokesDrag
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped
+from tests.helpers.tiers import rest_slow
 
 SHEAR = 10.0
 """G of the simple shear u = (G y, 0) [1/s]."""
@@ -67,7 +68,11 @@ def period_of(method, angle=0.2, shape=THREE_TO_ONE, until=2.5):
 
 
 @pytest.mark.parametrize(
-    "method", [Implicit(1e-9), Overdamped(1e-9)], ids=lambda method: type(method).__name__
+    "method",
+    rest_slow(
+        [Implicit(1e-9), Overdamped(1e-9)], lambda method: not isinstance(method, Overdamped)
+    ),
+    ids=lambda method: type(method).__name__,
 )
 def test_an_ellipse_turns_once_in_jefferys_period(method):
     """2π (a/b + b/a)/G = 20.944/G for 3 : 1, from any angle."""

@@ -3,6 +3,7 @@
 import pytest
 
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from tests.helpers.tiers import rest_slow
 
 METHODS = [VelocityVerlet(1e-8), DormandPrince54(1e-10), Implicit(1e-10)]
 """Overdamped is not among them: it has no inertia, which most of these tests rely on."""
@@ -15,12 +16,19 @@ def name_of(integrator):
     return type(integrator).__name__
 
 
-by_method = pytest.mark.parametrize("integrator", METHODS, ids=name_of)
+def is_adaptive(integrator, *_):
+    """What is tried by default; VelocityVerlet by the slow run, and by default uncompiled: by
+    tests/integrators/test_order.py and test_methods_battery.py."""
+    return not isinstance(integrator, VelocityVerlet)
+
+
+by_method = pytest.mark.parametrize("integrator", rest_slow(METHODS, is_adaptive), ids=name_of)
 by_adaptive = pytest.mark.parametrize("integrator", ADAPTIVE, ids=name_of)
 
 
 def by_setting(*cases):
     """Parametrises ``integrator`` and ``allowed`` by pairs of them."""
+    ids = [name_of(case[0]) for case in cases]
     return pytest.mark.parametrize(
-        ("integrator", "allowed"), cases, ids=[name_of(case[0]) for case in cases]
+        ("integrator", "allowed"), rest_slow(cases, is_adaptive), ids=ids
     )

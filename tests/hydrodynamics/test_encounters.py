@@ -43,7 +43,7 @@ def test_settling(k, with_water, without):
 
 @pytest.mark.parametrize(("k", "with_water", "without"), rest_slow([
     (1e-2, 0.604, 1.51), (1e-3, 0.325, 1.19), (1e-4, 0.189, 1.07), (1e-5, 0.110, 1.03),
-], lambda k, *_: k == 1e-3))  # fmt: skip
+], lambda k, *_: False))  # fmt: skip
 def test_shear(long_steps, k, with_water, without):
     pair, force = SpherePair((1.0, 1.0)), attraction((1.0, 1.0), k)
     assert Meeting(pair, force, 1e-7).in_flow("shear", 1.0) == pytest.approx(with_water, rel=8e-3)
@@ -53,9 +53,7 @@ def test_shear(long_steps, k, with_water, without):
 
 @pytest.mark.parametrize(
     ("radius", "alpha"),
-    rest_slow(
-        [(5e-6, 0.257), (10e-6, 0.159), (20e-6, 0.096)], lambda radius, alpha: radius == 5e-6
-    ),
+    rest_slow([(5e-6, 0.257), (10e-6, 0.159), (20e-6, 0.096)], lambda radius, alpha: False),
 )
 def test_quartz_in_shear(radius, alpha):
     def force(gap):
@@ -66,7 +64,7 @@ def test_quartz_in_shear(radius, alpha):
 
 
 @pytest.mark.parametrize("flow", ["shear", "extension"])
-@pytest.mark.parametrize("rate", [1.0, 30.0])
+@pytest.mark.parametrize("rate", rest_slow([1.0, 30.0], lambda rate: rate == 30.0))
 def test_without_water_and_forces_all_of_the_kernel_touches(flow, rate):
     meeting = Meeting(SpherePair((0.4, 1.0)), np.zeros_like, 1e-6, water=False)
     assert meeting.in_flow(flow, rate) == pytest.approx(1.0, rel=1e-3)
@@ -77,6 +75,7 @@ def test_without_water_and_forces_spheres_settle_straight():
     assert meeting.settling((0.2, 3.0)) == pytest.approx(1.0, rel=5e-4)
 
 
+@pytest.mark.slow
 def test_a_small_one_goes_round_a_large_one(long_steps):
     # Of spheres of one density that do not attract each other, the more is left the nearer they
     # may come; in Stokes's flow around the large one all are fewer than ½ p² (Fuchs).
@@ -110,6 +109,7 @@ def test_spheres_change_places_in_shear():
     assert found[0] == pytest.approx(found[1], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_units(long_steps):
     unit_force = attraction((0.5, 1.0), 1e-3)
 

@@ -50,6 +50,7 @@ def test_a_sphere_of_spheres(count):
     assert 0.95 < speeds[1] < 1.0
 
 
+@pytest.mark.slow
 def test_the_stated_error_covers_a_finer_covering(monkeypatch):
     usual = prism_drag([HOOK])
     monkeypatch.setattr(prism, "SPHERES", (300, 600, 1200))
@@ -114,6 +115,7 @@ def test_a_deeper_prism_sinks_more_slowly():
     assert deep < shallow
 
 
+@pytest.mark.slow
 def test_real_flocs():
     found = []
     for mask, _ in silhouettes()[:8]:

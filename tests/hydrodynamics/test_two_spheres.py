@@ -81,9 +81,7 @@ def test_a_rigid_doublet_in_shear():
     assert attraction / (0.5 * pair.doublet(1e-9)[0][0]) == pytest.approx(4.58e4, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    "ratio", rest_slow([0.02, 0.1, *RATIOS], lambda ratio: ratio in (0.02, 0.5))
-)
+@pytest.mark.parametrize("ratio", rest_slow([0.02, 0.1, *RATIOS], lambda ratio: ratio == 0.5))
 def test_an_unequal_doublet(ratio):
     first, second = SpherePair((1.0, ratio)), SpherePair((ratio, 1.0))
     for own, other in zip(first.doublet([1e-6, 0.1]), second.doublet([1e-6, 0.1]), strict=True):
@@ -99,6 +97,7 @@ def test_a_doublet_far_apart_is_held_by_two_drags():
     assert turning == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_batchelors_settling_coefficient():
     def excess(s):
         along, across = mobility(EQUAL, s - 2.0)
@@ -112,7 +111,7 @@ def test_batchelors_settling_coefficient():
     assert -5.0 + near - 3.75 / 40.0 == pytest.approx(-6.5486, abs=3e-3)
 
 
-@pytest.mark.parametrize("ratio", rest_slow([1.0, *RATIOS], lambda ratio: ratio == 0.5))
+@pytest.mark.parametrize("ratio", rest_slow([1.0, *RATIOS], lambda ratio: False))
 def test_point_forces_say_the_same(ratio):
     gap = 1.0
     resistance, strain = resistances(ratio, gap)
@@ -170,6 +169,7 @@ def test_what_is_left_of_lubrication_falls_as_it_should(ratio):
         assert late < 0.35 * early, (family, on, of)
 
 
+@pytest.mark.slow
 def test_more_terms_change_nothing():
     few, many = functions_of(0.2, 150), functions_of(0.2, 300)
     for xi in (1e-6, 1e-2, 1.0):
@@ -207,6 +207,7 @@ def test_spheres_that_touch_are_refused(gap):
         EQUAL.along(gap)
 
 
+@pytest.mark.slow
 def test_units():
     pair, unit = SpherePair((3e-6, 6e-6), 1e-3), SpherePair((1.0, 2.0))
     resistance, strain = pair.across(3e-7)

@@ -91,7 +91,7 @@ CASES = [
 
 @pytest.mark.parametrize(
     ("integrator", "scene", "counts", "order"),
-    rest_slow(CASES, lambda integrator, scene, *_: integrator is OWN or scene == "pressed"),
+    rest_slow(CASES, lambda integrator, scene, *_: scene == "pressed"),
     ids=[f"{name_of(case[0])}-{case[1]}" for case in CASES],
 )  # fmt: skip
 def test_order(integrator, scene, counts, order):

@@ -33,7 +33,7 @@ def path(integrator, surface_density):
 
 
 @pytest.mark.parametrize(
-    "masses", rest_slow([[0.2, 0.02], [0.2, 0.02, 0.002]], lambda masses: len(masses) == 2)
+    "masses", rest_slow([[0.2, 0.02], [0.2, 0.02, 0.002]], lambda masses: False)
 )
 def test_without_inertia_is_the_limit_of_little_mass(masses):
     """Overdamped does not depend on the mass; Implicit comes up to it in proportion to it."""

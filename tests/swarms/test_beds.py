@@ -12,6 +12,7 @@ from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Status
 from flocsim.swarms.placement import place_at_random
 from tests.helpers.swarm_scenes import WATER, R, forces
+from tests.helpers.tiers import rest_slow
 
 SPREAD = 1.4
 
@@ -66,6 +67,7 @@ def test_steps_across_switches_are_taken_and_change_no_bit_with_threads():
     assert runs[0] == runs[1]
 
 
+@pytest.mark.slow
 def test_a_bed_goes_on_from_a_state_to_the_same_bytes():
     swarm, _ = falling(30, 2)
     progress = swarm.begin(1.0)
@@ -126,7 +128,9 @@ def test_friction_keeps_a_heap_from_flattening():
     assert ends[0.0] < 1.01 * R
 
 
-@pytest.mark.parametrize("friction", ["none", 0.01, 0.4])
+@pytest.mark.parametrize(
+    "friction", rest_slow(["none", 0.01, 0.4], lambda friction: friction == 0.4)
+)
 def test_polygons_pile_up_as_cheaply_as_those_that_stick(friction):
     """Pairs that nothing attracts slide one way and the other within a step, or bear next to
     nothing."""

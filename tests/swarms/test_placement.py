@@ -15,6 +15,7 @@ from flocsim.integrators import Status
 from flocsim.swarms.placement import floor, place_at_random, wall
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R
+from tests.helpers.tiers import rest_slow
 
 STAR = SpheroPolygon(
     np.array([
@@ -121,7 +122,10 @@ def run_of(together, bodies, until):
 
 @pytest.mark.parametrize("together", [System, Swarm])
 @pytest.mark.parametrize("extra", [0, 12])
-@pytest.mark.parametrize(("slope", "apart"), [(45.0, 0.0), (45.0, -1e-4), (30.0, 5e-6)])
+@pytest.mark.parametrize(
+    ("slope", "apart"),
+    rest_slow([(45.0, 0.0), (45.0, -1e-4), (30.0, 5e-6)], lambda slope, apart: apart < 0.0),
+)
 def test_walls_that_meet_or_cross_share_a_weight_evenly(slope, apart, extra, together):
     """N = m g/(2 cos θ) on both, whether they meet in a corner or cross, and however many others
     cross them below."""
@@ -164,7 +168,7 @@ def test_a_disc_is_pushed_into_the_corner_of_a_floor_and_a_wall_that_cross():
         assert x >= DISC + THIN - 1e-8
 
 
-@pytest.mark.parametrize("count", [5, 11, 40])
+@pytest.mark.parametrize("count", rest_slow([5, 11, 40], lambda count: count == 5))
 def test_a_rough_floor_of_discs_that_overlap_carries_as_its_two_next_ones_do(count):
     """A disc in the dip between two of them: N = m g/(2 cos α) from each, from no other."""
     step = 1.2 * R

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from flocsim import System
+from flocsim.__main__ import main
 from flocsim.ensembles.collision.failures import FAILED, FAILURES, run_safely
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
@@ -14,7 +15,7 @@ from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
 from flocsim.io.results.file import read_results
-from tests.helpers.small_study import load_text, run_command
+from tests.helpers.small_study import load_text
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import head_on
 
@@ -155,18 +156,19 @@ def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
     ], lambda answer, allowed, words, said, kept: not words and allowed == 1),
 )  # fmt: skip
 def test_a_study_in_which_nothing_is_decided_ends_with_70(
-    tmp_path, answer, allowed, words, said, kept
+    tmp_path, monkeypatch, capsys, answer, allowed, words, said, kept
 ):
     write(tmp_path, "CentreForce", "", answer)
     (tmp_path / "c.toml").write_text(STUDY.format(replicates=3, allowed=allowed))
-    done = run_command(tmp_path, "c.toml", *words)
-    assert done.returncode == 70
-    [line] = [each for each in done.stderr.splitlines() if each.startswith("flocsim: ")]
+    monkeypatch.chdir(tmp_path)
+    assert main(["ensemble", "c.toml", *words]) == 70
+    told = capsys.readouterr()
+    [line] = [each for each in told.err.splitlines() if each.startswith("flocsim: ")]
     assert said in line and ("Wrong.kernel (" in line) == (answer != "0.0")
     assert (tmp_path / "r.h5").exists() == kept
     if kept:
         counts = read_results(tmp_path / "r.h5").probabilities
         assert int(counts["n_failed"].sum() + counts["n_undecided"].sum()) == 3
-        table = [line.split() for line in done.stdout.splitlines()]
+        table = [line.split() for line in told.out.splitlines()]
         ends = ["0", "0", "3"] if answer == LATE else ["0", "3", "0"]
         assert any(words[-3:] == ends for words in table)  # missed, undecided, failed

@@ -65,6 +65,7 @@ def drift(integrator, until):
     return end.contacts, energies[1] / energies[0] - 1.0, np.abs(change / unit).max()
 
 
+@pytest.mark.slow
 def test_velocity_verlet_over_two_thousand_contacts():
     count, energy_change, momenta_change = drift(VelocityVerlet(5e-8), 0.085)
     assert count >= 2000

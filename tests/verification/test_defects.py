@@ -14,6 +14,7 @@ from flocsim.ensembles.study import Study
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, Status
 from flocsim.io.results.schema import BONDS, OUTCOMES
+from tests.helpers.tiers import rest_slow
 
 STUDY = """\
 preset = "{}"
@@ -45,6 +46,7 @@ def replicate(number, place, vertices, delta, preset="tang2014", **over):
     return OUTCOMES[row["outcome"]], row
 
 
+@pytest.mark.slow
 def test_a_hanging_doublet_comes_to_rest():
     """A displacement handed to a contact point far off would create energy, for ever."""
     outcome, row = replicate(1256, TYPE_I, 8, 0.477)
@@ -52,6 +54,7 @@ def test_a_hanging_doublet_comes_to_rest():
     assert row["steps"] < 500
 
 
+@pytest.mark.slow
 def test_a_floc_in_the_cavity_of_another_comes_to_rest():
     """Its centre lies at the other's, where the line between them has no direction."""
     outcome, row = replicate(766, TYPE_II, 8, 0.133)
@@ -151,7 +154,9 @@ def test_the_stated_error_covers_a_lift_off():
         assert drift * abs(time - times[-1]) <= row["error"]
 
 
-@pytest.mark.parametrize("method", [Implicit, DormandPrince54])
+@pytest.mark.parametrize(
+    "method", rest_slow([Implicit, DormandPrince54], lambda each: each is Implicit)
+)
 def test_the_stated_error_covers_a_flight_without_drag(method):
     """What a bounce does to a velocity goes on for ten seconds."""
     floor = SpheroPolygon([(-2e-4, 0), (2e-4, 0)], 1e-6)

@@ -38,7 +38,7 @@ def assert_right_or_typed(index):
     assert verdict.kind != "typed" or verdict.detail.split()[0] in TYPED
 
 
-@pytest.mark.parametrize("index", rest_slow(SHORT, lambda index: index < 26))
+@pytest.mark.parametrize("index", rest_slow(SHORT, lambda index: index < 14))
 def test_cases_of_few_scenes(index):
     assert_right_or_typed(index)
 
@@ -63,6 +63,7 @@ def test_cases_depend_on_their_index_alone():
     assert first.until == again.until
 
 
+@pytest.mark.slow
 def test_draws_cover_their_ranges():
     drawn = [case_of(index)[1] for index in range(300)]
     for name in RANGES:

@@ -60,6 +60,7 @@ def test_elliptic_orbit(shapes, integrator, allowed):
     assert miss(orbit(*shapes), integrator, 1.3) < allowed
 
 
+@pytest.mark.slow
 def test_velocity_verlet_is_of_second_order():
     bodies = orbit(star(), hook())
     errors = [miss(bodies, VelocityVerlet(period(bodies) / n), 0.8) for n in (250, 500, 1000)]

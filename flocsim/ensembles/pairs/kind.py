@@ -22,6 +22,7 @@ from flocsim.ensembles.estimates.numerical import leading_axes
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.stop_rule import StopRule
 from flocsim.ensembles.estimates.summary import (
+    BLOCK_ROWS,
     JOINT,
     OF_OUTLINES,
     POOLED_NAMES,
@@ -90,12 +91,17 @@ def results(
         sums = sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
         rows = reader.arrays(COLUMNS) if in_memory else None
         return results_of(study, count, sums, run, rows, kernel)
-    nothing = sums_of(reader.codes, len(study.conditions), 0, 0, study.scrambles)
-    # Its tables have no values yet, but their places: where the rows go follows from them.
-    draft = results_of(study, count, nothing, run, kernel=kernel)
+    # Where the rows go follows from the places of all tables. Of a large study these have no values
+    # yet; few rows are counted at once, so that the tables need not be made twice.
+    few = count * len(study.conditions) <= BLOCK_ROWS
+    first = sums_of(reader.codes, len(study.conditions), 0, count if few else 0, study.scrambles)
+    draft = results_of(study, count, first, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:
         sums, digests = assemble(reader, file, comm, warn)
-        found = results_of(study, count, sums, run, kernel=kernel)
+        same = few and sums.keys() == first.keys() and all(
+            np.array_equal(sums[name], values) for name, values in first.items()
+        )  # fmt: skip
+        found = draft if same else results_of(study, count, sums, run, kernel=kernel)
         file.complete(found, digests)
     return found
 

@@ -7,6 +7,7 @@ are is not part of it, as no row depends on the others.
 """
 
 import ast
+import functools
 import hashlib
 import json
 import math
@@ -246,8 +247,10 @@ def facts_of_code(study, pair):
     return facts
 
 
+@functools.cache
 def arithmetic_digest():
-    """A hash of how this machine rounds sin, exp and their like, and what is made of them.
+    """A hash of how this machine rounds sin, exp and their like, and what is made of them; the same
+    as long as a process lives.
 
     numpy, its linear algebra and the C library choose their code by the processor: on another kind
     of it rows differ in their last digits, and so do the flocs.

@@ -20,11 +20,15 @@ FORMAT = "flocsim results"
 SCHEMA_VERSION = 7
 
 
+PAGE = 16_384
+
+
 class SparseImage(io.RawIOBase):
-    """A file in memory of which only what is written takes space; h5py takes it for a file."""
+    """A file in memory of which only what is written takes space, in pages of PAGE bytes; h5py
+    takes it for a file."""
 
     def __init__(self):
-        self.writes = []
+        self.pages = {}
         self.length = 0
         self.place = 0
 
@@ -42,7 +46,8 @@ class SparseImage(io.RawIOBase):
 
     def write(self, data):
         data = bytes(data)
-        self.writes.append((self.place, data))
+        for number, inside, part in self.pieces(self.place, self.place + len(data)):
+            self.pages.setdefault(number, bytearray(PAGE))[inside] = data[part]
         self.place += len(data)
         self.length = max(self.length, self.place)
         return len(data)
@@ -60,13 +65,20 @@ class SparseImage(io.RawIOBase):
         return self.length
 
     def content(self, start, stop):
-        """The bytes [start, stop), as a later write has left them."""
+        """The bytes [start, stop), as the last writes have left them."""
         found = bytearray(max(stop - start, 0))
-        for place, data in self.writes:
-            low, high = max(place, start), min(place + len(data), stop)
-            if low < high:
-                found[low - start : high - start] = data[low - place : high - place]
+        for number, inside, part in self.pieces(start, stop):
+            if number in self.pages:
+                found[part] = self.pages[number][inside]
         return bytes(found)
+
+    @staticmethod
+    def pieces(start, stop):
+        """(number of a page, slice of it, slice of these bytes) for the bytes [start, stop)."""
+        for number in range(start // PAGE, -(-stop // PAGE)):
+            low, high = max(start, number * PAGE), min(stop, (number + 1) * PAGE)
+            inside = slice(low - number * PAGE, high - number * PAGE)
+            yield number, inside, slice(low - start, high - start)
 
 
 @attrs.define

@@ -19,7 +19,7 @@ import numpy as np
 from flocsim.errors import FileError
 from flocsim.io.files import Rule, keep, reserve, unfinished
 from flocsim.io.pieces import PIECE, digest_of, seal_of_pieces, seal_size
-from flocsim.io.results.layout import frame_of
+from flocsim.io.results.layout import Frame, frame_of
 from flocsim.io.results.schema import REPLICATES, Results
 
 ROWS = 32_768
@@ -92,12 +92,15 @@ def plan_of(frame, rows):
 
 @attrs.define(eq=False)
 class RowFile:
-    """An open file to which rows go, by any process that sees it."""
+    """An open file to which rows go, by any process that sees it; who has begun it has the
+    ``draft`` and its ``frame``."""
 
     path: str
     token: bytes
     plan: Plan
     descriptor: int
+    draft: Results | None = None
+    frame: Frame | None = None
 
     def write_block(self, block: int, columns: Mapping[str, np.ndarray]) -> list[bytes]:
         """Write a block's rows, the values of each column; the digests of its pieces in order."""
@@ -138,7 +141,7 @@ class RowFile:
 
     def complete(self, results: Results, digests: Mapping[int, list[bytes]]) -> None:
         """Write all that is not in a column, and the seal; ``digests`` are those of each block."""
-        frame = frame_of(results)
+        frame = self.frame if results is self.draft and self.frame else frame_of(results)
         plan = plan_of(frame, self.plan.rows)
         if (plan.size, plan.columns) != (self.plan.size, self.plan.columns):
             raise ValueError("the tables have displaced the columns")
@@ -176,7 +179,7 @@ def new_row_file(path: str | Path, draft: Results, rule: Rule = keep) -> Iterato
         token = secrets.token_bytes(TOKEN_SIZE)
         reserve(new.file.fileno(), plan.size + seal_size(len(plan.cuts())))
         write_all(new.file.fileno(), memoryview(token), 0)
-        yield RowFile(os.fspath(new.path), token, plan, new.file.fileno())
+        yield RowFile(os.fspath(new.path), token, plan, new.file.fileno(), draft, frame)
 
 
 @contextlib.contextmanager

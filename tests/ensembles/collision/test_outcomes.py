@@ -35,6 +35,7 @@ from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.small_study import small_config, small_study
+from tests.helpers.tiers import rest_slow
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +93,7 @@ def escape_gap(study):
     return study.config.scene.start_gap
 
 
-@pytest.mark.parametrize("vertices", [1, 4, 16])
+@pytest.mark.parametrize("vertices", rest_slow([1, 4, 16], lambda vertices: vertices != 16))
 @pytest.mark.parametrize("condition", [0, 2], ids=["type I", "type III"])
 def test_no_decision_is_overturned_in_ten_times_the_time(study, condition, vertices):
     decisions = set()
@@ -302,6 +303,7 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     assert outcomes.bond_of(*known, later) == REST
 
 
+@pytest.mark.slow
 def test_a_step_through_a_body_ends_at_the_first_touch(tmp_path):
     """Long steps of free fall end beyond several features at once, of which the one that is found
     first is not the one that was touched first."""

@@ -68,6 +68,7 @@ def test_the_larger_comes_from_above_and_the_spans_hold_all():
     assert pair.fastest == (2e-6, 12e-6) and pair.largest == (9e-6, 12e-6)
 
 
+@pytest.mark.slow
 def test_the_radii_are_the_medians_over_the_pairs():
     rng = np.random.default_rng(1)
     sizes = rng.uniform(2e-6, 30e-6, 41).tolist()

@@ -16,13 +16,19 @@ def loads_or_says_why(path, text):
         assert all(line.startswith(str(path)) and line.isprintable() for line in lines)
 
 
-@settings(max_examples=400, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=4 * settings().max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(MUTATED)
 def test_a_mutated_config_loads_or_says_why(tmp_path, text):
     loads_or_says_why(tmp_path / "study.toml", text)
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=3 * settings().max_examples,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(GARBLED)
 def test_a_garbled_text_loads_or_says_why(tmp_path, text):
     loads_or_says_why(tmp_path / "study.toml", text)

@@ -22,6 +22,7 @@ from tests.helpers.synthetic_results import (
     draw_second_runs,
     make_results,
 )
+from tests.helpers.tiers import rest_slow
 
 NOT = 255
 OF_BONDS = ("pr_sticks", "pr_hangs", "pr_bond")
@@ -72,7 +73,7 @@ def test_classes_gain_and_lose_by_their_own_share():
     assert table["n_checked_pr_class"].tolist() == [[3, 3, 3, 3]]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", rest_slow(range(20), lambda seed: seed < 6))
 def test_no_probability_moves_further_than_its_flips(seed):
     codes = draw_codes(np.random.default_rng(seed), (2, 3, 2, 200))
     drawn = draw_second_runs(codes, seed)
@@ -282,6 +283,7 @@ def test_kinds_count_for_as_many_as_there_are():
     assert high[0, 0] <= 0.0
 
 
+@pytest.mark.slow
 def test_tables_from_sums_are_those_of_all_replicates_together():
     results = make_results(count=40)
     columns = [results.replicates[name] for name in COUNTED]

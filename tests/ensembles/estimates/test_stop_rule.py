@@ -42,6 +42,7 @@ def test_a_study_ends_at_the_first_look_that_is_narrow_enough(tmp_path):
     assert np.max(half_widths(tabulate(*codes))) > 0.12
 
 
+@pytest.mark.slow
 def test_it_is_the_beginning_of_the_study_without_a_rule(tmp_path):
     ended = run(small_config(tmp_path, SPHERES | {"stop": RULE}))
     whole = run(small_config(tmp_path, SPHERES))
@@ -83,6 +84,7 @@ def ended_at(outcome, stop):
     return next(look for look in borders(stop, len(outcome)) if rule(look) or look == len(outcome))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "studies"),
     rest_slow(

@@ -113,6 +113,7 @@ def mixed(folder, *jobs, timeout=60):
     return subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=timeout)
 
 
+@pytest.mark.slow
 def test_ranks_with_two_configs_are_refused(tmp_path):
     write_small(tmp_path, name="a.toml", vertices="[1]")
     write_small(tmp_path, name="b.toml", vertices="[1]", seed="2")
@@ -134,7 +135,7 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize("other", rest_slow(OTHERS, lambda other: other in (OTHERS[0], OTHERS[-1])))
+@pytest.mark.parametrize("other", rest_slow(OTHERS, lambda other: other == OTHERS[-1]))
 def test_ranks_with_other_words_are_refused(tmp_path, other):
     write_small(tmp_path, vertices="[1]")
     done = mixed(tmp_path, ["small.toml"], ["small.toml", *other])
@@ -204,7 +205,7 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(DIFFERS)
     env = os.environ | {}
     env["PYTHONPATH"] = os.pathsep.join([str(tmp_path), env.get("PYTHONPATH", "")])
-    done = run_command(tmp_path, "small.toml", ranks=3, env=env, timeout=60)
+    done = run_command(tmp_path, "small.toml", ranks=2, env=env, timeout=60)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
@@ -219,6 +220,7 @@ FACTOR = -1.0 if FIRST else -2.0
 """
 
 
+@pytest.mark.slow
 def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
     write_own(tmp_path)
     (tmp_path / "neighbour.py").write_text(DEPENDS)
@@ -242,6 +244,7 @@ def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monk
     assert not library.exists()
 
 
+@pytest.mark.slow
 def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
     write_small(tmp_path, vertices="[1]")
     words = command("small.toml", "--quiet")

@@ -118,7 +118,7 @@ def by_one_rank(folders, tmp_path_factory):
     ("name", "ranks"),
     rest_slow(
         product(["new file", "extended file"], [1, 2, 3, 4, 7]),
-        lambda name, ranks: ranks in ((1, 7) if name == "new file" else (3,)),
+        lambda name, ranks: name == "new file" and ranks == 7,
     ),
 )
 def test_any_number_of_ranks_writes_the_same_file(
@@ -226,7 +226,7 @@ def test_what_another_machine_has_written_is_read_before_it_is_believed(
     assert warnings == []
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", rest_slow([1, 3], lambda ranks: ranks == 3))
 def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monkeypatch, ranks):
     folder = copied(folders["new file"], tmp_path)
     path = journal_path(folder / "study.h5")
@@ -249,7 +249,7 @@ def test_rows_that_were_damaged_meanwhile_are_not_taken(folders, tmp_path, monke
     assert names == ["study.h5.journal", "study.toml"]
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", rest_slow([1, 3], lambda ranks: ranks == 3))
 def test_nothing_is_counted_that_is_not_what_was_written(
     folders, by_one_rank, tmp_path, monkeypatch, ranks
 ):
@@ -268,6 +268,7 @@ def test_nothing_is_counted_that_is_not_what_was_written(
     assert made.read_bytes() == by_one_rank.read_bytes()
 
 
+@pytest.mark.slow
 def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path, monkeypatch):
     folder = copied(folders["extended file"], tmp_path)
     found = assembly.old_columns
@@ -296,12 +297,9 @@ def test_a_signal_ends_it_and_leaves_nothing_behind(folders, tmp_path, monkeypat
     assert journal_path(folder / "study.h5").read_bytes().startswith(before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "kind"),
-    [
-        pytest.param("new file", "mpirun -n 2", marks=pytest.mark.slow),
-        ("extended file", "--jobs 2"),
-    ],
+    ("name", "kind"), [("new file", "mpirun -n 2"), ("extended file", "--jobs 2")]
 )
 def test_a_kill_while_the_file_is_made_loses_nothing(folders, reference, name, kind):
     if kind.startswith("mpirun"):

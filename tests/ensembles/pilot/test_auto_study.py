@@ -66,6 +66,7 @@ def test_two_ranks_choose_and_compute_the_same(first):
     assert json.loads(other.run["accuracy"]) == json.loads(found.run["accuracy"])
 
 
+@pytest.mark.slow
 def test_what_was_stopped_goes_on_with_the_choice_it_had(first, monkeypatch):
     folder, found = first
     config = small_config(folder, SPHERES)

@@ -115,6 +115,7 @@ def test_pairs_that_were_not_seen_are_made_like_the_later_ones(tmp_path):
     assert setting_up(study, [blank], 1) == 0.0
 
 
+@pytest.mark.slow
 def test_the_size_is_that_of_the_file(tmp_path):
     short = {"scene": {"types": ["I"], "delta": [0.0]}, "integrator": {"check_share": 0.0}}
     for count in (3, 300):

@@ -22,6 +22,7 @@ from flocsim.io.journal.journal import journal_path
 from flocsim.io.journal.records import SESSION, scan
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import problems, small_config
+from tests.helpers.tiers import rest_slow
 
 HERE = {
     "cpu": "znver4", "compiled_for": "znver4", "features": ["avx2", "avx512f", "fma"],
@@ -34,11 +35,14 @@ SPHERES = {"shapes": {"vertices": [1]}, "scene": {"types": ["I"], "delta": [0.0]
 
 @pytest.mark.parametrize(
     ("name", "value", "differing"),
-    [
-        ("NUMBA_CPU_NAME", "generic", {"compiled_for", "features"}),
-        ("NUMBA_CPU_FEATURES", "+sse2", {"features"}),
-        ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2", {"libm"}),
-    ],
+    rest_slow(
+        [
+            ("NUMBA_CPU_NAME", "generic", {"compiled_for", "features"}),
+            ("NUMBA_CPU_FEATURES", "+sse2", {"features"}),
+            ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2", {"libm"}),
+        ],
+        lambda name, value, differing: name == "NUMBA_CPU_NAME",
+    ),
 )
 def test_another_kind_is_seen_by_what_makes_it_one(name, value, differing):
     code = "import json; from flocsim.compiler.processor import cpu_kind as k; "
@@ -99,6 +103,7 @@ def cpus_of(path):
     return json.loads(read_results(path).run["cpus"])
 
 
+@pytest.mark.slow
 def test_a_results_file_extended_on_another_kind_says_so_and_records_both(
     tmp_path, monkeypatch, capsys
 ):

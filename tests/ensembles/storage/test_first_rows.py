@@ -91,6 +91,7 @@ def test_a_file_whose_first_row_comes_out_otherwise_is_not_gone_on_with(tmp_path
     assert run_to_file(more, SerialCommunicator(), output, RESUME).computed == 1
 
 
+@pytest.mark.slow
 def test_stored_rows_are_those_of_the_file(tmp_path):
     output = tmp_path / "r.h5"
     config = small_config(tmp_path, SPHERES)

@@ -152,15 +152,20 @@ def row(name, value):
     return change
 
 
-@pytest.mark.parametrize(
-    "change",
+CHANGES = (
     [put("identity", text) for text in ("[]", "{", "[" * 10**5, "NaN", 7, "")]
     + [put(name, text) for name in ("failed", "history", "cpus")
        for text in ("{}", "[1]", '[{"a": ' * 50, 1.5)]
     + [put("failed", '[{"type": "I", "vertices": 1, "delta": "x", "replicate": 0, "why": "y"}]')]
     + [row("outcome", 9), row("failure", 50), row("t_end", np.nan), row("steps", -4)]
-    + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")],
+    + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")]
 )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "change",
+    CHANGES[::2] + [pytest.param(each, marks=pytest.mark.slow) for each in CHANGES[1::2]],
+)
 def test_results_that_no_run_has_written_are_not_extended(tmp_path, finished, change):
     image = io.BytesIO(finished)
     with h5py.File(image, "r+") as file:

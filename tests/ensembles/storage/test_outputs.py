@@ -13,6 +13,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config, write_small
+from tests.helpers.tiers import rest_slow
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}
 
@@ -77,6 +78,7 @@ def test_results_of_another_study_are_kept_under_another_name(finished, capsys):
     assert results_in(finished).keys() == {"r.h5", "r.1.h5", "r.2.h5"}
 
 
+@pytest.mark.slow
 def test_resume_and_overwrite_extends_what_is_of_this_study(finished):
     ended = go(finished, RESUME, overwrite=True, replicates=5)
     assert ended.computed == 4 and results_in(finished).keys() == {"r.h5"}
@@ -111,7 +113,7 @@ def stop_at_the_end(monkeypatch, folder):
             go(folder)
 
 
-@pytest.mark.parametrize("mode", [NEW, RESUME])
+@pytest.mark.parametrize("mode", rest_slow([NEW, RESUME], lambda mode: mode == RESUME))
 def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
     ready, tmp_path, monkeypatch, mode
 ):

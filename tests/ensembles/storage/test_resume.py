@@ -156,10 +156,11 @@ def test_flocs_that_another_processor_made_are_not_said_to_have_changed():
 
 
 def test_the_digest_of_the_arithmetic_sees_last_digits(monkeypatch):
-    before = identity.arithmetic_digest()
-    assert identity.arithmetic_digest() == before
+    digest = identity.arithmetic_digest.__wrapped__  # a process looks once
+    before = digest()
+    assert digest() == before
     monkeypatch.setattr(np, "exp", lambda x, exp=np.exp: np.nextafter(exp(x), np.inf))
-    assert identity.arithmetic_digest() != before
+    assert digest() != before
 
 
 def test_the_digest_of_the_physics_sees_code_and_nothing_else():

@@ -91,6 +91,7 @@ def rows_in(path):
     return sum(each.description["count"] for each in journal.records if each.kind == CHUNK)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fewer", rest_slow(FEWER, lambda fewer: fewer == FEWER[0]))
 def test_results_with_more_than_is_asked_for_stay_and_the_rest_is_reported(
     finished, whole, fewer, tmp_path_factory

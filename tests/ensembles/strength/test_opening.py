@@ -111,13 +111,14 @@ def doublet(forces, flow="shear", jit=False, angle=1.0, held=False):
     return Doublet(start, flow, jit=jit)
 
 
-@pytest.mark.parametrize("flow", ["shear", "extension"])
+@pytest.mark.parametrize("flow", rest_slow(["shear", "extension"], lambda flow: flow == "shear"))
 def test_two_spheres_hold_below_their_rate_and_open_above(flow):
     pair = doublet(bond(), flow)
     assert pair.opens_at(0.98 * CRITICAL) is False
     assert pair.opens_at(1.02 * CRITICAL) is True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("h_min", "flow", "jit"),
     rest_slow(

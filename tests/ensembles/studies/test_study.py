@@ -16,6 +16,7 @@ from flocsim.ensembles import run
 from flocsim.ensembles.config.toml_text import toml_text
 from flocsim.ensembles.studies.study import settings_of
 from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
+from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
 
 TABLES = {
@@ -99,7 +100,8 @@ def test_rows_are_those_of_the_config(finished):
     assert results.config.shapes.vertices == (1,)
 
 
-def test_a_file_in_the_way_is_left_alone(finished):
+def test_a_file_in_the_way_is_left_alone(finished, monkeypatch):
+    parts_here.use(monkeypatch)
     folder = finished.folder
     study = flocsim.Study(folder / "small.toml").with_({"shapes.vertices": [1]})
     before = (folder / "small.h5").read_bytes()
@@ -157,6 +159,7 @@ def test_scripts_get_no_words_of_the_command():
     assert "killed" in str(error_of(-9, []))
 
 
+@pytest.mark.slow
 def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     study = flocsim.Study(write_small(tmp_path)).with_(

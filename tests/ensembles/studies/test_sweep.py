@@ -11,6 +11,7 @@ from flocsim.commands.sweep import values_of
 from flocsim.ensembles.studies.sweep import planned, swept_keys
 from flocsim.errors import FileError, UsageError
 from flocsim.io.results.file import read_results
+from tests.helpers import parts_here
 from tests.helpers.small_study import write_small
 
 HAMAKER = "forces.van_der_waals.hamaker"
@@ -28,8 +29,10 @@ def swept(tmp_path_factory):
                  "-o", str(folder / "same.h5"), "--dry-run"])  # fmt: skip
     assert code == 0
     before = (folder / "all.parts" / "0000.h5").stat()
-    code = main(["sweep", str(study.path), *words, "--over", f"{HAMAKER}=1e-18,'10 zJ'",
-                 "-o", str(folder / "all.h5"), "--resume"])  # fmt: skip
+    with pytest.MonkeyPatch.context() as patch:
+        parts_here.use(patch)
+        code = main(["sweep", str(study.path), *words, "--over", f"{HAMAKER}=1e-18,'10 zJ'",
+                     "-o", str(folder / "all.h5"), "--resume"])  # fmt: skip
     assert code == 0
     assert (folder / "all.parts" / "0000.h5").stat().st_mtime_ns == before.st_mtime_ns
     return study, folder / "all.h5"

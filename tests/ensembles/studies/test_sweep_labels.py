@@ -138,9 +138,8 @@ ASKED = st.fixed_dictionaries({
 BETWEEN = ("nothing", "parts gone", "one replaced", "one gone", "plan gone")
 
 
-@pytest.mark.parametrize(
-    "examples", [pytest.param(2, id="few"), pytest.param(60, marks=pytest.mark.slow, id="many")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("examples", [60])
 def test_two_sweeps_one_upon_the_other_have_right_labels(monkeypatch, examples):
     parts_here.use(monkeypatch)
 

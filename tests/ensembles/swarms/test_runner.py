@@ -295,6 +295,7 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
     assert read_swarm(tmp_path / "swarm.h5").run["sessions"] == 2
 
 
+@pytest.mark.slow
 def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, monkeypatch):
     """Killed between the last row and the file: the next run computes nothing, makes no trial."""
     from flocsim.ensembles.swarms import kind

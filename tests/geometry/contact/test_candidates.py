@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 import flocsim.arrays as at
@@ -73,7 +73,6 @@ def both_points(key, scene):
 
 
 @given(seeds, directions)
-@settings(max_examples=150)
 def test_no_pair_is_missed_while_the_budget_lasts(seed, wanted):
     assert_nothing_missed(random_scene(seed), wanted)
 
@@ -100,7 +99,6 @@ def unequal_scene(seed):
 
 
 @given(st.integers(0, 47), directions)
-@settings(max_examples=150)
 @example(2, [0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 def test_long_edges_are_not_missed_though_their_ends_are_far(seed, wanted):
     assert_nothing_missed(unequal_scene(seed), wanted)
@@ -122,7 +120,6 @@ REACHES = [1e-8, 1e-7, 4e-7, 1e-6, 3e-6, 2e-5]
 
 @pytest.mark.parametrize("reach", REACHES)
 @given(seed=seeds, wanted=directions, apart=st.floats(0.0, 3e-6))
-@settings(max_examples=40)
 def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, seed, wanted, apart):
     plain = random_scene(seed)
     scene, work = arrays(plain, reach)
@@ -225,7 +222,6 @@ def test_bodies_far_apart_list_nothing_and_may_move_until_they_are_near():
 
 
 @given(seeds)
-@settings(max_examples=40)
 def test_lists_are_as_wide_as_the_steps_ahead_need(seed):
     scene, work = arrays(random_scene(seed))
     assert list_candidates(scene, work)
@@ -248,7 +244,6 @@ def test_lists_that_are_far_too_wide_are_made_anew():
 
 
 @given(seeds)
-@settings(max_examples=40)
 def test_a_short_motion_spends_no_more_than_the_speeds_tell(seed):
     scene, work = arrays(random_scene(seed))
     assert list_candidates(scene, work)

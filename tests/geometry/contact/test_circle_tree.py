@@ -117,7 +117,7 @@ def listed(scene, work, cutoff, a=1, b=0):
     ]
 
 
-@given_often(25, 100, numbers, st.floats(0.0, 1.0))
+@given_often(8, 100, numbers, st.floats(0.0, 1.0))
 def test_just_the_pairs_nearer_than_the_cut_off_are_listed(drawn, share):
     shapes, places = placed(drawn)
     distances = all_distances(shapes, places)
@@ -157,7 +157,7 @@ def test_the_order_of_the_list_does_not_depend_on_the_place(drawn, other):
     assert [key for key in lists[0] if key in common] == [key for key in lists[1] if key in common]
 
 
-@given_often(50, 250, numbers)
+@given_often(15, 250, numbers)
 def test_the_gap_is_that_of_all_pairs(drawn):
     shapes, places = placed(drawn)
     scene, work = arrays(shapes, places)
@@ -168,7 +168,7 @@ def test_the_gap_is_that_of_all_pairs(drawn):
         assert gap(scene, work, a, b) == pytest.approx(expected, rel=1e-12, abs=10 * grain)
 
 
-@given_often(25, 100, numbers)
+@given_often(8, 100, numbers)
 def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
     scene, work = arrays(*placed(drawn))
     pose = pose_of(scene, work, 0, 1)

@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flocsim.arrays as at
@@ -77,7 +77,6 @@ DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0
          st.floats(-14.0, 14.0), st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
 @given(*DRAWN, st.floats(0.01, 6.0))
 def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
@@ -94,7 +93,6 @@ def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     assert clear <= found <= {key for key, gap in gaps.items() if gap < cutoff + 1e-9}
 
 
-@settings(max_examples=60, deadline=None)
 @given(*DRAWN)
 def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
@@ -107,7 +105,6 @@ def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
         assert gap == pytest.approx(min(gaps.values()), abs=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
 @given(*DRAWN)
 def test_the_gap_is_that_of_shapely(a, b, x, y, turn_a, turn_b):
     import shapely

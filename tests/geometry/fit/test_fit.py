@@ -165,7 +165,7 @@ def awkward_masks():
     ("vertices", "method"),
     rest_slow(
         product([2, 3, 5, 16, 64, 150], ["pattern", "paper", "even"]),
-        lambda vertices, method: vertices < 64 or method == "even",
+        lambda vertices, method: vertices in (3, 16),
     ),
 )
 def test_awkward_masks_give_simple_polygons(vertices, method):
@@ -209,7 +209,7 @@ def test_wrong_options_are_named(options, named):
 
 
 @pytest.mark.parametrize("method", ["pattern", "paper"])
-@pytest.mark.parametrize("vertices", rest_slow([2, 4, 16, 64], lambda n: n < 64))
+@pytest.mark.parametrize("vertices", rest_slow([2, 4, 16, 64], lambda n: n == 4))
 @pytest.mark.parametrize("radius", [1.0, 3.0])
 def test_no_fit_ends_above_its_start(method, vertices, radius):
     for seed in range(3):
@@ -251,6 +251,7 @@ def test_the_outline_lies_in_the_middle_of_its_play():
         assert fit.shape.area == pytest.approx(mask.sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_turned_and_mirrored_masks_fit_as_well():
     for seed in range(2):
         masks = [blob(seed), np.rot90(blob(seed)), blob(seed)[::-1]]
@@ -263,7 +264,7 @@ def plain_outside(mask, fit):
     return np.count_nonzero(plain_wrong(mask, fit, fit.radius * (1 - BORDER)) & ~np.pad(mask, 20))
 
 
-@pytest.mark.parametrize("vertices", [2, 3, 4, 9, 32])
+@pytest.mark.parametrize("vertices", rest_slow([2, 3, 4, 9, 32], lambda n: n in (3, 9)))
 @pytest.mark.parametrize("radius", [1.0, 2.3])
 def test_an_inscribed_shape_covers_nothing_outside_of_its_mask(vertices, radius):
     for seed in range(4):

@@ -40,6 +40,7 @@ def test_the_error_is_a_count_of_pixels():
     assert wrong == found.wrong_pixels
 
 
+@pytest.mark.slow
 def test_keeping_holes_never_makes_more_wrong():
     for count in (4, 8, 12, 24):
         kept = fit_mask(MASK, vertices=count, radius=1.5, holes=True)

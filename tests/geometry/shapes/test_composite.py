@@ -64,7 +64,7 @@ def polar(region):
     return total
 
 
-@pytest.mark.parametrize("make", rest_slow(MAKERS, lambda make: make is not lace))
+@pytest.mark.parametrize("make", rest_slow(MAKERS, lambda make: make is MAKERS[0]))
 def test_area_is_a_count_of_points(make):
     found = make()
     reach, count = found.bounding_radius, 900

@@ -18,7 +18,7 @@ TYPES = [4.62e-6, 4.95e-6, 16.41e-6, 23.02e-6]
 
 @pytest.mark.parametrize(
     "make_core",
-    rest_slow([segment, convex, star, c_shape, spiral], lambda make: make in (segment, star)),
+    rest_slow([segment, convex, star, c_shape, spiral], lambda make: make is star),
 )
 @given(seed=st.integers(0, 40), size=st.sampled_from(TYPES), share=st.floats(0.02, 0.95))
 @example(seed=3, size=4.62e-6, share=0.2417179327071084)  # arcs that cross at some 1e-5 rad

@@ -10,7 +10,8 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
-from tests.helpers.methods import by_adaptive, by_method
+from tests.helpers.methods import by_adaptive, by_method, is_adaptive
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import (
     ELASTIC,
     PolygonSystem,
@@ -210,12 +211,15 @@ def flight_to_touch(speed, gap, integrator):
 
 @pytest.mark.parametrize(
     ("integrator", "accuracy"),
-    [
-        (VelocityVerlet(1.3e-7), 1e-13),
-        (DormandPrince54(1e-9), 1e-12),
-        (Implicit(1e-9), 1e-12),
-        (Implicit(1e-11), 1e-13),
-    ],
+    rest_slow(
+        [
+            (VelocityVerlet(1.3e-7), 1e-13),
+            (DormandPrince54(1e-9), 1e-12),
+            (Implicit(1e-9), 1e-12),
+            (Implicit(1e-11), 1e-13),
+        ],
+        is_adaptive,
+    ),
 )
 @pytest.mark.parametrize(("speed", "gap"), [(1e-3, 1e-7), (0.2, 3e-6)])
 def test_the_touch_is_located(integrator, accuracy, speed, gap):
@@ -226,6 +230,7 @@ def test_the_touch_is_located(integrator, accuracy, speed, gap):
     assert instant == pytest.approx(gap / speed, abs=off / speed)
 
 
+@pytest.mark.slow
 def test_the_instant_of_a_touch_does_not_depend_on_the_method():
     """Two turning ragged bodies on free paths, whose touch is between any two steps."""
     methods = [VelocityVerlet(1e-7), VelocityVerlet(3e-8), DormandPrince54(1e-10)]

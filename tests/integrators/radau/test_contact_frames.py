@@ -28,6 +28,7 @@ def turning_doublet(shape, k_n):
     return bodies, PolygonSystem(bodies, forces, Implicit(1e-9)).run(4 * np.pi / TURN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [SPHERE, star(size=5e-6)], ids=["spheres", "stars"])
 def test_stiffness_does_not_add_steps(shape):
     soft, stiff = (turning_doublet(shape, k_n)[1] for k_n in (1e2, 1e6))

@@ -17,6 +17,7 @@ from flocsim.forces.check import sample_points
 from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
 from flocsim.integrators.rhs.charge_sum import field_at
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import (
     SIZE,
     Pair,
@@ -48,7 +49,7 @@ def test_two_cylinders(radius, allowed, gap):
     assert found[0] == pytest.approx(exact, rel=allowed)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", rest_slow(range(12), lambda seed: seed < 4))
 def test_force_and_torque_are_the_slopes_of_the_energy(seed):
     random = np.random.default_rng(seed)
     one, other = rough(8, SIZE, seed), rough(8 + seed, 1.7 * SIZE, 50 + seed)
@@ -143,7 +144,7 @@ def test_unlike_plates(boundary):
         assert quad(pressure, 1.0, 60.0)[0] == pytest.approx(energy, rel=1e-6)
 
 
-@pytest.mark.parametrize("boundary", PLATES)
+@pytest.mark.parametrize("boundary", rest_slow(PLATES, lambda boundary: boundary == "potential"))
 @pytest.mark.parametrize(("debye", "allowed"), [(1.5e-9, 0.02), (2e-8, 0.05)])
 def test_a_face_of_five_micrometres(boundary, debye, allowed):
     """Thin, by the pressure of plates, and thick, between charges and what is beside them."""

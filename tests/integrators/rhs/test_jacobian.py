@@ -120,26 +120,26 @@ ARMS = 2e-3
 """Left out of STIFFNESS: the point of a tangential force shifts with the overlap."""
 
 
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 20))
+@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("gap", GAPS)
 def test_stiffness_of_all_forces_together(seed, gap):
     assert differences(seed, ALL[gap], False).miss(at.STIFFNESS, 1e-12) < ARMS
 
 
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 20))
+@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("gap", GAPS)
 def test_damping_of_all_forces_together(seed, gap):
     assert differences(seed, ALL[gap], True).miss(at.DAMPING, 1e-6) < 1e-5
 
 
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 20))
+@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("name", [name for name in FORCES if name != "gravity"])
 def test_stiffness_of_every_force_alone(seed, name):
     allowed = ARMS if name == "contact" else 1e-6
     assert differences(seed, (name,), False).miss(at.STIFFNESS, 1e-12) < allowed
 
 
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 20))
+@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("name", ["drag", "contact"])
 def test_damping_of_every_force_alone(seed, name):
     assert differences(seed, (name,), True).miss(at.DAMPING, 1e-6) < 1e-5
@@ -169,7 +169,7 @@ def test_damping_of_lubrication_is_that_of_the_gaps_rate():
 
 def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
     """Newton's third law in every column of both matrices."""
-    for seed in SCENES:
+    for seed in SCENES[:10]:
         found = differences(seed, ("contact",), True)
         found.assemble(found.scene, found.work)
         for which in (at.STIFFNESS, at.DAMPING):

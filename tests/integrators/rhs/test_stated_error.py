@@ -20,6 +20,7 @@ from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.stated_error import forget_offsets
 from tests.helpers.fast_scene import flagged
+from tests.helpers.tiers import rest_slow
 
 RATE = 2e3
 """Of the trial forces [1/s]."""
@@ -274,7 +275,7 @@ def head_on(damping):
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e5])
-@pytest.mark.parametrize("tolerance", [1e-8, 1e-9])
+@pytest.mark.parametrize("tolerance", rest_slow([1e-8, 1e-9], lambda tolerance: tolerance == 1e-8))
 def test_the_stated_error_of_a_bounce_is_above_the_true_one_and_not_far(damping, tolerance):
     system, until = head_on(damping)
     run, exact = (

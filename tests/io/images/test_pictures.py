@@ -50,7 +50,7 @@ def found_radii(segmentation):
 
 
 @pytest.mark.parametrize("flocs", ["dark", "bright"])
-@pytest.mark.parametrize("vignette", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize("vignette", rest_slow([0.0, 0.5, 0.8], lambda vignette: vignette == 0.8))
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_equivalent_radii_come_out_within_one_percent(flocs, vignette, noise):
     grey, radii = synthetic(flocs, vignette, noise)
@@ -176,6 +176,7 @@ def test_a_chain_of_beads_is_one_aggregate_and_pairs_are_two_flocs():
     assert len(segment(pairs, **dark).regions) == 8
 
 
+@pytest.mark.slow
 def test_soot_is_not_cut_at_its_necks():
     grey = read_grey(real_image("soot_tem/201805A_A6_004_half.png"))
     whole, cut = segment(grey), segment(grey, neck=0.5)
@@ -207,6 +208,7 @@ def agreement(found, true):
     return (found.foreground & true).sum() / (found.foreground | true).sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scales", rest_slow([[1, 4], [1, 2, 3, 4]], lambda each: len(each) == 2))
 def test_the_soot_agrees_with_a_human_mask_at_every_noise_scale(scales):
     grey = read_grey(real_image("soot_tem/201805A_A6_004_half.png"))
@@ -393,7 +395,7 @@ def test_a_stack_of_pictures_is_refused(tmp_path):
         read_grey(tmp_path / "stack.tif")
 
 
-@pytest.mark.parametrize("frame", rest_slow(["023", "024", "025"], lambda frame: frame == "024"))
+@pytest.mark.parametrize("frame", rest_slow(["023", "024", "025"], lambda frame: False))
 def test_camera_frames_with_a_strong_vignette(frame):
     found = segment(read_grey(real_image(f"flocpy/{frame}.png")))
     assert found.flocs == "dark"
@@ -412,7 +414,7 @@ def test_camera_frames_with_a_strong_vignette(frame):
         ("sandi/FlocCAM-image2.jpg", "dark", 10, 20),
         ("sandi/Stereomicroscope-image1.jpg", "bright", 12, 25),
         ("soot_tem/201805A_A6_004_half.png", "dark", 5, 9),
-    ], lambda name, *_: name.endswith(("brightfield_flocs.png", "clayflocs.png", "image2.jpg"))),
+    ], lambda name, *_: name.endswith("clayflocs.png")),
 )  # fmt: skip
 def test_every_real_picture_gives_flocs(name, flocs, least, most):
     found = segment(read_grey(real_image(name)))

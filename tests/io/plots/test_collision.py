@@ -175,6 +175,7 @@ def test_all_frames_of_an_animation_are_there_and_differ(tmp_path):
     assert len(set(pictures)) == 4
 
 
+@pytest.mark.slow
 def test_the_same_frames_are_the_same_bytes(tmp_path):
     pair = [written(tmp_path / name, 2).read_bytes() for name in ("a.gif", "b.gif")]
     assert pair[0] == pair[1]

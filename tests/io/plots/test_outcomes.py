@@ -16,6 +16,7 @@ from flocsim.io.results.events import ends_of
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.sweep_file import SweepResults, Swept
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tiers import rest_slow
 
 HELD = OUTCOMES.index("held")
 
@@ -63,7 +64,11 @@ def test_bars_are_shares_of_all_replicates_and_add_up_to_1():
 
 
 @pytest.mark.parametrize(
-    ("values", "scale"), [((10e-3, 25e-3, 50e-3), "linear"), ((1e-3, 1e-2, 1.0), "log")]
+    ("values", "scale"),
+    rest_slow(
+        [((10e-3, 25e-3, 50e-3), "linear"), ((1e-3, 1e-2, 1.0), "log")],
+        lambda values, scale: scale == "log",
+    ),
 )
 def test_every_value_is_on_the_axis_whatever_has_no_value(values, scale, tmp_path):
     found = held_at_last(make_results(types=("I", "II"), vertices=(1, 16)), values)
@@ -85,6 +90,7 @@ def test_every_value_is_on_the_axis_whatever_has_no_value(values, scale, tmp_pat
     assert "h: held" in title and "missed" not in title
 
 
+@pytest.mark.slow
 def test_words_and_one_value_alone_have_an_axis(tmp_path):
     results = make_results(types=("I",), vertices=(4,), delta=(0.0,))
     for values in (("inner", "outer"), (5.0,), (0.0,)):

@@ -17,9 +17,12 @@ from flocsim.io.plots.overlay import (
     swept_rings,
 )
 from flocsim.io.plots.style import save
+from tests.helpers.tiers import rest_slow
 
 
-@pytest.mark.parametrize("name", [r"a$\frac{b.png", "$x^$", "a\x1b[31m\n.png"])
+@pytest.mark.parametrize(
+    "name", rest_slow([r"a$\frac{b.png", "$x^$", "a\x1b[31m\n.png"], lambda name: "frac" in name)
+)
 def test_a_picture_of_any_name_is_drawn(name, tmp_path):
     save(draw_overlay(np.zeros((20, 30)), [], f"{name}: 0 flocs", []), tmp_path / "o.png")
 
@@ -71,7 +74,7 @@ def test_a_dim_picture_becomes_visible():
         assert np.isfinite(stretched(flat)).all()
 
 
-@pytest.mark.parametrize("vertices", [1, 4, 32])
+@pytest.mark.parametrize("vertices", rest_slow([1, 4, 32], lambda vertices: vertices == 4))
 def test_the_pixels_that_differ_are_those_of_the_fit(vertices, tmp_path):
     mask = np.pad(synthetic_floc((1, 3), 40, 1.8), 2)
     fit = fit_mask(mask, vertices=vertices)

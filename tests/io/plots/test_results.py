@@ -164,9 +164,7 @@ def test_a_panel_without_events_says_so():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(
-    "name", rest_slow(OF_COLLISIONS, lambda name: name in ("4", "8", "overview"))
-)
+@pytest.mark.parametrize("name", rest_slow(OF_COLLISIONS, lambda name: name == "4"))
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
     assert name == "outcomes" or all("no " in texts(axes) for axes in figure.axes)
@@ -188,7 +186,7 @@ def test_many_vertex_counts_are_thinned_but_keep_both_ends():
 CONDITIONS = [
     {"types": ("I",), "vertices": (1,), "delta": (0.0,)},
     {"types": ("16.4/23 µm", "a$\\b$", "II", "III"), "vertices": (4, 5, 7)},
-    {"delta": tuple(np.linspace(0.0, 1.0, 12)), "types": ("I", "II")},
+    {"delta": tuple(np.linspace(0.0, 1.0, 12)), "types": ("I", "II"), "vertices": (1, 16)},
 ]
 
 
@@ -199,10 +197,10 @@ def is_next(number, name):
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("number", "name"), rest_slow(product(range(3), FIGURES), is_next))
-def test_any_number_of_conditions_can_be_drawn(name, number, tmp_path):
+def test_any_number_of_conditions_can_be_drawn(name, number):
     results = make_results(**CONDITIONS[number], count=5)
     figure = FIGURES[name](results)
-    save(figure, tmp_path / "figure.svg")
+    figure.canvas.draw()
     if name in OF_COLLISIONS or name == "size":  # others need not have a panel for each type
         assert len([axes for axes in figure.axes if axes.get_visible()]) in (
             len(results.vertices) if name == "size" else len(results.types),

@@ -61,7 +61,9 @@ def test_bonds_of_bodies_that_are_not_there_are_refused(tmp_path):
             read_swarm(tmp_path / f"{name}.h5")
 
 
-@pytest.mark.parametrize("results", [make_swarm_results(), compound_results()])
+@pytest.mark.parametrize(
+    "results", [compound_results(), pytest.param(make_swarm_results(), marks=pytest.mark.slow)]
+)
 def test_all_figures_are_drawn(results):
     for draw in SWARM_FIGURES.values():
         draw(results).canvas.draw()
@@ -85,6 +87,7 @@ def test_holes_stay_open_in_a_picture():
     assert colour(10.0, 14.0) < 3 * 250
 
 
+@pytest.mark.slow
 def test_what_has_left_is_not_drawn():
     results = make_swarm_results()
     results.groups["snapshots"]["cluster"][0, 1:, 0] = GONE

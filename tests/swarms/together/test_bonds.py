@@ -24,6 +24,7 @@ from flocsim.swarms.together.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R
+from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import star
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, polygon
 
@@ -218,7 +219,9 @@ def touching_places(rng, shapes, depth=2e-10):
         apart -= gap
 
 
-@pytest.mark.parametrize("gap", ["surface", "equivalent_spheres"])
+@pytest.mark.parametrize(
+    "gap", rest_slow(["surface", "equivalent_spheres"], lambda gap: gap == "surface")
+)
 @pytest.mark.parametrize("ends", [(1, 1), (5, 7)], ids=["discs", "stars"])
 def test_two_bodies_are_judged_as_a_pair_of_a_study_is(tmp_path, gap, ends):
     """At many places, speeds and strengths of attraction, by observer and by gauge."""

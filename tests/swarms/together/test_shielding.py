@@ -47,6 +47,7 @@ def velocity(bodies, forces=FORCES, **options):
     return swarm_of(bodies, forces, **options).run("1 ms").velocity[-1, :, :2].mean(axis=0)
 
 
+@pytest.mark.slow
 def test_a_doublet_settles_as_two_spheres_do():
     alone = velocity(row(1))[1]
     apart = velocity(row(2), [Gravity(), StokesDrag(), Contact()])[1]
@@ -144,6 +145,7 @@ def test_a_drag_in_a_cluster_is_that_alone_or_less_and_takes_energy(law, fluid):
         assert fx * vx + fy * vy + torque * spin < 0.0
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_from_its_state_to_the_same_bytes():
     bodies, side = crowd(20, 1, fraction=0.45)
     swarm = Swarm(bodies, FORCES, fluid=WATER, box=(side, side))
