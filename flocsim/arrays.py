@@ -223,7 +223,8 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     NEAR_A,  # of the body that is gone along, those that may be near the other one
     NEAR_B,  # of that one
     AROUND,  # of these, those that may be near the piece that is gone along
-) = range(3)
+    SEEN,  # those that may be near any piece that has been
+) = range(4)
 
 # Places in ``Work.listed``: for what the first two hold.
 (
@@ -652,7 +653,7 @@ class Work(NamedTuple):
     candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]  # see VERTEX_BODY
     geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]  # see NORMAL_X
     kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
-    near: np.ndarray  # (3, pieces + 1): pieces of two bodies, see NEAR_A
+    near: np.ndarray  # (4, pieces + 1): pieces of two bodies, see NEAR_A
     listed: np.ndarray  # see LISTED_A
     feet: np.ndarray  # scratch of rhs.outline_sum
     nodes: Annotated[np.ndarray, (NODE_ROWS, MOST_NODES)]  # see NODE_X
@@ -759,7 +760,7 @@ def work_of(
         candidates=np.zeros((capacity, CANDIDATE_COLUMNS), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
-        near=np.zeros((3, len(scene.pieces) + 1), dtype=np.int64),
+        near=np.zeros((4, len(scene.pieces) + 1), dtype=np.int64),
         listed=np.full(LISTED_SIZE, -1.0),
         feet=np.zeros(MOST_FEET),
         nodes=np.zeros((NODE_ROWS, MOST_NODES)),

@@ -103,12 +103,16 @@ def beside_end(end, middle, half, middle_2, half_2):
 def between_cores(one, other):
     """(squared distance, x, y on the one's core, x, y on the other's) where two are nearest."""
     (middle, half), (middle_2, half_2) = core_of(one), core_of(other)
+    # The core of an arc is a point.
+    if one.bend > 0.0:
+        return beside_end(0.0, middle, half, middle_2, half_2)
     least = math.inf
     x, y, x_2, y_2 = 0.0, 0.0, 0.0, 0.0
     for end in (-1.0, 1.0):
-        squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
-        if squared < least:
-            least, x, y, x_2, y_2 = squared, px, py, qx, qy
+        if other.bend == 0.0:
+            squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
+            if squared < least:
+                least, x, y, x_2, y_2 = squared, px, py, qx, qy
         squared, qx, qy, px, py = beside_end(end, middle_2, half_2, middle, half)
         if squared < least:
             least, x, y, x_2, y_2 = squared, px, py, qx, qy

@@ -40,8 +40,9 @@ that are as near to each other are one."""
 MOST_HALVES = 40
 """How often a way along a piece is halved: far below any length that counts."""
 
-SKIN = 0.25
-"""Pieces are listed to so much further than they count, so that lists last."""
+SKIN, MOST_SKIN = 1.0, 4.0
+"""Pieces are listed to so much further than they count, so that lists last, and anew where it is
+more than the latter."""
 
 UNMOVED = Pose(0.0, 0.0, 1.0, 0.0)
 """Of the body in whose frame all is."""
@@ -118,15 +119,26 @@ def gap_listed(scene, work, pose):
 
 
 def look_around_piece(scene, work, piece, lens):
-    """List the pieces of the other body that may be within ``lens`` of one; how many they are."""
+    """List the pieces of the other body that may be within ``lens`` of one, and add them to those
+    that have been so far; how many they are."""
     near, count = work.near, 0
     for j in range(near[at.NEAR_B, 0]):
         row = near[at.NEAR_B, 1 + j]
         if may_be_within(piece, piece_at(scene.pieces, row), lens):
             count += 1
             near[at.AROUND, count] = row
+            add_row(near[at.SEEN], row)
     near[at.AROUND, 0] = count
     return count
+
+
+def add_row(rows, row):
+    """Add a row to some unless it is among them."""
+    for k in range(1, rows[0] + 1):
+        if rows[k] == row:
+            return
+    rows[0] += 1
+    rows[rows[0]] = row
 
 
 def gap_from(scene, work, x, y):
@@ -246,11 +258,11 @@ def put_side(scene, work, count, piece, foot, end, inset, lens):
 
 
 def look_from(scene, work, count, inset, lens):
-    """Look from so many nodes at the pieces that are listed: how far they are, and at which gap
+    """Look from so many nodes at the pieces that are around any: how far they are, and at which gap
     plates attract each other as they do."""
     near = work.near
-    for j in range(near[at.NEAR_B, 0]):
-        piece = piece_at(scene.pieces, near[at.NEAR_B, 1 + j])
+    for j in range(near[at.SEEN, 0]):
+        piece = piece_at(scene.pieces, near[at.SEEN, 1 + j])
         if piece.bend > 0.0:
             add_arc(work.nodes, count, piece, inset, lens)
         else:
@@ -312,7 +324,7 @@ def lens_at(scene, least):
     reach, floor, _, steady = scene.outlines
     if not least < reach:
         return 0.0
-    return max(LENS * math.sqrt(max(least, floor) * floor), steady)
+    return max(min(LENS * math.sqrt(max(least, floor) * floor), reach), steady)
 
 
 def look_around(scene, work, time, a, b, pose):
@@ -322,7 +334,8 @@ def look_around(scene, work, time, a, b, pose):
     slack = slack_of(scene, work, a, b, pose)
     least = gap_listed(scene, work, pose) if slack > 0.0 else math.inf
     lens = lens_at(scene, least)
-    if max(lens, min(least, reach)) > slack:
+    needed = max(lens, min(least, reach))
+    if needed > slack or (1.0 + MOST_SKIN) * needed < slack:
         list_near(scene, work, a, b, pose, (1.0 + SKIN) * reach)
         least = gap_listed(scene, work, pose)
         lens = lens_at(scene, least)
@@ -353,7 +366,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     inset, lens, view = numbers
     if lens == 0.0:
         return total
-    count = 0
+    count, work.near[at.SEEN, 0] = 0, 0
     for i in range(work.near[at.NEAR_A, 0]):
         piece = placed(scene.pieces, work.near[at.NEAR_A, 1 + i], pose)
         if look_around_piece(scene, work, piece, lens) == 0:
