@@ -220,13 +220,14 @@ def order_of(width):
     """How many nodes of Gauss's rule a panel of so much t takes: what it is taken of has its poles
     near ±i, from where the error is below 1e-7."""
     if width < 0.3:
-        return 8 if width > 0.1 else 6
+        return 4 if width > 0.1 else 3
     return 16 if width > 0.7 else 12
 
 
-def growth_at(scene, work, x, y, nx, ny, bend):
-    """(gap, its slope along a piece [-], and that of the slope [1/m]) at a place of a piece with
-    that normal; ``bend``: its radius, 0 of a segment."""
+def growth_at(scene, work, piece, foot):
+    """(gap, its slope along a piece [-], that of the slope [1/m], metres for a unit of the
+    parameter) at a foot."""
+    x, y, nx, ny, metres = at_parameter(piece, foot)
     near, gap, slope, rise = work.near, math.inf, 0.0, 0.0
     for j in range(near[at.AROUND, 0]):
         other = piece_at(scene.pieces, near[at.AROUND, 1 + j])
@@ -236,17 +237,16 @@ def growth_at(scene, work, x, y, nx, ny, bend):
             gap = distance - other.inward
             away = (nx * dx + ny * dy) / distance
             slope = (nx * dy - ny * dx) / distance
-            rise = -away / bend if bend > 0.0 else 0.0
+            rise = -away / piece.bend if piece.bend > 0.0 else 0.0
             rise += away * away / distance if end else 0.0
-    return gap, slope, rise
+    return gap, slope, rise, metres
 
 
-def put_side(scene, work, count, piece, foot, end, inset, lens):
-    """Put the nodes of a piece from a foot to an end after so many others; how many there are
-    then."""
+def put_side(scene, work, count, piece, foot, growth, end, inset, lens):
+    """Put the nodes of a piece from a foot, with its growth_at, to an end after so many others; how
+    many there are then."""
     reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
-    x, y, nx, ny, metres = at_parameter(piece, foot)
-    gap, slope, rise = growth_at(scene, work, x, y, nx, ny, piece.bend)
+    gap, slope, rise, metres = growth
     parted, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
     # Where the gap, as it grows there, has become twice as large.
     whole = abs(reach) * metres
@@ -375,12 +375,13 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
         first, last = ends_of(piece)
         for k in range(feet):
             foot = work.feet[k]
+            growth = growth_at(scene, work, piece, foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
             if low < foot:
-                count = put_side(scene, work, count, piece, foot, low, inset, lens)
+                count = put_side(scene, work, count, piece, foot, growth, low, inset, lens)
             if foot < high:
-                count = put_side(scene, work, count, piece, foot, high, inset, lens)
+                count = put_side(scene, work, count, piece, foot, growth, high, inset, lens)
             if count > MOST_NODES - 2 * MOST_ORDER:
                 total = add_nodes(scene, work, total, count, numbers)
                 count = 0
