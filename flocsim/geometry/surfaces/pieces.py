@@ -17,6 +17,10 @@ from flocsim.geometry.shapes.shape import Shape
 WIDEST = 0.5 * math.pi
 """No arc is longer than this angle [rad]."""
 
+ROUNDED = 1e-7
+"""Of the longest segment: one that is shorter is what rounding has left of a side at a reflex
+corner."""
+
 
 def segment_rows(starts, units, low, high, radius):
     """Rows of segments: each from ``low`` to ``high`` along its unit tangent from its start."""
@@ -24,7 +28,7 @@ def segment_rows(starts, units, low, high, radius):
     half = 0.5 * (high - low)
     radii = np.broadcast_to(radius, half.shape)
     rows = np.column_stack([middle, units, half, np.zeros_like(half), middle, half, radii])
-    return rows[half > 0.0]
+    return rows[half > ROUNDED * half.max(initial=0.0)]
 
 
 def arc_rows(centres, radii, low, high):

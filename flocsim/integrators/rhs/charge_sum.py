@@ -4,6 +4,8 @@ What charges are, and why there are any: flocsim.geometry.surfaces.charges; the 
 (field.py there). The two sums of forces between outlines share the way in (outline_sum.py).
 """
 
+from typing import NamedTuple
+
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart, loops_apart
 from flocsim.hooks import hook
@@ -21,29 +23,47 @@ def slopes_of_cubics(t):
     return -6.0 * t * s, 6.0 * t * s, s * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
 
 
-def cell_of(scene, body, x, y):
+class Grid(NamedTuple):
+    """A row of ``grids`` as numbers, whole where they count."""
+
+    x: float
+    y: float
+    fineness: float
+    across: int
+    wide: float
+    high: float
+    tile: int
+
+
+def grid_of(scene, body):
+    """The Grid of a body's field."""
+    grid = scene.grids
+    across, up = grid[body, at.GRID_ACROSS], grid[body, at.GRID_UP]
+    return Grid(
+        grid[body, at.GRID_X], grid[body, at.GRID_Y], grid[body, at.GRID_FINENESS], int(across),
+        at.TILE * across, at.TILE * up, int(grid[body, at.GRID_TILE]),
+    )  # fmt: skip
+
+
+def cell_of(tiles, grid, x, y):
     """(node, shares of a step beyond it along x and y) of the cell in which a point of a body's
     frame lies, by its lower left corner; a node of −1 beyond the tiles that have some."""
-    grid = scene.grids
-    across = (x - grid[body, at.GRID_X]) * grid[body, at.GRID_FINENESS]
-    up = (y - grid[body, at.GRID_Y]) * grid[body, at.GRID_FINENESS]
-    width = grid[body, at.GRID_ACROSS]
-    if not (0.0 <= across < at.TILE * width and 0.0 <= up < at.TILE * grid[body, at.GRID_UP]):
+    across, up = (x - grid.x) * grid.fineness, (y - grid.y) * grid.fineness
+    if not (0.0 <= across < grid.wide and 0.0 <= up < grid.high):
         return -1, 0.0, 0.0
     # Tiles and steps are counted from the corner, by whole numbers that are not below 0.
     i, j = int(across), int(up)
-    tile = (j >> at.TILE_BITS) * int(width) + (i >> at.TILE_BITS)
-    first = scene.tiles[int(grid[body, at.GRID_TILE]) + tile]
+    first = tiles[grid.tile + (j >> at.TILE_BITS) * grid.across + (i >> at.TILE_BITS)]
     if first < 0:
         return -1, 0.0, 0.0
     within = at.TILE - 1
     return first + (j & within) * (at.TILE + 1) + (i & within), across - i, up - j
 
 
-def put_charge(scene, nodes, count, body, x, y, charge):
-    """Put a charge in the field of a body's, with what is known at the corners of its cell, after
+def put_charge(scene, nodes, count, grid, x, y, charge):
+    """Put a charge in the field of a Grid, with what is known at the corners of its cell, after
     so many others; how many there are then: none more where there is no field."""
-    node, across, up = cell_of(scene, body, x, y)
+    node, across, up = cell_of(scene.tiles, grid, x, y)
     if node < 0:
         return count
     nodes[at.NODE_X, count], nodes[at.NODE_Y, count] = x, y
@@ -105,7 +125,7 @@ def sum_charges(scene, work, a, b, x, y, cosine, sine):
     where a lies at x, y [m] turned by an angle of that cosine and sine."""
     _, strength, reach = scene.layer
     bound, charges = scene.bodies[b, at.BOUNDING_RADIUS] + reach, scene.charges
-    total, count = (0.0, 0.0, 0.0), 0
+    total, count, grid = (0.0, 0.0, 0.0), 0, grid_of(scene, b)
     for row in range(scene.first_charge[a], scene.first_charge[a + 1]):
         px, py = charges[row, at.GROUP_X], charges[row, at.GROUP_Y]
         most = bound + charges[row, at.GROUP_EXTENT]
@@ -116,12 +136,12 @@ def sum_charges(scene, work, a, b, x, y, cosine, sine):
             place = at.FIRST_CHARGE + 3 * k
             px, py = charges[row, place], charges[row, place + 1]
             ax, ay = x + cosine * px - sine * py, y + sine * px + cosine * py
-            count = put_charge(scene, work.nodes, count, b, ax, ay, charges[row, place + 2])
+            count = put_charge(scene, work.nodes, count, grid, ax, ay, charges[row, place + 2])
         if count > at.MOST_NODES - at.GROUP:
             total = add_forces(work.nodes, total, count)
             count = 0
     fx, fy, torque = add_forces(work.nodes, total, count)
-    strength *= scene.grids[b, at.GRID_FINENESS]
+    strength *= grid.fineness
     return strength * fx, strength * fy, strength * torque
 
 

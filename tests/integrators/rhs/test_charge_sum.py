@@ -16,7 +16,7 @@ from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import sample_points
 from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
-from flocsim.integrators.rhs.charge_sum import between_corners, cubics, put_charge
+from flocsim.integrators.rhs.charge_sum import between_corners, cubics, grid_of, put_charge
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.integrators.rhs.test_outline_sum import (
     SIZE,
@@ -70,7 +70,7 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed):
 def potential_at(pair, x, y):
     """That of the earlier body by its tables."""
     nodes = pair.work.nodes
-    if put_charge(pair.scene, nodes, 0, 0, x, y, 1.0) == 0:
+    if put_charge(pair.scene, nodes, 0, grid_of(pair.scene, 0), x, y, 1.0) == 0:
         return 0.0
     across, up = nodes[at.CELL_X, 0], nodes[at.CELL_Y, 0]
     return between_corners(nodes, 0, cubics(across), cubics(up))
