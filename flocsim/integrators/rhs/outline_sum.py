@@ -47,8 +47,8 @@ more than the latter."""
 UNMOVED = Pose(0.0, 0.0, 1.0, 0.0)
 """Of the body in whose frame all is."""
 
-MOST_SCALE = 1e3
-"""Over the length of a piece: scales that are longer make no difference to where nodes lie."""
+LEAST_GROWTH = 1e-6
+"""Of the gap: what grows by less is flat."""
 
 AT_ONCE = 8
 """Nodes that a processor takes at once at most."""
@@ -248,10 +248,13 @@ def put_side(scene, work, count, piece, foot, growth, end, inset, lens):
     reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
     gap, slope, rise, metres = growth
     parted, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
-    # Where the gap, as it grows there, has become twice as large.
+    # Where the gap, as it grows there, has become twice as large; and as it has grown by then.
     whole = abs(reach) * metres
     root = slope + math.sqrt(slope * slope + 2.0 * max(rise, 0.0) * parted)
-    scale = 2.0 * parted / max(root, 2.0 * parted / (MOST_SCALE * whole))
+    way = min(2.0 * parted / max(root, parted / whole), whole)
+    x, y, _, _, _ = at_parameter(piece, foot + math.copysign(way / metres, reach))
+    grown = (gap_from(scene, work, x, y) - gap) / parted
+    scale = way / math.sqrt(max(grown, LEAST_GROWTH))
     share = whole / scale
     last = share / (1.0 + math.sqrt(1.0 + share * share))
     return put_panel(work, count, piece, foot, math.copysign(scale / metres, reach), 0.0, last)
