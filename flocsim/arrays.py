@@ -3,6 +3,7 @@
 Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
 """
 
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -217,6 +218,49 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     PIECE_COLUMNS,
 ) = range(11)
 
+# Rows of ``Work.near``, each with its number of pieces in front (rhs.outline_sum).
+(
+    NEAR_A,  # of the body that is gone along, those that may be near the other one
+    NEAR_B,  # of that one
+    AROUND,  # of these, those that may be near the piece that is gone along
+    SEEN,  # those that may be near any piece that has been
+) = range(4)
+
+# Places in ``Work.listed``: for what the first two hold.
+(
+    LISTED_A,  # the bodies
+    LISTED_B,
+    LISTED_X,  # where the first one was, in the frame of the second [m]
+    LISTED_Y,
+    LISTED_COSINE,  # and how it was turned
+    LISTED_SINE,
+    LISTED_REACH,  # how near to each other pieces that are listed may have been [m]
+    LISTED_SIZE,
+) = range(8)
+
+# Rows of ``Work.nodes``: places along an outline at which the other one is looked at.
+(
+    NODE_X,  # [m]
+    NODE_Y,
+    NODE_NORMAL_X,  # the outward normal
+    NODE_NORMAL_Y,
+    NODE_WEIGHT,  # how much of the outline it stands for [m]
+    NODE_GAP,  # how far the other outline is [m]
+    NODE_SUM,  # what attraction comes to there: geometry.surfaces.attraction [1/m³]
+    NODE_PLATES,  # at which gap plates attract each other as strongly [m]
+    NODE_LOG_SHARE,  # scratch of that: what a logarithm counts for
+    NODE_LOG_OF,  # and of what it is; below 0 where there is none
+    CELL_X,  # of a charge, where it lies in a cell of a field: from its corner, of a step
+    CELL_Y,
+    FIRST_CORNER,  # from here on the columns of ``Scene.field`` at all four corners
+) = range(13)
+
+MOST_NODES = 144
+"""Nodes at a time."""
+
+MOST_ORDER = 16
+"""Nodes of a rule at most."""
+
 # Columns of ``Scene.charges``: up to GROUP neighbours, in the frame of their body.
 (
     GROUP_X,  # the centre of a circle that holds them [m]
@@ -239,10 +283,12 @@ CHARGE_COLUMNS = FIRST_CHARGE + 3 * GROUP
     GRID_ACROSS,  # how many tiles there are along x
     GRID_UP,  # and along y
     GRID_TILE,  # where they begin in ``tiles``
+    GRID_FINENESS,  # one over the step [1/m]
     GRID_COLUMNS,
-) = range(7)
+) = range(8)
 
-TILE = 8
+TILE_BITS = 3
+TILE = 1 << TILE_BITS
 """Steps along a tile; its nodes are (TILE + 1)², those along its edges being its own."""
 
 # Columns of ``Scene.field``: of charges that make a potential of 1 on their outline.
@@ -253,6 +299,8 @@ TILE = 8
     BY_XY,
     FIELD_COLUMNS,
 ) = range(5)
+
+NODE_ROWS = FIRST_CORNER + 4 * FIELD_COLUMNS
 
 # Places in ``Scene.water``: what two bodies' resistance follows from beside ``Scene.pair_table``.
 (
@@ -605,8 +653,11 @@ class Work(NamedTuple):
     candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]  # see VERTEX_BODY
     geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]  # see NORMAL_X
     kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
-    near: np.ndarray  # rows of pieces of two bodies: rhs.outline_sum
-    feet: np.ndarray  # scratch of the same
+    near: np.ndarray  # (4, pieces + 1): pieces of two bodies, see NEAR_A
+    listed: np.ndarray  # see LISTED_A
+    feet: np.ndarray  # scratch of rhs.outline_sum
+    nodes: Annotated[np.ndarray, (NODE_ROWS, MOST_NODES)]  # see NODE_X
+    rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss's: nodes, weights
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
     pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
@@ -666,6 +717,15 @@ def elimination_of(n: int, pairs: int, room: int) -> Elimination:
     )
 
 
+@cache
+def gauss_rules() -> np.ndarray:
+    """Nodes and weights of Gauss's rules on [−1, 1], by their numbers of nodes."""
+    rules = np.zeros((MOST_ORDER + 1, 2, MOST_ORDER))
+    for order in range(1, MOST_ORDER + 1):
+        rules[order, :, :order] = np.polynomial.legendre.leggauss(order)
+    return rules
+
+
 def work_of(
     scene: Scene,
     position: np.ndarray,
@@ -700,8 +760,11 @@ def work_of(
         candidates=np.zeros((capacity, CANDIDATE_COLUMNS), dtype=np.int64),
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
-        near=np.zeros(2 * len(scene.pieces) + 2, dtype=np.int64),
+        near=np.zeros((4, len(scene.pieces) + 1), dtype=np.int64),
+        listed=np.full(LISTED_SIZE, -1.0),
         feet=np.zeros(MOST_FEET),
+        nodes=np.zeros((NODE_ROWS, MOST_NODES)),
+        rules=gauss_rules(),
         squares=np.zeros((SQUARES + 1, 7)),
         pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
         budget=np.full(pairs, -1.0),

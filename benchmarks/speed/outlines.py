@@ -1,14 +1,19 @@
-"""What forces between outlines cost at touch: a force evaluation, and what is made once a shape.
+"""What forces between outlines cost: an evaluation at touch, what is made once a shape, a study.
 
-    python -m benchmarks.speed.outlines [--pairs 8]
+    python -m benchmarks.speed.outlines [--pairs 8] [--replicates 20]
 
 evaluates force and torque of pairs of rough flocs, r_eq of some 5 and 16 µm, 1 nm apart at random
 poses, in a compiled loop: van der Waals forces (d_min 1 nm), double layers of 0.98 µm, which are
 thick beside corners of 1 µm, and of 1 nm, which are thin, each alone and the first two together.
-Goals for both: 1 µs at N = 16, 3 µs at N = 64.
+Goals for both: 1 µs at N = 16, 3 µs at N = 64. And it runs replicates of all three types at δ = .5,
+N = 16, with both forces by the outlines and as the preset has them, without and with the resistance
+of the water between the bodies: how many a second, CPU time without what is made once a shape. Goal
+for their ratio: .4.
 """
 
 import time
+from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +21,8 @@ from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim import Body, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
+from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.study import Study
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.geometry.surfaces import charges, field
 from flocsim.integrators.rhs.outline_sum import between_outlines
@@ -29,6 +36,10 @@ FORCES = {
     "both, thick": (PULL, THICK),
 }  # fmt: skip
 
+QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
+ZONES = {"tang2014": 5.925e-6, "clay": 1e-8}
+"""{preset: D_0 [m]}, which divides outcomes and moves with the law where it follows from it."""
+
 
 def many(scene, work, x, y, angle, count):
     """The sum of so many forces, so that none is left out."""
@@ -40,7 +51,7 @@ def many(scene, work, x, y, angle, count):
 
 
 def cost(one, other, pose, forces, count):
-    """Of an evaluation [µs]."""
+    """Of an evaluation [µs], the least of five CPU times."""
     bodies = [Body(other, density=1100.0), Body(one, pose[:2], pose[2], density=1100.0)]
     system = System(bodies, forces)
     scene = system.scene()
@@ -49,15 +60,60 @@ def cost(one, other, pose, forces, count):
     entry = compose(many, fillings)
     given = [float(each) for each in pose]
     entry(scene, work, *given, 1)
-    start = time.perf_counter()
-    entry(scene, work, *given, count)
-    return 1e6 * (time.perf_counter() - start) / count
+    spent = []
+    for _ in range(5):
+        start = time.process_time()
+        entry(scene, work, *given, count)
+        spent.append(time.process_time() - start)
+    return 1e6 * min(spent) / count
+
+
+def study_of(preset, law, film, replicates):
+    """A Study of all types, compiled."""
+    forces = {"van_der_waals": law, "double_layer": law} | ({"lubrication": {}} if film else {})
+    config = load_config(QUICKSTART, {
+        "preset": preset, "seed": 1, "replicates": replicates, "forces": forces,
+        "zone": {"distance": ZONES[preset]}, "shapes": {"vertices": [16]},
+        "scene": {"types": ["I", "II", "III"], "delta": [0.5]}, "integrator": {"check_share": 0.0},
+    })  # fmt: skip
+    study = Study(config)
+    study.compile(study.kinds)
+    return study
+
+
+def run_all(study, replicates):
+    """(CPU seconds, steps) of all its replicates."""
+    spent, steps = 0.0, 0
+    for condition, replicate in product(range(3), range(replicates)):
+        draw = study.draw(condition, 16, 0.5, replicate)
+        driver, _ = study.driver(draw.encounter), draw.encounter.scene
+        began = time.process_time()
+        row = draw.run(driver, study.config.integrator.max_steps)
+        spent += time.process_time() - began
+        steps += row["steps"]
+    return spent, steps
+
+
+def print_studies(replicates, markdown):
+    """The table of studies."""
+    table = Table("Replicates a second, N = 16",
+                  ("preset", "water between", "as it is", "outlines", "ratio", "steps", "outlines")
+                  )  # fmt: skip
+    for preset, film in product(ZONES, (False, True)):
+        whole = [run_all(study_of(preset, law, film, replicates), replicates)
+                 for law in ({}, {"law": "outline"})]  # fmt: skip
+        count = 3 * replicates
+        (plain, steps), (along, more) = whole
+        table.add(preset, "yes" if film else "no", count / plain, count / along, plain / along,
+                  steps / count, more / count)  # fmt: skip
+    table.print(markdown)
 
 
 def main():
-    """Print both tables."""
+    """Print all tables."""
     parser = parser_of(__doc__)
     parser.add_argument("--pairs", type=int, default=8)
+    parser.add_argument("--replicates", type=int, default=20, help="of each type")
     args = parser.parse_args()
     pairs, count = (2, 500) if args.quick else (args.pairs, 2000)
     print_heading()
@@ -84,6 +140,7 @@ def main():
         made.add(n, len(known), float(spent[0]), len(nodes), float(spent[1]))
     table.print(args.markdown)
     made.print(args.markdown)
+    print_studies(2 if args.quick else args.replicates, args.markdown)
 
 
 if __name__ == "__main__":

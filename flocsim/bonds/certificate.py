@@ -57,8 +57,13 @@ def attraction_at(scene, work, time, bond, way):
     return centres, surfaces
 
 
+def is_enough(all_of_it, follows, pries, enough):
+    """Whether a capacity is above what is asked for: all of it, and one of its two parts."""
+    return all_of_it > enough[0] and (follows > enough[1] or pries > enough[2])
+
+
 @apart
-def most_between(scene, work, time, bond, start, end, near, share):
+def most_between(scene, work, time, bond, start, end, near, share, enough):
     """What the attraction comes to at most over the ways from ``start`` to ``end`` [N], as capacity
     has it, and the way at which all of it is most [m]; ``share``: steps over the gap there."""
     sizes, best = radii_of(scene, bond), start
@@ -71,6 +76,8 @@ def most_between(scene, work, time, bond, start, end, near, share):
         follows = max(follows, surfaces + min(centres, 0.0))
         if way <= near:
             pries = max(pries, centres)
+        if is_enough(all_of_it, follows, pries, enough):
+            break
         # Forces change over as much as is left of the gap that they go by.
         left = end
         if has(scene, CENTRE_FORCE):
@@ -90,22 +97,27 @@ def lets_out(scene, work, time, bond, pull, needed):
     return can_climb(*known, bond.distance, bond.surface_gap, pull, needed)
 
 
-def capacity(scene, work, time, bond, near):
+def capacity(scene, work, time, bond, near, enough):
     """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
-    a repulsion of centres; that of centres alone, over a way ``near`` [m])."""
+    a repulsion of centres; that of centres alone, over a way ``near`` [m]). It is not looked for
+    any further than to where it is ``enough`` (is_enough)."""
     between = scene.surface_reach > bond.surface_gap or outline_reach(scene) > bond.gap
     if not has(scene, CENTRE_FORCE) and not between:
         return 0.0, 0.0, 0.0
     sizes = radii_of(scene, bond)
     end = 2.0 * sizes + max(-bond.surface_gap, sizes - bond.distance, 0.0)
-    most, follows, pries, best = most_between(scene, work, time, bond, 0.0, end, near, RUNG)
+    known = scene, work, time, bond, 0.0, end, near, RUNG, enough
+    most, follows, pries, best = most_between(*known)
+    if is_enough(most, follows, pries, enough):
+        return most, follows, pries
     # Once more about the highest place, which may be a cusp.
     around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
     if outline_reach(scene) > 0.0:
         around = min(around, RUNG * max(bond.gap + best, scene.outlines[1]))
     if has(scene, CENTRE_FORCE):
         around = min(around, RUNG * abs(bond.distance + best - sizes))
-    known = scene, work, time, bond, max(best - around, 0.0), best + around, near, FINER * RUNG
+    start, end = max(best - around, 0.0), best + around
+    known = scene, work, time, bond, start, end, near, FINER * RUNG, enough
     finer, follows_finer, pries_finer, _ = most_between(*known)
     return max(most, finer), max(follows, follows_finer), max(pries, pries_finer)
 
@@ -139,11 +151,10 @@ def is_held(scene, work, time, bond, load):
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)
     near = LEANING * bond.distance / (ratio * ratio)
-    all_of_it, follows, pries = capacity(scene, work, time, bond, near)
-    if not all_of_it > needed:
-        return False
-    pried = shear < CALM * load.drift and pries > needed * ratio
-    if not (spheres or follows > needed or pried):
+    pried = needed * ratio if shear < CALM * load.drift else math.inf
+    enough = needed, -1.0 if spheres else needed, pried
+    all_of_it, follows, pries = capacity(scene, work, time, bond, near, enough)
+    if not is_enough(all_of_it, follows, pries, enough):
         return False
     # In a well, which they might still be leaving.
     moving = 0.5 * mass * along * along
@@ -176,7 +187,7 @@ def is_certain_in_kicks(scene, work, time, bond, load):
     """Whether neither a later load nor kicks can open the bond."""
     pull = SAFETY * load.force
     if pull > 0.0 and not are_spheres(scene, bond):
-        _, follows, _ = capacity(scene, work, time, bond, 0.0)
+        _, follows, _ = capacity(scene, work, time, bond, 0.0, (-1.0, pull, math.inf))
         if not follows > pull:
             pull *= leverage(work, bond, load.lever)
     needed = BARRIER * load.kicks + energy_of(scene, work, bond)

@@ -7,6 +7,8 @@ in their attraction against the load, and shapes, whose contacts no potential te
 takes as much to lift one by the smaller spheroradius against it.
 """
 
+import math
+
 import flocsim.arrays as at
 from flocsim.bonds.bond import HOOK, NO_BOND, REST, are_spheres, radii_of
 from flocsim.bonds.certificate import CALM, capacity, lets_out
@@ -67,5 +69,5 @@ def kind_at_rest(scene, work, time, bond, load, rested):
         return NO_BOND
     if load.kicks > 0.0 and not outlasts_kicks(scene, work, time, bond, load):
         return NO_BOND
-    borne, _, _ = capacity(scene, work, time, bond, 0.0)
+    borne, _, _ = capacity(scene, work, time, bond, 0.0, (load.force, -1.0, math.inf))
     return HOOK if borne <= load.force and is_hooked(scene, work, bond, load) else REST

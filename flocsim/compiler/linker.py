@@ -16,6 +16,13 @@ def apart(function: Callable) -> Callable:
     return function
 
 
+def loops_apart(function: Callable) -> Callable:
+    """Mark a function that is compiled by itself, and is a loop over many numbers without a branch:
+    it takes several of them at once, to the same bits."""
+    function.loops = True  # type: ignore[attr-defined]
+    return apart(function)
+
+
 class Linker:
     """Clones functions, with others in the place of hooks."""
 

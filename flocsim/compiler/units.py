@@ -118,7 +118,7 @@ class Build:
         # Without the interpreter's lock, dividing by zero as numpy does.
         self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
         self.options |= {} if code.allocates else internals.NO_COUNTING
-        self.for_inner, self.for_entry = internals.compilers()
+        self.for_inner, self.for_entry, self.for_loops = internals.compilers()
         by_units = self.for_entry and not code.allocates
         self.linker = Linker({}, self.inner, made, self.called if by_units else None)
         self.units: dict[str, ObjectCode] = {}
@@ -177,7 +177,8 @@ class Build:
         try:
             run = run_of(module, entry, **readers)
             run.__globals__["driver"] = self.linker.first(entry)
-            options = {**self.options, **self.for_entry}
+            kind = self.for_loops if hasattr(entry, "loops") else self.for_entry
+            options = {**self.options, **kind}
             code, missing, lasts = internals.object_code(run, signature, options)
         finally:
             del sys.modules[name]

@@ -22,6 +22,9 @@ from tests.helpers.two_bodies import TwoBodies, load, polygon
 RADII = (4e-6, 5e-6)
 REDUCED = RADII[0] * RADII[1] / sum(RADII)
 
+WHATEVER = (math.inf, math.inf, math.inf)
+"""What is asked of a capacity that is to be found whole."""
+
 
 def net_attraction(gap, hamaker, layer):
     """Of the two spheres [N]."""
@@ -50,7 +53,9 @@ def test_a_well_above_the_touch_is_judged_by_the_most_that_it_bears(share):
     pull = load(share * most)
     here = sum(certificate.attraction_at(two.scene, two.work, 0.0, two.bond, 0.0))
     assert two.bond.gap > 0.0 and here == pytest.approx(pull.force, rel=1e-3)
-    assert capacity(two.scene, two.work, 0.0, two.bond, 0.0)[0] == pytest.approx(most, rel=0.02)
+    assert capacity(two.scene, two.work, 0.0, two.bond, 0.0, WHATEVER)[0] == pytest.approx(
+        most, rel=0.02
+    )
     assert is_certain(two.scene, two.work, 0.0, two.bond, pull) == (share < 1.0 / SAFETY)
     # Whatever it bears, no shape holds a sphere: at most it rests, if it does so for long.
     assert not is_hooked(two.scene, two.work, two.bond, pull)
@@ -82,13 +87,13 @@ def test_who_is_on_the_way_out_of_a_well_is_not_held_by_it():
 def test_capacity_is_the_largest_attraction_of_centres_and_outlines_together():
     """A spring between the centres that pulls from some distance on, and one that pushes."""
     two, _ = in_well(1e-12)
-    only = capacity(two.scene, two.work, 0.0, two.bond, 0.0)
+    only = capacity(two.scene, two.work, 0.0, two.bond, 0.0, WHATEVER)
     assert only[0] == only[1] and only[2] == 0.0
     forces = [VanDerWaals(4.7e-20, gap="surface"), Contact(), Spring(1e-3, 1e-6)]
     shapes, places = [Sphere(r) for r in RADII], [(0, 0, 0), (0, -sum(RADII), 0)]
     both = TwoBodies(shapes, places, forces)
     way = 2.0 * sum(RADII)
-    total, follows, pries = capacity(both.scene, both.work, 0.0, both.bond, 2e-6)
+    total, follows, pries = capacity(both.scene, both.work, 0.0, both.bond, 2e-6, WHATEVER)
     assert 0.8 * 1e-3 * (way - 1e-6) < total <= 1e-3 * way
     assert pries == pytest.approx(1e-3 * 1e-6, rel=0.3)
     # Where the spring pushes, outlines have to hold against it.
@@ -121,7 +126,7 @@ def test_a_cluster_pries_with_its_own_length():
     ratio = certificate.leverage(two.work, two.bond, 0.0)
     assert ratio == pytest.approx(math.hypot(3.0, 3.05) / 3.0, rel=1e-2)
     assert certificate.leverage(two.work, two.bond, 3e-5) == pytest.approx(10.0, rel=1e-2)
-    most = capacity(two.scene, two.work, 0.0, two.bond, 0.0)[2]
+    most = capacity(two.scene, two.work, 0.0, two.bond, 0.0, WHATEVER)[2]
     for force, lever, held in ((0.9, 0.0, True), (1.1, 0.0, False), (0.9, 3e-5, False)):
         pull = load(force * most / (SAFETY * ratio), lever=lever)
         assert certificate.is_held(two.scene, two.work, 0.0, two.bond, pull) == held

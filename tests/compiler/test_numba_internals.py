@@ -112,7 +112,7 @@ def test_arguments_of_other_types_are_refused_when_compiled():
 
 
 def test_inner_functions_are_linked_and_have_no_machine_code(fresh):
-    linked, _ = numba_internals.libraries()
+    linked, _, _ = numba_internals.libraries()
     asked = []
     fresh.setattr(linked, "finalize", lambda self: asked.append(self.name))
     assert linked.get_pointer_to_function(None, "inner") == 0

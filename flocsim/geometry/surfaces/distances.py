@@ -77,11 +77,18 @@ def place_beside(x, y, middle, half):
     return min(max(along, -1.0), 1.0)
 
 
-def distance_to(x, y, piece):
-    """How far a point is outside of what lies behind a piece [m], negative inside of it."""
+def from_core(x, y, piece):
+    """(dx, dy) to a point from where the core of a piece is nearest to it [m], and whether that is
+    an end of the core."""
     middle, half = core_of(piece)
     place = place_beside(x, y, middle, half)
     dx, dy = x - middle[0] - place * half[0], y - middle[1] - place * half[1]
+    return dx, dy, piece.bend > 0.0 or abs(place) == 1.0
+
+
+def distance_to(x, y, piece):
+    """How far a point is outside of what lies behind a piece [m], negative inside of it."""
+    dx, dy, _ = from_core(x, y, piece)
     return math.sqrt(dx * dx + dy * dy) - piece.inward
 
 
@@ -96,19 +103,34 @@ def beside_end(end, middle, half, middle_2, half_2):
 def between_cores(one, other):
     """(squared distance, x, y on the one's core, x, y on the other's) where two are nearest."""
     (middle, half), (middle_2, half_2) = core_of(one), core_of(other)
+    # The core of an arc is a point.
+    if one.bend > 0.0:
+        return beside_end(0.0, middle, half, middle_2, half_2)
     least = math.inf
     x, y, x_2, y_2 = 0.0, 0.0, 0.0, 0.0
     for end in (-1.0, 1.0):
-        squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
-        if squared < least:
-            least, x, y, x_2, y_2 = squared, px, py, qx, qy
+        if other.bend == 0.0:
+            squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
+            if squared < least:
+                least, x, y, x_2, y_2 = squared, px, py, qx, qy
         squared, qx, qy, px, py = beside_end(end, middle_2, half_2, middle, half)
         if squared < least:
             least, x, y, x_2, y_2 = squared, px, py, qx, qy
     return least, x, y, x_2, y_2
 
 
-def apart_at_least(one, other):
-    """How far two pieces are apart at least, by the circles that hold them [m]."""
+def may_be_within(one, other, reach):
+    """Whether two pieces may be nearer to each other than a reach [m], by the circles that hold
+    them."""
     dx, dy = one.middle_x - other.middle_x, one.middle_y - other.middle_y
-    return math.sqrt(dx * dx + dy * dy) - one.extent - other.extent
+    most = one.extent + other.extent + reach
+    return most > 0.0 and dx * dx + dy * dy < most * most
+
+
+def are_within(one, other, reach):
+    """Whether two pieces, or what lies behind them, are nearer to each other than a reach [m]."""
+    if not may_be_within(one, other, reach):
+        return False
+    squared, _, _, _, _ = between_cores(one, other)
+    most = reach + one.inward + other.inward
+    return squared < most * most

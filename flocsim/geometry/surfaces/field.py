@@ -145,7 +145,7 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     charges = rows_of_shape(shape, kappa)
     near = np.zeros(len(charges), np.int64)
     compiled_fill()(charges, kappa, step, corners, near, field)
-    return Field(np.array([[*low, step, *counts, 0.0]]), tiles, field)
+    return Field(np.array([[*low, step, *counts, 0.0, 1.0 / step]]), tiles, field)
 
 
 def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:

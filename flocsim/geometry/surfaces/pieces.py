@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.arrays import PIECE_COLUMNS
+from flocsim.arrays import BEND, EXTENT, PIECE_COLUMNS
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import signed_area
 from flocsim.geometry.shapes.moments import exposed_arcs, exposed_chords, is_disc, pieces_of
@@ -16,6 +16,10 @@ from flocsim.geometry.shapes.shape import Shape
 
 WIDEST = 0.5 * math.pi
 """No arc is longer than this angle [rad]."""
+
+ROUNDED = 1e-7
+"""Of the longest piece: segments that are shorter are what rounding has left of a side at a reflex
+corner."""
 
 
 def segment_rows(starts, units, low, high, radius):
@@ -84,8 +88,15 @@ def pieces_of_shape(shape: Shape) -> np.ndarray:
     return outline_pieces(shape.parts)
 
 
+def pieces_that_count(shape: Shape) -> np.ndarray:
+    """The pieces of a shape's outline without those that are nothing but rounding: they would be
+    looked at as often as any other."""
+    rows = pieces_of_shape(shape)
+    return rows[(rows[:, BEND] > 0.0) | (rows[:, EXTENT] > ROUNDED * rows[:, EXTENT].max())]
+
+
 def pieces_of_bodies(shapes: Sequence[Shape], count: int) -> Pieces:
     """The Pieces of bodies of these shapes; of so many bodies with none where there are none."""
-    rows = [pieces_of_shape(shape) for shape in shapes] or [np.zeros((0, PIECE_COLUMNS))] * count
+    rows = [pieces_that_count(shape) for shape in shapes] or [np.zeros((0, PIECE_COLUMNS))] * count
     first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
     return Pieces(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))

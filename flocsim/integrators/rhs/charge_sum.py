@@ -4,8 +4,10 @@ What charges are, and why there are any: flocsim.geometry.surfaces.charges; the 
 (field.py there). The two sums of forces between outlines share the way in (outline_sum.py).
 """
 
+from typing import NamedTuple
+
 import flocsim.arrays as at
-from flocsim.compiler.linker import apart
+from flocsim.compiler.linker import apart, loops_apart
 from flocsim.hooks import hook
 
 
@@ -21,53 +23,109 @@ def slopes_of_cubics(t):
     return -6.0 * t * s, 6.0 * t * s, s * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
 
 
-def between_nodes(field, row, tx, ty):
-    """(φ, its derivatives by x and y) at shares tx, ty of the steps from a node on, of a step."""
-    a, a_slope, c, c_slope = cubics(tx), slopes_of_cubics(tx), cubics(ty), slopes_of_cubics(ty)
-    value, by_x, by_y = 0.0, 0.0, 0.0
-    for up in range(2):
-        for across in range(2):
-            node = row + up * (at.TILE + 1) + across
-            here, along = field[node, at.POTENTIAL], field[node, at.BY_X]
-            above, both = field[node, at.BY_Y], field[node, at.BY_XY]
-            at_x = a[across] * here + a[2 + across] * along
-            rise = a[across] * above + a[2 + across] * both
-            value += c[up] * at_x + c[2 + up] * rise
-            by_y += c_slope[up] * at_x + c_slope[2 + up] * rise
-            at_x = a_slope[across] * here + a_slope[2 + across] * along
-            rise = a_slope[across] * above + a_slope[2 + across] * both
-            by_x += c[up] * at_x + c[2 + up] * rise
-    return value, by_x, by_y
+class Grid(NamedTuple):
+    """A row of ``grids`` as numbers, whole where they count."""
+
+    x: float
+    y: float
+    fineness: float
+    across: int
+    wide: float
+    high: float
+    tile: int
 
 
-def field_at(scene, body, x, y):
-    """(φ [-], its derivatives [1/m]) of a body's charges at a point of its frame; 0 beyond the
-    tiles that have nodes."""
-    grid, step = scene.grids, scene.grids[body, at.GRID_STEP]
+def grid_of(scene, body):
+    """The Grid of a body's field."""
+    grid = scene.grids
+    across, up = grid[body, at.GRID_ACROSS], grid[body, at.GRID_UP]
+    return Grid(
+        grid[body, at.GRID_X], grid[body, at.GRID_Y], grid[body, at.GRID_FINENESS], int(across),
+        at.TILE * across, at.TILE * up, int(grid[body, at.GRID_TILE]),
+    )  # fmt: skip
+
+
+def cell_of(tiles, grid, x, y):
+    """(node, shares of a step beyond it along x and y) of the cell in which a point of a body's
+    frame lies, by its lower left corner; a node of −1 beyond the tiles that have some."""
+    across, up = (x - grid.x) * grid.fineness, (y - grid.y) * grid.fineness
+    if not (0.0 <= across < grid.wide and 0.0 <= up < grid.high):
+        return -1, 0.0, 0.0
     # Tiles and steps are counted from the corner, by whole numbers that are not below 0.
-    across, up = (x - grid[body, at.GRID_X]) / step, (y - grid[body, at.GRID_Y]) / step
-    if not (across >= 0.0 and up >= 0.0):
-        return 0.0, 0.0, 0.0
     i, j = int(across), int(up)
-    tile_i, tile_j, width = i // at.TILE, j // at.TILE, int(grid[body, at.GRID_ACROSS])
-    if tile_i >= width or tile_j >= int(grid[body, at.GRID_UP]):
-        return 0.0, 0.0, 0.0
-    first = scene.tiles[int(grid[body, at.GRID_TILE]) + tile_j * width + tile_i]
+    first = tiles[grid.tile + (j >> at.TILE_BITS) * grid.across + (i >> at.TILE_BITS)]
     if first < 0:
-        return 0.0, 0.0, 0.0
-    row = first + (j % at.TILE) * (at.TILE + 1) + i % at.TILE
-    value, by_x, by_y = between_nodes(scene.field, row, across - i, up - j)
-    return value, by_x / step, by_y / step
+        return -1, 0.0, 0.0
+    within = at.TILE - 1
+    return first + (j & within) * (at.TILE + 1) + (i & within), across - i, up - j
+
+
+def put_charge(scene, nodes, count, grid, x, y, charge):
+    """Put a charge in the field of a Grid, with what is known at the corners of its cell, after
+    so many others; how many there are then: none more where there is no field."""
+    node, across, up = cell_of(scene.tiles, grid, x, y)
+    if node < 0:
+        return count
+    nodes[at.NODE_X, count], nodes[at.NODE_Y, count] = x, y
+    nodes[at.NODE_WEIGHT, count] = charge
+    nodes[at.CELL_X, count], nodes[at.CELL_Y, count] = across, up
+    for corner in range(4):
+        # Two beside each other, and the two above them.
+        place = node + (corner >> 1) * (at.TILE + 1) + (corner & 1)
+        row = at.FIRST_CORNER + corner * at.FIELD_COLUMNS
+        for column in range(at.FIELD_COLUMNS):
+            nodes[row + column, count] = scene.field[place, column]
+    return count + 1
+
+
+def along_side(nodes, k, row, x):
+    """What is known at two corners of a cell, ``row`` being the first one's, blended along x: φ
+    from its rows, its derivative by y from those that follow."""
+    first, second = nodes[row, k], nodes[row + at.FIELD_COLUMNS, k]
+    slope, slope_2 = nodes[row + 1, k], nodes[row + at.FIELD_COLUMNS + 1, k]
+    return x[0] * first + x[1] * second + x[2] * slope + x[3] * slope_2
+
+
+def between_corners(nodes, k, x, y):
+    """φ in a cell, or its derivative by x or y, of a step, ``x`` and ``y`` being the cubics or
+    their slopes."""
+    low, high = at.FIRST_CORNER, at.FIRST_CORNER + 2 * at.FIELD_COLUMNS
+    value, value_2 = along_side(nodes, k, low, x), along_side(nodes, k, high, x)
+    rise = along_side(nodes, k, low + at.BY_Y, x)
+    rise_2 = along_side(nodes, k, high + at.BY_Y, x)
+    return y[0] * value + y[1] * value_2 + y[2] * rise + y[3] * rise_2
+
+
+@loops_apart
+def write_forces(nodes, count):
+    """Write the forces on so many charges, times a step, to where nodes have their normals."""
+    for k in range(count):
+        tx, ty = nodes[at.CELL_X, k], nodes[at.CELL_Y, k]
+        across = between_corners(nodes, k, slopes_of_cubics(tx), cubics(ty))
+        up = between_corners(nodes, k, cubics(tx), slopes_of_cubics(ty))
+        nodes[at.NODE_NORMAL_X, k] = -nodes[at.NODE_WEIGHT, k] * across
+        nodes[at.NODE_NORMAL_Y, k] = -nodes[at.NODE_WEIGHT, k] * up
+
+
+def add_forces(nodes, total, count):
+    """(fx, fy, torque) of so many charges, times a step, added to a total."""
+    fx, fy, torque = total
+    write_forces(nodes, count)
+    for k in range(count):
+        across, up = nodes[at.NODE_NORMAL_X, k], nodes[at.NODE_NORMAL_Y, k]
+        fx, fy = fx + across, fy + up
+        torque += nodes[at.NODE_X, k] * up - nodes[at.NODE_Y, k] * across
+    return fx, fy, torque
 
 
 @hook
 @apart
-def sum_charges(scene, a, b, x, y, cosine, sine):
+def sum_charges(scene, work, a, b, x, y, cosine, sine):
     """(fx, fy, torque about b's centroid) on a metre of body a [N/m, N/m, N], in the frame of b,
     where a lies at x, y [m] turned by an angle of that cosine and sine."""
     _, strength, reach = scene.layer
     bound, charges = scene.bodies[b, at.BOUNDING_RADIUS] + reach, scene.charges
-    fx, fy, torque = 0.0, 0.0, 0.0
+    total, count, grid = (0.0, 0.0, 0.0), 0, grid_of(scene, b)
     for row in range(scene.first_charge[a], scene.first_charge[a + 1]):
         px, py = charges[row, at.GROUP_X], charges[row, at.GROUP_Y]
         most = bound + charges[row, at.GROUP_EXTENT]
@@ -78,14 +136,15 @@ def sum_charges(scene, a, b, x, y, cosine, sine):
             place = at.FIRST_CHARGE + 3 * k
             px, py = charges[row, place], charges[row, place + 1]
             ax, ay = x + cosine * px - sine * py, y + sine * px + cosine * py
-            _, by_x, by_y = field_at(scene, b, ax, ay)
-            across, up = -charges[row, place + 2] * by_x, -charges[row, place + 2] * by_y
-            fx += across
-            fy += up
-            torque += ax * up - ay * across
+            count = put_charge(scene, work.nodes, count, grid, ax, ay, charges[row, place + 2])
+        if count > at.MOST_NODES - at.GROUP:
+            total = add_forces(work.nodes, total, count)
+            count = 0
+    fx, fy, torque = add_forces(work.nodes, total, count)
+    strength *= grid.fineness
     return strength * fx, strength * fy, strength * torque
 
 
-def no_charges(scene, a, b, x, y, cosine, sine):
+def no_charges(scene, work, a, b, x, y, cosine, sine):
     """There are none."""
     return 0.0, 0.0, 0.0

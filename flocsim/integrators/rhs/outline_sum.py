@@ -8,15 +8,17 @@ one is gone along. All is in the frame of the other.
 import math
 
 import flocsim.arrays as at
-from flocsim.arrays import MOST_FEET, OutlineView
+from flocsim.arrays import MOST_FEET, MOST_NODES, MOST_ORDER, OutlineView
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.separation import length_of, separation
-from flocsim.geometry.surfaces.attraction import EIGHT, piece_at_point
+from flocsim.geometry.surfaces.attraction import add_arc, add_segment, find_plates
 from flocsim.geometry.surfaces.distances import (
     Pose,
-    apart_at_least,
+    are_within,
     between_cores,
     distance_to,
+    from_core,
+    may_be_within,
     piece_at,
     placed,
 )
@@ -38,81 +40,122 @@ that are as near to each other are one."""
 MOST_HALVES = 40
 """How often a way along a piece is halved: far below any length that counts."""
 
-NO_ATTRACTION = 1e3
-"""The gap [m] of plates that stands for none."""
+SKIN, MOST_SKIN = 1.0, 4.0
+"""Pieces are listed to so much further than they count, so that lists last, and anew where it is
+more than the latter."""
+
+UNMOVED = Pose(0.0, 0.0, 1.0, 0.0)
+"""Of the body in whose frame all is."""
+
+LEAST_GROWTH = 1e-6
+"""Of the gap: what grows by less is flat."""
+
+AT_ONCE = 8
+"""Nodes that a processor takes at once at most."""
 
 
 def list_near(scene, work, a, b, pose, reach):
-    """List the pieces of two bodies that may be nearer to each other than ``reach``."""
-    near, middle = work.near, work.near.shape[0] // 2
-    # The first half is a's, the second b's; the first number of each says how many.
-    bound_a, bound_b = scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS]
+    """List the pieces of two bodies that are nearer to each other than ``reach``."""
+    near, listed = work.near, work.listed
+    list_within(scene.pieces, near[at.NEAR_A], scene.first_piece[a], scene.first_piece[a + 1],
+                pose, 0.0, 0.0, scene.bodies[b, at.BOUNDING_RADIUS] + reach)  # fmt: skip
+    list_within(scene.pieces, near[at.NEAR_B], scene.first_piece[b], scene.first_piece[b + 1],
+                UNMOVED, pose.x, pose.y, scene.bodies[a, at.BOUNDING_RADIUS] + reach)  # fmt: skip
+    keep_paired(scene.pieces, near[at.NEAR_A], pose, near[at.NEAR_B], UNMOVED, reach)
+    keep_paired(scene.pieces, near[at.NEAR_B], UNMOVED, near[at.NEAR_A], pose, reach)
+    listed[at.LISTED_A], listed[at.LISTED_B], listed[at.LISTED_REACH] = a, b, reach
+    listed[at.LISTED_X], listed[at.LISTED_Y] = pose.x, pose.y
+    listed[at.LISTED_COSINE], listed[at.LISTED_SINE] = pose.cosine, pose.sine
+
+
+def list_within(pieces, rows, first, last, pose, x, y, reach):
+    """List the pieces from ``first`` on, of a body in a Pose, that may be within a reach of a
+    point [m]."""
     count = 0
-    for row in range(scene.first_piece[a], scene.first_piece[a + 1]):
-        piece = placed(scene.pieces, row, pose)
-        away = math.sqrt(piece.middle_x * piece.middle_x + piece.middle_y * piece.middle_y)
-        if away - piece.extent < bound_b + reach:
+    for row in range(first, last):
+        piece = placed(pieces, row, pose)
+        dx, dy, most = piece.middle_x - x, piece.middle_y - y, reach + piece.extent
+        if dx * dx + dy * dy < most * most:
             count += 1
-            near[count] = row
-    near[0] = count
+            rows[count] = row
+    rows[0] = count
+
+
+def keep_paired(pieces, rows, pose, others, other_pose, reach):
+    """Keep of some pieces those that are within a reach of one of others [m]."""
     count = 0
-    for row in range(scene.first_piece[b], scene.first_piece[b + 1]):
-        piece = piece_at(scene.pieces, row)
-        dx, dy = piece.middle_x - pose.x, piece.middle_y - pose.y
-        if math.sqrt(dx * dx + dy * dy) - piece.extent < bound_a + reach:
-            count += 1
-            near[middle + count] = row
-    near[middle] = count
+    for i in range(1, rows[0] + 1):
+        one = placed(pieces, rows[i], pose)
+        for j in range(1, others[0] + 1):
+            if are_within(one, placed(pieces, others[j], other_pose), reach):
+                count += 1
+                rows[count] = rows[i]
+                break
+    rows[0] = count
+
+
+def slack_of(scene, work, a, b, pose):
+    """How near to each other pieces have to be so that they are listed, as bodies lie by now [m];
+    below 0 where none are."""
+    listed = work.listed
+    if listed[at.LISTED_A] != a or listed[at.LISTED_B] != b:
+        return -1.0
+    way = length_of(pose.x - listed[at.LISTED_X], pose.y - listed[at.LISTED_Y])
+    c, s = pose.cosine - listed[at.LISTED_COSINE], pose.sine - listed[at.LISTED_SINE]
+    return listed[at.LISTED_REACH] - way - scene.bodies[a, at.BOUNDING_RADIUS] * length_of(c, s)
 
 
 def gap_listed(scene, work, pose):
     """The least gap of the pieces that are listed [m]; inf where none are."""
-    near, middle, least = work.near, work.near.shape[0] // 2, math.inf
-    for i in range(near[0]):
-        one = placed(scene.pieces, near[1 + i], pose)
-        for j in range(near[middle]):
-            other = piece_at(scene.pieces, near[middle + 1 + j])
-            if apart_at_least(one, other) < least:
+    near, least = work.near, math.inf
+    for i in range(near[at.NEAR_A, 0]):
+        one = placed(scene.pieces, near[at.NEAR_A, 1 + i], pose)
+        for j in range(near[at.NEAR_B, 0]):
+            other = piece_at(scene.pieces, near[at.NEAR_B, 1 + j])
+            if may_be_within(one, other, least):
                 squared, _, _, _, _ = between_cores(one, other)
                 least = min(least, math.sqrt(squared) - one.inward - other.inward)
     return least
 
 
-def look_from(scene, work, x, y, inset, lens):
-    """(gap, S) at a point: how far the other outline is [m], and what attraction comes to (of all
-    pieces that are listed for it) [1/m³]."""
-    near, middle = work.near, work.near.shape[0] // 2
-    gap, total = math.inf, 0.0
-    for j in range(near[middle]):
-        row = near[middle + 1 + j]
-        piece = piece_at(scene.pieces, row)
-        dx, dy = x - piece.middle_x, y - piece.middle_y
-        if math.sqrt(dx * dx + dy * dy) - piece.extent < lens:
-            gap = min(gap, distance_to(x, y, piece))
-            total += piece_at_point(x, y, piece, inset, lens)
-    return gap, total
+def look_around_piece(scene, work, piece, lens):
+    """List the pieces of the other body that may be within ``lens`` of one, and add them to those
+    that have been so far; how many they are."""
+    near, count = work.near, 0
+    for j in range(near[at.NEAR_B, 0]):
+        row = near[at.NEAR_B, 1 + j]
+        if may_be_within(piece, piece_at(scene.pieces, row), lens):
+            count += 1
+            near[at.AROUND, count] = row
+            add_row(near[at.SEEN], row)
+    near[at.AROUND, 0] = count
+    return count
+
+
+def add_row(rows, row):
+    """Add a row to some unless it is among them."""
+    for k in range(1, rows[0] + 1):
+        if rows[k] == row:
+            return
+    rows[0] += 1
+    rows[rows[0]] = row
 
 
 def gap_from(scene, work, x, y):
-    """How far the other outline is from a point [m]."""
-    near, middle, gap = work.near, work.near.shape[0] // 2, math.inf
-    for j in range(near[middle]):
-        piece = piece_at(scene.pieces, near[middle + 1 + j])
-        dx, dy = x - piece.middle_x, y - piece.middle_y
-        if math.sqrt(dx * dx + dy * dy) - piece.extent < gap:
-            gap = min(gap, distance_to(x, y, piece))
+    """How far the other outline, as far as it is around, is from a point [m]."""
+    near, gap = work.near, math.inf
+    for j in range(near[at.AROUND, 0]):
+        gap = min(gap, distance_to(x, y, piece_at(scene.pieces, near[at.AROUND, 1 + j])))
     return gap
 
 
 def find_feet(scene, work, piece, inset, lens):
     """Write the feet of a piece to ``work.feet``, in their order; how many there are. They are the
     places, ends among them, from where the gap within the lens grows either way."""
-    near, middle, count = work.near, work.near.shape[0] // 2, 0
+    near, count = work.near, 0
     first, last = ends_of(piece)
-    for j in range(near[middle]):
-        other = piece_at(scene.pieces, near[middle + 1 + j])
-        if apart_at_least(piece, other) >= lens:
-            continue
+    for j in range(near[at.AROUND, 0]):
+        other = piece_at(scene.pieces, near[at.AROUND, 1 + j])
         parameter = min(max(foot_of(piece, other), first), last)
         x, y, _, _, metres = at_parameter(piece, parameter)
         gap = distance_to(x, y, other)
@@ -156,52 +199,103 @@ def way_to_gap(scene, work, piece, foot, way, wanted):
     return way
 
 
-def add_side(scene, work, total, piece, foot, there, end, numbers):
-    """(fx, fy, torque about the origin) of a piece from a foot, where the gap is that ``there``, to
-    an end, added to a total."""
-    inset, lens, _ = numbers
+def put_panel(work, count, piece, foot, scale, low, high):
+    """Put the nodes of a panel after so many others: t from ``low`` to ``high``, where a piece goes
+    on from a foot by 2 t/(1 − t²) times a scale in its parameter; how many nodes there are then."""
+    nodes, rules, order = work.nodes, work.rules, order_of(high - low)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    for k in range(order):
+        t = middle + half * rules[order, 0, k]
+        shrunk = 1.0 / (1.0 - t * t)
+        part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * shrunk * shrunk
+        x, y, nx, ny, metres = at_parameter(piece, foot + 2.0 * scale * t * shrunk)
+        nodes[at.NODE_X, count + k], nodes[at.NODE_Y, count + k] = x, y
+        nodes[at.NODE_NORMAL_X, count + k], nodes[at.NODE_NORMAL_Y, count + k] = nx, ny
+        nodes[at.NODE_WEIGHT, count + k] = part * metres
+        nodes[at.NODE_GAP, count + k], nodes[at.NODE_SUM, count + k] = math.inf, 0.0
+    return count + order
+
+
+def order_of(width):
+    """How many nodes of Gauss's rule a panel of so much t takes: what it is taken of has its poles
+    near ±i, from where the error is below 1e-7."""
+    if width < 0.3:
+        return 4 if width > 0.1 else 3
+    return 16 if width > 0.7 else 12
+
+
+def growth_at(scene, work, piece, foot):
+    """(gap, its slope along a piece [-], that of the slope [1/m], metres for a unit of the
+    parameter) at a foot."""
+    x, y, nx, ny, metres = at_parameter(piece, foot)
+    near, gap, slope, rise = work.near, math.inf, 0.0, 0.0
+    for j in range(near[at.AROUND, 0]):
+        other = piece_at(scene.pieces, near[at.AROUND, 1 + j])
+        dx, dy, end = from_core(x, y, other)
+        distance = math.sqrt(dx * dx + dy * dy)
+        if distance - other.inward < gap:
+            gap = distance - other.inward
+            away = (nx * dx + ny * dy) / distance
+            slope = (nx * dy - ny * dx) / distance
+            rise = -away / piece.bend if piece.bend > 0.0 else 0.0
+            rise += away * away / distance if end else 0.0
+    return gap, slope, rise, metres
+
+
+def put_side(scene, work, count, piece, foot, growth, end, inset, lens):
+    """Put the nodes of a piece from a foot, with its growth_at, to an end after so many others; how
+    many there are then."""
     reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
-    scale = way_to_gap(scene, work, piece, foot, reach, 3.0 * there + 2.0 * inset)
-    near = abs(scale) < abs(reach)
-    for node, weight in EIGHT:
-        share = 0.5 * (1.0 + node)
-        part = 0.5 * abs(scale) * weight
-        total = add_node(scene, work, total, piece, foot + share * scale, part, numbers)
-    if not near:
-        return total
-    log = math.log(reach / scale)
-    for node, weight in EIGHT:
-        way = scale * math.exp(0.5 * log * (1.0 + node))
-        total = add_node(
-            scene, work, total, piece, foot + way, 0.5 * log * abs(way) * weight, numbers
-        )
-    return total
+    gap, slope, rise, metres = growth
+    parted, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
+    # Where the gap, as it grows there, has become twice as large; and as it has grown by then.
+    whole = abs(reach) * metres
+    root = slope + math.sqrt(slope * slope + 2.0 * max(rise, 0.0) * parted)
+    way = min(2.0 * parted / max(root, parted / whole), whole)
+    x, y, _, _, _ = at_parameter(piece, foot + math.copysign(way / metres, reach))
+    grown = (gap_from(scene, work, x, y) - gap) / parted
+    scale = way / math.sqrt(max(grown, LEAST_GROWTH))
+    share = whole / scale
+    last = share / (1.0 + math.sqrt(1.0 + share * share))
+    return put_panel(work, count, piece, foot, math.copysign(scale / metres, reach), 0.0, last)
 
 
-def add_node(scene, work, total, piece, parameter, weight, numbers):
-    """What acts on a piece at a parameter, over so much of it, added to a total."""
+def look_from(scene, work, count, inset, lens):
+    """Look from so many nodes at the pieces that are around any: how far they are, and at which gap
+    plates attract each other as they do."""
+    near = work.near
+    for j in range(near[at.SEEN, 0]):
+        piece = piece_at(scene.pieces, near[at.SEEN, 1 + j])
+        if piece.bend > 0.0:
+            add_arc(work.nodes, count, piece, inset, lens)
+        else:
+            add_segment(work.nodes, count, piece, inset, lens)
+    find_plates(work.nodes, count, inset, lens)
+
+
+def add_nodes(scene, work, total, count, numbers):
+    """(fx, fy, torque about the origin) of so many nodes, added to a total."""
     inset, lens, view = numbers
-    x, y, nx, ny, metres = at_parameter(piece, parameter)
-    gap, attraction = look_from(scene, work, x, y, inset, lens)
-    if not gap < lens:
-        return total
     fx, fy, torque = total
-    size = -outline_pressure(scene, seen_at(view, gap, attraction, inset, lens)) * weight * metres
-    return fx + size * nx, fy + size * ny, torque + size * (x * ny - y * nx)
-
-
-def seen_at(view, gap, attraction, inset, lens):
-    """The OutlineView at a point with a gap and that S, outlines being moved apart by an inset."""
-    share = gap / lens
-    share *= share
-    attraction *= 1.0 - share * share * share
-    plates = NO_ATTRACTION
-    if attraction < 0.0:
-        plates = min(plates, (-0.75 * attraction) ** (-1.0 / 3.0))
-    return OutlineView(
-        view.time, gap, gap + inset, plates, view.depth, view.radius_i, view.radius_j,
-        view.reduced_radius, view.effective_mass,
-    )  # fmt: skip
+    nodes = work.nodes
+    # Several are looked from at once: as if there were some more, of no weight.
+    whole = -(-count // AT_ONCE) * AT_ONCE
+    for row in range(at.CELL_X):
+        for k in range(count, whole):
+            nodes[row, k] = nodes[row, count - 1]
+    look_from(scene, work, whole, inset, lens)
+    for k in range(count):
+        gap = nodes[at.NODE_GAP, k]
+        if gap < lens:
+            point = OutlineView(
+                view.time, gap, gap + inset, nodes[at.NODE_PLATES, k], view.depth, view.radius_i,
+                view.radius_j, view.reduced_radius, view.effective_mass,
+            )  # fmt: skip
+            size = -outline_pressure(scene, point) * nodes[at.NODE_WEIGHT, k]
+            x, y = nodes[at.NODE_X, k], nodes[at.NODE_Y, k]
+            across, up = size * nodes[at.NODE_NORMAL_X, k], size * nodes[at.NODE_NORMAL_Y, k]
+            fx, fy, torque = fx + across, fy + up, torque + x * up - y * across
+    return fx, fy, torque
 
 
 def radii_of(scene, a, b):
@@ -227,49 +321,74 @@ def depth_of(scene, a, b):
     return 4.0 / 3.0 * min(radius_a, radius_b)
 
 
+def lens_at(scene, least):
+    """How far counts around a point of one outline, as near as both are somewhere [m]; 0 where they
+    are too far from each other."""
+    reach, floor, _, steady = scene.outlines
+    if not least < reach:
+        return 0.0
+    return max(min(LENS * math.sqrt(max(least, floor) * floor), reach), steady)
+
+
 def look_around(scene, work, time, a, b, pose):
     """(inset, lens, OutlineView of the two) of body a in a Pose, the pieces within the lens being
     listed; a lens of 0 where nothing acts along the outlines."""
-    reach, floor, _, steady = scene.outlines
-    list_near(scene, work, a, b, pose, reach)
-    least = gap_listed(scene, work, pose)
-    inset, lens = max(0.0, floor - least), 0.0
-    if least < reach:
-        lens = max(LENS * math.sqrt((least + inset) * floor), steady)
-        list_near(scene, work, a, b, pose, lens)
+    reach, floor, _, _ = scene.outlines
+    slack = slack_of(scene, work, a, b, pose)
+    least = gap_listed(scene, work, pose) if slack > 0.0 else math.inf
+    lens = lens_at(scene, least)
+    needed = max(lens, min(least, reach))
+    if needed > slack or (1.0 + MOST_SKIN) * needed < slack:
+        list_near(scene, work, a, b, pose, (1.0 + SKIN) * reach)
+        least = gap_listed(scene, work, pose)
+        lens = lens_at(scene, least)
+        if lens > 0.0:
+            list_near(scene, work, a, b, pose, (1.0 + SKIN) * lens)
     radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
         time, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
-    return inset, lens, view
+    return max(0.0, floor - least), lens, view
+
+
+def apart_for_sure(scene, a, b, pose):
+    """Whether two bodies are too far from each other for anything to act along outlines."""
+    bound = scene.bodies[a, at.BOUNDING_RADIUS] + scene.bodies[b, at.BOUNDING_RADIUS]
+    return length_of(pose.x, pose.y) - bound > scene.outlines[0]
 
 
 @apart
 def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     """(fx, fy, torque about b's centroid) on body a [N, N, N m], in the frame of b, where a lies at
     x, y [m] turned by an angle of that cosine and sine."""
-    pose = Pose(x, y, cosine, sine)
+    pose, total = Pose(x, y, cosine, sine), (0.0, 0.0, 0.0)
+    if apart_for_sure(scene, a, b, pose):
+        return total
     numbers = look_around(scene, work, time, a, b, pose)
     inset, lens, view = numbers
     if lens == 0.0:
-        return 0.0, 0.0, 0.0
-    total = 0.0, 0.0, 0.0
-    for i in range(work.near[0]):
-        piece = placed(scene.pieces, work.near[1 + i], pose)
+        return total
+    count, work.near[at.SEEN, 0] = 0, 0
+    for i in range(work.near[at.NEAR_A, 0]):
+        piece = placed(scene.pieces, work.near[at.NEAR_A, 1 + i], pose)
+        if look_around_piece(scene, work, piece, lens) == 0:
+            continue
         feet = find_feet(scene, work, piece, inset, lens)
         first, last = ends_of(piece)
         for k in range(feet):
             foot = work.feet[k]
-            x_foot, y_foot, _, _, _ = at_parameter(piece, foot)
-            there = gap_from(scene, work, x_foot, y_foot)
+            growth = growth_at(scene, work, piece, foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
             if low < foot:
-                total = add_side(scene, work, total, piece, foot, there, low, numbers)
+                count = put_side(scene, work, count, piece, foot, growth, low, inset, lens)
             if foot < high:
-                total = add_side(scene, work, total, piece, foot, there, high, numbers)
-    fx, fy, torque = total
+                count = put_side(scene, work, count, piece, foot, growth, high, inset, lens)
+            if count > MOST_NODES - 2 * MOST_ORDER:
+                total = add_nodes(scene, work, total, count, numbers)
+                count = 0
+    fx, fy, torque = add_nodes(scene, work, total, count, numbers)
     return view.depth * fx, view.depth * fy, view.depth * torque
 
 
@@ -306,7 +425,7 @@ def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
     if has(scene, OUTLINE_PRESSURE):
         across, up, torque = sum_along(scene, work, time, a, b, seen_x, seen_y, cosine, sine)
     if scene.layer[2] > 0.0:
-        fx, fy, turning = sum_charges(scene, a, b, seen_x, seen_y, cosine, sine)
+        fx, fy, turning = sum_charges(scene, work, a, b, seen_x, seen_y, cosine, sine)
         depth = depth_of(scene, a, b)
         across, up, torque = across + depth * fx, up + depth * fy, torque + depth * turning
     own = torque - (seen_x * up - seen_y * across)

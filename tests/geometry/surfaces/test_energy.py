@@ -5,10 +5,16 @@ import math
 import numpy as np
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
 from flocsim.geometry.surfaces.energy import attraction_energy
-from flocsim.geometry.surfaces.pieces import outline_pieces, polygon_pieces
+from flocsim.geometry.surfaces.pieces import (
+    outline_pieces,
+    pieces_of_shape,
+    pieces_that_count,
+    polygon_pieces,
+)
 
 CORNERS = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 SQUARE = polygon_pieces(CORNERS)
@@ -72,6 +78,17 @@ def test_the_outline_closes_and_has_the_area_of_the_shape():
     out = 2.0 * np.sin(half) * (x * way_x + y * way_y)[~flat] * bend[~flat]
     twice += np.sum(out + 2.0 * half * bend[~flat] ** 2)
     assert twice == pytest.approx(2.0 * shape.area, rel=1e-9)
+
+
+def test_what_rounding_leaves_of_a_side_is_not_looked_at():
+    """At reflex corners; the length of the outline is the same without."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    away = np.where(np.arange(12) % 2 == 0, 3e-6, 1.5e-6)[:, None]
+    shape = SpheroPolygon(away * np.column_stack([np.cos(turn), np.sin(turn)]), 4e-7)
+    whole, kept = pieces_of_shape(shape), pieces_that_count(shape)
+    assert kept[:, at.EXTENT].min() > 1e-7 * kept[:, at.EXTENT].max()
+    lengths = [np.sum(each[each[:, at.BEND] == 0.0, at.SIZE]) for each in (whole, kept)]
+    assert lengths[1] == pytest.approx(lengths[0], rel=1e-6)
 
 
 def test_what_is_no_polygon_is_refused():

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0, k1
 
+import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
@@ -15,7 +16,7 @@ from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import sample_points
 from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
-from flocsim.integrators.rhs.charge_sum import field_at
+from flocsim.integrators.rhs.charge_sum import between_corners, cubics, grid_of, put_charge
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import (
@@ -67,6 +68,15 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed):
     assert abs(found[2] - wanted[2]) < 1e-3 * strength * SIZE
 
 
+def potential_at(pair, x, y):
+    """That of the earlier body by its tables."""
+    nodes = pair.work.nodes
+    if put_charge(pair.scene, nodes, 0, grid_of(pair.scene, 0), x, y, 1.0) == 0:
+        return 0.0
+    across, up = nodes[at.CELL_X, 0], nodes[at.CELL_Y, 0]
+    return between_corners(nodes, 0, cubics(across), cubics(up))
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_force_and_torque_are_the_slopes_of_the_potential_in_the_tables(seed):
     """At any place, also where tiles meet."""
@@ -80,7 +90,7 @@ def test_force_and_torque_are_the_slopes_of_the_potential_in_the_tables(seed):
         x, y, angle = each
         c, s = math.cos(angle), math.sin(angle)
         placed = charges[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
-        potentials = [field_at(pair.scene, 0, *place)[0] for place in placed]
+        potentials = [potential_at(pair, *place) for place in placed]
         return strength * charges[:, 2] @ potentials
 
     wanted, found = slopes(energy, pose, 1e-3 * DEBYE, SIZE), pair.loads(*pose)

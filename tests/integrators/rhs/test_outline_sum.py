@@ -96,6 +96,24 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed, gap, allowed):
     assert abs(found[2] - wanted[2]) < allowed * strength * SIZE
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_was_listed_before_changes_nothing(seed):
+    """On a way in, along and out again, with lists that are kept."""
+    random = np.random.default_rng(seed)
+    one, other = rough(16, SIZE, seed), rough(64, 1.7 * SIZE, 50 + seed)
+    force = VanDerWaals(HAMAKER, law="outline")
+    x, y, angle = at_gap(one, other, 1e-9, *random.uniform(0.0, 6.28, 2))
+    pair = Pair(other, one, (x, y, angle), force)
+    for away in (1e-6, 3e-7, 1e-8, 0.0, 2e-9, 4e-8, 2e-7):
+        far = 1.0 + away / math.hypot(x, y)
+        pose = far * x, far * y, angle + random.normal() * 0.1 * away / SIZE
+        found = pair.loads(*pose)
+        alone = Pair(other, one, pose, force).loads(*pose)
+        strength = math.hypot(*alone[:2])
+        np.testing.assert_allclose(found[:2], alone[:2], atol=1e-9 * strength)
+        np.testing.assert_allclose(found[2:], alone[2:], atol=1e-9 * strength * SIZE)
+
+
 def balanced(swapped, force):
     """(a Pair of two rough bodies, its pose, its loads there), seen to obey the third law."""
     one, other = rough(8, SIZE, 1), rough(16, 1.7 * SIZE, 2)
