@@ -65,10 +65,9 @@ def test_claim_3_errors_rise_with_the_radius_from_28_vertices_on(counts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vertices", [4, 8])
-def test_claim_3_does_not_hold_for_few_vertices(vertices):
-    """Few sharp corners suit a round floc less than few round ones."""
-    assert interval(large(vertices, 4.0) - large(vertices, 1.0))[1] < 0
+def test_claim_3_does_not_hold_for_four_vertices():
+    """Four sharp corners suit a round floc less than four round ones."""
+    assert interval(large(4, 4.0) - large(4, 1.0))[1] < 0
 
 
 @pytest.mark.parametrize("radius", rest_slow(RADII, lambda radius: radius == 1.0))

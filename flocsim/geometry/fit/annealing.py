@@ -7,6 +7,7 @@ Heat and steps shrink as it goes on.  The pixels are those of edge_errors, so th
 or three sums along edges.
 """
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -23,11 +24,12 @@ from flocsim.geometry.fit.edge_errors import (
 )
 from flocsim.geometry.fit.simple import edge_is_open
 
-MOVES = 32_000
-"""Moves of a run, of all vertices together: twice as many lower RE by about a hundredth of it."""
+MOVES = 16_000
+"""Moves of a run, of all vertices together: half as many again lower RE by about a hundredth of
+it."""
 
-RUNS = 2
-"""The second run goes on from the best of the first, with half its heat."""
+MOST_RUNS = 3
+"""One from each start, and one more from the best of these, with half the heat."""
 
 HEAT = 0.007
 """Heat at the start [pixels], for each of the mask's pixels a vertex has."""
@@ -53,12 +55,15 @@ PIXEL = 0.4
 
 @cache
 def random_moves() -> np.ndarray:
-    """(RUNS, MOVES, 6): two normal numbers and four from 0 to 1, the same for every fit."""
+    """(MOST_RUNS, MOVES, 6): two normal numbers, one from 0 to 1, an exponential one, two from 0 to
+    1; the same for every fit."""
     # The legacy generator's numbers stay what they are in every version of numpy.
     generator = np.random.RandomState(0)
-    shape = RUNS, MOVES
+    shape = MOST_RUNS, MOVES
     normal = generator.standard_normal((*shape, 2))
-    return np.concatenate([normal, generator.random_sample((*shape, 4))], axis=2)
+    even = generator.random_sample((*shape, 4))
+    even[..., 1] = -np.log(1.0 - even[..., 1])
+    return np.concatenate([normal, even], axis=2)
 
 
 def put_into_edge(vertices, k, edge, x, y):
@@ -75,14 +80,14 @@ def put_into_edge(vertices, k, edge, x, y):
     return k
 
 
-def proposed(vertices, k, step, draws):
+def proposed(vertices, before, k, after, step, draws):
     """A place near vertex k: a step in any direction, or along one of its edges."""
     x, y = vertices[k, 0], vertices[k, 1]
     one, other = step * draws[0], step * draws[1]
     share = (draws[4] - JUMPS) / SLIDES
     if share >= 1.0:
         return x + one, y + other
-    end = (k - 1 if share < 0.5 else k + 1) % len(vertices)
+    end = before if share < 0.5 else after
     ux, uy = vertices[end, 0] - x, vertices[end, 1] - y
     length = np.sqrt(ux * ux + uy * uy)
     one, other = STRETCH[0] * one / length, STRETCH[1] * other / length
@@ -96,6 +101,7 @@ def copy(vertices, into):
 
 def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
     """Anneal ``vertices``, which are changed; the polygon of the least sum goes into ``best``.
+    Returns that sum.
 
     pixels: the mask's; draws: random_moves of one run; heats, steps: at the start and at the end.
     """
@@ -114,18 +120,18 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
     for move in range(moves):
         heat, step = heat * cooling, step * shrinking
         k = int(draws[move, 2] * count)
-        before, after = (k - 1) % count, (k + 1) % count
+        before, after = k - 1 if k > 0 else last, k + 1 if k < last else 0
         jump = draws[move, 4] < JUMPS
         if jump:
             edge = int(draws[move, 5] * count)
             if edge in (k, before) or count < 4:
                 continue
-            start, stop = edge, (edge + 1) % count
+            start, stop = edge, edge + 1 if edge < last else 0
             x = 0.5 * (vertices[start, 0] + vertices[stop, 0]) + 2.0 * step * draws[move, 0]
             y = 0.5 * (vertices[start, 1] + vertices[stop, 1]) + 2.0 * step * draws[move, 1]
         else:
             edge, start, stop = before, before, after
-            x, y = proposed(vertices, k, step, draws[move])
+            x, y = proposed(vertices, before, k, after, step, draws[move])
         if not leaves_room(shape, (x, y), room):
             continue
         new, one, two = (x, y), point(vertices, start), point(vertices, stop)
@@ -140,7 +146,8 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
                 point(out, after),
             ) - edges[before]  # fmt: skip
         added -= edges[k]
-        if added > 0 and draws[move, 3] >= np.exp(-added / heat):
+        # Kept with the probability exp(−added/heat).
+        if added > heat * draws[move, 3]:
             continue
         copy(vertices, kept)
         if jump:
@@ -173,23 +180,29 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             copy(vertices, best)
             if least <= -pixels:
                 break
+    return least
 
 
 def annealed_runs(
-    sums: np.ndarray, start: np.ndarray, radius: float, pixels: int
+    sums: np.ndarray, starts: Sequence[np.ndarray], radius: float, pixels: int
 ) -> list[np.ndarray]:
-    """The polygons (N, 2) that RUNS of annealing come to, one after the other.
+    """The polygons (N, 2) that runs from each of the ``starts``, two at most, and a last one from
+    the best of these come to.
 
-    sums: running_sums of the mask, of so many pixels.  The start is left as it is.
+    sums: running_sums of the mask, of so many pixels.  Starts are left as they are.
     """
-    heat = HEAT * pixels / len(start)
+    heat = HEAT * pixels / len(starts[0])
     size = np.sqrt(pixels / np.pi)
     steps = max(STEPS[0] * size, PIXEL), max(STEPS[1] * size, PIXEL)
-    found = []
-    for draws in random_moves():
+    moves = random_moves()
+
+    def run(start: np.ndarray, draws: np.ndarray, heat: float) -> tuple[int, np.ndarray]:
         vertices, best = np.array(start), np.empty_like(start)
         heats = heat, COOLED * heat
-        compiled(annealed)(sums, vertices, best, radius, pixels, draws, heats, steps)
-        found.append(best)
-        start, heat = best, 0.5 * heat
-    return found
+        least = compiled(annealed)(sums, vertices, best, radius, pixels, draws, heats, steps)
+        return least, best
+
+    found = [run(start, moves[k], heat) for k, start in enumerate(starts)]
+    _, best = min(found, key=lambda each: each[0])
+    found.append(run(best, moves[-1], 0.5 * heat))
+    return [vertices for _, vertices in found]

@@ -2,8 +2,8 @@
 
 1. Starts: the best N of points along the outline (splits.py); the points that tell most; even
    spacing; where vertices are crowded, a search with half as many.
-2. The best two are lowered by steps of all their vertices at once, and the better one annealed
-   (annealing.py).  Both take V as a sum over edges (edge_errors.py).
+2. The best two are lowered by steps of all their vertices at once, and annealed (annealing.py).
+   Both take V as a sum over edges (edge_errors.py).
 3. The best of all these, by the pixels counted, is searched vertex by vertex.
 
 The starts are among those, so that V never ends above that of even spacing.
@@ -34,8 +34,8 @@ COARSE = np.array([8.0, 4.0, 2.0, 1.0])
 FINE = np.array([1.0, 0.5, 0.25])
 """Last steps [px], below a pixel."""
 
-FEW_VERTICES = 12
-"""Up to so many a search finds their places from any start."""
+FEW = 12
+"""Up to so many a search finds their places from the points that tell most."""
 
 CRAMPED = 1.5
 """Vertices are many for a floc if they are nearer than so many radii along the outline."""
@@ -44,7 +44,7 @@ FINALISTS = 3
 """So many of all trials are searched vertex by vertex."""
 
 LOWERED = 2
-"""So many starts are lowered by steps of all their vertices at once."""
+"""So many starts are lowered by steps of all their vertices at once, and annealed."""
 
 DESCENT = np.array([2.0, 1.0, 0.5])
 """Steps [px] of all vertices at once."""
@@ -176,12 +176,12 @@ def pattern_fit(
     sums = running_sums(mask, weights[1])
     trials = _starts(mask, sums, count, radius)
     if count > 2:
-        for start in _lowest(mask, trials, radius, weights)[:LOWERED]:
-            vertices = np.array(start)
+        lowered = [np.array(s) for s in _lowest(mask, trials, radius, weights)[:LOWERED]]
+        for vertices in lowered:
             compiled(descend)(sums, vertices, radius, DIRECTIONS, DESCENT)
-            trials.append(vertices)
-        best = _lowest(mask, trials, radius, weights)[0]
-        for vertices in annealed_runs(sums, best, radius, int(mask.sum())):
+        begin = _lowest(mask, [*trials, *lowered], radius, weights)[:LOWERED]
+        trials += lowered
+        for vertices in annealed_runs(sums, begin, radius, int(mask.sum())):
             compiled(descend)(sums, vertices, radius, DIRECTIONS, FINE)
             trials.append(vertices)
     else:
@@ -224,7 +224,7 @@ def _split_coarser(mask, outline, count, radius):
     Where vertices are many for the floc's size, starts on the outline are cramped; this is not.
     """
     half = max(2, (count + 1) // 2)
-    if half < FEW_VERTICES:
+    if half < FEW:
         start = inset(_telling(outline, half), mask, radius)
     else:
         start = inset(_split_coarser(mask, outline, half, radius), mask, 0.0)
