@@ -13,14 +13,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flocsim.arrays import PairView
-from flocsim.body import Fluid
+import flocsim.arrays as at
+from flocsim.arrays import PairView, work_of
+from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit, is_number
-from flocsim.forces.base import Force
+from flocsim.forces.base import Force, PairForce
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.outline import refuse_outlines
+from flocsim.forces.outline import asks_for_both, refuse_outlines
+from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.integrators.events.modes import set_closed
+from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.surface_gap import flag_near
+from flocsim.system import System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -49,8 +57,19 @@ def length(name: str, value: float | str) -> float:
 def repulsion(
     forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A function of gaps (k,) [m] that gives the force between two spheres at rest [N]."""
-    refuse_outlines(forces, "a meeting of two spheres")
+    """A function of gaps (k,) [m] that gives the force between two spheres at rest [N].
+
+    Forces along outlines are those of their circles, as deep as bodies are that have no depth of
+    their own.  UsageError for forces that ask how bodies are turned.
+    """
+    along = [f for f in forces if isinstance(f, PairForce) and asks_for_both(f)]
+    refuse_outlines(
+        [force for force in along if force.acts_on != "outlines"], "a meeting of two spheres"
+    )
+    if along:
+        return repulsion_of_circles(
+            [each for each in forces if isinstance(each, PairForce)], radii, fluid
+        )
     pieces = laws_of(forces, fluid)
     laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
     r_i, r_j = radii
@@ -63,6 +82,41 @@ def repulsion(
         return np.array([sum(law(view, pieces.parameters) for law in laws) for view in views])
 
     return found
+
+
+def repulsion_of_circles(
+    forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid
+) -> Callable[[np.ndarray], np.ndarray]:
+    """The same of forces along outlines and others that keep to a pair, by the engine's own sum."""
+    total = sum(radii)
+    bodies = [
+        Body(Sphere(radius), (place, 0.0), surface_density=1.0)
+        for radius, place in zip(radii, (0.0, 2.0 * total), strict=True)
+    ]
+    system = System(bodies, forces, fluid=fluid)
+    scene = system.scene()
+    push = system.compose(entry=pushes)
+
+    def found(gaps):
+        work, forces_at = work_of(scene, *system.motion()), np.empty(len(gaps))
+        # One pair fits in any list.
+        push(scene, work, total, np.asarray(gaps, dtype=float), forces_at)
+        return forces_at
+
+    return found
+
+
+def pushes(scene, work, total, gaps, found):
+    """The force on the second of two spheres away from the first, at each gap, into ``found``."""
+    for k in range(len(gaps)):
+        work.motion[at.NOW, 1, at.X] = total + gaps[k]
+        if list_candidates(scene, work):
+            locate_contacts(scene, work, at.NOW)
+            set_closed(work)
+            flag_near(scene, work, at.NOW, 0.0)
+            locate_and_rate(scene, work, at.NOW)
+            sum_forces(scene, work, 0.0, at.NOW)
+        found[k] = work.rates[at.NOW, 1, at.FORCE]
 
 
 class Profile:

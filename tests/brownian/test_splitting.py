@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from flocsim.brownian.splitting import splitting_probability, stability_ratio
+from flocsim import Sphere, SpheroPolygon
+from flocsim.body import Fluid
+from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
+from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
-from flocsim.forces import Contact, DoubleLayer, Gravity, VanDerWaals
+from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerWaals
+from flocsim.geometry.surfaces.charges import layer_energy
+from flocsim.geometry.surfaces.energy import attraction_energy
+from flocsim.geometry.surfaces.pieces import outline_pieces
 
 KT = 1.380649e-23 * 298.15
 SMALL = (1e-7, 1e-7)
@@ -104,3 +110,57 @@ def test_colder_bodies_meet_less_often_across_a_barrier():
         splitting_probability(barrier, SMALL, 3e-7, 6e-7, temperature=t) for t in (250, 300, 350)
     ]
     assert np.all(np.diff(found) > 0.0)
+
+
+def energies(shape, gaps, depth):
+    """V [J] of two equal bodies of an outline about 100 nm wide, by the sums over outlines."""
+    pieces = outline_pieces(shape.parts)
+    kappa, strength = 1.0 / 3.04e-9, 2.0 * math.pi * 78.5 * VACUUM_PERMITTIVITY * 14e-3**2
+    reach = 2.0 * shape.bounding_radius
+    return np.array([
+        attraction_energy(pieces, pieces, (reach + h, 0.0, 0.0), 1e-20, depth)
+        + strength * depth * layer_energy(shape, shape, (reach + h, 0.0, 0.0), kappa)
+        for h in gaps
+    ])  # fmt: skip
+
+
+def regular(count, radius):
+    """A polygon with so many rounded corners about a circle, one of them at either side."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    core = np.column_stack([np.cos(angles), np.sin(angles)])
+    return SpheroPolygon(0.7 * radius * core, 0.3 * radius)
+
+
+def test_w_of_forces_along_outlines_is_the_integral_over_their_energy():
+    """Within a tenth: the factor for a depth no larger than the gap is that of plates, .1 k_B T."""
+    radius = SMALL[0]
+    forces = [VanDerWaals(1e-20, 1e-9, law="outline"), DoubleLayer(14e-3, 3.04e-9, law="outline")]
+    found = stability_ratio(forces, SMALL)
+    gaps = np.geomspace(1e-9, 3e-7, 120)
+    potential = energies(Sphere(radius), gaps, 4.0 / 3.0 * radius) / KT
+    inner = np.trapezoid(np.exp(potential) * gaps / (2e-7 + gaps) ** 2, np.log(gaps))
+    # Nearer than d_min the attraction grows no more; the barrier is at some nanometres.
+    assert found == pytest.approx(2e-7 * (inner + 1.0 / 5e-7), rel=0.1)
+    assert found > 50.0
+
+
+@pytest.mark.parametrize("count", [1, pytest.param(512, marks=pytest.mark.slow)])
+def test_forces_of_circles_are_the_slopes_of_their_energy(count):
+    radius, gaps = SMALL[0], np.array([1e-9, 2e-9, 4e-9])
+    forces = [VanDerWaals(1e-20, 1e-9, law="outline"), DoubleLayer(14e-3, 3.04e-9, law="outline")]
+    found = repulsion(forces, SMALL, Fluid())(gaps)
+    shape = Sphere(radius) if count == 1 else regular(count, radius)
+    step = 1e-4 * gaps
+    rise = energies(shape, gaps + step, 4.0 / 3.0 * radius) - energies(
+        shape, gaps - step, 4.0 / 3.0 * radius
+    )
+    assert found == pytest.approx(-rise / (2.0 * step), rel=5e-3 if count == 1 else 0.02)
+
+
+def test_what_asks_for_angles_has_no_stability_ratio():
+    class Dipoles(OrientedForce):
+        def kernel(view):
+            return 0.0
+
+    with pytest.raises(UsageError, match="asks how bodies are turned"):
+        stability_ratio([Dipoles()], SMALL)
