@@ -94,6 +94,13 @@ def proposed(vertices, before, k, after, step, draws):
     return x + one * ux - other * uy, y + one * uy + other * ux
 
 
+def total_of(edges):
+    total = 0
+    for each in edges:
+        total += each
+    return total
+
+
 def copy(vertices, into):
     for k in range(len(vertices)):
         into[k, 0], into[k, 1] = vertices[k, 0], vertices[k, 1]
@@ -112,7 +119,7 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
     edges = np.empty(count, np.int64)
     set_bisectors(vertices, out, 0, last)
     set_edge_sums(sums, radius, vertices, out, edges, 0, last)
-    least = edges.sum()
+    least = total_of(edges)
     copy(vertices, best)
     heat = heats[0]
     cooling, shrinking = (heats[1] / heat) ** (1.0 / moves), (steps[1] / steps[0]) ** (1.0 / moves)
@@ -174,7 +181,7 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
         if not sound:
             copy(kept, vertices)
             continue
-        now = edges.sum()
+        now = total_of(edges)
         if now < least:
             least = now
             copy(vertices, best)

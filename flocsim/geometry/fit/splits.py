@@ -69,7 +69,10 @@ def best_ring(costs, start, spread, places, picks):
     came = np.empty((count + 1, size + 1, choices), np.int64)
     best = POSSIBLE
     for first in range(choices):
-        least[:] = BARRED
+        for used in range(count + 1):
+            for place in range(size + 1):
+                for j in range(choices):
+                    least[used, place, j] = BARRED
         least[0, 0, first] = 0
         for place in range(1, size + 1):
             even = place * count // size
@@ -133,7 +136,8 @@ def descend(sums, vertices, radius, directions, steps):
             if not is_open(moved, 2.0 * radius):
                 break
             lowest = found
-            vertices[:] = moved
+            for k in range(count):
+                vertices[k, 0], vertices[k, 1] = moved[k, 0], moved[k, 1]
 
 
 def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):
