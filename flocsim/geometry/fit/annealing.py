@@ -15,12 +15,14 @@ import numpy as np
 from flocsim.geometry.fit.coverage import compiled
 from flocsim.geometry.fit.edge_errors import (
     BARRED,
+    copy,
     edge_sum,
     leaves_room,
     outward_bisector,
     point,
     set_bisectors,
     set_edge_sums,
+    total_of,
 )
 from flocsim.geometry.fit.simple import edge_is_open
 
@@ -92,18 +94,6 @@ def proposed(vertices, before, k, after, step, draws):
     length = np.sqrt(ux * ux + uy * uy)
     one, other = STRETCH[0] * one / length, STRETCH[1] * other / length
     return x + one * ux - other * uy, y + one * uy + other * ux
-
-
-def total_of(edges):
-    total = 0
-    for each in edges:
-        total += each
-    return total
-
-
-def copy(vertices, into):
-    for k in range(len(vertices)):
-        into[k, 0], into[k, 1] = vertices[k, 0], vertices[k, 1]
 
 
 def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):

@@ -174,31 +174,32 @@ def pattern_fit(
     mask: with room around it (coverage.padded); weights: what counts beside V.
     """
     sums = running_sums(mask, weights[1])
-    trials = _starts(mask, sums, count, radius)
+
+    def counted(vertices: np.ndarray) -> tuple[np.ndarray, int]:
+        return searched(mask, vertices, radius, NO_STEPS, weights)
+
+    trials = [counted(start) for start in _starts(mask, sums, count, radius)]
     if count > 2:
-        lowered = [np.array(s) for s in _lowest(mask, trials, radius, weights)[:LOWERED]]
-        for vertices in lowered:
+        for start, _ in _lowest(trials, LOWERED):
+            vertices = np.array(start)
             compiled(descend)(sums, vertices, radius, DIRECTIONS, DESCENT)
-        begin = _lowest(mask, [*trials, *lowered], radius, weights)[:LOWERED]
-        trials += lowered
+            trials.append(counted(vertices))
+        begin = [vertices for vertices, _ in _lowest(trials, LOWERED)]
         for vertices in annealed_runs(sums, begin, radius, int(mask.sum())):
             compiled(descend)(sums, vertices, radius, DIRECTIONS, FINE)
-            trials.append(vertices)
+            trials.append(counted(vertices))
     else:
-        trials += [searched(mask, start, radius, COARSE, weights)[0] for start in trials]
-    fine = [
-        searched(mask, trial, radius, FINE, weights)
-        for trial in _lowest(mask, trials, radius, weights)[:FINALISTS]
-    ]
-    vertices, _ = min(fine, key=lambda found: found[1])
+        trials += [searched(mask, start, radius, COARSE, weights) for start, _ in trials]
+    fine = [searched(mask, trial, radius, FINE, weights) for trial, _ in _lowest(trials, FINALISTS)]
+    [(vertices, _)] = _lowest(fine, 1)
     if weights == INSCRIBED:
         vertices = searched(mask, vertices, radius, np.append(COARSE, FINE[1:]), INSIDE)[0]
     return vertices
 
 
-def _lowest(mask, trials, radius, weights):
-    """The trials, those of the lowest objective first."""
-    return sorted(trials, key=lambda trial: searched(mask, trial, radius, NO_STEPS, weights)[1])
+def _lowest(trials, many):
+    """So many of (vertices, objective), those of the lowest objective first."""
+    return sorted(trials, key=lambda trial: trial[1])[:many]
 
 
 def _starts(mask, sums, count, radius):

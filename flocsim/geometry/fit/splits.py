@@ -13,11 +13,13 @@ from flocsim.geometry.fit.coverage import compiled
 from flocsim.geometry.fit.edge_errors import (
     BARRED,
     POSSIBLE,
+    copy,
     edge_sum,
     leaves_room,
     point,
     set_bisectors,
     set_edge_sums,
+    total_of,
 )
 from flocsim.geometry.fit.simple import is_open
 
@@ -117,16 +119,14 @@ def descend(sums, vertices, radius, directions, steps):
         while True:
             set_bisectors(vertices, out, 0, count - 1)
             set_edge_sums(sums, radius, vertices, out, edges, 0, count - 1)
-            now = 0
             for k in range(count):
-                now += edges[k]
                 for axis in range(2):
                     points[k, 0, axis] = vertices[k, axis]
                     for i in range(1, choices):
                         points[k, i, axis] = vertices[k, axis] + step * directions[i - 1, axis]
             edge_costs(sums, radius, points, out, costs)
             # With the directions of what was found, its own sum can be a little higher.
-            lowest = min(lowest, now)
+            lowest = min(lowest, total_of(edges))
             found = best_ring(costs, 0, 0, places, picks)
             if found >= lowest:
                 break
@@ -136,8 +136,7 @@ def descend(sums, vertices, radius, directions, steps):
             if not is_open(moved, 2.0 * radius):
                 break
             lowest = found
-            for k in range(count):
-                vertices[k, 0], vertices[k, 1] = moved[k, 0], moved[k, 1]
+            copy(moved, vertices)
 
 
 def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):
