@@ -1,5 +1,6 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
+import copy
 import math
 import time
 import warnings
@@ -12,7 +13,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.arrays import Scene, copy_of, work_of
-from flocsim.body import Body, Fluid, scene_of
+from flocsim.body import NO_OUTLINES, Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.explain import explain
@@ -140,6 +141,19 @@ class System:
         words += [type(force).__name__ for force in self.forces]
         return f"System({', '.join([*words, type(self.integrator).__name__])})"
 
+    def changed(self, **fields: Any) -> "System":
+        """The same with as many other ``bodies``, or another ``seed``, taken as they are.
+
+        What its forces add up to is found out and checked once, but where it hangs on the bodies.
+        """
+        of_bodies = self.pieces.outlines != NO_OUTLINES or resistance_of_pairs(self.forces)
+        if "bodies" in fields and of_bodies:
+            return attrs.evolve(self, **fields)
+        other = copy.copy(self)
+        for name, value in fields.items():
+            object.__setattr__(other, name, value)
+        return other
+
     @property
     def spheres_only(self) -> bool:
         """Whether no body has an edge."""
@@ -165,15 +179,16 @@ class System:
             "water": resistance_of_pairs(self.forces) is not None,
         }
 
-    def scene(self, *, jit: bool = True) -> Scene:
-        """The bodies as arrays for the drivers, with the laws that their forces add up to.
+    def scene(self, *, jit: bool = True, laws: Any = None) -> Scene:
+        """The bodies as arrays for the drivers, with the laws that their forces add up to, or with
+        those that are given.
 
         KernelError for a law that cannot be compiled.
         """
         pieces = self.pieces
         return scene_of(
             self.bodies, self.fluid, pieces.parameters,
-            laws=self.laws(jit=jit),
+            laws=self.laws(jit=jit) if laws is None else laws,
             surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
             outlines=pieces.outlines, layer=pieces.layer,
             smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),

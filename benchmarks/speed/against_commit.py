@@ -1,13 +1,14 @@
 """The throughput of this tree over that of another commit, replicates taken in turn.
 
     python -m benchmarks.speed.against_commit COMMIT [--quick] [--markdown] [--vertices N]
-                                              [--meeting settling | shear]
+                                              [--meeting settling | shear] [--preset tang2014 | si]
 
-Both run the same replicates of `tang2014` in processes of their own, one group (four displacements,
-or four points of a study of kernels in shear) after the other, each group twice and in both orders;
-of two CPU times the smaller counts. The machine's moods hit both alike then: the median over the
-groups is steadier than the ratio of sums.  Flocs are those of the library that is shipped, as each
-tree would fit grown ones in its own way.
+Both run the same replicates in processes of their own, one group (four displacements, or four
+points of a study of kernels in shear) after the other, each group twice and in both orders; of two
+CPU times the smaller counts. The machine's moods hit both alike then: the median over the groups is
+steadier than the ratio of sums. Groups are spread over what a study of 240 replicates a condition
+takes more than one of 40: of the first ones far more are run again, to know the numerical error.
+Flocs are those of the library that is shipped, as each tree would fit grown ones in its own way.
 """
 
 import os
@@ -68,7 +69,7 @@ every version."""
 
 STUDY = {
     "settling": """\
-preset = "tang2014"
+preset = "{preset}"
 seed = 1
 replicates = 1000
 [scene]
@@ -77,11 +78,11 @@ delta = [0.0, 0.25, 0.5, 0.75]
 [shapes]
 source = "library"
 file = "synthetic"
-vertices = [{}]
+vertices = [{vertices}]
 pool = 10
 """,
     "shear": """\
-preset = "tang2014"
+preset = "{preset}"
 seed = 1
 replicates = 1024
 [scene]
@@ -92,12 +93,16 @@ sizes = ["5 um", "10 um", "20 um"]
 [shapes]
 source = "library"
 file = "synthetic"
-vertices = [{}]
+vertices = [{vertices}]
 """,
 }
 
 PLACES = {"settling": (0, 1, 2), "shear": (1, 4, 5)}
 """Of the conditions of a study, those that are run, by the names in TYPES."""
+
+
+REPLICATES = 40, 240
+"""Of a condition, the first that is run and the one behind the last."""
 
 
 class Child:
@@ -143,7 +148,7 @@ def seconds(child, condition, replicate):
 def compare(there, here, condition, groups):
     """(CPU times there, here) of so many groups of a condition."""
     found = []
-    for replicate in range(groups):
+    for replicate in np.linspace(*REPLICATES, groups, endpoint=False, dtype=int).tolist():
         seconds(there, condition, replicate), seconds(here, condition, replicate)  # makes shapes
         first = seconds(there, condition, replicate), seconds(here, condition, replicate)
         second = seconds(here, condition, replicate), seconds(there, condition, replicate)
@@ -157,18 +162,22 @@ def main():
     parser.add_argument("commit", help="the other commit")
     parser.add_argument("--meeting", choices=list(TYPES), default="settling")
     parser.add_argument("--vertices", type=int, default=64, metavar="N", help="default: 64")
+    parser.add_argument("--preset", default="tang2014", help="default: tang2014")
     arguments = parser.parse_args()
     print_heading()
     meeting = arguments.meeting
     groups = 10 if arguments.quick else 60
     table = Table(
-        f"Throughput over that of {arguments.commit}, {meeting}, N = {arguments.vertices}",
+        f"Throughput over that of {arguments.commit}, {arguments.preset}, {meeting}, "
+        f"N = {arguments.vertices}",
         ("type", "groups", "of all", "median", "a quarter below", "a quarter above"),
     )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         study = folder / "study.toml"
-        study.write_text(STUDY[meeting].format(arguments.vertices))
+        study.write_text(
+            STUDY[meeting].format(vertices=arguments.vertices, preset=arguments.preset)
+        )
         other = other_tree(arguments.commit, folder)
         program = CHILD.format(made=MADE[meeting])
         there = Child(other, program, study, folder=folder, cache=folder / "cache_there")

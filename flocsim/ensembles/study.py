@@ -80,6 +80,7 @@ class Study(StudyKind):
     floc_pool: FlocPool = attrs.field(init=False)
     pools: dict[str, FlocPool] = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
+    first: dict[str, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
     exact: dict[str, tuple[Integrator, Integrator] | None] = attrs.field(init=False)
 
@@ -165,10 +166,12 @@ class Study(StudyKind):
                 pool.shape(floc, count, radius)
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
-            self.encounters[key] = make_encounter(
+            made = make_encounter(
                 self.config, shapes, self.zone(name, shapes), self.methods[name],
-                self.pairings[condition].meeting,
+                self.pairings[condition].meeting, self.first.get(name),
             )  # fmt: skip
+            self.first.setdefault(name, made)
+            self.encounters[key] = made
         return self.encounters[key]
 
     def zone(self, name: str, shapes: Sequence[Shape]) -> float:

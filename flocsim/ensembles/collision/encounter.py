@@ -74,13 +74,15 @@ class Encounter:
 
     Made once for each pair of shapes and used for all replicates that draw it. ``zone_distance``
     is D_0 [m]; ``settling`` has (velocity (2,) [m/s], mobility [s/kg]) of i and j, alone;
-    ``meeting`` says what brings them together (flocsim.ensembles.collision.meetings).
+    ``meeting`` says what brings them together (flocsim.ensembles.collision.meetings); ``first`` is
+    one of the same forces, whose compiled laws serve all.
     """
 
     system: System
     options: PairScene
     zone_distance: float
     meeting: str = SETTLING
+    first: "Encounter | None" = None
     settling: tuple[tuple[np.ndarray, float], ...] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
@@ -110,9 +112,16 @@ class Encounter:
             )
 
     @functools.cached_property
+    def laws(self) -> np.ndarray:
+        """The laws of the scene, compiled."""
+        if self.first is not None and self.first.system.pieces is self.system.pieces:
+            return self.first.laws
+        return self.system.laws()
+
+    @functools.cached_property
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
-        return self.system.scene()
+        return self.system.scene(laws=self.laws)
 
     def keyed(self, *numbers: int) -> "Encounter":
         """The same for a replicate whose random forces go by these numbers (seed, replicate)."""
@@ -120,7 +129,7 @@ class Encounter:
         if not self.kick_energy:
             return self
         other = copy.copy(self)
-        object.__setattr__(other, "system", attrs.evolve(self.system, seed=numbers))
+        object.__setattr__(other, "system", self.system.changed(seed=numbers))
         other.__dict__["scene"] = self.scene._replace(key=key_of(*numbers))
         return other
 
@@ -401,12 +410,12 @@ def resisting(system: System, body: Body) -> tuple[float, float, float]:
 
 def make_encounter(
     config: Config, shapes: Sequence[Shape], zone: float, integrator: Integrator | None = None,
-    meeting: str = SETTLING,
+    meeting: str = SETTLING, first: Encounter | None = None,
 ) -> Encounter:  # fmt: skip
     """The Encounter of two shapes under a config; ``zone`` is D_0 [m].
 
     ``integrator``: instead of the config's, where a pilot has chosen it; ``meeting``: what brings
-    the two together.
+    the two together; ``first``: one of other shapes under the same config, met by the same method.
     """
     bodies = [
         Body(
@@ -416,6 +425,9 @@ def make_encounter(
         )
         for place, shape in enumerate(shapes)
     ]
+    if first is not None:
+        system = first.system.changed(bodies=tuple(bodies))
+        return Encounter(system, config.scene, zone, meeting, first)
     method = integrator or config.integrator.method
     forces, fluid = meetings.circumstances(config.forces, config.fluid, meeting, config.scene.rate)
     system = System(bodies, forces, method, fluid=fluid)

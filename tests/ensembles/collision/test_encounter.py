@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
+from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import Draw
-from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
+from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, make_encounter
 from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.rounding import to_rounding
-from tests.helpers.small_study import small_study
+from tests.helpers.small_study import small_config, small_study
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +144,21 @@ def test_contacts_that_never_pull_come_to_an_end(tmp_path):
     rows = [study.run(0, 16, 0.0, replicate) for replicate in range(10)]
     assert max(row["steps"] for row in rows) < 20_000
     assert not any(OUTCOMES[row["outcome"]] == "undecided" for row in rows)
+
+
+SMALL, LARGE = [Sphere(2e-6), Sphere(3e-6)], [Sphere(20e-6), Sphere(30e-6)]
+THICK = {"double_layer": {"law": "outline", "potential": "25 mV", "debye_length": "1 um"}}
+
+
+@pytest.mark.parametrize("forces", [{}, THICK], ids=["between centres", "along outlines"])
+def test_an_encounter_that_follows_another_is_as_one_made_alone(tmp_path, forces):
+    """What forces add up to is found out once for all pairs, but where it hangs on their shapes."""
+    config = small_config(tmp_path, {"forces": forces})
+    first = make_encounter(config, LARGE, 1e-6)
+    after = make_encounter(config, SMALL, 1e-7, first=first)
+    alone = make_encounter(config, SMALL, 1e-7)
+    assert after.settling[1][1] == alone.settling[1][1]
+    assert (after.system.pieces is first.system.pieces) == (forces == {})
+    assert np.array_equal(after.laws, alone.laws)
+    for name, values in alone.scene._asdict().items():
+        assert np.array_equal(getattr(after.scene, name), values), name
