@@ -68,6 +68,8 @@ class Draw:
         """
         run = self.begin(driver, max_steps, integrator=integrator)
         status = run.to_end(halted)
+        room = self.encounter.room
+        room[0] = max(room[0], len(run.work.candidates))
         if status == Status.PAUSED:
             return None
         return self.row(run, status)

@@ -52,6 +52,9 @@ OBSERVER: dict[Callable, Callable] = {
 KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: watch_kicked_pair}
 """The same for one under thermal motion."""
 
+LEAST_ROOM = 256
+"""Pairs of features that a run has room for at first."""
+
 LIMIT_TURNS = 1000.0
 """Automatic time limit, in turn times."""
 
@@ -117,6 +120,12 @@ class Encounter:
         if self.first is not None and self.first.system.pieces is self.system.pieces:
             return self.first.laws
         return self.system.laws()
+
+    @functools.cached_property
+    def room(self) -> list[int]:
+        """[for how many pairs of features runs so far have had to find room], at most: those to
+        come begin with as much."""
+        return self.first.room if self.first else [LEAST_ROOM]
 
     @functools.cached_property
     def scene(self) -> Scene:
@@ -358,7 +367,7 @@ class Encounter:
         """
         if self.meeting == BROWNIAN:
             place = start_apart(angles, share, self.ends[0])
-            return work_of(self.scene, place, np.zeros((2, 3)))
+            return self.work_at(place, np.zeros((2, 3)))
         if self.rate is not None:
             return self.start_in_flow(angles, share)
         shapes = self.shapes
@@ -374,7 +383,11 @@ class Encounter:
             place[1, 1] = max(place[1, 1], math.sqrt(max(clear * clear - x * x, 0.0)))
         velocity = np.zeros((2, 3))
         velocity[0, :2], velocity[1, :2] = self.settling[0][0], self.settling[1][0]
-        return work_of(self.scene, place, velocity)
+        return self.work_at(place, velocity)
+
+    def work_at(self, place: np.ndarray, velocity: np.ndarray) -> Work:
+        """Work arrays of the two at places and velocities (2, 3)."""
+        return work_of(self.scene, place, velocity, self.room[0])
 
     def start_in_flow(self, angles: Sequence[float], share: float) -> Work:
         """Work arrays where both go along with the flow, j on the way of share · (R_i + R_j)."""
@@ -384,7 +397,7 @@ class Encounter:
         spin = 0.5 * (yx - xy)
         place = np.array([[0.0, 0.0, angles[0]], [x, y, angles[1]]])
         velocity = np.array([[0.0, 0.0, spin], [xx * x + xy * y, yx * x + yy * y, spin]])
-        return work_of(self.scene, place, velocity)
+        return self.work_at(place, velocity)
 
 
 @functools.lru_cache(maxsize=1024)

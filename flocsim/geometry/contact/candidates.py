@@ -30,6 +30,11 @@ TOO_WIDE = 4.0
 """Of few bodies they are made anew where they are so many times as wide as that."""
 
 
+MOST_AHEAD, LEAST_USED = 0.8, 0.1
+"""Shares of its budget that a pair of few bodies may have spent behind a step, and that it has to
+have spent before lists are made anew for the sake of a longer step."""
+
+
 def edge_length(scene, body):
     """The mean length of a body's edges [m], as if its outline were a circle's."""
     points = scene.first[body + 1] - scene.first[body]
@@ -56,7 +61,7 @@ def list_for_surface_force(scene, work, pair, skin, reach):
     least = gap_between(scene, work, a, b)
     if least > reach + skin:
         return least - reach
-    spend = max(0.5 * skin, 0.25 * least)
+    spend = max(0.5 * skin, 0.1 * least)
     if list_polygons(scene, work, pair, max(skin, least + 2.0 * spend)):
         return spend
     return -math.inf
@@ -188,6 +193,31 @@ def time_within(scene, work, share):
         if speed > 0.0:
             longest = min(longest, share * work.budget[pair] / speed)
     return longest
+
+
+def is_apart(work):
+    """Whether few bodies are there, and none of them touch: their lists are soon made anew."""
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] != at.OPEN:
+            return False
+    return watches_all(work)
+
+
+def share_ahead(scene, work):
+    """The share of the budgets that the next step may spend at constant speed: half of them or, of
+    few bodies that are apart, most of what is left."""
+    if not is_apart(work):
+        return 0.5
+    return max(MOST_AHEAD - spent(scene, work, at.NOW), 0.5)
+
+
+def outlived(scene, work, ahead):
+    """Whether lists are to be made anew before a step of ``ahead`` [s]."""
+    used = spent(scene, work, at.NOW)
+    if used > 0.5:
+        return True
+    apart = used > LEAST_USED and is_apart(work)
+    return apart and time_within(scene, work, MOST_AHEAD - used) < ahead
 
 
 def too_wide(scene, work, ahead):

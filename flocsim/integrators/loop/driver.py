@@ -6,7 +6,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import list_ahead, spent, too_wide
+from flocsim.geometry.contact.candidates import list_ahead, outlived, spent, too_wide
 from flocsim.geometry.contact.points import locate_contacts, row_radii
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import (
@@ -137,7 +137,7 @@ def pause_reason(counts, record):
 def keep_lists(scene, work, counts, ahead):
     """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
     or they are too wide; False without room."""
-    if spent(scene, work, at.NOW) > 0.5 or too_wide(scene, work, ahead):
+    if outlived(scene, work, ahead) or too_wide(scene, work, ahead):
         if not list_ahead(scene, work, ahead):
             return False
         locate_contacts(scene, work, at.NOW)

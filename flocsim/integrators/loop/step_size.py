@@ -3,7 +3,7 @@
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.candidates import time_within
+from flocsim.geometry.contact.candidates import share_ahead, time_within
 from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import resolutions_of
 from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
@@ -103,7 +103,7 @@ def imminent_switch(scene, work, clock, step):
 def choose_step(scene, work, clock, lists):
     step = min(clock[at.STEP], clock[at.LARGEST_STEP])
     if lists:
-        step = min(step, time_within(scene, work, 0.5))
+        step = min(step, time_within(scene, work, share_ahead(scene, work)))
         if clock[at.TOLERANCE] < math.inf and clock[at.ACROSS] == 0.0:
             step = imminent_switch(scene, work, clock, step)
     left = min(clock[at.UNTIL], kick_end(scene, work)) - clock[at.TIME]

@@ -17,18 +17,27 @@ from flocsim.geometry.contact.separation import length_of
 from flocsim.laws import CENTRE_FORCE, has
 
 LEADING_SHARE = 0.2
-"""Share of a surface force from which on a pair's normal counts among those that bodies follow."""
+"""Share of a surface force from which on a pair's normal counts among those that bodies follow,
+…"""
+
+LEADING_GAP = 0.1
+"""… and the gap, over the smaller one's size, up to which it does: what acts farther away is not
+stiff, and drag, which is the same whatever way a pair lies, would be taken along."""
 
 
 def acts(work, row):
     return work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0
 
 
-def leads(work, row):
+def leads(scene, work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
-    return work.candidates[row, at.CLOSED] != at.OPEN or (
-        work.candidates[row, at.NEAR] == 1 and work.geometry[at.NOW, row, at.SHARE] > LEADING_SHARE
-    )
+    if work.candidates[row, at.CLOSED] != at.OPEN:
+        return True
+    if work.candidates[row, at.NEAR] == 0 or work.geometry[at.NOW, row, at.SHARE] <= LEADING_SHARE:
+        return False
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
+    return work.geometry[at.NOW, row, at.GAP] < LEADING_GAP * size
 
 
 def first_of(labels, body):
@@ -122,13 +131,13 @@ def share_turns(work):
             work.bodies[body, frame + at.TURN_SINE] = sine / size if size > 0.0 else 0.0
 
 
-def follow_contacts(work):
+def follow_contacts(scene, work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
     for body in range(work.bodies.shape[0]):
         for column in range(at.FRAMES, at.FRAMES + at.MOST_FRAMES * at.FRAME_COLUMNS):
             work.bodies[body, column] = 0.0
     for row in range(work.tally[at.CANDIDATES]):
-        if leads(work, row):
+        if leads(scene, work, row):
             for stage in range(3):
                 add_frame(work, row, stage)
     average_shifts(work)

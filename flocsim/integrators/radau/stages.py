@@ -19,7 +19,7 @@ from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_sta
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
-from flocsim.integrators.rhs.surface_gap import length_at
+from flocsim.integrators.rhs.surface_gap import length_at, locate_sharing
 from flocsim.integrators.rhs.views import along_normal, lever, memory_of
 
 MOST_ITERATIONS = 10
@@ -28,8 +28,9 @@ MOST_ITERATIONS = 10
 FIRST_PACE = 0.5
 """What to expect of the second iteration when only one has been made."""
 
-NEWTON_SHARE = 1e-3
-"""Newton's method goes on until what is left is below this share of the tolerance."""
+NEWTON_SHARE, FREE_NEWTON_SHARE = 1e-3, 1e-2
+"""Newton's method goes on until what is left is below this share of what a step may be wrong by;
+and where nothing is near, which allows a hundred times less anyway."""
 
 DOUBTED_PACE = 10.0
 """The second iteration is expected to shrink the first one's change by so many times less than it
@@ -93,7 +94,10 @@ def slip_stages(scene, work, step, first):
 def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
-        locate_touching(scene, work, state)
+        if state == at.NOW or scene.listed_reach <= 0.0:
+            locate_touching(scene, work, state)
+        else:
+            locate_sharing(scene, work, state)
     if first == at.FIRST_STAGE:
         slip_stages(scene, work, step, 0)
     for state in range(first, last):
@@ -149,7 +153,7 @@ def newton_step(scene, work, time, step, goal):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
     evaluate_states(scene, work, time, step, at.FIRST_STAGE, at.FIRST_STAGE + 3)
-    follow_contacts(work)
+    follow_contacts(scene, work)
     write_loads(scene, work, step)
     solve_both(work)
     work.tally[at.SOLVES] += 1
@@ -178,11 +182,12 @@ def solve_stages(scene, work, clock, step):
     guess_stages(scene, work, clock, step)
     expected = expected_pace(clock, step)
     allowed = step_tolerance(work, clock)
+    share = NEWTON_SHARE if allowed == clock[at.TOLERANCE] else FREE_NEWTON_SHARE
     # Turning makes every other iteration worse, so that the pace is taken over two of them.
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
-        change = newton_step(scene, work, clock[at.TIME], step, NEWTON_SHARE * allowed)
-        goal = max(NEWTON_SHARE * allowed, rounding_size(scene, work, THIRD_STAGE, step))
+        change = newton_step(scene, work, clock[at.TIME], step, share * allowed)
+        goal = max(share * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         first = before == math.inf
         if first:

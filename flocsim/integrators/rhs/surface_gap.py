@@ -15,13 +15,15 @@ g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIA
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.candidates import relative_speed
+from flocsim.geometry.contact.candidates import core_radius, relative_speed
+from flocsim.geometry.contact.points import locate_polygons, turn_bodies
+from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 
 RANGE = 40.0
 """Pairs whose u is so much above the least have no share: exp(−40) is below rounding."""
 
-LOOK_AHEAD = 2.0
+LOOK_AHEAD = 1.25
 """Pairs that could come near in a step so many times as long are near in it."""
 
 
@@ -51,6 +53,22 @@ def gap_of(scene, measure):
     return gap + (measure - near) * (shortest + growth * end)
 
 
+def reach_of(scene, gap):
+    """The gap up to which a pair may have a share where the least gap is this one [m]: that of
+    RANGE more."""
+    shortest, growth, end = scene.smoothing
+    if growth == 0.0 or gap <= 0.0:
+        return gap_of(scene, measure_of(scene, gap) + RANGE)
+    if gap < end:
+        # u goes with ln(1 + growth g/shortest) up to the end, where the power is met or not.
+        start = shortest / growth
+        reach = (gap + start) * math.exp(growth * RANGE) - start
+        if reach <= end:
+            return reach
+        return gap_of(scene, measure_of(scene, gap) + RANGE)
+    return gap + RANGE * (shortest + growth * end)
+
+
 def run_end(work, row):
     """The end of the run of rows that belong to the same two bodies as this one."""
     pair, end = work.candidates[row, at.PAIR], row + 1
@@ -74,8 +92,7 @@ def flag_near(scene, work, state, step):
         end = run_end(work, row)
         a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
         way = LOOK_AHEAD * step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
-        least = measure_of(scene, least_gap(work, state, row, end))
-        reach = gap_of(scene, least + RANGE) + 2.0 * way
+        reach = reach_of(scene, least_gap(work, state, row, end)) + 2.0 * way
         for each in range(row, end):
             near = work.geometry[state, each, at.GAP] <= reach
             work.candidates[each, at.NEAR] = 1 if near else 0
@@ -87,12 +104,44 @@ def overlooked(scene, work):
     row = 0
     while row < work.tally[at.CANDIDATES]:
         end = run_end(work, row)
-        reach = gap_of(scene, measure_of(scene, least_gap(work, at.NEW, row, end)) + RANGE)
+        reach = reach_of(scene, least_gap(work, at.NEW, row, end))
         for each in range(row, end):
             if work.candidates[each, at.NEAR] == 0 and work.geometry[at.NEW, each, at.GAP] < reach:
                 return True
         row = end
     return False
+
+
+def way_to(scene, work, state, a, b):
+    """How far the cores of two bodies may have moved against each other from now to a state [m]."""
+    m = work.motion
+    x, y = separation(scene, work, state, a, b)
+    x_now, y_now = separation(scene, work, at.NOW, a, b)
+    way = length_of(x - x_now, y - y_now)
+    for body in (a, b):
+        turn = abs(m[state, body, at.ANGLE] - m[at.NOW, body, at.ANGLE])
+        way += turn * core_radius(scene, body)
+    return way
+
+
+def locate_sharing(scene, work, state):
+    """Geometry, in a stage, of closed pairs and of flagged ones that may have a share of a surface
+    force there; the gap of others counts as without end."""
+    turn_bodies(work, state)
+    row = 0
+    while row < work.tally[at.CANDIDATES]:
+        end = run_end(work, row)
+        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        way = way_to(scene, work, state, a, b)
+        reach = reach_of(scene, least_gap(work, at.NOW, row, end) + way) + way
+        for each in range(row, end):
+            closed = work.candidates[each, at.CLOSED] != at.OPEN
+            if closed or work.candidates[each, at.NEAR] == 1:
+                if closed or work.geometry[at.NOW, each, at.GAP] <= reach:
+                    locate_polygons(scene, work, state, each)
+                else:
+                    work.geometry[state, each, at.GAP] = math.inf
+        row = end
 
 
 def soften(scene, work, state, row, end):
@@ -102,15 +151,18 @@ def soften(scene, work, state, row, end):
     for each in range(row, end):
         if work.candidates[each, at.NEAR] == 1:
             least = min(least, geometry[state, each, at.GAP])
-    least = measure_of(scene, least)
-    reach = gap_of(scene, least + RANGE)
+    reach = reach_of(scene, least)
     for each in range(row, end):
-        share = 0.0
-        if work.candidates[each, at.NEAR] == 1 and geometry[state, each, at.GAP] <= reach:
-            share = math.exp(least - measure_of(scene, geometry[state, each, at.GAP]))
+        gap, share = geometry[state, each, at.GAP], 0.0
+        if work.candidates[each, at.NEAR] == 1 and gap <= reach:
+            share = 1.0
+            if gap > least:
+                share = math.exp(measure_of(scene, least) - measure_of(scene, gap))
         geometry[state, each, at.SHARE] = share
         total += share
-    gap = gap_of(scene, least - math.log(total))
+    gap = least
+    if total > 1.0:
+        gap = gap_of(scene, measure_of(scene, least) - math.log(total))
     length = length_at(scene, gap)
     for each in range(row, end):
         if geometry[state, each, at.SHARE] > 0.0:

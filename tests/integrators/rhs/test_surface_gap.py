@@ -10,8 +10,18 @@ import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.constants import LARGEST_BIAS
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
+from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.near_pairs import gap_between
-from flocsim.integrators.rhs.surface_gap import gap_of, length_at, measure_of, soften
+from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.rhs.surface_gap import (
+    RANGE,
+    gap_of,
+    length_at,
+    locate_sharing,
+    measure_of,
+    reach_of,
+    soften,
+)
 from flocsim.integrators.rhs.views import pair_view
 from tests.helpers.fast_scene import FastScene
 from tests.helpers.trial_scenes import hook, star
@@ -141,6 +151,42 @@ def test_of_two_features_at_one_distance_both_count_in_full(force):
     assert np.count_nonzero(gaps < gaps.min() + 1e-12) == 2
     measure = measure_of(pair.scene, 1e-6) - math.log(2.0)
     assert soft == pytest.approx(gap_of(pair.scene, measure), abs=1e-14)
+
+
+@FORCES
+def test_the_reach_of_a_gap_is_that_of_so_much_more_of_its_measure(force):
+    scene = Pair([hook(), star()], force).scene
+    for gap in np.concatenate(
+        [-np.geomspace(1e-12, 1e-7, 8), [0.0], np.geomspace(1e-12, 1e-4, 30)]
+    ):
+        reach = reach_of(scene, float(gap))
+        assert reach == pytest.approx(gap_of(scene, measure_of(scene, gap) + RANGE), rel=1e-9)
+
+
+@FORCES
+def test_pairs_that_a_stage_leaves_out_have_no_share_in_it(force):
+    """The gap of a stage, and the shares in it, are those of all pairs."""
+    rng, left = np.random.default_rng(4), 0
+    for _ in range(40):
+        pair = Pair([jagged(rng), jagged(rng)], force)
+        gap = 10.0 ** rng.uniform(-8, -6)
+        pair.approach(rng, gap)
+        scene, work = pair.scene, pair.work
+        assert list_candidates(scene, work)
+        locate_contacts(scene, work, at.NOW)
+        stage, end = at.FIRST_STAGE, int(work.tally[at.CANDIDATES])
+        work.candidates[:end, at.NEAR] = 1
+        work.motion[stage] = work.motion[at.NOW]
+        moved = rng.uniform(-0.3, 0.3, 3) * gap
+        work.motion[stage, 1, :3] += moved / [1.0, 1.0, pair.shapes[1].bounding_radius]
+        locate_sharing(scene, work, stage)
+        found = soften(scene, work, stage, 0, end)[0]
+        shares = work.geometry[stage, :end, at.SHARE].copy()
+        left += int(np.isinf(work.geometry[stage, :end, at.GAP]).sum())
+        locate_contacts(scene, work, stage)
+        assert found == pytest.approx(soften(scene, work, stage, 0, end)[0], rel=1e-12)
+        np.testing.assert_allclose(shares, work.geometry[stage, :end, at.SHARE], atol=1e-14)
+    assert left > 20
 
 
 @FORCES
