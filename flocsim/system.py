@@ -145,10 +145,12 @@ class System:
         """The same with as many other ``bodies``, or another ``seed``, taken as they are.
 
         What its forces add up to is found out and checked once, but where it hangs on the bodies.
+        UsageError where bodies are none for the water between them.
         """
-        of_bodies = self.pieces.outlines != NO_OUTLINES or resistance_of_pairs(self.forces)
-        if "bodies" in fields and of_bodies:
-            return attrs.evolve(self, **fields)
+        if "bodies" in fields:
+            if self.pieces.outlines != NO_OUTLINES:
+                return attrs.evolve(self, **fields)
+            water_between(self.forces, fields["bodies"], self.fluid)
         other = copy.copy(self)
         for name, value in fields.items():
             object.__setattr__(other, name, value)

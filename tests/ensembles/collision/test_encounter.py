@@ -150,7 +150,12 @@ SMALL, LARGE = [Sphere(2e-6), Sphere(3e-6)], [Sphere(20e-6), Sphere(30e-6)]
 THICK = {"double_layer": {"law": "outline", "potential": "25 mV", "debye_length": "1 um"}}
 
 
-@pytest.mark.parametrize("forces", [{}, THICK], ids=["between centres", "along outlines"])
+WATER = {"hydrodynamics": {}}
+
+
+@pytest.mark.parametrize(
+    "forces", [{}, WATER, THICK], ids=["between centres", "in water", "along outlines"]
+)
 def test_an_encounter_that_follows_another_is_as_one_made_alone(tmp_path, forces):
     """What forces add up to is found out once for all pairs, but where it hangs on their shapes."""
     config = small_config(tmp_path, {"forces": forces})
@@ -158,7 +163,7 @@ def test_an_encounter_that_follows_another_is_as_one_made_alone(tmp_path, forces
     after = make_encounter(config, SMALL, 1e-7, first=first)
     alone = make_encounter(config, SMALL, 1e-7)
     assert after.settling[1][1] == alone.settling[1][1]
-    assert (after.system.pieces is first.system.pieces) == (forces == {})
+    assert (after.system.pieces is first.system.pieces) == (forces != THICK)
     assert np.array_equal(after.laws, alone.laws)
     for name, values in alone.scene._asdict().items():
         assert np.array_equal(getattr(after.scene, name), values), name
