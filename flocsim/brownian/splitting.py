@@ -22,12 +22,8 @@ from flocsim.fields import in_unit, is_number
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.outline import asks_for_both, refuse_outlines
-from flocsim.geometry.contact.candidates import list_candidates
-from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.integrators.events.modes import set_closed
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
-from flocsim.integrators.rhs.surface_gap import flag_near
+from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.system import System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -110,12 +106,7 @@ def pushes(scene, work, total, gaps, found):
     """The force on the second of two spheres away from the first, at each gap, into ``found``."""
     for k in range(len(gaps)):
         work.motion[at.NOW, 1, at.X] = total + gaps[k]
-        if list_candidates(scene, work):
-            locate_contacts(scene, work, at.NOW)
-            set_closed(work)
-            flag_near(scene, work, at.NOW, 0.0)
-            locate_and_rate(scene, work, at.NOW)
-            sum_forces(scene, work, 0.0, at.NOW)
+        evaluate_as_they_lie(scene, work)
         found[k] = work.rates[at.NOW, 1, at.FORCE]
 
 

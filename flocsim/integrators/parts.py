@@ -12,6 +12,7 @@ import attrs
 import flocsim.arrays as at
 from flocsim.arrays import NEW, NOW, TIME, UNTIL, VELOCITY
 from flocsim.fields import quantity
+from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.modes import set_closed
@@ -35,6 +36,7 @@ __all__ = [
     "all_finite",
     "error_ratio",
     "evaluate",
+    "evaluate_as_they_lie",
     "limit_slips",
     "move_slips",
     "weigh_velocities",
@@ -45,6 +47,18 @@ def evaluate(scene, work, time, state):
     """Forces and torques in a state, from its motion and its tangential displacements."""
     locate_and_rate(scene, work, state)
     sum_forces(scene, work, time, state)
+
+
+def evaluate_as_they_lie(scene, work):
+    """Forces and torques of NOW where bodies have been put: all pairs are listed and flagged anew;
+    False where the list has no room."""
+    if not list_candidates(scene, work):
+        return False
+    locate_contacts(scene, work, NOW)
+    set_closed(work)
+    flag_near(scene, work, NOW, 0.0)
+    evaluate(scene, work, 0.0, NOW)
+    return True
 
 
 def acceleration(scene, work, state, body, axis):

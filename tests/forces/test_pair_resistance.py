@@ -10,9 +10,10 @@ from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
 from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal, VanDerWaals
 from flocsim.hydrodynamics import SpherePair
+from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.swarms.swarm import Swarm
-from tests.helpers.fast_scene import FastScene, right_hand_side
+from tests.helpers.fast_scene import FastScene
 from tests.helpers.real_pairs import (
     SIZE,
     Resistance,
@@ -275,4 +276,4 @@ def test_engines_without_it_compile_none_of_it():
     system = System(spheres(5e-6, 5e-6), [StokesDrag()])
     with_water = System(spheres(5e-6, 5e-6), WATER)
     assert set(system.fillings()) - set(with_water.fillings())
-    assert right_hand_side(with_water.scene(jit=False), FastScene(with_water, jit=False).work)
+    assert evaluate_as_they_lie(with_water.scene(jit=False), FastScene(with_water, jit=False).work)

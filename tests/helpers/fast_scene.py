@@ -13,25 +13,12 @@ from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_closed, set_modes
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
-from flocsim.integrators.rhs.surface_gap import flag_near
+from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.parts import evaluate_as_they_lie
 from tests.reference import forces as plain_forces
 from tests.reference.contacts import contacts
 from tests.reference.samples import scene_of
 from tests.reference.shapes import Scene
-
-
-def right_hand_side(scene, work):
-    """List the candidates and sum the forces of state NOW; False where the list has no room."""
-    if not list_candidates(scene, work):
-        return False
-    locate_contacts(scene, work, at.NOW)
-    set_closed(work)
-    flag_near(scene, work, at.NOW, 0.0)
-    locate_and_rate(scene, work, at.NOW)
-    sum_forces(scene, work, 0.0, at.NOW)
-    return True
 
 
 def flagged(system):
@@ -89,7 +76,7 @@ class FastScene:
         self.system = system
         self.scene = system.scene(jit=jit)
         self.work = work_of(self.scene, *system.motion(), capacity=capacity)
-        self.evaluate = system.compose(entry=right_hand_side, observer=None, jit=jit)
+        self.evaluate = system.compose(entry=evaluate_as_they_lie, observer=None, jit=jit)
 
     def loads(self, slips=None):
         """Force and torque (n, 3) on every body, with tangential displacements by pair."""

@@ -12,8 +12,8 @@ from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.hydrodynamics import prism
+from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from tests.helpers.fast_scene import right_hand_side
 from tests.helpers.real_images import silhouettes
 
 SIZE = 1e-5
@@ -98,7 +98,7 @@ def multiblobs(shapes, places):
 
 def resistance_here(scene, work):
     """An entry of the engine: the Jacobian of forces where bodies are."""
-    if not right_hand_side(scene, work):
+    if not evaluate_as_they_lie(scene, work):
         return False
     assemble_jacobian(scene, work, 0.0, 1.0)
     return True
