@@ -133,6 +133,14 @@ def package_sources():
     }
 
 
+@pytest.fixture(scope="module", autouse=True)
+def sources_are_let_go():
+    """A hundred megabytes of trees are of no use to other tests."""
+    yield
+    package_sources.cache_clear()
+    imports_of.cache_clear()
+
+
 def room_of(path):
     """The room of a file, given by its path inside the package: "io/plots/style.py" → "io"."""
     first = path.split("/")[0].removesuffix(".py")
