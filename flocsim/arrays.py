@@ -661,6 +661,8 @@ class Work(NamedTuple):
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
     pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
+    along: Annotated[np.ndarray, ("pairs", 4)]  # what acts along outlines now, and by how both are
+    # turned: F_x, F_y on the later body [N], the torques on it and on the earlier one [N m]
     discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
     order: np.ndarray  # (n,): the same
     starts: np.ndarray  # (n + 1,): the same
@@ -768,6 +770,7 @@ def work_of(
         squares=np.zeros((SQUARES + 1, 7)),
         pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
         budget=np.full(pairs, -1.0),
+        along=np.zeros((pairs, 4)),
         discs=np.zeros((n, 8)),
         order=np.arange(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
@@ -805,6 +808,7 @@ def with_room(work: Work) -> Work:
             jacobian=grown(work.jacobian, 1, 2 * n + 2 * pairs),
             pairs=grown(work.pairs, 0, pairs),
             budget=grown(work.budget, 0, pairs),
+            along=grown(work.along, 0, pairs),
             elimination=elimination,
         )
     if full == BLOCKS_FULL:

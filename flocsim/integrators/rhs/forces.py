@@ -79,6 +79,10 @@ def add_outline_forces(scene, work, time, state):
     for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         fx, fy, torque_a, torque_b = outlines_in(scene, work, time, state, a, b)
+        if state == at.NOW:
+            # Derivatives, which are taken next, begin from it.
+            work.along[pair, 0], work.along[pair, 1] = fx, fy
+            work.along[pair, 2], work.along[pair, 3] = torque_a, torque_b
         add_force(work, state, a, fx, fy, torque_a)
         add_force(work, state, b, -fx, -fy, torque_b)
 

@@ -295,14 +295,14 @@ OF_SIZE = 1e-6
 @hook
 def add_outlines(scene, work, time):
     """Derivatives of the forces between outlines, and by how bodies are turned, by the places of
-    both, from differences: all three follow from those by j's place, forces going with them."""
+    both, from differences to what they are, which has been summed: all three follow from those by
+    j's place, forces going with them."""
     for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         x, y = separation(scene, work, at.NOW, a, b)
         angle_a, angle_b = work.motion[at.NOW, a, at.ANGLE], work.motion[at.NOW, b, at.ANGLE]
-        fx, fy, torque_a, torque_b = between_outlines(
-            scene, work, time, a, b, x, y, angle_a, angle_b
-        )
+        fx, fy = work.along[pair, 0], work.along[pair, 1]
+        torque_a, torque_b = work.along[pair, 2], work.along[pair, 3]
         if fx == 0.0 and fy == 0.0 and torque_a == 0.0 and torque_b == 0.0:
             continue
         by = NUDGE * scene.outlines[1]

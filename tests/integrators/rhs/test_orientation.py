@@ -13,6 +13,7 @@ from flocsim.errors import KernelError, UsageError
 from flocsim.fields import quantity
 from flocsim.forces import OrientedForce, StokesDrag
 from flocsim.integrators import DormandPrince54
+from flocsim.integrators.rhs.forces import add_outline_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from flocsim.swarms.swarm import Swarm
@@ -124,6 +125,7 @@ def test_two_dipoles_turn_into_line_and_no_energy_is_made(shape):
 
 
 def derivatives(scene, work):
+    add_outline_forces(scene, work, 0.0, at.NOW)
     assemble_jacobian(scene, work, 0.0, 1.0)
 
 

@@ -16,6 +16,7 @@ from flocsim.forces import Contact, Gravity, OutlineForce, StokesDrag, VanDerWaa
 from flocsim.geometry.shapes.parts import core_gap, cores_overlap
 from flocsim.geometry.surfaces.energy import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
+from flocsim.integrators.rhs.forces import add_outline_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from flocsim.swarms.swarm import Swarm
@@ -216,6 +217,7 @@ def test_a_swarm_refuses_them():
 
 
 def derivatives(scene, work):
+    add_outline_forces(scene, work, 0.0, at.NOW)
     assemble_jacobian(scene, work, 0.0, 1.0)
 
 
