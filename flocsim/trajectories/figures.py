@@ -21,7 +21,7 @@ from flocsim.io.plots.collision import (
     draw_strip,
     write_animation,
 )
-from flocsim.io.plots.style import CLASS_WORDS, Figure
+from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.replay import motion_at
 
@@ -136,7 +136,7 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
     """One of FIGURES of a Trajectory; ``title``: another one than `title_of` gives."""
     if figure not in FIGURES:
         raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
-    title = title_of(trajectory) if title is None else title
+    title = plain(title_of(trajectory) if title is None else title, MOST_OF_TITLE)
     touch, zone = touch_and_zone(trajectory)
     if figure == "strip":
         seen = frames_of(trajectory, frames)
@@ -171,7 +171,8 @@ def animated(
     check_pair(trajectory)
     seen = frames_of(trajectory, frames)
     _, zone = touch_and_zone(trajectory)
-    write_animation(path, seen, distances(trajectory), zone, title, rule or figure_rule())
+    told = plain(title, MOST_OF_TITLE)
+    write_animation(path, seen, distances(trajectory), zone, told, rule or figure_rule())
 
 
 def distances(trajectory: Any) -> tuple[list[float], list[float]]:

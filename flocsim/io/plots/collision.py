@@ -18,6 +18,7 @@ from flocsim.io.plots.style import (
     house_style,
     keep_titles_whole,
     new_figure,
+    plain,
     save_gif,
 )
 
@@ -197,7 +198,7 @@ def draw_forces(
             pull = np.where(force < 0.0, -force, np.nan)
             # Drag balances weight: what lies under another curve is seen on both sides of it.
             width = max(2.6 - 0.5 * place, 0.8)
-            axes.plot(time, push, color=colour, linewidth=width, label=name)
+            axes.plot(time, push, color=colour, linewidth=width, label=plain(name))
             axes.plot(time, pull, color=colour, linewidth=width, linestyle=(0, (3, 1.5)))
         if collision is not None and np.isfinite(collision):
             axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":",
@@ -228,7 +229,7 @@ def draw_energies(
         raise UsageError("a figure of energies needs one energy per time")
     unit, factor = time_unit(times)
     time = np.asarray(times) * factor
-    curves = {f"work of {name}": np.asarray(each) * FEMTO for name, each in work.items()}
+    curves = {f"work of {plain(name)}": np.asarray(each) * FEMTO for name, each in work.items()}
     curves["kinetic energy"] = np.asarray(kinetic) * FEMTO
     sizes = np.abs(np.concatenate(list(curves.values())))
     largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)

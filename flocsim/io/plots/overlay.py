@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flocsim.errors import visible
 from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.images.regions import Region, Rejection
-from flocsim.io.plots.style import Figure, house_style, new_figure, plain
+from flocsim.io.plots.style import MOST_OF_TITLE, Figure, house_style, new_figure, plain
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
@@ -64,7 +63,7 @@ def draw_overlay(
         axes.imshow(stretched(grey), cmap="gray", interpolation="nearest", vmin=0.0, vmax=1.0)
         axes.set_axis_off()
         figure.text(0.004, 1.0 - 0.05 / figure.get_figheight(),
-                    plain(visible(title, keep="")), va="top", fontsize=9)  # fmt: skip
+                    plain(title, MOST_OF_TITLE), va="top", fontsize=9)  # fmt: skip
         labels = Labels(axes, grey.shape, max(grey.shape) / LONGEST_SIDE)
         key = [Line2D([], [], color=FLOC_COLOUR, label=f"{len(flocs)} fitted")]
         for region, fit in flocs:
@@ -212,7 +211,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         panels[3].text(0.0, -0.02, "blue: missing, orange: in excess", fontsize=7, va="top",
                        transform=panels[3].transAxes)  # fmt: skip
         if name:
-            figure.suptitle(plain(visible(name, keep="")), x=0.01, ha="left", fontsize=9)
+            figure.suptitle(plain(name, MOST_OF_TITLE), x=0.01, ha="left", fontsize=9)
         return figure
 
 

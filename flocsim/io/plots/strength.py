@@ -12,6 +12,7 @@ from flocsim.io.plots.style import (
     add_line_legend,
     graded_colours,
     house_style,
+    plain,
     set_log_axis,
     type_titles,
 )
@@ -34,7 +35,7 @@ def over_rate(found: Strengths) -> Figure:
     """A panel per type, a line per N, all displacements together."""
     types, vertices = (found.conditions.axes[name].values for name in ("type", "vertices"))
     with house_style():
-        x_label = f"rate G of the {found.about.get('flow')} [1/s]"
+        x_label = f"rate G of the {plain(found.about.get('flow'))} [1/s]"
         figure, panels, last = panel_grid(type_titles(types), "share of bonds opened", 2.0, x_label)
         colours = graded_colours(len(vertices))
         for number, axes in enumerate(panels):

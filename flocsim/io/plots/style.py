@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import math
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.errors import UsageError
+from flocsim.errors import UsageError, visible
 from flocsim.io.files import Rule, write_file
 from flocsim.io.outputs import marked, redrawn
 
@@ -60,7 +61,13 @@ PLAIN = (1e-3, 2e5)
 """Numbers that are written out."""
 LEAST_LETTERS = 8
 """Of a line of a title that is broken."""
+MOST_LETTERS = 40
+"""Of a name or a word of a label, a legend or a panel's title."""
+MOST_OF_TITLE = 300
+"""Letters of a title that has the whole figure's width, and is broken."""
 LEGEND_ROWS = 9
+LEGEND_ROOM, MOST_GROWTH = 2.0, 30.0
+"""Inches that a legend may take of a figure, and by which a figure grows at most for it."""
 CROWDED = 50
 """Points in a panel from which on markers and lines are drawn finer."""
 
@@ -103,30 +110,43 @@ def new_figure(width: float, height: float) -> Figure:
 def keep_titles_whole(figure: Figure) -> None:
     """Draw a figure, the lines of titles broken that are wider than the room they have.
 
-    The room of a panel's title ends where the next panel of its row begins, or the figure.
+    The room of a panel's title ends where the next panel of its row begins, or the figure. The
+    figure grows by the lines that are added: panels keep their height.
     """
-    figure.canvas.draw()  # places are known only then
     width = figure.bbox.width
+    titles = [each for axes in figure.axes for each in titles_of(axes)]
+    longest = [each for each in titles if each.get_window_extent().width > width]
+    for title in longest:  # half of one would be taken for room that the panel needs beside it
+        title.set_visible(False)
+    figure.canvas.draw()  # places are known only then
+    for title in longest:
+        title.set_visible(True)
     panels = [(axes, axes.get_window_extent()) for axes in figure.axes if axes.get_visible()]
-    wrapped = False
+    added = dict.fromkeys([box.y1 for _, box in panels], 0.0)
     for text in [figure._suptitle] if figure._suptitle else []:
-        wrapped |= wrap(text, width - text.get_window_extent().x0 - 4.0)
+        added[math.inf] = wrap(text, width - text.get_window_extent().x0 - 4.0)
     for axes, box in panels:
         beside = [o.x0 for _, o in panels if o.x0 > box.x1 and o.y0 < box.y1 and o.y1 > box.y0]
-        for title in (axes.title, axes._left_title, axes._right_title):
+        for title in titles_of(axes):
             room = min([width, *beside]) - box.x0 - 4.0
-            wrapped |= wrap(title, room)
-    if wrapped:
+            added[box.y1] = max(added[box.y1], wrap(title, room))
+    if any(added.values()):
+        figure.set_figheight(figure.get_figheight() + sum(added.values()) / figure.dpi)
         figure.canvas.draw()
+
+
+def titles_of(axes):
+    return [each for each in (axes.title, axes._left_title, axes._right_title) if each.get_text()]
 
 
 def wrap(text, room):
     """Break a text into lines that fit a room [pixels], at other resolutions too, where letters are
-    rounded to other widths; whether it was too wide."""
-    found = text.get_window_extent().width if text.get_text() else 0.0
+    rounded to other widths; by how much higher it has become [pixels]."""
+    found = text.get_window_extent().width
     room *= 0.95
     if found <= room:
-        return False
+        return 0.0
+    height = text.get_window_extent().height
     lines = text.get_text().splitlines()
     fitting = int(max(map(len, lines)) * room / found) + 1
     while found > room and fitting > LEAST_LETTERS:
@@ -134,7 +154,7 @@ def wrap(text, room):
         parts = [part for line in lines for part in textwrap.wrap(line, fitting)]
         text.set_text("\n".join(parts))
         found = text.get_window_extent().width
-    return True
+    return text.get_window_extent().height - height
 
 
 def mark_figure(figure: Figure, words: str) -> None:
@@ -150,9 +170,16 @@ def graded_colours(count):
     return matplotlib.colormaps["viridis"](np.linspace(0.0, 0.85, max(count, 1)))
 
 
-def plain(text):
-    """Text in which a dollar sign does not start mathematics."""
-    return str(text).replace("$", r"\$")
+def plain(text, most=MOST_LETTERS):
+    """A text that came from a file or from the user, as a figure can show it, whatever it is.
+
+    A dollar sign does not start mathematics, letters that no font has are written out, and of more
+    letters than ``most`` those in the middle are left out: else there were no room for the panels.
+    """
+    words = visible(str(text), keep="")
+    if len(words) > most:
+        words = f"{words[: most - most // 2 - 1]}…{words[-(most // 2) :]}"
+    return words.replace("$", r"\$")
 
 
 def type_titles(names):
@@ -233,7 +260,9 @@ def add_line_legend(axes, words, colours, title):
 
 
 def place_legend(axes, handles, title):
-    axes.legend(
+    """A legend beside a panel. The figure grows by what it is wider than the room beside panels:
+    else long words, or many columns, would leave none to these."""
+    legend = axes.legend(
         handles=handles,
         title=title,
         loc="upper left",
@@ -242,6 +271,10 @@ def place_legend(axes, handles, title):
         ncols=-(-len(handles) // LEGEND_ROWS),
         alignment="left",
     )
+    figure = axes.figure
+    more = legend.get_window_extent().width / figure.dpi - LEGEND_ROOM
+    if more > 0.0:
+        figure.set_figwidth(figure.get_figwidth() + min(more, MOST_GROWTH))
 
 
 def dodge(number, count):

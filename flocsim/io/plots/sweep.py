@@ -100,7 +100,7 @@ def against_key(results: SweepResults) -> Figure:
         grid[0, 0].set_ylabel("share of replicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
         place_legend(grid[0, -1], end_handles(), "bars from left:\nas lines below")
-        title = ", ".join(line_title(name, results) for name in others) + BARS + words_of(marked)
+        title = ",\n".join(line_title(name, results) for name in others) + BARS + words_of(marked)
         add_line_legend(grid[1, -1], words, colours, title)
         return figure
 
@@ -119,7 +119,7 @@ def lines_of(values, place):
 def key_label(swept, prefixed=PREFIXED):
     """A key with its unit in brackets, but for units that stand at the values."""
     unit = f" [{swept.unit}]" if swept.unit not in ("1", *prefixed) else ""
-    return plain(swept.key) + unit
+    return plain(swept.key + unit)
 
 
 def line_title(name, results):
@@ -160,11 +160,11 @@ def line_words(axes):
     """The values of all axes but the first key and the type, one text a line."""
     found = [""]
     for name, values in axes:
-        told = [f"{value:g}" if isinstance(value, float) else plain(value) for value in values]
+        told = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
         if name == "delta":
             told = [f"{word} (grazes)" if word == "1" else word for word in told]
         found = [f"{before}, {each}" if before else each for before in found for each in told]
-    return found
+    return [plain(each) for each in found]
 
 
 def over_time(results: SweepResults) -> Figure:
@@ -179,12 +179,14 @@ def over_time(results: SweepResults) -> Figure:
         for axes, (name, factor, label) in zip(panels, SHOWN, strict=True):
             values = table.columns[name].values
             lines = mean(np.moveaxis(values, -2, 0)).reshape(-1, len(times))
-            for line, word, colour in zip(lines, words, colours, strict=True):
-                axes.plot(times, factor * line, color=colour, label=word)
+            drawn = [
+                axes.plot(times, factor * line, color=colour, label=word)[0]
+                for line, word, colour in zip(lines, words, colours, strict=True)
+            ]
             axes.set_xlabel("time [s]")
             axes.set_title(label, fontsize=8.0)
-        panels[-1].legend(loc="upper left", bbox_to_anchor=(1.01, 1.0),
-                          title=", ".join(line_title(name, results) for name in names))  # fmt: skip
+        title = ",\n".join(line_title(name, results) for name in names)
+        place_legend(panels[-1], drawn, title)
         return figure
 
 

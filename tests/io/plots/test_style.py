@@ -2,15 +2,29 @@
 
 import io
 import re
+import warnings
+from pathlib import Path
 
+import attrs
+import numpy as np
 import pytest
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots.collision import draw_distance
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.io.labelled import Column
+from flocsim.io.plots.collision import draw_distance, draw_energies, draw_forces
 from flocsim.io.plots.results import figure_4
-from flocsim.io.plots.style import new_figure, save, set_log_axis
+from flocsim.io.plots.style import keep_titles_whole, new_figure, plain, save, set_log_axis
+from flocsim.io.plots.sweep import against_key, over_time
+from flocsim.io.results.sweep_file import SweepResults, Swept
+from flocsim.io.trajectory import StoredTrajectory
+from flocsim.trajectories.figures import drawn
+from tests.helpers.swarm_study import make_swarm_results
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow
+
+ODD = "$\\frac{\x1b[31m\n" + "W" * 5000 + "$"
+"""What a file may have in the place of a word."""
 
 
 @pytest.mark.parametrize(
@@ -72,3 +86,86 @@ def test_a_logarithmic_axis_has_round_numbers_that_fit(low, high, words):
     labels = axes.xaxis.get_major_formatter().format_ticks(at)
     shown = [word for place, word in zip(at, labels, strict=True) if low <= place <= high]
     assert shown == words
+
+
+def test_of_a_long_text_the_middle_is_left_out_and_no_letter_has_a_meaning():
+    assert plain("5 $ or 6 $") == r"5 \$ or 6 \$"
+    assert plain("a\nb\x1b") == r"a\nb\x1b"
+    assert plain("x" * 40) == "x" * 40
+    assert plain("first" + "x" * 90 + "last", 10) == "firs…xlast"
+
+
+def swept_over(results, group, swept):
+    """The SweepResults of equal results at each value of a key."""
+    found, count = results.labelled(group), len(swept.values)
+    columns = {
+        name: Column(("key", *each.axes), np.stack([each.values] * count), each.about)
+        for name, each in found.columns.items()
+    }
+    axes = {"key": swept.column("key"), **found.axes}
+    joined = attrs.evolve(found, axes=axes, columns=columns)
+    return SweepResults(Path("s.h5"), {"key": swept}, {group: joined})
+
+
+def pairs_over(swept):
+    return against_key(swept_over(make_results(types=("I",), count=4), "probabilities", swept))
+
+
+def motion_of(figure):
+    """A figure of a trajectory file that says ODD of how it ended."""
+    square = SpheroPolygon(1e-6 * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]), 1e-7)
+    position = np.array([[[0.0, 0.0, 0.0], [5e-6 - k * 1e-6, 0.0, 0.0]] for k in range(3)])
+    found = StoredTrajectory(
+        np.arange(3.0), position, np.zeros_like(position), (square, square), {"status": ODD}
+    )
+    return drawn(found, figure, 3)
+
+
+ODD_FIGURES = {
+    "type": lambda: figure_4(make_results(types=(ODD,), count=4)),
+    "key": lambda: pairs_over(Swept(ODD, [1.0, 2.0], "V")),
+    "unit": lambda: pairs_over(Swept("a.b", [1.0, 2.0], ODD)),
+    "values": lambda: pairs_over(Swept("a.b", [ODD, "1"])),
+    "key of swarms": lambda: over_time(
+        swept_over(make_swarm_results(), "counts", Swept(ODD, [1.0, 2.0], ODD))
+    ),
+    "values of swarms": lambda: over_time(
+        swept_over(make_swarm_results(), "counts", Swept("a.b", [ODD, "1"]))
+    ),
+    "strip": lambda: motion_of("strip"),
+    "distance": lambda: motion_of("distance"),
+    "forces": lambda: draw_forces([0.0, 1.0], {ODD: [1e-9, 2e-9]}),
+    "energies": lambda: draw_energies([0.0, 1.0], {ODD: [0.0, 1e-15]}, [0.0, 1e-15]),
+}
+
+
+@pytest.mark.parametrize("name", ODD_FIGURES)
+def test_words_of_a_file_are_drawn_whatever_they_are_and_leave_the_panels_room(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # matplotlib says so where there is no room, or no letter
+        figure = ODD_FIGURES[name]()
+        figure.canvas.draw()
+        keep_titles_whole(figure)
+    for axes in figure.axes:
+        assert not axes.get_visible() or axes.get_window_extent().height > 60.0
+
+
+def test_a_figure_grows_by_the_lines_of_its_title():
+    figures = [draw_distance([0.0, 1.0], [1e-5, 2e-5], title="W" * n) for n in (20, 60, 300)]
+    lines = [each.axes[0]._left_title.get_text().count("\n") + 1 for each in figures]
+    heights = [each.axes[0].get_window_extent().height for each in figures]
+    assert lines[0] == 1 < lines[1] < lines[2]
+    assert heights[1:] == pytest.approx([heights[0]] * 2, abs=3.0)
+
+
+@pytest.mark.parametrize("figure", ["outcomes", "swarms"])
+def test_a_figure_grows_by_a_long_legend(figure):
+    many = [round(k / 29, 3) for k in range(30)]
+    if figure == "outcomes":
+        made = figure_4(make_results(types=("I",), vertices=(1, 4), delta=tuple(many), count=4))
+    else:
+        made = over_time(swept_over(make_swarm_results(), "counts", Swept("a.b", many)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        made.canvas.draw()
+    assert min(axes.get_window_extent().width for axes in made.axes) > 100.0
