@@ -9,18 +9,22 @@ from benchmarks.accuracy.stated_error import judge
 @pytest.mark.parametrize(
     "number",
     [
-        232,
-        263,
-        276,
+        14,
+        65,
+        548,
         pytest.param(
-            279,
+            181,
             marks=pytest.mark.xfail(
-                strict=True, reason="one of the 1 % that the stated error does not cover, by 2.8"
+                strict=True, reason="one of the 1 % that the stated error does not cover, by 1.5"
             ),
         ),
     ],
 )
 def test_a_slow_release_is_within_the_stated_error(number):
-    """Random departing pairs whose velocities at the release hang on when it comes."""
+    """Random departing pairs whose velocities at the release depend on when it comes.
+
+    Which pair a number gives depends on how its flocs are fitted. Without what their overlaps may
+    be wrong by (SHARE_OF_SCATTER = 0), 16, 8, 10 and 2 times the stated error is the true one.
+    """
     true, stated, amplification = judge("departing", 1e-9, number)
     assert amplification < 10.0 and 1e-8 < true < stated < 1e3 * true
