@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -244,7 +245,10 @@ def test_killed_command_gives_the_exit_code_of_a_shell(installed, tmp_path):
 def test_interrupt_waits_for_the_command_to_save_its_work(installed, tmp_path):
     save = "trap 'sleep 0.5; echo saved > work; exit 0' INT; echo ready; sleep 20"
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    process = subprocess.Popen([*installed(save), "test"], start_new_session=True, **pipes)
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a job of nohup ignores it
+    process = subprocess.Popen(
+        [*installed(save), "test"], start_new_session=True, preexec_fn=heard, **pipes
+    )
     while process.stdout.readline().strip() != "ready":
         assert process.poll() is None
     time.sleep(0.1)  # run.py itself has to be waiting by now
