@@ -13,9 +13,9 @@ from benchmarks.accuracy.stated_error import judge
         65,
         548,
         pytest.param(
-            181,
+            398,
             marks=pytest.mark.xfail(
-                strict=True, reason="one of the 1 % that the stated error does not cover, by 1.5"
+                strict=True, reason="one of the 1 % that the stated error does not cover, by 5"
             ),
         ),
     ],
@@ -24,7 +24,7 @@ def test_a_slow_release_is_within_the_stated_error(number):
     """Random departing pairs whose velocities at the release depend on when it comes.
 
     Which pair a number gives depends on how its flocs are fitted. Without what their overlaps may
-    be wrong by (SHARE_OF_SCATTER = 0), 16, 8, 10 and 2 times the stated error is the true one.
+    be wrong by (SHARE_OF_SCATTER = 0) the true error was 16, 8 and 10 times the stated one.
     """
     true, stated, amplification = judge("departing", 1e-9, number)
     assert amplification < 10.0 and 1e-8 < true < stated < 1e3 * true

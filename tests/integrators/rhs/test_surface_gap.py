@@ -7,15 +7,18 @@ import pytest
 from scipy.integrate import quad
 
 import flocsim.arrays as at
+from benchmarks.speed.swarms import lone_pair
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.constants import LARGEST_BIAS
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators import Implicit
 from flocsim.integrators.rhs.surface_gap import (
     RANGE,
     gap_of,
+    least_between,
     length_at,
     locate_sharing,
     measure_of,
@@ -271,3 +274,27 @@ def test_a_block_that_lies_flat_in_a_well_takes_few_steps():
     turned = found.position[-1, 0, 2]
     assert abs(angle) < 1e-6
     assert y * math.cos(turned) - x * math.sin(turned) == pytest.approx(7e-6 + 1.5e-10, rel=2e-5)
+
+
+def test_the_least_value_of_a_cubic_between_two():
+    rng, t = np.random.default_rng(6), np.linspace(0.0, 1.0, 100_001)
+    for _ in range(50):
+        start, stop = rng.uniform(0.0, 1.0, 2)
+        rate, later = -rng.uniform(0.01, 5.0), rng.uniform(0.01, 5.0)
+        values = start + t * t * (3.0 - 2.0 * t) * (stop - start)
+        values += t * (1.0 - t) * ((1.0 - t) * rate - t * later)
+        assert least_between(start, rate, stop, later) == pytest.approx(values.min(), abs=1e-9)
+
+
+def test_no_step_passes_through_the_reach_of_a_force_unnoticed():
+    """Two spheres come within reach for a part of a step that free flight would take in one."""
+    forces = [Gravity(), StokesDrag(), VanDerWaals(1e-19, gap="surface", cut=1e-6), Contact()]
+    fluid = Fluid(viscosity=8.9e-4, density=997.0, buoyancy=True)
+    found, exact = (
+        System(lone_pair(886, 1000), forces, Implicit(tolerance), fluid=fluid).run(0.3)
+        for tolerance in (1e-9, 1e-12)
+    )
+    gap = np.hypot(*(exact.position[:, 1] - exact.position[:, 0])[:, :2].T)
+    gap = gap - sum(body.shape.radius for body in lone_pair(886, 1000))
+    assert gap[0] > 5e-6 and gap[-1] > 5e-6 and 0.8e-6 < gap.min() < 1e-6
+    assert found.position[-1] == pytest.approx(exact.position[-1], abs=1e-10)
