@@ -11,7 +11,7 @@ is taken anew, until it is short against the vibrations, or the contacts change 
 
 import flocsim.arrays as at
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.surface_gap import run_end
+from flocsim.integrators.rhs.surface_gap import least_row, run_end
 from flocsim.integrators.rhs.views import contact_view
 
 LARGE = 0.25
@@ -22,15 +22,13 @@ RESOLVED = 1.0
 """A step of so many times 1/ω0 follows a contact's vibration."""
 
 
-def deepest_of(work, state, row, end, closed):
-    """The row of the least gap in a state, of those that touch if only they count; −1 without."""
+def deepest_of(work, state, row, end):
+    """The row of the least gap in a state, of those that touch; −1 without."""
     deepest = -1
     for each in range(row, end):
-        if closed and work.candidates[each, at.CLOSED] != at.TOUCHES:
-            continue
-        if (
-            deepest < 0
-            or work.geometry[state, each, at.GAP] < work.geometry[state, deepest, at.GAP]
+        gap = work.geometry[state, each, at.GAP]
+        if work.candidates[each, at.CLOSED] == at.TOUCHES and (
+            deepest < 0 or gap < work.geometry[state, deepest, at.GAP]
         ):
             deepest = each
     return deepest
@@ -39,8 +37,10 @@ def deepest_of(work, state, row, end, closed):
 def overtaken(work, row, end, closed):
     """The row of the two bodies that has been the deepest before and is overtaken by much; −1
     without."""
-    old = deepest_of(work, at.NOW, row, end, closed)
-    new = deepest_of(work, at.NEW, row, end, closed)
+    if closed:
+        old, new = deepest_of(work, at.NOW, row, end), deepest_of(work, at.NEW, row, end)
+    else:
+        old, new = least_row(work, at.NOW, row, end), least_row(work, at.NEW, row, end)
     if old < 0 or old == new:
         return -1
     g = work.geometry

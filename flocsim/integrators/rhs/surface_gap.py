@@ -80,12 +80,18 @@ def run_end(work, row):
     return end
 
 
+def least_row(work, state, row, end):
+    """The row of two bodies with the least gap."""
+    least = row
+    for each in range(row + 1, end):
+        if work.geometry[state, each, at.GAP] < work.geometry[state, least, at.GAP]:
+            least = each
+    return least
+
+
 def least_gap(work, state, row, end):
     """The least gap of the rows of two bodies [m]."""
-    least = math.inf
-    for each in range(row, end):
-        least = min(least, work.geometry[state, each, at.GAP])
-    return least
+    return work.geometry[state, least_row(work, state, row, end), at.GAP]
 
 
 def flag_near(scene, work, state, step):
@@ -113,15 +119,6 @@ def overlooked(scene, work):
                 return True
         row = end
     return False
-
-
-def least_row(work, state, row, end):
-    """The row of two bodies with the least gap."""
-    least = row
-    for each in range(row + 1, end):
-        if work.geometry[state, each, at.GAP] < work.geometry[state, least, at.GAP]:
-            least = each
-    return least
 
 
 def least_between(start, rate, stop, later):
