@@ -63,20 +63,21 @@ def look_at(scene, work, step, share, row):
     return margin(work, at.TRIAL, row)
 
 
-def may_dip(work, step, row):
-    """Whether the margin may be negative inside the step though it is not at its ends."""
+def may_dip(work, step, row, level):
+    """Whether the margin may be below a level [m] inside the step though it is not at its ends."""
     rate_low = step * margin_rate(work, at.NOW, row)
     rate_high = step * margin_rate(work, at.NEW, row)
     if not rate_low < 0.0 < rate_high:
         return False
     # Straight lines from both ends bound what a convex margin can fall to.
-    at_start, at_end = margin(work, at.NOW, row), margin(work, at.NEW, row)
+    at_start, at_end = margin(work, at.NOW, row) - level, margin(work, at.NEW, row) - level
     return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
 
 
-def lowest_share(scene, work, step, row):
-    """Where in the step the margin is least, if that lies inside it and is low; else NEVER."""
-    if not may_dip(work, step, row):
+def lowest_share(scene, work, step, row, level):
+    """Where in the step the margin is least, if that lies inside it and may be below a level [m],
+    the pair being located there in TRIAL; else NEVER."""
+    if not may_dip(work, step, row, level):
         return NEVER
     low, high = 0.0, 1.0
     rate_low = step * margin_rate(work, at.NOW, row)
@@ -147,7 +148,7 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
     high, limit = min(earliest, 1.0), unnoticed(scene, work, step, row, resolution, depth)
     resolution = min(resolution, limit)
     if margin(work, at.NEW, row) >= -limit:
-        lowest = lowest_share(scene, work, step, row)
+        lowest = lowest_share(scene, work, step, row, 0.0)
         if lowest > high:
             return earliest
         high = lowest
@@ -161,7 +162,23 @@ def may_switch(scene, work, step, resolution, depth):
     """Whether a pair may switch in a step before its end, as seen from both ends of it."""
     for row in range(work.tally[at.CANDIDATES]):
         limit = unnoticed(scene, work, step, row, resolution, depth)
-        if margin(work, at.NEW, row) < -limit or may_dip(work, step, row):
+        if margin(work, at.NEW, row) < -limit or may_dip(work, step, row, 0.0):
+            return True
+    return False
+
+
+def passes_within(scene, work, step, depth):
+    """Whether a pair was within reach of a surface force inside of a step, by more than a depth
+    [m], whose ends are both beyond it: the stages may all have missed that."""
+    reach, g = scene.surface_reach, work.geometry
+    if reach <= 0.0:
+        return False
+    for row in range(work.tally[at.CANDIDATES]):
+        if (
+            min(g[at.NOW, row, at.GAP], g[at.NEW, row, at.GAP]) > reach
+            and lowest_share(scene, work, step, row, reach) < 1.0
+            and g[at.TRIAL, row, at.GAP] < reach - depth
+        ):
             return True
     return False
 

@@ -17,7 +17,7 @@ from flocsim.hooks import (
     note_step,
     observe,
 )
-from flocsim.integrators.events.crossings import may_switch
+from flocsim.integrators.events.crossings import may_switch, passes_within
 from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
 from flocsim.integrators.events.modes import (
     OTHER_CONTACTS,
@@ -41,7 +41,7 @@ from flocsim.integrators.loop.step_size import (
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.rolling import rolled, rolled_besides
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
-from flocsim.integrators.rhs.surface_gap import flag_near, overlooked, passed_within
+from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
@@ -154,7 +154,7 @@ def went_too_far(scene, work, clock, step):
     locate_contacts(scene, work, at.NEW)
     if scene.listed_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
         return False
-    if overlooked(scene, work) or passed_within(scene, work, step, clock[at.TOLERANCE]):
+    if overlooked(scene, work) or passes_within(scene, work, step, clock[at.TOLERANCE]):
         return True
     return overtakes(scene, work, clock, step)
 

@@ -90,14 +90,19 @@ def slip_stages(scene, work, step, first):
                 slip[state, row] = slip_in(scene, work, state, row, stuck)
 
 
+def locate_state(scene, work, state):
+    """Geometry of NOW, or of a stage, of the pairs through which forces act there."""
+    if state == at.NOW or scene.listed_reach <= 0.0:
+        locate_touching(scene, work, state)
+    else:
+        locate_sharing(scene, work, state)
+
+
 @apart
 def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
-        if state == at.NOW or scene.listed_reach <= 0.0:
-            locate_touching(scene, work, state)
-        else:
-            locate_sharing(scene, work, state)
+        locate_state(scene, work, state)
     if first == at.FIRST_STAGE:
         slip_stages(scene, work, step, 0)
     for state in range(first, last):
@@ -163,7 +168,7 @@ def newton_step(scene, work, time, step, goal):
 def finish_stages(scene, work, step):
     """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
-    locate_touching(scene, work, THIRD_STAGE)
+    locate_state(scene, work, THIRD_STAGE)
     slip_stages(scene, work, step, 2)
     take_stage(work, THIRD_STAGE)
 

@@ -23,9 +23,6 @@ from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 RANGE = 40.0
 """Pairs whose u is so much above the least have no share: exp(−40) is below rounding."""
 
-HALVINGS = 20
-"""In search of the least value of a cubic: to a millionth of a step."""
-
 LOOK_AHEAD = 1.25
 """Pairs that could come near in a step so many times as long are near in it."""
 
@@ -116,40 +113,6 @@ def overlooked(scene, work):
         reach = reach_of(scene, least_gap(work, at.NEW, row, end))
         for each in range(row, end):
             if work.candidates[each, at.NEAR] == 0 and work.geometry[at.NEW, each, at.GAP] < reach:
-                return True
-        row = end
-    return False
-
-
-def least_between(start, rate, stop, later):
-    """The least value of the cubic between two values, that falls at first and rises in the end, at
-    these rates over the whole."""
-    low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
-        t = 0.5 * (low + high)
-        slope = rate * (1.0 - t) * (1.0 - 3.0 * t) + later * t * (3.0 * t - 2.0)
-        slope += 6.0 * t * (1.0 - t) * (stop - start)
-        if slope < 0.0:
-            low = t
-        else:
-            high = t
-    t = 0.5 * (low + high)
-    risen = t * t * (3.0 - 2.0 * t) * (stop - start)
-    return start + risen + t * (1.0 - t) * ((1.0 - t) * rate - t * later)
-
-
-def passed_within(scene, work, step, depth):
-    """Whether two bodies were within reach of a surface force inside of a step, by more than a
-    depth [m], whose ends are both beyond it: its stages may all have missed that."""
-    reach, row = scene.surface_reach, 0
-    while row < work.tally[at.CANDIDATES]:
-        end = run_end(work, row)
-        before, after = least_row(work, at.NOW, row, end), least_row(work, at.NEW, row, end)
-        start, stop = work.geometry[at.NOW, before, at.GAP], work.geometry[at.NEW, after, at.GAP]
-        if start > reach and stop > reach:
-            rate = step * normal_rate(work, at.NOW, before)
-            later = step * normal_rate(work, at.NEW, after)
-            if rate < 0.0 < later and least_between(start, rate, stop, later) < reach - depth:
                 return True
         row = end
     return False

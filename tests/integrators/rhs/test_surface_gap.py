@@ -18,7 +18,6 @@ from flocsim.integrators import Implicit
 from flocsim.integrators.rhs.surface_gap import (
     RANGE,
     gap_of,
-    least_between,
     length_at,
     locate_sharing,
     measure_of,
@@ -274,16 +273,6 @@ def test_a_block_that_lies_flat_in_a_well_takes_few_steps():
     turned = found.position[-1, 0, 2]
     assert abs(angle) < 1e-6
     assert y * math.cos(turned) - x * math.sin(turned) == pytest.approx(7e-6 + 1.5e-10, rel=2e-5)
-
-
-def test_the_least_value_of_a_cubic_between_two():
-    rng, t = np.random.default_rng(6), np.linspace(0.0, 1.0, 100_001)
-    for _ in range(50):
-        start, stop = rng.uniform(0.0, 1.0, 2)
-        rate, later = -rng.uniform(0.01, 5.0), rng.uniform(0.01, 5.0)
-        values = start + t * t * (3.0 - 2.0 * t) * (stop - start)
-        values += t * (1.0 - t) * ((1.0 - t) * rate - t * later)
-        assert least_between(start, rate, stop, later) == pytest.approx(values.min(), abs=1e-9)
 
 
 def test_no_step_passes_through_the_reach_of_a_force_unnoticed():
