@@ -197,9 +197,9 @@ def test_many_marks_do_not_keep_the_reader_busy():
     # Each promises a description as long as all that follows.
     head = HEAD.pack(MARK, CHUNK, 2**23, 0, b"", b"")
     data = head * 100_000
-    began = time.monotonic()
+    began = time.process_time()
     assert [(each.start, each.stop) for each in read(data)] == [(0, len(data))]
-    assert time.monotonic() - began < 5.0
+    assert time.process_time() - began < 20.0
 
 
 @pytest.mark.parametrize("words", [b"[" * 100_000, b"[]", b"1", b"\xff", b"{" + b"9" * 9999])

@@ -2,7 +2,6 @@
 
 import errno
 import os
-import threading
 import time
 
 import pytest
@@ -63,21 +62,28 @@ def test_a_pipe_that_comes_between_the_look_and_the_open_does_not_stall(path, mo
         LockedFile(path)
 
 
-def test_who_waited_gets_the_file_of_that_name_and_not_the_deleted_one(path):
+def test_who_waited_gets_the_file_of_that_name_and_not_the_deleted_one(path, monkeypatch):
     first = LockedFile(path)
-    got = []
-    waiting = threading.Thread(target=lambda: got.append(LockedFile(path)))
-    waiting.start()
-    time.sleep(0.15)
-    first.unlink()
-    other = LockedFile(path)  # a third job is faster
-    first.close()
-    time.sleep(0.15)
-    assert got == []  # the lock on what was deleted is worth nothing
-    other.close()
-    waiting.join(5.0)
-    assert got[0].is_in_place()
-    got[0].close()
+    others = []
+
+    def turns(descriptor, path, original=module.lock):
+        """Whoever waits has opened the file when its name is taken away and given to another."""
+        if not others:
+            first.unlink()
+            others.append(None)
+            others[0] = LockedFile(path)  # a third job is faster
+            first.close()
+        elif others[0] is not None and others[0].descriptor >= 0:
+            locked = original(descriptor, path)
+            assert locked is False  # the lock on what was deleted was worth nothing
+            others[0].close()
+            return locked
+        return original(descriptor, path)
+
+    monkeypatch.setattr(module, "lock", turns)
+    got = LockedFile(path)
+    assert others[0].descriptor < 0 and got.is_in_place()
+    got.close()
 
 
 def test_the_lock_of_a_file_that_was_replaced_before_it_was_got_is_not_believed(path, monkeypatch):
