@@ -44,7 +44,8 @@ INNER_ROWS = {
         ["units"],
         ["fingerprint", "interpreter_calls"],
         ["constants", "numba_internals", "linker"],
-        ["by_pointer", "disk_cache", "object_code", "processor", "reads", "waiting"],
+        ["by_pointer", "disk_cache", "object_code", "reads", "waiting"],
+        ["processor"],
     ],
     "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],
     "swarms": [

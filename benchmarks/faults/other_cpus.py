@@ -4,7 +4,8 @@
 
 numpy and the C library choose their code by the processor, and numba compiles for it. Each setting
 takes something away that this one has: numpy's code for AVX-512, then for AVX2 and fused
-multiply-add too; the C library's; numba's for anything newer than a plain x86-64. A run of all the
+multiply-add too; the C library's; the compiler's for anything newer than a plain x86-64; and one
+lets it use all that there is, where engines are for any processor of their kind. A run of all the
 tests takes long, as each setting compiles all scenes anew where numba is concerned; name files or
 folders to run only these. The code is 1 where a test failed.
 """
@@ -42,7 +43,11 @@ def settings():
         chosen["C library without AVX2, FMA"] = {"GLIBC_TUNABLES": without}
     chosen["linear algebra of Haswell"] = {"OPENBLAS_CORETYPE": "Haswell"}
     chosen["linear algebra of Prescott"] = {"OPENBLAS_CORETYPE": "Prescott"}
-    chosen["numba for a plain processor"] = {"NUMBA_CPU_NAME": "generic"}
+    import llvmlite.binding as llvm
+
+    plain = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    chosen["engines for a plain processor"] = plain
+    chosen["engines for this very processor"] = {"NUMBA_CPU_NAME": llvm.get_host_cpu_name()}
     return chosen
 
 

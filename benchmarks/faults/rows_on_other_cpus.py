@@ -107,7 +107,7 @@ def main():
     """Print the table."""
     arguments = parser_of(__doc__).parse_args()
     print_heading(("numpy", "numba"))
-    replicates = 3 if arguments.quick else 50
+    replicates = 3 if arguments.quick else 80
     table = Table("Rows by setting, against this machine as it is", COLUMNS)
     bad = False
     with tempfile.TemporaryDirectory() as scratch:

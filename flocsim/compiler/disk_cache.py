@@ -5,6 +5,9 @@ folders above are the user's or root's and writable by nobody else (as OpenSSH's
 keys), and where its checksum is right. The checksum finds damage and files under wrong names; it
 is no secret, so that it keeps nobody out: the permissions do. On any doubt there is no file, and
 the code is compiled anew.
+
+A package may bring such files of its own (.ci/package): of the engines that most studies need, in a
+folder for each kind of processor. They are looked for last, held to the same, and never written.
 """
 
 import contextlib
@@ -16,6 +19,8 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from flocsim.compiler.processor import compiled_for
 
 MARK = b"flocsim compiled code 1\n"
 DIGEST_SIZE = 32
@@ -29,6 +34,9 @@ ABANDONED = 86_400.0
 """Seconds after which a file that was never finished is removed: its writer was killed."""
 
 WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+
+SHIPPED = Path(__file__).parent / "shipped"
+"""Where the package has compiled code of its own, if it has any."""
 
 _warned: set[str] = set()
 
@@ -122,6 +130,23 @@ def folders() -> Iterator[Path]:
             yield folder
 
 
+def shipped() -> Path | None:
+    """The folder of compiled code that came with the package for processors such as this one; None
+    without."""
+    kind = compiled_for()
+    if len(kind) != 2:  # for this very processor alone
+        return None
+    folder = resolved(SHIPPED / "-".join(kind))
+    return folder if folder.is_dir() and not why_unsafe(folder) else None
+
+
+def folders_to_read() -> Iterator[Path]:
+    """The folders in which compiled code may be, in the order in which they are asked."""
+    yield from folders()
+    if (folder := shipped()) is not None:
+        yield folder
+
+
 def is_writable(folder: Path) -> bool:
     """Whether files can be put into a folder, or it can be made."""
     while not os.path.exists(folder) and folder != folder.parent:
@@ -143,21 +168,25 @@ def digest(name: str, key: str, data: bytes) -> bytes:
 
 def read(name: str, key: str) -> bytes | None:
     """What has been written under a name and a key, whole and unchanged; else None."""
-    for folder in folders():
+    for folder in folders_to_read():
         content = content_of(folder / file_name(name, key))
+        if content is None:
+            continue
         start = len(MARK) + DIGEST_SIZE
-        if content is not None and content.startswith(MARK):
-            data = content[start:]
-            if content[len(MARK) : start] == digest(name, key, data):
-                return data
+        data = content[start:]
+        if content[:start] == MARK + digest(name, key, data):
+            return data
+        if folder.parent == resolved(SHIPPED):  # where nothing takes its place
+            warn_once(
+                f"compiled code in {folder} is damaged, and is compiled anew: install flocsim again"
+            )
     return None
 
 
 def has(name: str) -> bool:
     """Whether something was written under a name; also where nothing can be kept."""
-    looked_at = list(folders())
-    found = any(any(folder.glob(f"{name}-*{SUFFIX}")) for folder in looked_at)
-    return found or not any(map(is_writable, looked_at))
+    found = any(any(folder.glob(f"{name}-*{SUFFIX}")) for folder in folders_to_read())
+    return found or not any(map(is_writable, folders()))
 
 
 def content_of(path):

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 from flocsim.compiler.constants import Untold, told
-from flocsim.compiler.processor import numba_settings, versions
+from flocsim.compiler.processor import compilers, numba_settings
 from flocsim.compiler.reads import chains, module_reads, reached, refuse_closure, where
 from flocsim.errors import KernelError
 
@@ -49,7 +49,7 @@ def has_docstring(code):
 @functools.cache
 def compiler_text() -> str:
     """What compiles: Python, numba, LLVM, numpy and numba's settings."""
-    return f"{versions()}\n{numba_settings()}"
+    return f"{compilers()}\n{numba_settings()}"
 
 
 def globals_read(function: Any) -> Iterable[tuple[str, Any]]:

@@ -10,7 +10,8 @@
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
    says about an error is without colours.
-6. ``object_code``: what numba makes is taken as an object file, which runs without numba.
+6. ``object_code``: what numba makes is taken as an object file, which runs without numba, and may
+   be for another processor than the one that numba compiles for.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
    hash of a kernel could tell it.
 
@@ -31,6 +32,7 @@ from typing import Any
 
 from flocsim.compiler.by_pointer import address_of_data, is_array
 from flocsim.compiler.object_code import LENT, ObjectCode
+from flocsim.compiler.processor import BASELINE, baseline
 from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
 from flocsim.errors import KernelError
 
@@ -184,13 +186,27 @@ def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCod
     library = result.library
     with global_compiler_lock:
         library._ensure_finalized()
+    machine = getattr(library, "machine", library._codegen._tm)  # numba's own have none
     declared = [each.name for each in library._final_module.functions if each.is_declaration]
     found = ObjectCode(
-        library._codegen._tm.emit_object(library._final_module), result.fndesc.llvm_func_name,
+        machine.emit_object(library._final_module), result.fndesc.llvm_func_name,
         returned_as(result.signature.return_type),
         any(name.encode().startswith(LENT) for name in declared),
     )  # fmt: skip
     return found, declared, not library.has_dynamic_globals
+
+
+@functools.cache
+def baseline_machine() -> Any:
+    """The target machine of the baseline, otherwise as numba's."""
+    import llvmlite.binding as llvm
+    import numba
+
+    config: Any = numba.config
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    return target.create_target_machine(
+        cpu=BASELINE, features="", opt=config.OPT, reloc="static", codemodel="jitdefault", jit=True
+    )
 
 
 class NoEnvironment:
@@ -248,6 +264,11 @@ def libraries():
 
         loops = False
 
+        @property
+        def machine(self):
+            """What LLVM knows of the processor that the code is for."""
+            return self._codegen._tm if self.loops or not baseline() else baseline_machine()
+
         def finalize(self):
             """Link and optimise."""
             self._linking_libraries = list(reached(self, {}))
@@ -262,9 +283,14 @@ def libraries():
             for each in module.functions:
                 if not (each.is_declaration or each.name in self.own):
                     each.linkage = "internal"
-            passes, builder = self._codegen._module_pass_manager(
-                loop_vectorize=self.loops, slp_vectorize=False
-            )
+            codegen = self._codegen
+            native, codegen._tm = codegen._tm, self.machine
+            try:
+                passes, builder = codegen._module_pass_manager(
+                    loop_vectorize=self.loops, slp_vectorize=False
+                )
+            finally:
+                codegen._tm = native
             passes.run(module, builder)
 
         def _finalize_final_module(self):

@@ -9,6 +9,19 @@ from pathlib import Path
 from typing import Any
 
 PACKAGES = "numba", "llvmlite", "numpy", "scipy", "shapely", "flocsim"
+COMPILERS = "numba", "llvmlite", "numpy", "flocsim"
+"""Packages of which machine code depends on the version."""
+
+BASELINE = "x86-64-v3"
+"""The processor that engines are compiled for, where the one at hand can do all that it can: others
+can then use the same code, and what is not a loop over many numbers is no slower
+(benchmarks/speed/processors.py)."""
+
+OF_BASELINE = {
+    "avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse3",
+    "sse4.1", "sse4.2", "ssse3", "xsave",
+}  # fmt: skip
+"""What the baseline can do more than any x86-64, as LLVM calls it."""
 
 SETTINGS = {
     "OPT": "_OptLevel(3)", "LOOP_VECTORIZE": "1", "SLP_VECTORIZE": "0", "BOUNDSCHECK": "None",
@@ -62,15 +75,44 @@ def has_svml() -> bool:
     return llvm.targets.has_svml()
 
 
-def compiled_for() -> tuple[str, ...]:
-    """What of the machine the machine code that numba makes depends on."""
+@functools.cache
+def compilers() -> dict[str, str]:
+    """The versions that machine code depends on; of Python all releases that read the same
+    bytecode are one."""
+    found = versions()
+    known = {name: found[f"version of {name}"] for name in COMPILERS}
+    return {"Python": str(sys.implementation.cache_tag), **known}
+
+
+def set_for_numba() -> tuple[str, str, str, str]:
+    """What was set for numba of the processor that it is to compile for."""
+    settings = numba_settings()
+    more = CONFIG_FILE.read_text("utf-8", "replace") if CONFIG_FILE.exists() else ""
+    named = settings["CPU_NAME"], settings["CPU_FEATURES"]
+    return *named, os.environ.get("NUMBA_ENABLE_AVX", ""), more
+
+
+def baseline() -> str:
+    """BASELINE where this processor can do all that it can, and nothing was set for numba; else ""
+    for code made for this very processor."""
     import llvmlite.binding as llvm
 
-    settings = numba_settings()
-    named = settings["CPU_NAME"], settings["CPU_FEATURES"], os.environ.get("NUMBA_ENABLE_AVX", "")
+    if set_for_numba() != ("None", "None", "", ""):
+        return ""
+    known = llvm.get_host_cpu_features()
+    return BASELINE if all(known.get(name) for name in OF_BASELINE) else ""
+
+
+def compiled_for(loops: bool = False) -> tuple[str, ...]:
+    """What of the machine the machine code of an engine depends on; ``loops``: that of functions
+    that are mostly loops, which are compiled for this very processor."""
+    import llvmlite.binding as llvm
+
+    triple, target = llvm.get_process_triple(), baseline()
+    if target and not loops:
+        return triple, target
     native = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    more = CONFIG_FILE.read_text("utf-8", "replace") if CONFIG_FILE.exists() else ""
-    return llvm.get_process_triple(), *native, *named, more
+    return triple, *native, *set_for_numba()
 
 
 def cpu_kind() -> dict:

@@ -28,7 +28,7 @@ from flocsim.compiler.constants import Intrinsic
 from flocsim.compiler.fingerprint import hashed, tell
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import Called, ObjectCode, link
-from flocsim.compiler.processor import compiled_for, numba_settings, versions
+from flocsim.compiler.processor import compiled_for, numba_settings
 from flocsim.compiler.waiting import compiling
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.limits import COMPILING, lacking
@@ -77,7 +77,7 @@ class Code:
         """(address of its machine code, what it returns), from the disk or compiled; ``told`` tells
         all that ``typed()``, the signature and the readers of arguments (see run_of), follow from.
         """
-        key = key_of(told)
+        key = key_of(told, self.entry)
         if (data := disk_cache.read(self.name, key)) is not None:
             # What fails was written by this code, and yet is of no use: it is compiled anew.
             with contextlib.suppress(Exception):
@@ -90,9 +90,9 @@ class Code:
         return link(code, build.units), code.returned
 
 
-def key_of(told):
-    """What machine code depends on beside the name: types, processor, versions."""
-    return repr((told, compiled_for(), versions()))
+def key_of(told, function):
+    """What the machine code of a function depends on beside the name: types, processor."""
+    return repr((told, compiled_for(hasattr(function, "loops"))))
 
 
 def from_files(data):
@@ -193,7 +193,7 @@ class Build:
         told = told_types(given)
         symbol = symbol_of(function.apart, told)
         if symbol not in self.units:
-            name, key = unit_of(function).name, key_of(told)
+            name, key = unit_of(function).name, key_of(told, function)
             code = self.found(function, name, key)
             if code is None:
                 code = self.compiled(function, name, given, {})

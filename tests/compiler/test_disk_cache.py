@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from flocsim.compiler import composer, disk_cache
+from flocsim.compiler import composer, disk_cache, units
 from flocsim.compiler.composer import compose
 from flocsim.compiler.disk_cache import MARK, digest, file_name, read, why_unsafe, write
 
@@ -141,6 +141,64 @@ def test_code_that_cannot_be_loaded_is_compiled_anew(folder):
     real(*key[0], pickle.dumps(("an", "odd", "tuple")))
     assert only_file(folder).name == name
     assert answer() == 7.0
+
+
+@pytest.fixture
+def shipped(folder, tmp_path, monkeypatch):
+    """The folder of what came with the package, a compiled function; the cache is empty."""
+    assert answer() == 7.0
+    place = tmp_path / "package" / "shipped" / "system-kind"
+    place.mkdir(parents=True)
+    path = only_file(folder)
+    path.rename(place / path.name)
+    monkeypatch.setattr(disk_cache, "SHIPPED", place.parent)
+    monkeypatch.setattr(disk_cache, "compiled_for", lambda: ("system", "kind"))
+    return place
+
+
+def test_what_came_with_the_package_is_used_and_never_copied(folder, shipped, monkeypatch):
+    monkeypatch.setattr(units, "Build", None)
+    assert answer() == 7.0
+    assert list(folder.iterdir()) == []
+    assert composer.is_on_disk(compose(entry, {}))
+
+
+def test_what_came_for_another_kind_of_processor_is_left_alone(folder, shipped, monkeypatch):
+    name = only_file(shipped).name.partition("-")[0]
+    assert disk_cache.has(name)
+    for kind in (("system", "other kind"), ("system", "kind", "and features")):
+        monkeypatch.setattr(disk_cache, "compiled_for", lambda found=kind: found)
+        assert not disk_cache.has(name)
+    assert answer() == 7.0
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, "a planted pickle"])
+def test_damage_to_what_came_is_told_and_compiled_anew(folder, shipped, tmp_path, damage):
+    path = only_file(shipped)
+    if damage in DAMAGES:
+        path.write_bytes(DAMAGES[damage](path.read_bytes()))
+    else:
+        plant(path, tmp_path / "ran")
+    before = path.read_bytes()
+    with pytest.warns(UserWarning, match=f"{shipped} is damaged, .* install flocsim again") as got:
+        assert answer() == 7.0
+    assert len(said(got)) == 1 and path.read_bytes() == before
+    assert only_file(folder).name == path.name
+    assert answer() == 7.0  # by the cache, which is asked first
+    assert not (tmp_path / "ran").exists()
+
+
+def test_what_others_can_have_put_into_the_package_is_not_used(folder, shipped):
+    path = only_file(shipped)
+    name = path.name.partition("-")[0]
+    for unsafe in (shipped, shipped.parent):
+        unsafe.chmod(0o775)
+        assert not disk_cache.has(name)
+        unsafe.chmod(0o755)
+    path.chmod(0o666)
+    assert answer() == 7.0
+    assert only_file(folder).name == path.name
 
 
 def said(caught):
