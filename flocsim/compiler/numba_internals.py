@@ -8,8 +8,9 @@
 3. ``compilers``: of an engine's five hundred functions Python calls one. The others are kept as
    they are lowered, and are linked and optimised once, with it, as a program of one file is.
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
-5. ``quick_typing``: while numba compiles, it remembers what it inferred, and garbage waits; what it
-   says about an error is without colours.
+5. ``quick_typing``: while numba compiles, it remembers what it inferred, garbage waits, nobody is
+   told of every call of LLVM, and variables are listed by a shorter way; what it says about an error
+   is without colours.
 6. ``object_code``: what numba makes is taken as an object file, which runs without numba, and may
    be for another processor than the one that numba compiles for.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no
@@ -283,14 +284,10 @@ def libraries():
             for each in module.functions:
                 if not (each.is_declaration or each.name in self.own):
                     each.linkage = "internal"
-            codegen = self._codegen
-            native, codegen._tm = codegen._tm, self.machine
-            try:
-                passes, builder = codegen._module_pass_manager(
+            with replaced(self._codegen, _tm=self.machine):
+                passes, builder = self._codegen._module_pass_manager(
                     loop_vectorize=self.loops, slp_vectorize=False
                 )
-            finally:
-                codegen._tm = native
             passes.run(module, builder)
 
         def _finalize_final_module(self):
@@ -427,21 +424,77 @@ def remembering(real):
 
 
 @contextlib.contextmanager
-def types_remembered():
+def replaced(owner: Any, **others: Any) -> Iterator[None]:
+    """Attributes of a class or module are others inside."""
+    own = {name: vars(owner)[name] for name in others if name in vars(owner)}
+    for name, value in others.items():
+        setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        for name in others:
+            if name in own:
+                setattr(owner, name, own[name])
+            else:
+                delattr(owner, name)
+
+
+def types_remembered() -> Any:
     """numba's built-in functions remember their types inside: it asks anew for the type of every
     ``+`` and ``sqrt``, though an engine of two hundred functions has some hundred different cases.
     The memory ends with the compilation: it can't outlive the options that it was made under."""
     from numba.core.types import Function
 
-    own, real = vars(Function).get("get_call_type"), Function.get_call_type
-    Function.get_call_type = remembering(real)
-    try:
-        yield
-    finally:
-        if own is None:
-            del Function.get_call_type
-        else:
-            Function.get_call_type = own
+    return replaced(Function, get_call_type=remembering(Function.get_call_type))
+
+
+def sizes_remembered() -> Any:
+    """The sizes of LLVM's types are remembered inside: LLVM is asked for one by parsing a text."""
+    from numba.core.base import BaseContext
+
+    real, known = BaseContext.get_abi_sizeof, dict[str, int]()
+
+    def remembered(self, kind):
+        found = known.get(text := str(kind))
+        if found is None:
+            found = known[text] = real(self, kind)
+        return found
+
+    return replaced(BaseContext, get_abi_sizeof=remembered)
+
+
+def unheard() -> Any:
+    """numba tells nobody of its events inside: there are two for every call of LLVM, and functions
+    that are compiled within others each have listeners of their own, which measure times."""
+    from numba.core import event
+
+    def nothing(*arguments, **more):
+        """Nobody is told."""
+
+    return replaced(event, start_event=nothing, end_event=nothing)
+
+
+def variables_listed() -> Any:
+    """numba lists the variables of an instruction by a shorter way inside: it does so a million
+    times, and most of what it looks at are no variables."""
+    from numba.core.ir import Inst, Loc, Var
+
+    real, plain = Inst._rec_list_vars, {str, int, float, bool, type(None), Loc}
+
+    def listed(self, value):
+        if type(value) is dict:
+            value = value.values()
+        elif type(value) not in (list, tuple):
+            return [] if type(value) in plain else real(self, value)
+        found = []
+        for each in value:
+            if type(each) is Var:
+                found.append(each)
+            elif type(each) not in plain:
+                found += listed(self, each)
+        return found
+
+    return replaced(Inst, _rec_list_vars=listed)
 
 
 @contextlib.contextmanager
@@ -451,7 +504,7 @@ def quick_typing() -> Iterator[None]:
         if "quick_typing" in WITHOUT:
             yield
             return
-        with garbage_waits(), types_remembered():
+        with garbage_waits(), types_remembered(), sizes_remembered(), unheard(), variables_listed():
             yield
 
 
@@ -463,14 +516,8 @@ def plain_errors() -> Iterator[None]:
 
     # The class, since numba's modules each hold its one instance.
     scheme = type(termcolor())
-    coloured = {name: getattr(scheme, name) for name in COLOURED}
-    for name in COLOURED:
-        setattr(scheme, name, lambda self, text: text)
-    try:
+    with replaced(scheme, **dict.fromkeys(COLOURED, lambda self, text: text)):
         yield
-    finally:
-        for name, method in coloured.items():
-            setattr(scheme, name, method)
 
 
 @functools.cache
