@@ -385,7 +385,8 @@ SOFT_GAP = 6
     CANDIDATES_FULL,
     PAIRS_FULL,
     BLOCKS_FULL,
-) = range(4)
+    NOT_COMPILED,  # what the engine has left out until it is reached
+) = range(5)
 
 # Places in the ``clock`` of a run.
 (

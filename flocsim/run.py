@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,15 @@ STEPS_AT_A_TIME = 5_000
 
 RECORD_ROWS = 4096
 """Rows of the record between two copies."""
+
+
+def with_more(driver: Any, work: Work) -> tuple[Callable[..., int], Work]:
+    """An engine and its arrays with what was lacking (flocsim.arrays: FULL): with what it had left
+    out until a run needs it, or with room."""
+    if work.tally[at.FULL] == at.NOT_COMPILED:
+        work.tally[at.FULL] = at.NOTHING_FULL
+        return driver.whole, work
+    return driver, with_room(work)
 
 
 class Run:
@@ -62,7 +72,7 @@ class Run:
                 self.saved.append(self.record[: self.counts[at.RECORDED]].copy())
                 self.counts[at.RECORDED] = 0
             if code == Status.NO_ROOM:
-                self.work = with_room(self.work)
+                self.driver, self.work = with_more(self.driver, self.work)
             elif code != Status.RECORD_FULL:
                 return Status(code)
 

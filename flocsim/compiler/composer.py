@@ -15,28 +15,41 @@ Kernels must be plain functions that capture nothing: a closure's variables are 
 numba's symbol table, where two of them can collide and silently return each other's answers.
 """
 
+import functools
 import itertools
 from collections.abc import Callable
 from typing import Any
 
 from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import argument_at, table_of, told_kinds, type_of, words_in
+from flocsim.compiler.by_pointer import (
+    argument_at,
+    table_of,
+    told_kinds,
+    type_of,
+    types_within,
+    words_in,
+)
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import function_at
-from flocsim.compiler.units import Code, options_text
+from flocsim.compiler.units import Code, argument_names, options_text
 
 _composed: dict = {}
 
 
 class Compiled:
     """A Code that is compiled at its first call, or loaded from the disk; once more for arguments
-    of other types."""
+    of other types. Without what is postponed, unless it is ``complete``."""
 
-    def __init__(self, code):
-        self.code = code
+    def __init__(self, code, complete=False):
+        self.code, self.complete = code, complete
         self.functions = {}
+
+    @functools.cached_property
+    def whole(self):
+        """The same with what is postponed."""
+        return Compiled(self.code, True)
 
     def __call__(self, *arguments):
         table, kinds = table_of(arguments)
@@ -53,10 +66,12 @@ class Compiled:
 
             found = [type_of(each, arrays=code.allocates) for each in arguments]
             places = itertools.accumulate(map(words_in, found), initial=0)
-            names = code.entry.__code__.co_varnames
-            return (int64,), dict(zip(names, map(argument_at, found, places), strict=False))
+            readers = dict(
+                zip(argument_names(code.entry), map(argument_at, found, places), strict=False)
+            )
+            return (int64,), readers, types_within(found)
 
-        return function_at(*code.loaded(told_kinds(kinds), typed))
+        return function_at(*code.loaded(told_kinds(kinds), typed, self.complete))
 
 
 def compose(
@@ -102,5 +117,5 @@ def compile_law(law: Callable, told: str, signature: Callable[[], Any]) -> int:
     key = (fingerprint(law, {}, options_text(False)), told)
     if key not in _composed:
         code = Code(law, f"flocsim_law_{key[0]}")
-        _composed[key], _ = code.loaded(told, lambda: (signature().args, {}))
+        _composed[key], _ = code.loaded(told, lambda: (signature().args, {}, {}))
     return _composed[key]

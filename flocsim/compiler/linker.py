@@ -23,6 +23,17 @@ def loops_apart(function: Callable) -> Callable:
     return apart(function)
 
 
+def postponed(stand_in: Callable) -> Callable:
+    """Mark a function that few runs reach, and that fills a hook which is compiled apart: until it
+    is reached, ``stand_in`` is called, which tells so (flocsim.arrays: NOT_COMPILED)."""
+
+    def mark(function: Callable) -> Callable:
+        function.stand_in = stand_in  # type: ignore[attr-defined]
+        return function
+
+    return mark
+
+
 class Linker:
     """Clones functions, with others in the place of hooks."""
 

@@ -9,8 +9,8 @@
    they are lowered, and are linked and optimised once, with it, as a program of one file is.
 4. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 5. ``quick_typing``: while numba compiles, it remembers what it inferred, garbage waits, nobody is
-   told of every call of LLVM, and variables are listed by a shorter way; what it says about an error
-   is without colours.
+   told of every call of LLVM, and variables are listed by a shorter way; what it says about an
+   error is without colours.
 6. ``object_code``: what numba makes is taken as an object file, which runs without numba, and may
    be for another processor than the one that numba compiles for.
 7. ``refuse_extensions``: what the user has taught numba (@overload and its kin) is found, since no

@@ -4,7 +4,9 @@ The first unit of an engine is its driver; each function marked @apart (flocsim.
 another. A unit knows those that it calls by the names of their functions alone, as a C file knows
 what it includes no body of; which ones these are is settled when they are loaded. Engines of
 spheres and of polygons, of two bodies and of many, of one observer and of another therefore share
-most of their machine code, and an edited function compiles its own unit.
+most of their machine code, and an edited function compiles its own unit. What is @postponed is
+compiled, with all that it alone reaches, when a run first gets there: until then a stand-in goes by
+its name.
 
 A unit's file is named by a hash of what it does up to the units that it calls, and of the types
 that it is given; it says what these have to return. The engine's, named by a hash of everything,
@@ -73,17 +75,18 @@ class Code:
                 "compiled code only: unset it (in Python, jit=False runs a scene uncompiled)"
             )
 
-    def loaded(self, told, typed):
-        """(address of its machine code, what it returns), from the disk or compiled; ``told`` tells
-        all that ``typed()``, the signature and the readers of arguments (see run_of), follow from.
-        """
-        key = key_of(told, self.entry)
+    def loaded(self, told, typed, whole=False):
+        """(address of its machine code, what it returns), from the disk or compiled, ``whole`` or
+        without what is postponed; ``told`` tells all that ``typed()`` follows from: the signature,
+        the readers of arguments (see run_of) and {words: numba type} of what is in them."""
+        begun = key_of(told, self.entry)
+        key = f"whole {begun}" if whole else begun
         if (data := disk_cache.read(self.name, key)) is not None:
             # What fails was written by this code, and yet is of no use: it is compiled anew.
             with contextlib.suppress(Exception):
                 return from_files(data)
-        build = Build(self)
-        code = build.entry(*typed())
+        build = Build(self, whole)
+        code = build.entry(*typed(), disk_cache.read(self.name, begun) if whole else None)
         if build.lasts:
             head = json.dumps(build.files).encode()
             disk_cache.write(self.name, key, head + b"\n" + code.packed())
@@ -109,12 +112,13 @@ def from_files(data):
 class Build:
     """An engine while it is compiled, unit after unit: ``units`` {symbol: ObjectCode} and ``files``
     {symbol: (name, key)} on the disk; ``lasts``: whether another process can use all of them;
-    ``known`` {words: numba type} of arguments. Functions of several units are lowered once."""
+    ``known`` {words: numba type} of arguments. Functions of several units are lowered once.
+    ``whole``: with what is postponed."""
 
-    def __init__(self, code):
+    def __init__(self, code, whole=False):
         from flocsim.compiler import numba_internals as internals
 
-        self.code = code
+        self.code, self.whole = code, whole
         # Without the interpreter's lock, dividing by zero as numpy does.
         self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
         self.options |= {} if code.allocates else internals.NO_COUNTING
@@ -128,17 +132,20 @@ class Build:
         self.known: dict[str, Any] = {}
         self.parts: list[Any] = []
 
-    def entry(self, signature, readers):
+    def entry(self, signature, readers, known, begun=None):
         """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
-        be compiled."""
+        be compiled. ``begun``: of the engine without what is postponed, as the disk has it."""
         from flocsim.compiler import numba_internals as internals
 
         if text := lacking(COMPILING, "compiling"):
             raise FlocsimError(text)  # LLVM ends the process where it gets no memory
         code = self.code
         try:
-            with compiling(code.what, to_compile(code.entry)), internals.quick_typing():
-                return self.compiled(code.entry, code.name, signature, readers)
+            missing = to_compile(code.entry, self.whole)
+            with compiling(code.what, missing), internals.quick_typing():
+                self.known |= known
+                found = self.completed(code.entry, begun.split(b"\n", 1)[1]) if begun else None
+                return found or self.compiled(code.entry, code.name, signature, readers)
         except internals.compiler_error() as error:
             raise KernelError(compiler_complaint(str(error))) from None
         finally:
@@ -192,9 +199,11 @@ class Build:
         self.known |= types_within(given)
         told = told_types(given)
         symbol = symbol_of(function.apart, told)
+        function = made_of(function, self.whole)
         if symbol not in self.units:
             name, key = unit_of(function).name, key_of(told, function)
-            code = self.found(function, name, key)
+            data = disk_cache.read(name, key)
+            code = self.completed(function, data) if data else None
             if code is None:
                 code = self.compiled(function, name, given, {})
                 if self.lasts:
@@ -202,11 +211,9 @@ class Build:
             self.units[symbol], self.files[symbol] = code, (name, key)
         return symbol, self.units[symbol]
 
-    def found(self, function, name, key):
-        """The ObjectCode of a unit that is on the disk, if what it calls returns what it expects;
+    def completed(self, function, data):
+        """The ObjectCode of a unit as the disk has it, if what it calls returns what it expects;
         of that, what is not on the disk is compiled."""
-        if (data := disk_cache.read(name, key)) is None:
-            return None
         code, calls = ObjectCode.unpacked(data), unit_of(function).calls
         for each in code.calls:
             if not self.known.keys() >= set(each.types):
@@ -245,16 +252,23 @@ def unit_of(function: Callable) -> Unit:
     return Unit(name, found.calls, found.functions)
 
 
-def to_compile(entry):
-    """How many functions there are in an engine's units that are not on the disk."""
+def made_of(function, whole):
+    """What is compiled of a function: its stand-in, where that is all that is asked for."""
+    return function if whole else getattr(function, "stand_in", function)
+
+
+def to_compile(entry, whole=False):
+    """How many functions there are in an engine's units that are not on the disk; that of the entry
+    is, where ``whole`` is what follows."""
     units, more = {entry}, [entry]
     for each in more:  # grows
-        new = set(unit_of(each).calls.values()) - units
+        new = {made_of(called, whole) for called in unit_of(each).calls.values()} - units
         units |= new
         more += new
     found = [unit_of(each) for each in units if each is not entry]
     missing = [unit for unit in found if not disk_cache.has(unit.name)]
-    return len(set().union(*(unit.functions for unit in [unit_of(entry), *missing])))
+    missing += [] if whole else [unit_of(entry)]
+    return len(set().union(*(unit.functions for unit in missing)))
 
 
 def made(value):

@@ -13,8 +13,9 @@ import numpy as np
 
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
-from flocsim.arrays import Scene, Work, with_room, work_of
+from flocsim.arrays import Scene, Work, work_of
 from flocsim.integrators.base import Integrator
+from flocsim.run import with_more
 from flocsim.swarms.arrays import Found, Swarm, found_of
 
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
@@ -207,7 +208,7 @@ class Runner:
             if place.work.tally[at.FULL] == at.NOTHING_FULL:
                 own.found = larger(own.found)
             else:
-                place.work = with_room(place.work)
+                self.driver, place.work = with_more(self.driver, place.work)
 
     def run(
         self, swarm: Swarm, islands: Islands, look: Look | None = None

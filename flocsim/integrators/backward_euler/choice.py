@@ -15,6 +15,7 @@ Counts of steps alone decide: clocks have no say, so that the choice is the same
 import math
 
 import flocsim.arrays as at
+from flocsim.compiler.linker import postponed
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.backward_euler.step import (
     end_at_switches,
@@ -84,6 +85,13 @@ def hand_over(scene, work, clock, counts):
             work.motion[at.LOOKED, body, axis] = work.motion[at.NOW, body, axis]
 
 
+def across_not_compiled(scene, work, clock, step):
+    """Tell that steps across switches have not been compiled yet."""
+    work.tally[at.FULL] = at.NOT_COMPILED
+    return -1.0
+
+
+@postponed(across_not_compiled)
 def step_or_give_back(scene, work, clock, step):
     """One step across switches; −1 where it fails, also for bodies that would fly apart again."""
     ratio, bounce = euler_step(scene, work, clock, step, False)
