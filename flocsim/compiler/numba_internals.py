@@ -304,7 +304,11 @@ def libraries():
     return LinkedLibrary, WholeLibrary, LoopLibrary
 
 
-NEEDLESS_PASSES = "InlineClosureLikes", "NopythonRewrites", "InlineOverloads"
+NEEDLESS_PASSES = (
+    "InlineClosureLikes", "MakeFunctionToJitFunction", "InlineInlinables",
+    "FindLiterallyCalls", "LiteralUnroll", "LiteralPropagationSubPipelinePass", "NopythonRewrites",
+    "InlineOverloads",
+)  # fmt: skip
 """Passes of numba's that find nothing in functions on scalars that define no others inside."""
 
 ANNOTATIONS = "AnnotateTypes"
