@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.body import Body, read_position
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit
-from flocsim.geometry.shapes.parts import core_gap, cores_overlap
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.wall import wall_between
 
@@ -102,10 +102,9 @@ class Placement:
             return False
         a = shape.placed_parts(float(way[0]), float(way[1]), float(place[2]))
         b = there.placed_parts(0.0, 0.0, self.places[other, 2])
-        pairs = list(product(a, b))
-        if any(cores_overlap(one, two) for one, two in pairs):
-            return False
-        return all(core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in pairs)
+        return all(
+            core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in product(a, b)
+        )
 
 
 def place_at_random(

@@ -1,36 +1,21 @@
 """Composite: several shapes fixed to each other, one rigid body; and what holds of cores of several
 rings, holes included."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.moments import all_moments
-from flocsim.geometry.shapes.outline import simplicity_fault
-from flocsim.geometry.shapes.parts import (
-    Part,
-    Parts,
-    core_gap,
-    cores_overlap,
-    moved_parts,
-    scaled_parts,
-)
+from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
 from flocsim.geometry.shapes.shape import (
     Shape,
     Swept,
     positive_radius,
-    read_only,
     read_points,
-    require_distinct,
-    stretched,
+    swept_parts,
 )
-
-TOUCHING = 1e-6
-"""Parts nearer to each other than this share of the smaller radius are fixed to each other."""
 
 
 def read_parts(parts: Iterable[Any]) -> Parts:
@@ -103,84 +88,3 @@ class Composite(Shape):
     def radius(self) -> float:
         """The smallest spheroradius of its parts [m]."""
         return min(part.radius for part in self.given)
-
-    @property
-    def is_compound(self) -> bool:
-        return True
-
-
-def swept_parts(parts: Sequence[Part]) -> Swept:
-    """The Swept of some parts fixed to each other; ShapeError where they make no body."""
-    parts = tuple(checked_part(part) for part in parts)
-    require_joined(parts)
-    points = np.concatenate([part.points for part in parts])
-    # As in swept_by.
-    extent = float(np.ptp(points, axis=0).max() + max(part.radius for part in parts))
-    area, centroid, moment, stretch = all_moments(scaled_parts(parts, 1.0 / extent))
-    centroid = centroid * extent
-    around = tuple(
-        Part(tuple(read_only(ring - centroid) for ring in part.rings), part.radius)
-        for part in parts
-    )
-    vertices = read_only(points - centroid)
-    return Swept(
-        vertices, centroid, float(area * extent**2), float(moment * extent**4),
-        *stretched(stretch, moment), around,
-    )  # fmt: skip
-
-
-def checked_part(part: Part) -> Part:
-    """A part with its outer ring counter-clockwise and its holes clockwise; ShapeError where it is
-    none."""
-    outer, *holes = part.rings
-    for ring in part.rings:
-        if len(ring) > 1:
-            require_distinct(ring)
-    if len(outer) < 3:
-        if holes:
-            raise ShapeError("a point or a segment has no holes")
-        return part
-    fault = simplicity_fault(outer, holes)
-    if fault is not None and not holes:
-        raise ShapeError(f"the polygon of {len(outer)} vertices is not simple ({fault})")
-    if fault is not None:
-        raise ShapeError(
-            f"a polygon with {len(holes)} holes is not simple ({fault}): holes must lie inside of "
-            "it and apart from each other, and no edges may cross"
-        )
-    return Part((facing(outer, 1.0), *(facing(ring, -1.0) for ring in holes)), part.radius)
-
-
-def facing(ring: np.ndarray, sense: float) -> np.ndarray:
-    """The ring counter-clockwise (1) or clockwise (−1), the first point kept."""
-    if sense * signed_area(ring - ring.mean(axis=0)) > 0.0:
-        return ring
-    return np.roll(ring[::-1], 1, axis=0)
-
-
-def require_joined(parts: Sequence[Part]) -> None:
-    """ShapeError where a part lies apart from all others that hang together."""
-    centres = [part.points.mean(axis=0) for part in parts]
-    reach = [
-        float(np.hypot(*(part.points - centre).T).max() + part.radius)
-        for part, centre in zip(parts, centres, strict=True)
-    ]
-    left, joined = set(range(1, len(parts))), [0]
-    for one in joined:
-        near = [other for other in sorted(left) if touch(parts, centres, reach, one, other)]
-        left.difference_update(near)
-        joined += near
-    if left:
-        raise ShapeError(
-            f"part {min(left)} of {len(parts)} touches none of those that hang together with the "
-            "first: move it nearer"
-        )
-
-
-def touch(parts, centres, reach, one, other):
-    """Whether two parts touch or overlap."""
-    a, b = parts[one], parts[other]
-    slack = TOUCHING * min(a.radius, b.radius)
-    if np.hypot(*(centres[one] - centres[other])) > reach[one] + reach[other] + slack:
-        return False
-    return core_gap(a, b) <= a.radius + b.radius + slack or cores_overlap(a, b)

@@ -18,14 +18,44 @@ def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> 
     return None if polygon.is_valid else shapely.is_valid_reason(polygon)
 
 
-def require_simple(vertices: np.ndarray) -> None:
-    """Raise ShapeError where edges of the closed polygon cross or touch."""
-    fault = simplicity_fault(vertices)
+def require_simple(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> None:
+    """Raise ShapeError where edges of the closed polygon cross or touch, or a hole is none."""
+    fault = simplicity_fault(vertices, holes)
+    if fault is not None and holes:
+        raise ShapeError(
+            f"a polygon with {len(holes)} holes is not simple ({fault}): holes must lie inside of "
+            "it and apart from each other, and no edges may cross"
+        )
     if fault is not None:
         raise ShapeError(
             f"the polygon of {len(vertices)} vertices is not simple ({fault}); "
             "its edges must not cross or touch: reorder or move the vertices"
         )
+
+
+def core_gap(a: Part, b: Part) -> float:
+    """Smallest distance [m] between the cores of two parts, 0 where they overlap."""
+    if len(a.points) == len(b.points) == 1:
+        return float(np.hypot(*(a.points[0] - b.points[0])))
+    return float(core_geometry(a.rings).distance(core_geometry(b.rings)))
+
+
+def loose_parts(parts: Sequence[Part], slack: float) -> np.ndarray:
+    """The numbers of the parts that do not hang together with the first; what is nearer than a
+    share ``slack`` of the smaller radius touches."""
+    import shapely
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    radius = np.array([part.radius for part in parts])
+    cores = np.array([core_geometry(part.rings) for part in parts])
+    farthest = (2.0 + slack) * radius.max()
+    one, other = shapely.STRtree(cores).query(cores, "dwithin", farthest)
+    reach = radius[one] + radius[other] + slack * np.minimum(radius[one], radius[other])
+    near = shapely.distance(cores[one], cores[other]) <= reach
+    joins = coo_array((near[near], (one[near], other[near])), shape=(len(parts),) * 2)
+    _, group = connected_components(joins)
+    return np.flatnonzero(group != group[0])
 
 
 def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np.ndarray]:

@@ -1,5 +1,6 @@
 """Shape: what every body outline has, core points swept by a disk, and what follows from them."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from inspect import getattr_static
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,14 +13,17 @@ from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
 from flocsim.geometry.shapes.measures import ShapeMeasures, measures_of
 from flocsim.geometry.shapes.moments import all_moments
-from flocsim.geometry.shapes.outline import require_simple, swept_rings
-from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
+from flocsim.geometry.shapes.outline import loose_parts, require_simple, swept_rings
+from flocsim.geometry.shapes.parts import Part, Parts, is_compound, moved_parts
 
 ROUND = 1e-12
 """Shapes whose principal moments differ by less than this share of their sum have no long axis."""
 
 TOO_CLOSE = 1e-12
 """Core points nearer than this share of the core's extent count as repeated."""
+
+TOUCHING = 1e-6
+"""Parts nearer to each other than this share of the smaller radius are fixed to each other."""
 
 
 class Swept(NamedTuple):
@@ -28,7 +32,7 @@ class Swept(NamedTuple):
     Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
     centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
     B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments; the angle of the long axis [rad];
-    ``parts``, around the centroid as well, where there is more than one ring.
+    ``parts``, around the centroid as well.
     """
 
     vertices: np.ndarray
@@ -37,7 +41,7 @@ class Swept(NamedTuple):
     second_moment: float
     elongation: float
     long_axis: float
-    parts: Parts = ()
+    parts: Parts
 
 
 class Shape:
@@ -78,7 +82,8 @@ class Shape:
         for name in ("core", "radius"):
             if getattr_static(self, name, None) is None:
                 raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
-        return swept_by(read_points("core", self.core), positive_radius(self.radius))
+        core, radius = read_points("core", self.core), positive_radius(self.radius)
+        return swept_parts([Part((core,), radius)])
 
     @property
     def vertices(self) -> np.ndarray:
@@ -93,12 +98,12 @@ class Shape:
     @property
     def parts(self) -> Parts:
         """The parts, each of one or more rings, around the centroid of the whole."""
-        return self.swept.parts or (Part((self.vertices,), self.radius),)
+        return self.swept.parts
 
     @property
     def is_compound(self) -> bool:
         """Whether the core has more than one ring: holes, or parts."""
-        return False
+        return is_compound(self.parts)
 
     @property
     def area(self) -> float:
@@ -132,9 +137,7 @@ class Shape:
     @property
     def bounding_radius(self) -> float:
         """R, the largest distance from the centroid to the outline [m]."""
-        if self.is_compound:
-            return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
-        return float(np.hypot(*self.vertices.T).max() + self.radius)
+        return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
 
     @cached_property
     def measures(self) -> ShapeMeasures:
@@ -155,9 +158,7 @@ class Shape:
 
     def placed_parts(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> Parts:
         """The parts of the body at (x, y), turned by ``angle`` [rad]."""
-        if self.is_compound:
-            return moved_parts(self.parts, x, y, angle)
-        return (Part((self.placed_vertices(x, y, angle),), self.radius),)
+        return moved_parts(self.parts, x, y, angle)
 
     def outline(
         self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
@@ -167,23 +168,50 @@ class Shape:
         return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
 
 
-def swept_by(core: np.ndarray, radius: float) -> Swept:
-    """The Swept of core points (N, 2) and a radius [m]; ShapeError where they make no body."""
-    if len(core) > 1:
-        require_distinct(core)
-    if len(core) > 2:
-        require_simple(core)
-        if signed_area(core - core.mean(axis=0)) < 0.0:
-            # Counter-clockwise, the first one kept.
-            core = np.roll(core[::-1], 1, axis=0)
+def swept_parts(parts: Sequence[Part]) -> Swept:
+    """The Swept of some parts fixed to each other; ShapeError where they make no body."""
+    parts = tuple(checked_part(part) for part in parts)
+    if len(parts) > 1 and len(loose := loose_parts(parts, TOUCHING)):
+        raise ShapeError(
+            f"part {loose[0]} of {len(parts)} touches none of those that hang together with the "
+            "first: move it nearer"
+        )
+    points = parts[0].points if len(parts) == 1 else np.concatenate([p.points for p in parts])
     # A unit-sized copy keeps fourth powers of micrometres far from underflow.
-    extent = np.ptp(core, axis=0).max() + radius
-    unit = Part((core / extent,), radius / extent)
-    area, centroid, moment, stretch = all_moments((unit,))
+    extent = np.ptp(points, axis=0).max() + max(part.radius for part in parts)
+    unit = [Part(tuple(ring / extent for ring in p.rings), p.radius / extent) for p in parts]
+    area, centroid, moment, stretch = all_moments(unit)
     centroid = centroid * extent
-    vertices = read_only(core - centroid)
-    size = float(area * extent**2), float(moment * extent**4)
-    return Swept(vertices, centroid, *size, *stretched(stretch, moment))
+    around = tuple(
+        Part(tuple(read_only(ring - centroid) for ring in part.rings), part.radius)
+        for part in parts
+    )
+    return Swept(
+        read_only(points - centroid), centroid, float(area * extent**2),
+        float(moment * extent**4), *stretched(stretch, moment), around,
+    )  # fmt: skip
+
+
+def checked_part(part: Part) -> Part:
+    """A part with its outer ring counter-clockwise and its holes clockwise; ShapeError where it is
+    none."""
+    outer, *holes = part.rings
+    for ring in part.rings:
+        if len(ring) > 1:
+            require_distinct(ring)
+    if len(outer) < 3:
+        if holes:
+            raise ShapeError("a point or a segment has no holes")
+        return part
+    require_simple(outer, holes)
+    return Part((facing(outer, 1.0), *(facing(ring, -1.0) for ring in holes)), part.radius)
+
+
+def facing(ring: np.ndarray, sense: float) -> np.ndarray:
+    """The ring counter-clockwise (1) or clockwise (−1), the first point kept."""
+    if sense * signed_area(ring - ring.mean(axis=0)) > 0.0:
+        return ring
+    return np.roll(ring[::-1], 1, axis=0)
 
 
 def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:

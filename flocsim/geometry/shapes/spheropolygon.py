@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.composite import Composite, swept_parts
+from flocsim.geometry.shapes.composite import Composite
 from flocsim.geometry.shapes.parts import Part, scaled_parts
 from flocsim.geometry.shapes.shape import (
     Shape,
@@ -16,7 +16,7 @@ from flocsim.geometry.shapes.shape import (
     positive_radius,
     read_only,
     read_points,
-    swept_by,
+    swept_parts,
 )
 from flocsim.geometry.shapes.sphere import Sphere
 
@@ -54,15 +54,7 @@ class SpheroPolygon(Shape):
 
     def __attrs_post_init__(self):
         # What is wrong with a polygon is said when it is made, not when it is used.
-        if self.holes:
-            swept = swept_parts((Part((self.core, *self.holes), self.radius),))
-        else:
-            swept = swept_by(self.core, self.radius)
-        self.__dict__["swept"] = swept
-
-    @property
-    def is_compound(self) -> bool:
-        return bool(self.holes)
+        self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
 
 
 def scaled_outline(shape: Shape, factor: float) -> Shape:
