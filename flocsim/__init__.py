@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from flocsim.ensembles.swarms.comparison import SwarmComparison
     from flocsim.forces.base import Force
     from flocsim.geometry.shapes.composite import Composite
-    from flocsim.geometry.shapes.shape import Shape
-    from flocsim.geometry.shapes.sphere import Sphere
+    from flocsim.geometry.shapes.shape import Shape, Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
     from flocsim.integrators.base import Integrator, Status
     from flocsim.io.results.curvilinear import curvilinear_factor
@@ -41,7 +40,7 @@ HOMES = {
     "Force": "forces.base",
     "Integrator": "integrators.base",
     "Shape": "geometry.shapes.shape",
-    "Sphere": "geometry.shapes.sphere",
+    "Sphere": "geometry.shapes.shape",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
     "State": "trajectories.trajectory",
     "Status": "integrators.base",

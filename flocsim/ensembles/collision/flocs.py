@@ -17,10 +17,8 @@ from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config.schema import BAND, CUT, ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
-from flocsim.geometry.shapes.resize import resized
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.shape import Shape, Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.results.schema import BAND_ENDS
 

@@ -27,8 +27,7 @@ from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import point_columns
 from flocsim.geometry.contact.outlines import outlines_of
-from flocsim.geometry.shapes.resize import resized
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 

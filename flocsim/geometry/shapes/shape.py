@@ -1,19 +1,26 @@
-"""Shape: what every body outline has, core points swept by a disk, and what follows from them."""
+"""Shape: what every body outline has, core points swept by a disk, and what follows from them; and
+the plainest one, Sphere."""
 
 from collections.abc import Sequence
 from functools import cached_property
 from inspect import getattr_static
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.errors import RangeError, ShapeError
 from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.measures import ShapeMeasures, measures_of
 from flocsim.geometry.shapes.moments import all_moments
-from flocsim.geometry.shapes.outline import loose_parts, require_simple, swept_rings
+from flocsim.geometry.shapes.outline import (
+    ShapeMeasures,
+    loose_parts,
+    measures_of,
+    require_simple,
+    swept_rings,
+)
 from flocsim.geometry.shapes.parts import Part, Parts, is_compound, moved_parts
 
 ROUND = 1e-12
@@ -24,6 +31,54 @@ TOO_CLOSE = 1e-12
 
 TOUCHING = 1e-6
 """Parts nearer to each other than this share of the smaller radius are fixed to each other."""
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
+
+
+def positive_radius(radius: Any) -> float:
+    """``radius``, a number or a text such as "5 um", as a float; ShapeError unless it is finite
+    and above 0."""
+    if isinstance(radius, np.generic):
+        radius = radius.item()
+    try:
+        radius = in_unit(radius, "m", "the radius")
+    except RangeError as error:
+        raise ShapeError(str(error)) from None
+    if not is_number(radius) or radius <= 0.0:
+        raise ShapeError(f"the radius must be a finite number above 0 (metres), found {radius!r}")
+    return float(radius)
+
+
+def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
+    """``points`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
+    try:
+        array = np.array(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"{name} must be numbers of shape (N, 2): {error}") from None
+    if array.ndim != 2 or array.shape[1] != 2 or len(array) < fewest:
+        advice = "; for one point use Sphere" if fewest == 2 else ""
+        raise ShapeError(
+            f"{name} must have shape (N, 2) with N ≥ {fewest}, found {array.shape}{advice}"
+        )
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise ShapeError(f"vertex {row} is not finite: {tuple(array[row].tolist())}")
+    return array
+
+
+def require_distinct(vertices):
+    extent = np.ptp(vertices, axis=0).max()
+    steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
+    repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)
+    if len(repeated):
+        k = int(repeated[0])
+        raise ShapeError(
+            f"vertices {k} and {(k + 1) % len(vertices)} repeat the same point "
+            f"{tuple(vertices[k].tolist())}; leave one out"
+        )
 
 
 class Swept(NamedTuple):
@@ -168,6 +223,17 @@ class Shape:
         return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
 
 
+@attrs.frozen(eq=False)
+class Sphere(Shape):
+    """A disk of ``radius`` [m] in the plane of motion, one core point at its centre."""
+
+    radius: float = attrs.field(converter=positive_radius)
+
+    @property
+    def core(self) -> np.ndarray:
+        return np.zeros((1, 2))
+
+
 def swept_parts(parts: Sequence[Part]) -> Swept:
     """The Swept of some parts fixed to each other; ShapeError where they make no body."""
     parts = tuple(checked_part(part) for part in parts)
@@ -220,51 +286,3 @@ def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:
     if elongation <= ROUND:
         return 0.0, 0.0
     return elongation, 0.5 * float(np.arctan2(stretch[1], stretch[0]))
-
-
-def read_only(array: np.ndarray) -> np.ndarray:
-    array.flags.writeable = False
-    return array
-
-
-def positive_radius(radius: Any) -> float:
-    """``radius``, a number or a text such as "5 um", as a float; ShapeError unless it is finite
-    and above 0."""
-    if isinstance(radius, np.generic):
-        radius = radius.item()
-    try:
-        radius = in_unit(radius, "m", "the radius")
-    except RangeError as error:
-        raise ShapeError(str(error)) from None
-    if not is_number(radius) or radius <= 0.0:
-        raise ShapeError(f"the radius must be a finite number above 0 (metres), found {radius!r}")
-    return float(radius)
-
-
-def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
-    """``points`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
-    try:
-        array = np.array(points, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ShapeError(f"{name} must be numbers of shape (N, 2): {error}") from None
-    if array.ndim != 2 or array.shape[1] != 2 or len(array) < fewest:
-        advice = "; for one point use Sphere" if fewest == 2 else ""
-        raise ShapeError(
-            f"{name} must have shape (N, 2) with N ≥ {fewest}, found {array.shape}{advice}"
-        )
-    if not np.isfinite(array).all():
-        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-        raise ShapeError(f"vertex {row} is not finite: {tuple(array[row].tolist())}")
-    return array
-
-
-def require_distinct(vertices):
-    extent = np.ptp(vertices, axis=0).max()
-    steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
-    repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)
-    if len(repeated):
-        k = int(repeated[0])
-        raise ShapeError(
-            f"vertices {k} and {(k + 1) % len(vertices)} repeat the same point "
-            f"{tuple(vertices[k].tolist())}; leave one out"
-        )

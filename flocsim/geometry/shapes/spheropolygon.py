@@ -1,5 +1,5 @@
 """SpheroPolygon: a simple polygon, with or without holes, swept by a disk (paper section 2.2,
-eq. 1)."""
+eq. 1); a wall, which is a segment; and any outline in another size, or of a wanted spheroradius."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,16 +9,24 @@ from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.composite import Composite
+from flocsim.geometry.shapes.moments import area_and_growth
 from flocsim.geometry.shapes.parts import Part, scaled_parts
 from flocsim.geometry.shapes.shape import (
     Shape,
+    Sphere,
     Swept,
     positive_radius,
     read_only,
     read_points,
     swept_parts,
 )
-from flocsim.geometry.shapes.sphere import Sphere
+
+SETTLED = 1e-4
+"""Relative error of the area from which one more step of the model below leaves less than 1e-9."""
+
+FLATNESS = 1e6
+"""A wall counts as a sphere of so many times its length in forces between surfaces: a reduced
+radius is then that of what comes near, to a millionth."""
 
 
 def read_vertices(vertices: ArrayLike) -> np.ndarray:
@@ -57,6 +65,19 @@ class SpheroPolygon(Shape):
         self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
 
 
+@attrs.frozen(eq=False, slots=False)
+class WallShape(Shape):
+    """A segment between two points swept by a disk: half of the ``radius`` [m] is its thickness."""
+
+    core: np.ndarray = attrs.field(converter=read_vertices, alias="vertices")
+    radius: float = attrs.field(converter=positive_radius)
+
+    @property
+    def equivalent_radius(self) -> float:
+        """What forces between surfaces take for its radius [m]: flat."""
+        return FLATNESS * float(np.hypot(*(self.vertices[1] - self.vertices[0])))
+
+
 def scaled_outline(shape: Shape, factor: float) -> Shape:
     """A Sphere, SpheroPolygon or Composite ``factor`` times as large; ShapeError unless finite,
     above 0."""
@@ -91,3 +112,51 @@ def shape_of_parts(parts: Sequence[Part]) -> Shape:
     if len(outer) == 1:
         return Sphere(radius)
     return SpheroPolygon(outer, radius, holes=holes)
+
+
+def parts_factor(parts: Sequence[Part], area: float) -> float:
+    """The factor by which cores of one radius must be scaled for the swept outline to have an area;
+    the radius stays what it is.
+
+    While the outline keeps its form, the area is disc + b·factor + c·factor², of which each trial
+    gives b and c: scaled as a whole, radius and all, the area goes with the square, and with the
+    radius alone it grows by the length of the outline.
+    """
+    [radius] = {part.radius for part in parts}
+    room = area - np.pi * radius**2
+
+    factor = 1.0
+    for _ in range(60):
+        found, growth = area_and_growth(scaled_parts(parts, factor, 1.0))
+        slope = (2.0 * found - radius * growth) / factor
+        above = found - area + room
+        c = (slope * factor - above) / factor**2
+        b = slope - 2.0 * c * factor
+        root = b * b + 4.0 * c * room
+        step = 2.0 * room / (b + np.sqrt(root)) if root > 0.0 else 0.0
+        # Far from the model's reach the area still goes roughly with the square.
+        factor = step if 0.2 * factor < step < 5.0 * factor else factor * np.sqrt(area / found)
+        if abs(found - area) <= SETTLED * area:
+            break
+    return factor
+
+
+def resized(shape: Shape, equivalent_radius: float, radius: float) -> Shape:
+    """The shape's core scaled so that, swept by ``radius`` [m], r_eq is exact [m]; a
+    Composite, whose parts would come apart, is scaled as a whole, its radii with it.
+
+    Raises ShapeError where the disk alone is already as large as the wanted body.
+    """
+    if len(shape.parts) > 1:
+        return shape.scaled(equivalent_radius / shape.equivalent_radius)
+    if radius >= equivalent_radius:
+        raise ShapeError(
+            f"a spheroradius of {radius:g} m leaves no room for a core in a body of "
+            f"r_eq = {equivalent_radius:g} m: choose a smaller spheroradius"
+        )
+    # Solved in units of the wanted body, far from underflow.
+    extent = shape.equivalent_radius
+    unit = Part(tuple(ring / extent for ring in shape.parts[0].rings), radius / equivalent_radius)
+    factor = parts_factor([unit], np.pi) * equivalent_radius
+    sized = shape_of_parts([Part(tuple(ring * factor for ring in unit.rings), radius)])
+    return sized.scaled(equivalent_radius / sized.equivalent_radius)
