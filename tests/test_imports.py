@@ -56,7 +56,7 @@ INNER_ROWS = {
         ["arrays", "methods"],
     ],
     "brownian": [["meeting"], ["splitting"]],
-    "hydrodynamics": [["encounters", "pair_table", "prism"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
