@@ -8,11 +8,12 @@ one by the smaller spheroradius against it.
 
 Of a hook the contacts carry the load, whatever attraction there is: statics without tension. Every
 closed contact gives body j a force N n + T t, N ≥ 0, |T| ≤ µ N, along its normal n and tangent t,
-and its moment. The load hangs from them where such forces balance it. That is so for all loads that the doublet meets, or there is a motion of j against i
-that no contact forbids and along which a load does work (Farkas' lemma); a motion is forbidden where a
-contact's force could only ever do negative work along it. In the plane a motion (v_x, v_y, ω) has
-three numbers, and those to look at are the edges of what is allowed: each is across two of the
-contacts' forces, so that two loops over these find them.
+and its moment. The load hangs from them where such forces balance it. That is so for all loads that
+the doublet meets, or there is a motion of j against i that no contact forbids and along which a
+load does work (Farkas' lemma); a motion is forbidden where a contact's force could only ever do
+negative work along it. In the plane a motion (v_x, v_y, ω) has three numbers, and those to look at
+are the edges of what is allowed: each is across two of the contacts' forces, so that two loops over
+these find them.
 
 A load is a force f on j and its reverse on i. Of a free doublet that settles askew, and turns, it
 acts along f somewhere between the two centroids, and less of it across their line, as drag takes up
