@@ -12,7 +12,6 @@ from typing import Any
 from flocsim.compiler import waiting
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
-    SerialCommunicator,
     StopRequested,
     find_communicator,
     launched_rank,
@@ -274,7 +273,7 @@ def on_process(comm, arguments):
 def run_command(arguments: argparse.Namespace) -> int:
     if arguments.parent is not None:
         end_with_parent(arguments.parent)
-    comm: Communicator = SerialCommunicator()
+    comm: Communicator = Communicator()
     try:
         comm = find_communicator()
         wrong = what_is_wrong(arguments, comm)

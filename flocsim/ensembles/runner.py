@@ -21,18 +21,17 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.estimates.stop_rule import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
-    SerialCommunicator,
     StopRequested,
 )
-from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
-from flocsim.ensembles.parallel.messages import ExitCode, Plan
+from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
+from flocsim.ensembles.parallel.messages import ExitCode
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
-from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.pilot.choice import (
     Choice,
     choose,
@@ -41,12 +40,11 @@ from flocsim.ensembles.pilot.choice import (
 )
 from flocsim.ensembles.pilot.trials import Job, try_out
 from flocsim.ensembles.preflight import said_doubts
-from flocsim.ensembles.storage import first_rows
-from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, short
 from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.storage.stored_json import distinct, mixture_warnings
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
@@ -86,7 +84,7 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     ``comm`` has the ranks of the job (default: this process alone). The arrays of the results are
     the same whatever the number of ranks.
     """
-    comm = comm or SerialCommunicator()
+    comm = comm or Communicator()
     try:
         joint = join(config, comm)
         if comm.rank > 0:
@@ -246,11 +244,11 @@ def hear(comm: Communicator, value: Any) -> Any:
 
 def follow(study: StudyKind, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
-    plan = hear(comm, None)
-    if plan.remaining:
+    remaining, key = hear(comm, None)
+    if remaining:
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
-    run_chunks(study, RemoteCoordinator(comm), plan.key)
+    run_chunks(study, RemoteCoordinator(comm), key)
     code = assist(study, comm).code
     if code not in (0, STOPPED):
         raise RankZeroFailed(code)
@@ -273,11 +271,11 @@ def lead(
     progress.say(announcement(study, comm.size, study.size - remaining))
     if study.remark:
         progress.say(study.remark)
-    comm.broadcast(Plan(remaining, key))
+    comm.broadcast((remaining, key))
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
-        compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
+        compile_in_turn(study, comm, agreement.stored_rows(study, start.store))
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):
@@ -322,10 +320,12 @@ def compile_in_turn(study, comm, stored=()):
     in_copies([partial(study.compile, [kind]) for kind in study.uncompiled(own)])
     study.compile(own)
     comm.barrier()
-    rows = first_rows.packed(study, study.compile(study.kinds))
+    rows = agreement.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))
     with sharing_errors(comm):
-        if told and (line := first_rows.difference(study, *zip(*told, strict=True), dict(stored))):
+        if told and (
+            line := agreement.row_difference(study, *zip(*told, strict=True), dict(stored))
+        ):
             raise UsageError(line)
     if isinstance(go_on := comm.broadcast(None), ExitCode):
         raise RankZeroFailed(go_on.code)

@@ -42,7 +42,8 @@ class StopRequested(FlocsimError):
 
 
 class Communicator:
-    """Messages between rank 0 and the others, and what can be made of them.
+    """Messages between rank 0 and the others, and what can be made of them; by itself one process
+    alone, what a job without a launcher runs on.
 
     A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
     job, and ``arrived()``, which yields (source, message) of all that has come in; ``beat(sign)``
@@ -53,8 +54,8 @@ class Communicator:
     library is for, which may not return, and ``calls`` how many there were.
     """
 
-    rank: int
-    size: int
+    rank = 0
+    size = 1
     threads = True
     concurrent = True
     ends_all = True
@@ -66,13 +67,13 @@ class Communicator:
         self.heartbeat: Heartbeat | None = None
 
     def send(self, to: int, message: Any) -> None:
-        raise NotImplementedError
+        """There is nobody."""
 
     def arrived(self) -> Iterable[tuple[int, Any]]:
-        raise NotImplementedError
+        return ()
 
     def abort(self, code: int) -> None:
-        raise NotImplementedError
+        sys.exit(code)
 
     def beat(self, sign: bytes) -> None:
         """Give a sign of life to rank 0, or from there to all others."""
@@ -136,34 +137,12 @@ class Communicator:
             self.send(rank, value)
         return value
 
-    def all_gather(self, value: Any) -> list:
-        """The values of all ranks, on all ranks."""
-        return self.broadcast(self.gather(value))
-
     def barrier(self) -> None:
-        self.all_gather(None)
+        self.broadcast(self.gather(None))
 
     def close(self) -> None:
         """The work is done: let the others go."""
         self.unwatch()
-
-
-class SerialCommunicator(Communicator):
-    """One process: what a job without a launcher runs on."""
-
-    rank = 0
-    size = 1
-
-    def send(self, to: int, message: Any) -> None:
-        """There is nobody."""
-
-    def arrived(self) -> tuple:
-        return ()
-
-    def abort(self, code: int) -> None:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        sys.exit(code)
 
 
 def launched_size() -> int | None:
@@ -184,10 +163,7 @@ def find_communicator() -> Communicator:
     """The ranks of this job: MPI only where a launcher started more than one."""
     try:
         size = launched_size()
-        if size in (0, 1):
-            return SerialCommunicator()
-
-        return MpiCommunicator(size)
+        return Communicator() if size in (0, 1) else MpiCommunicator(size)
     finally:
         INTERRUPTION.held = False
 

@@ -2,24 +2,17 @@
 
 rank 0 → another rank         the flocs and the Facts of its study (or ExitCode, wherever it fails)
 every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
-rank 0 → another rank         Plan, once (or ExitCode, where the study cannot begin)
-                              Assignment or Dismissal, in answer to a Request
-every other rank → rank 0     Kept and Going, while it works, where replicates take long
+rank 0 → another rank         how many replicates are to be run, and the key of the study's identity
+                              for their records, once (or ExitCode, where the study cannot begin)
+                              a Chunk in answer to a Request, None where there is no more
                               Halt, while it works, when its chunk is of no use any more
-                              ExitCode, after its Dismissal, when all is written
+                              ExitCode, after the last answer, when all is written
+every other rank → rank 0     Kept and Going, while it works, where replicates take long
 """
 
 import attrs
 
 from flocsim.ensembles.chunks import Chunk
-
-
-@attrs.frozen
-class Plan:
-    """How many replicates are to be run, and the key of the study's identity for their records."""
-
-    remaining: int
-    key: str
 
 
 @attrs.frozen
@@ -68,18 +61,8 @@ class Request:
 
 
 @attrs.frozen
-class Assignment:
-    chunk: Chunk
-
-
-@attrs.frozen
 class Halt:
     """Give up the replicate at hand, and hand in what is finished."""
-
-
-@attrs.frozen
-class Dismissal:
-    """There is nothing more to run."""
 
 
 @attrs.frozen

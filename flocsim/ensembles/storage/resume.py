@@ -26,10 +26,9 @@ from flocsim.ensembles.chunks import (
     rows_of,
 )
 from flocsim.ensembles.kind import StudyKind
-from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
-from flocsim.ensembles.storage.stored_json import is_session, stored
+from flocsim.ensembles.storage.stored_json import distinct, is_session, stored
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path

@@ -8,7 +8,7 @@ import pytest
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.statistics import CODES, count, tabulate
 from flocsim.ensembles.estimates.stop_rule import StopRule, borders
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.io.results.file import read_results
@@ -52,14 +52,14 @@ def test_it_is_the_beginning_of_the_study_without_a_rule(tmp_path):
 
 def test_the_study_goes_on_where_the_rule_is_made_stricter(tmp_path):
     config = small_config(tmp_path, SPHERES | {"stop": RULE})
-    run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", NEW)
+    run_to_file(config, Communicator(), tmp_path / "r.h5", NEW)
     first = read_results(tmp_path / "r.h5").count
     stricter = small_config(tmp_path, SPHERES | {"stop": RULE | {"half_width": 0.05}})
-    ended = run_to_file(stricter, SerialCommunicator(), tmp_path / "r.h5", RESUME)
+    ended = run_to_file(stricter, Communicator(), tmp_path / "r.h5", RESUME)
     second = read_results(tmp_path / "r.h5").count
     assert second > first
     assert ended.computed >= 4 * (second - first)
-    run_to_file(stricter, SerialCommunicator(), tmp_path / "fresh.h5", NEW)
+    run_to_file(stricter, Communicator(), tmp_path / "fresh.h5", NEW)
     assert same_data(tmp_path / "r.h5", tmp_path / "fresh.h5") == []
 
 
