@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES

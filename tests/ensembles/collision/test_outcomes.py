@@ -12,9 +12,8 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.bonds.bond import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.encounter import make_encounter
-from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
     CLEARANCE,
