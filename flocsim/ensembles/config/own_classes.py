@@ -17,8 +17,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.config.problems import misfit
 from flocsim.ensembles.config.sources import Neighbours, Sources, place
+from flocsim.ensembles.config.values import misfit
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, PairForce

@@ -81,6 +81,10 @@ class Composite(Shape):
         return made
 
     @property
+    def parts(self) -> Parts:
+        return self.swept.parts
+
+    @property
     def core(self) -> np.ndarray:
         return np.concatenate([part.points for part in self.given])
 

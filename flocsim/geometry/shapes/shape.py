@@ -153,7 +153,7 @@ class Shape:
     @property
     def parts(self) -> Parts:
         """The parts, each of one or more rings, around the centroid of the whole."""
-        return self.swept.parts
+        return (Part((self.vertices,), self.radius),)
 
     @property
     def is_compound(self) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.composite import Composite
 from flocsim.geometry.shapes.moments import area_and_growth
-from flocsim.geometry.shapes.parts import Part, scaled_parts
+from flocsim.geometry.shapes.parts import Part, Parts, scaled_parts
 from flocsim.geometry.shapes.shape import (
     Shape,
     Sphere,
@@ -63,6 +63,10 @@ class SpheroPolygon(Shape):
     def __attrs_post_init__(self):
         # What is wrong with a polygon is said when it is made, not when it is used.
         self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
+
+    @property
+    def parts(self) -> Parts:
+        return self.swept.parts
 
 
 @attrs.frozen(eq=False, slots=False)
