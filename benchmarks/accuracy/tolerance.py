@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.outcome_changes import OutcomeChanges, changes_between
+from flocsim.ensembles.estimates.numerical import OutcomeChanges, changes_between
 from flocsim.ensembles.runner import run
 from flocsim.errors import UsageError
 from flocsim.io.results.schema import Results

@@ -9,7 +9,7 @@ from output import save_all, write_page, write_table
 from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.estimates.outcome_changes import second_run_changes
+from flocsim.ensembles.estimates.numerical import second_run_changes
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import CLASSES, read_results

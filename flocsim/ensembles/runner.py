@@ -19,7 +19,7 @@ from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
-from flocsim.ensembles.estimates.stop_rule import borders
+from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import Facts, disagreement

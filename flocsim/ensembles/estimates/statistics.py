@@ -3,16 +3,21 @@
 Of single conditions, and pooled over all displacements. There a replicate has the same orientations
 at every displacement, so that its collisions are not independent: the interval is Wilson's at the
 number of independent events which the spread between replicates shows (a ratio of cluster totals;
-W. G. Cochran, Sampling Techniques, 1977, ch. 6).
+W. G. Cochran, Sampling Techniques, 1977, ch. 6). And the rule that ends a study early, once these
+are narrow enough, where the config asks for one.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
+import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.ensembles.estimates.paired import sums_of_scrambles
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import UsageError
 from flocsim.io.confidence import (
     bounded_sums,
@@ -209,3 +214,48 @@ def scrambled_probabilities(
         if pooled:
             table[f"n_effective_{name}"] = effective
     return table
+
+
+GROWTH = 1.25
+"""Each look is at so many times the replicates of the one before."""
+
+
+def borders(stop: StopConfig, replicates: int) -> list[int]:
+    """The numbers of replicates at which the rule looks; the last is ``replicates``."""
+    looks = []
+    look = stop.least
+    while stop.half_width is not None and look < replicates:
+        looks.append(look)
+        look = math.ceil(GROWTH * look)
+    return [*looks, replicates]
+
+
+@attrs.define
+class StopRule:
+    """Whether the first so many replicates of every condition are enough. Counts as it goes."""
+
+    stop: StopConfig
+    store: RowStore
+    seen: int = 0
+    counts: list[dict[str, np.ndarray]] = attrs.Factory(list)
+
+    def __call__(self, replicates: int) -> bool:
+        """Whether the study may end with this many, all of which exist."""
+        for place in range(len(self.store.conditions)):
+            codes = (self.store.read(place, name, self.seen, replicates) for name in CODES)
+            more = count(*codes)
+            if place == len(self.counts):
+                self.counts.append(more)
+            else:
+                before = self.counts[place]
+                self.counts[place] = {name: more[name] + before[name] for name in more}
+        self.seen = replicates
+        if self.stop.half_width is None:
+            return False
+        return all(self.is_narrow(counts) for counts in self.counts)
+
+    def is_narrow(self, counts: dict[str, np.ndarray]) -> bool:
+        """Whether the intervals of a condition are narrow enough."""
+        table = probabilities(counts)
+        widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]
+        return not np.any(0.5 * np.array(widths) > self.stop.half_width)

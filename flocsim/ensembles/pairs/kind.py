@@ -19,8 +19,7 @@ from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
-from flocsim.ensembles.estimates.statistics import COUNTED
-from flocsim.ensembles.estimates.stop_rule import StopRule
+from flocsim.ensembles.estimates.statistics import COUNTED, StopRule
 from flocsim.ensembles.estimates.summary import (
     BLOCK_ROWS,
     JOINT,
