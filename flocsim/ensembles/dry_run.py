@@ -8,7 +8,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
 from flocsim.ensembles.collision.flocs import read_flocs
-from flocsim.ensembles.collision.pairings import class_facts
+from flocsim.ensembles.collision.pairings import class_facts, pairings_of
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, Config
 from flocsim.ensembles.equivalent_spheres import sphere_facts
@@ -28,7 +28,6 @@ from flocsim.ensembles.preflight import (
     IMPLIED,
     kinds,
     measured_flocs,
-    pairings,
     paper_weight,
     placed_system,
     said_doubts,
@@ -57,7 +56,7 @@ MOST_CHOOSING = 60.0
 def condition_lines(config, flocs):
     """A line for every collision type: sizes, zone, settling of the equivalent spheres."""
     facts = settling_facts(config, flocs)
-    found = pairings(config, flocs)
+    found = pairings_of(config, flocs)
     if classes := class_words(class_facts(found)):
         yield f"  {classes}"
     spans = {each.name: each.spans for each in found}

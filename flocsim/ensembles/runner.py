@@ -132,7 +132,7 @@ def run_to_file(
         for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
         ended = lead(study, start, comm, progress, output)
-        if ended.code == 0 and start.has_more(ended.count):
+        if ended.code == 0 and (start.unasked or start.farthest > ended.count):
             progress.warn(
                 f"{journal.path} has more rows than were asked for, and is kept: --resume uses "
                 "them when more are asked for"

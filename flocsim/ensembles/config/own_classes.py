@@ -155,7 +155,11 @@ def load_module(name, folder, sources):
             module = run_file(name, path, sources.module(path, folder))
         else:
             module = importlib.import_module(name)
-            note_installed(module, folder, sources)
+            # The source of what lies elsewhere is known by its name.
+            source = getattr(module, "__file__", None) or ""
+            if source.endswith(".py") and place(source, folder) not in sources.modules:
+                with contextlib.suppress(OSError):
+                    sources.modules[module.__name__] = Path(source).read_bytes()
         if module is not before:
             # Neighbours that an older one had imported are not run again.
             READ[name] = (READ.get(name, {}) if before else {}) | sources.modules
@@ -172,14 +176,6 @@ def load_module(name, folder, sources):
 
 READ: dict[str, dict[str, bytes]] = {}
 """Module of the user's own → what it and its neighbours were when they were run."""
-
-
-def note_installed(module, folder, sources):
-    """Put the source of a module that lies elsewhere into ``sources``, by its name."""
-    path = getattr(module, "__file__", None)
-    if path and path.endswith(".py") and place(path, folder) not in sources.modules:
-        with contextlib.suppress(OSError):
-            sources.modules[module.__name__] = Path(path).read_bytes()
 
 
 def run_file(name, path, source):

@@ -160,13 +160,6 @@ def counted(codes: Codes) -> dict[str, Events]:
     return told | {"alpha": Events(touched.least & stays.known, stays.least, ~stays.known)}
 
 
-def student(scrambles: int) -> float:
-    """Half the width of a 95 % interval over the standard error of so many means."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(scrambles - 1, 0.975))
-
-
 def half_width(values: np.ndarray, point: float) -> float:
     """Of the 95 % interval of the mean of what scrambles gave (S,), to which one point of a
     scramble adds ``point``.
@@ -174,8 +167,10 @@ def half_width(values: np.ndarray, point: float) -> float:
     Even points in a simple set are as many in every scramble, up to one: their scatter is taken for
     half a point at least.
     """
+    from scipy.special import stdtrit
+
     scatter = max(float(values.std(ddof=1)), 0.5 * point)
-    return student(len(values)) * scatter / math.sqrt(len(values))
+    return float(stdtrit(len(values) - 1, 0.975)) * scatter / math.sqrt(len(values))
 
 
 def mean_of(

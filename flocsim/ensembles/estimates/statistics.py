@@ -254,7 +254,7 @@ class StopRule:
             return False
         return all(self.is_narrow(counts) for counts in self.counts)
 
-    def is_narrow(self, counts: dict[str, np.ndarray]) -> bool:
+    def is_narrow(self, counts):
         """Whether the intervals of a condition are narrow enough."""
         table = probabilities(counts)
         widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]

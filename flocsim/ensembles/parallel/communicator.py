@@ -189,20 +189,15 @@ def load_mpi() -> Any:
     with open(os.devnull, "w") as nowhere:
         faulthandler.dump_traceback_later(JOINING, exit=True, file=nowhere)
         try:
-            return imported_mpi()
+            from mpi4py import MPI
+        except (ImportError, RuntimeError) as error:
+            raise UsageError(
+                f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
+                "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
+                "the launcher"
+            ) from None
         finally:
             faulthandler.cancel_dump_traceback_later()
-
-
-def imported_mpi():
-    try:
-        from mpi4py import MPI
-    except (ImportError, RuntimeError) as error:
-        raise UsageError(
-            f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
-            "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
-            "the launcher"
-        ) from None
     return MPI
 
 

@@ -212,37 +212,28 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 
 
 def kernel_facts(study):
-    """Fingerprints of the compiled code for spheres and for polygons, by every method."""
-    config = study.config
+    """Fingerprints of the compiled code for spheres and for polygons, by every method, of what
+    the types compile that meet alike."""
+    config, facts = study.config, {}
     meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
     pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
-    return {
-        name: fact
-        for place in sorted(meetings.values())
-        for name, fact in facts_of_code(study, pairs[place]).items()
-    }
-
-
-def facts_of_code(study, pair):
-    """The same for what the types compile that meet as this pair of spheres does."""
-    config, facts = study.config, {}
     methods = {type(each): each for each in study.methods.values()}.values()
-    wanted = [*kinds(config, pair.shapes)]
     several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
-    wanted += [(each, each) for each in several[:1]]
-    for shapes, method in product(wanted, methods):
-        system = placed_system(config, attrs.evolve(pair.system, integrator=method), shapes)
-        name = system.family
-        if config.integrator.is_chosen:
-            name += f" by {type(method).__name__}"
-        if pair.meeting != SETTLING:
-            name += f" in {pair.meeting}"
-        laws = sorted(system.pieces.laws.items())
-        codes = [fingerprint(advance, system.fillings(pair.observer))]
-        codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
-        facts[f"kernels.{name}"] = hashlib.blake2b(
-            "\n".join(codes).encode(), digest_size=12
-        ).hexdigest()
+    for pair in (pairs[place] for place in sorted(meetings.values())):
+        wanted = [*kinds(config, pair.shapes), *((each, each) for each in several[:1])]
+        for shapes, method in product(wanted, methods):
+            system = placed_system(config, pair.system.changed(integrator=method), shapes)
+            name = system.family
+            if config.integrator.is_chosen:
+                name += f" by {type(method).__name__}"
+            if pair.meeting != SETTLING:
+                name += f" in {pair.meeting}"
+            laws = sorted(system.pieces.laws.items())
+            codes = [fingerprint(advance, system.fillings(pair.observer))]
+            codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
+            facts[f"kernels.{name}"] = hashlib.blake2b(
+                "\n".join(codes).encode(), digest_size=12
+            ).hexdigest()
     return facts
 
 
