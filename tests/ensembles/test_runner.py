@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS
 from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.schedule import Phase
@@ -16,6 +16,7 @@ from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results
 from tests.helpers.small_study import small_study
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 

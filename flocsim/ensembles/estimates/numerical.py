@@ -16,12 +16,11 @@ first part less what may be lost to the first part and what may be gained.
 
 from collections.abc import Callable, Mapping, Sequence
 
-import attrs
 import numpy as np
 
 from flocsim.io.confidence import FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import WITHOUT_OUTCOME, Events, events, events_of, kinds_of
-from flocsim.io.results.schema import CLASSES, NOT_APPLICABLE, PROBABILITIES, Results, last_axis
+from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES, last_axis
 
 EACH_SIDE = 0.975
 """Probability of each end of an interval."""
@@ -250,34 +249,3 @@ def change_columns(
         f"{name}_change{end}": intervals[name][side]
         for name in PROBABILITIES for side, end in enumerate(("_low", "_high"))
     }  # fmt: skip
-
-
-@attrs.frozen(eq=False)
-class OutcomeChanges:
-    """Which replicates change: flags (type, vertices, delta, replicate).
-
-    ``checked``: those that were run twice; ``both``: decided collisions in both runs;
-    ``aggregation`` and ``zone``: those of them that change between aggregated and departed, inside
-    and outside; ``outcome``: any change of outcome, also to missed or undecided, among ``checked``.
-    """
-
-    checked: np.ndarray
-    both: np.ndarray
-    aggregation: np.ndarray
-    zone: np.ndarray
-    outcome: np.ndarray
-
-
-def changes_between(a: np.ndarray, b: np.ndarray) -> OutcomeChanges:
-    """The OutcomeChanges of outcome codes; NOT_APPLICABLE in ``b``: was not run again."""
-    both = (a < len(CLASSES)) & (b < len(CLASSES))
-    checked = b != NOT_APPLICABLE
-    return OutcomeChanges(
-        checked, both, both & (a % 2 != b % 2), both & (a // 2 != b // 2), checked & (a != b)
-    )
-
-
-def second_run_changes(results: Results) -> OutcomeChanges:
-    """The OutcomeChanges of a study's second runs; its table of replicates must be there."""
-    assert results.replicates is not None, "the table of replicates was not read into memory"
-    return changes_between(results.replicates["outcome"], results.replicates["checked_outcome"])

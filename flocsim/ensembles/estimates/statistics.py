@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.ensembles.config.schema import StopConfig
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
 from flocsim.ensembles.estimates.paired import sums_of_scrambles
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import UsageError
@@ -24,7 +23,6 @@ from flocsim.io.confidence import (
     clustered_proportion,
     proportion,
     scrambled_proportion,
-    wilson,
 )
 from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import (
@@ -41,8 +39,6 @@ from flocsim.io.results.events import (
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
 from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES, last_axis
 
-__all__ = ["probabilities", "tabulate", "wilson"]
-
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
 
@@ -58,34 +54,6 @@ EXACT_RUNS = COUNTED[: 3 * len(CODES)]
 def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:
     """CODES of each run, from columns in the order of COUNTED, all of them or the first ones."""
     return [columns[k : k + len(CODES)] for k in range(0, len(columns), len(CODES))]
-
-
-def tabulate(
-    outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike,
-    checked_outcome: ArrayLike = NOT_APPLICABLE, checked_inside: ArrayLike = NOT_APPLICABLE,
-    checked_bond: ArrayLike = NOT_APPLICABLE, third_outcome: ArrayLike = NOT_APPLICABLE,
-    third_inside: ArrayLike = NOT_APPLICABLE, third_bond: ArrayLike = NOT_APPLICABLE,
-) -> dict[str, np.ndarray]:  # fmt: skip
-    """Counts and probabilities of every condition, over the last axis of the arrays.
-
-    ``outcome``, ``inside``, ``bond``: codes as in the results file, (…, replicate), in practice
-    (type, vertices, delta, replicate). Returns a dict of arrays (…), (…, 4) for the classes A–D and
-    (…, 3) for the kinds of bond: the counts ``n_*`` (see `count`, `count_changes`), the
-    probabilities of `probabilities` and their `numerical_errors`. ``checked_…``, ``third_…``:
-    those of second and third runs, none by default. Raises UsageError for unknown codes, and where
-    they contradict each other.
-    """
-    first = checked_codes(outcome, inside, bond)
-    again, third = (
-        tuple(np.broadcast_to(np.asarray(codes), first[0].shape) for codes in run)
-        for run in (
-            (checked_outcome, checked_inside, checked_bond),
-            (third_outcome, third_inside, third_bond),
-        )
-    )
-    sums = count(*first) | count_changes(first, again, third)
-    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
-    return counts | probabilities(counts) | numerical_errors(sums)
 
 
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:

@@ -106,11 +106,6 @@ def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.n
     return np.stack([x - share * ax, y - share * ay], axis=-1)
 
 
-def distance_to_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    away = from_edges(points, starts, ends)
-    return np.hypot(away[..., 0], away[..., 1])
-
-
 def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Which of the points (k, 2) lie inside the core polygon (crossing number)."""
     if len(vertices) < 3:

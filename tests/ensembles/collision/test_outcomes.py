@@ -25,7 +25,6 @@ from flocsim.ensembles.collision.outcomes import (
     watch_pair,
 )
 from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
@@ -34,6 +33,7 @@ from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.small_study import small_config, small_study
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 

@@ -6,15 +6,15 @@ import pytest
 from scipy.stats import nbinom, poisson
 
 from benchmarks.accuracy.tolerance import outcome_changes, percent_changed
+from examples.tang2014.changes import second_run_changes
 from flocsim.ensembles.estimates.numerical import (
     change_intervals,
     count_changes,
     further_of_kinds,
     numerical_errors,
     over_displacements,
-    second_run_changes,
 )
-from flocsim.ensembles.estimates.statistics import COUNTED, EXACT_RUNS, by_runs, count, tabulate
+from flocsim.ensembles.estimates.statistics import COUNTED, EXACT_RUNS, by_runs, count
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
 from flocsim.errors import UsageError
 from flocsim.io.confidence import MEANS, SHAPES, FurtherFlips, flips_together, further_flips
@@ -27,6 +27,7 @@ from tests.helpers.synthetic_results import (
     draw_second_runs,
     make_results,
 )
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 NOT = 255

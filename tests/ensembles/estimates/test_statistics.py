@@ -13,15 +13,13 @@ from flocsim.ensembles.estimates.statistics import (
     borders,
     count,
     probabilities,
-    tabulate,
-    wilson,
 )
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.report import format_table
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.errors import UsageError
-from flocsim.io.confidence import bounds_quantile, proportion
+from flocsim.io.confidence import bounds_quantile, proportion, wilson
 from flocsim.io.results.events import events, events_of
 from flocsim.io.results.file import NOT_APPLICABLE, read_results
 from flocsim.io.results.schema import PROBABILITIES
@@ -29,6 +27,7 @@ from tests.helpers.results_files import same_data
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config
 from tests.helpers.synthetic_results import bonds_of, draw_codes, make_results
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 Z = 1.959963984540054
