@@ -26,10 +26,10 @@ from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
+    ExitCode,
     StopRequested,
 )
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
-from flocsim.ensembles.parallel.messages import ExitCode
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.pilot.choice import (

@@ -20,8 +20,7 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
-from flocsim.ensembles.parallel.messages import ExitCode
+from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage.row_store import (
     OldColumns,
     ReadOnlyJournal,

@@ -14,9 +14,10 @@ import numpy as np
 
 from flocsim.ensembles.chunks import Chunk, chunk_record, kept_record
 from flocsim.ensembles.kind import StudyKind
-from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
-from flocsim.ensembles.parallel.messages import (
+from flocsim.ensembles.parallel.communicator import (
+    SLEEP,
     ChunkResult,
+    Communicator,
     Going,
     Halt,
     Kept,

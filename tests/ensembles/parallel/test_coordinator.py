@@ -4,9 +4,8 @@ import pytest
 
 from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.parallel import communicator
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
+from flocsim.ensembles.parallel.communicator import Communicator, Halt, Request, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
-from flocsim.ensembles.parallel.messages import Halt, Request
 from flocsim.ensembles.parallel.schedule import TooManyFailures
 from tests.helpers.study_state import make_state, result_of
 
