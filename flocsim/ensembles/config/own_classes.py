@@ -60,7 +60,7 @@ def full_name(own: object) -> str:
     return f"{type(own).__module__}:{type(own).__qualname__}"
 
 
-def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None = None) -> type:
+def load_class(name: object, folder: Path, kind: Kind, sources: Sources) -> type:
     """The class ``name`` = "module:Class" of a Kind; the module lies in ``folder`` or is installed.
 
     ``sources``: what of it has been read already, by rank 0 of a job. Misfit for a name of another
@@ -72,7 +72,6 @@ def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None =
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise misfit(f"'module:Class' such as {kind.example!r}", name)
-    sources = sources or Sources()
     if sources.consent is not None and not sources.has(folder / f"{module_name}.py", folder):
         sources.consent.check_module(module_name, class_name, folder)
     module = load_module(module_name, folder, sources)

@@ -427,7 +427,12 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         radii = np.array(scene.sizes)
     numerical = numerical_parts(found, shape)
     arrays = {name: np.full(shape, np.nan) for name in KERNEL}
-    fill_alike(arrays, scene.meeting, scene.sizes is not None)
+    if scene.sizes is not None and SETTLING in scene.meeting:
+        # Bodies of one given size do not meet by settling.
+        m, alike = scene.meeting.index(SETTLING), np.arange(len(labels))
+        for name in KERNEL:
+            if name.startswith(("width", "beta")) or name in ("speed", "checked"):
+                arrays[name][m, :, alike, alike] = 0.0
     for cell, each in found.items():
         m, v, i, j = cell
         for name, value in (each.values | numerical[cell]).items():
@@ -435,15 +440,3 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
     water = resistance_of_pairs(study.config.forces) is not None
     fractal = fractal_in(repr(study.config.bodies.density))
     return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water, fractal)
-
-
-def fill_alike(arrays: dict[str, np.ndarray], meetings: Sequence[str], given: bool) -> None:
-    """Bodies of one given size do not meet by settling: widths and rates are 0."""
-    if not given or SETTLING not in meetings:
-        return
-    m = meetings.index(SETTLING)
-    diagonal = np.arange(arrays["alpha"].shape[-1])
-    for name in KERNEL:
-        known = name.startswith(("width", "beta")) or name in ("speed", "checked")
-        if known:
-            arrays[name][m, :, diagonal, diagonal] = 0.0
