@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from flocsim.ensembles.studies.sweep import sweep
     from flocsim.ensembles.swarms.comparison import SwarmComparison
     from flocsim.forces.base import Force
-    from flocsim.geometry.shapes.composite import Composite
     from flocsim.geometry.shapes.shape import Shape, Sphere
-    from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+    from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
     from flocsim.integrators.base import Integrator, Status
     from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
@@ -35,7 +34,7 @@ __version__ = "0.2.0"
 
 HOMES = {
     "Body": "body",
-    "Composite": "geometry.shapes.composite",
+    "Composite": "geometry.shapes.spheropolygon",
     "Fluid": "body",
     "Force": "forces.base",
     "Integrator": "integrators.base",
