@@ -215,17 +215,11 @@ def why_not(name, folder, error):
     what = " ".join(f"{type(error).__name__}: {error}".split())
     if isinstance(error, SyntaxError) and error.filename:
         what = f"{error.filename}:{error.lineno}: {error.msg}"
-    elif frame := frame_to_blame(error, folder):
-        what = f"{frame.filename}:{frame.lineno}: {what}"
+    else:
+        # The innermost frame in the user's folder, or that is not Python's import.
+        frames = [each for each in traceback.extract_tb(error.__traceback__)
+                  if each.filename != __file__ and not each.filename.startswith("<")]  # fmt: skip
+        own = [each for each in frames if Path(each.filename).parent == folder.resolve()]
+        for frame in (own or frames)[-1:]:
+            what = f"{frame.filename}:{frame.lineno}: {what}"
     return f"importing module {name!r} failed: {what}"
-
-
-def frame_to_blame(error, folder):
-    """The innermost frame in the user's folder, else the innermost that is not Python's import."""
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename != __file__ and not frame.filename.startswith("<")
-    ]
-    own = [frame for frame in frames if Path(frame.filename).parent == folder.resolve()]
-    return next(reversed(own or frames), None)

@@ -169,23 +169,15 @@ def floc_facts(study):
         weights = np.array([floc.weight for floc in study.flocs])
         if np.any(weights != 1.0):
             facts["flocs.weight"] = digest(weights)
-    return facts | own_shape_facts(study)
-
-
-def own_shape_facts(study):
-    """A digest of all that a replicate reads of the user's own shape, at the sizes of each type.
-
-    Its class computes what is known of others, and how it grows.
-    """
-    config = study.config
-    facts = {}
-    if config.shapes.own is not None and study.flocs:
+    shapes = study.config.shapes
+    if shapes.own is not None and study.flocs:
+        # Its class computes what is known of others, and how it grows, at the sizes of each type.
         [floc] = study.flocs
         [n] = floc.shapes
         for each in study.pairings:
-            shapes = [floc.resized(n, radius, config.shapes.radius) for radius in each.radii]
+            sized = [floc.resized(n, radius, shapes.radius) for radius in each.radii]
             facts[f"flocs.{n} at the sizes of {each.name}"] = digest(
-                np.concatenate([shape_numbers(each) for each in shapes])
+                np.concatenate([shape_numbers(one) for one in sized])
             )
     return facts
 
