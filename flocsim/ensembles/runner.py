@@ -86,12 +86,11 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     """
     comm = comm or Communicator()
     try:
-        joint = join(config, comm)
+        study, identity, cpus, accuracy = join(config, comm)
         if comm.rank > 0:
-            return follow(joint.study, comm).results
-        study = joint.study
+            return follow(study, comm).results
         store = RowStore(MemoryJournal(), study.conditions, study.row)
-        start = Beginning(store, joint.identity, cpus_now=joint.cpus, accuracy=joint.accuracy)
+        start = Beginning(store, identity, cpus_now=cpus, accuracy=accuracy)
         return lead(study, start, comm, progress_of(study, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
@@ -110,20 +109,20 @@ def run_to_file(
     study this has to be.
     """
     if comm.rank > 0:
-        return follow(join(config, comm).study, comm)
+        return follow(join(config, comm)[0], comm)
     with sharing_errors(comm):
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
         records = recorded_choices(journal) if config.integrator.is_chosen else ()
-        joint = join(config, comm, records, quiet)
-        study, progress = joint.study, progress_of(joint.study, quiet)
+        study, identity, cpus, accuracy = join(config, comm, records, quiet)
+        progress = progress_of(study, quiet)
         with sharing_errors(comm):
             if plan is not None:
-                refuse_other_part(plan, str(output), joint.identity)
+                refuse_other_part(plan, str(output), identity)
             start = begin(
-                study, joint.identity, output, mode, journal, kind_of(config).old_rows, joint.cpus,
-                overwrite, joint.accuracy,
+                study, identity, output, mode, journal, kind_of(config).old_rows, cpus,
+                overwrite, accuracy,
             )  # fmt: skip
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
@@ -142,23 +141,13 @@ def run_to_file(
     return ended
 
 
-@attrs.frozen
-class Joint:
-    """What all ranks have agreed on; ``cpus`` on rank 0 alone: the kinds of CPU of all ranks.
-
-    ``accuracy``: the record of a pilot's choice, where there was one.
-    """
-
-    study: StudyKind
-    identity: dict
-    cpus: list[dict]
-    accuracy: dict = attrs.Factory(dict)
-
-
 def join(
     config: Config, comm: Communicator, records: Sequence[dict] = (), quiet: bool = True
-) -> Joint:
+) -> tuple[StudyKind, dict, list[dict], dict]:
     """Make the Study on every rank, and see that all would compute the same rows.
+
+    (study, identity, the kinds of CPU of all ranks, the record of a pilot's choice where there was
+    one); the kinds are known on rank 0 alone.
 
     Rank 0 grows or reads the flocs for all. Where a pilot chooses the methods, all ranks run it,
     unless one of the ``records`` that rank 0 has is of this study. Where any rank would compute
@@ -182,10 +171,10 @@ def join(
     with sharing_errors(comm):
         kind_of(config).prepare(study, comm)
     if not config.integrator.is_chosen:
-        return Joint(study, leader.identity, cpus)
+        return study, leader.identity, cpus, {}
     choice = chosen(study, comm, records, quiet)
     study = study.by_methods(choice.methods)
-    return Joint(study, identity_of(study), cpus, choice.record)
+    return study, identity_of(study), cpus, choice.record
 
 
 def chosen(study: Any, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:

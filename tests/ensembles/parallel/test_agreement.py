@@ -252,8 +252,8 @@ def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monk
     config = load_config(write_small(tmp_path, text, vertices="[4]", replicates="2"))
     comm = Pair(lambda own: own)
     monkeypatch.setattr(comm, "send", lambda to, message: library.unlink(missing_ok=True))
-    joint = runner.join(config, comm)
-    assert len(joint.study.flocs) == 3
+    study, *_ = runner.join(config, comm)
+    assert len(study.flocs) == 3
     assert not library.exists()
 
 
