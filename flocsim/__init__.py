@@ -19,10 +19,8 @@ if TYPE_CHECKING:
     from flocsim.ensembles.studies.sweep import sweep
     from flocsim.ensembles.swarms.comparison import SwarmComparison
     from flocsim.forces.base import Force
-    from flocsim.geometry.shapes.composite import Composite
-    from flocsim.geometry.shapes.shape import Shape
-    from flocsim.geometry.shapes.sphere import Sphere
-    from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+    from flocsim.geometry.shapes.shape import Shape, Sphere
+    from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
     from flocsim.integrators.base import Integrator, Status
     from flocsim.io.results.curvilinear import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
@@ -36,12 +34,12 @@ __version__ = "0.2.0"
 
 HOMES = {
     "Body": "body",
-    "Composite": "geometry.shapes.composite",
+    "Composite": "geometry.shapes.spheropolygon",
     "Fluid": "body",
     "Force": "forces.base",
     "Integrator": "integrators.base",
     "Shape": "geometry.shapes.shape",
-    "Sphere": "geometry.shapes.sphere",
+    "Sphere": "geometry.shapes.shape",
     "SpheroPolygon": "geometry.shapes.spheropolygon",
     "State": "trajectories.trajectory",
     "Status": "integrators.base",

@@ -318,7 +318,7 @@ FIRST_RADIUS = FLOW + 6
 WATER_SIZE = FIRST_RADIUS + 2
 
 TABLE_COLUMNS = 20
-"""Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair_table.COLUMNS."""
+"""Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair.COLUMNS."""
 
 SQUARES = 6
 """Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a

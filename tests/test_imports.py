@@ -31,7 +31,8 @@ ROWS = [
     ["bonds", "plausibility"],
     ["forces", "integrators"],
     ["body"],
-    ["geometry", "hydrodynamics", "laws"],
+    ["hydrodynamics"],
+    ["geometry", "laws"],
     ["arrays", "hooks"],
     ["compiler", "fields", "interruption", "water"],
     ["constants", "errors", "limits"],
@@ -57,7 +58,7 @@ INNER_ROWS = {
         ["arrays", "methods"],
     ],
     "brownian": [["meeting"], ["splitting"]],
-    "hydrodynamics": [["encounters", "pair_table", "prism"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

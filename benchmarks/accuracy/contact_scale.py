@@ -29,7 +29,7 @@ import numpy as np
 
 from benchmarks.reporting import ROOT, Table, parser_of, print_heading
 from benchmarks.speed.against_commit import Child, other_tree
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.io.results.schema import AGGREGATED, BONDS, CLASSES, OUTCOMES
 
 TYPES = ("III", "I", "II")

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.reporting import ROOT, Table, parser_of, print_heading
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.dry_run import forecast_study
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 
 EXAMPLES = ROOT / "examples"
@@ -61,7 +61,7 @@ def judge(name, factor, table):
         study, found, _, _ = forecast_study(config, 1)
         pilot = time.process_time() - began
         began = time.process_time()
-        run_to_file(config, SerialCommunicator(), config.output.file, "new")
+        run_to_file(config, Communicator(), config.output.file, "new")
         truth = time.process_time() - began
         size = Path(config.output.file).stat().st_size
     hours = 3600.0 * found.hours.value

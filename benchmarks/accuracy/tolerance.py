@@ -8,8 +8,8 @@ runs the config's study at every tolerance, in one process, and compares each wi
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
+from examples.tang2014.changes import OutcomeChanges, changes_between
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.outcome_changes import OutcomeChanges, changes_between
 from flocsim.ensembles.runner import run
 from flocsim.errors import UsageError
 from flocsim.io.results.schema import Results

@@ -22,13 +22,13 @@ from flocsim.ensembles.estimates.statistics import (
     pooled_probabilities,
     pooled_sums,
     probabilities,
-    tabulate,
 )
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.runner import run
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.kernel_group import ESTIMATES
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, POOLED_PROBABILITIES, PROBABILITIES
+from tests.helpers.tabulate import tabulate
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 DELTA = [0.0, 0.5, 1.0]

@@ -28,7 +28,7 @@ from flocsim.ensembles.chunks import COLUMNS, ROW, chunk_record, layout
 from flocsim.ensembles.collision.draw import FURTHER
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pairs.kind import KIND
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.storage.resume import RESUME, begin, claim
@@ -108,7 +108,7 @@ def resumed(study, identity, folder):
 def finish_here(folder):
     """Finish the study in this process: its results file; all rows must have been there."""
     config = load_config(folder / "study.toml")
-    ended = run_to_file(config, SerialCommunicator(), folder / "study.h5", "resume")
+    ended = run_to_file(config, Communicator(), folder / "study.h5", "resume")
     assert (ended.code, ended.computed) == (0, 0)
     return folder / "study.h5"
 

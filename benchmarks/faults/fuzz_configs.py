@@ -18,10 +18,10 @@ import attrs
 from hypothesis import HealthCheck, given, seed, settings
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.ensembles.collision.failures import run_safely
+from flocsim.ensembles.collision.draw import run_safely
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS
-from flocsim.ensembles.estimates.stop_rule import borders
+from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.study import Study

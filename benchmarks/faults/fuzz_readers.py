@@ -234,7 +234,7 @@ class JournalReader:
     def read(self, path):
         """Take its rows and look at them."""
         from flocsim.ensembles.chunks import ROW
-        from flocsim.ensembles.collision.failures import FAILURES
+        from flocsim.ensembles.collision.draw import FAILURES
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.io.journal.journal import Journal

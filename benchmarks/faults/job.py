@@ -12,7 +12,7 @@ from pathlib import Path
 import attrs
 
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.journal.records import CHUNK, Record, scan
@@ -201,7 +201,7 @@ def run_here(folder):
     """Finish the study in this process; its results file."""
     config = load_config(folder / "study.toml")
     output = folder / "study.h5"
-    ended = run_to_file(config, SerialCommunicator(), output, "resume")
+    ended = run_to_file(config, Communicator(), output, "resume")
     assert ended.code == 0
     return output
 

@@ -26,7 +26,7 @@ import numpy as np
 from benchmarks.faults.job import KINDS, PATIENCE, STUDY, Tally, alive, descendants
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.errors import FlocsimError
 from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
@@ -96,7 +96,7 @@ def make_study(folder):
 def finish(folder, seed):
     """Finish the study of a seed in a folder, in this process; its results file."""
     config = load_config(folder / "study.toml", {"seed": seed})
-    ended = run_to_file(config, SerialCommunicator(), folder / "study.h5", "resume")
+    ended = run_to_file(config, Communicator(), folder / "study.h5", "resume")
     assert ended.code == 0
     return folder / "study.h5"
 

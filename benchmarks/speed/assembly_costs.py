@@ -23,7 +23,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, sums_of, tables_of
 from flocsim.ensembles.pairs.kind import results_of
 from flocsim.ensembles.parallel.assembly import COUNTED_ROWS, Answer, Assembly, Share
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
@@ -171,7 +171,7 @@ def measure_assembly(folder):
         reader = Reader(start.store, study.shape)
         draft = results_of(study, study.config.replicates, sums_of(reader.codes, 10, 0, 0), {})
         with new_row_file(place / "made.h5", draft) as file:
-            rank_zero = Assembly(reader, file, SerialCommunicator())
+            rank_zero = Assembly(reader, file, Communicator())
             for _ in range(3):
                 began = time.perf_counter()
                 rank_zero.write()

@@ -19,8 +19,8 @@ from benchmarks.reporting import Table, parse_arguments, print_heading
 from benchmarks.speed.cases import VERTICES, Result, differing, make_cases, run_cases
 from benchmarks.speed.measure import largest_step
 from benchmarks.speed.scenes import collisions
+from flocsim.ensembles.collision.draw import outcome_of
 from flocsim.ensembles.collision.encounter import OBSERVER
-from flocsim.ensembles.collision.failures import outcome_of
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.base import Status

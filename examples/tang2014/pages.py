@@ -1,6 +1,7 @@
 """Figures, tables and claims of a finished study: what reproduce.py writes at its end."""
 
 import numpy as np
+from changes import second_run_changes
 from claims import COLLISION_CLAIMS, check_claims
 from claims.several import read_touches
 from claims.table import claims_table
@@ -9,7 +10,6 @@ from output import save_all, write_page, write_table
 from summary import write_summary
 
 from flocsim.ensembles.collision.zone import zone_distance
-from flocsim.ensembles.estimates.outcome_changes import second_run_changes
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import CLASSES, read_results

@@ -1,19 +1,49 @@
-"""Rests: bonds that have shown to hold, by keeping their pose while the load was at its worst.
+"""Rests and hooks: bonds that have shown to hold, as they kept their pose under the worst load.
 
-Where attraction could not carry the load, and the contacts do by themselves (statics.py), such a
-bond is a hook; what merely has kept its pose is a rest. A rest shows that the doublet holds, not
-that no kick could open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them
-in their attraction against the load, and shapes, whose contacts no potential tells of, where it
-takes as much to lift one by the smaller spheroradius against it.
+Where attraction could not carry the load, and the contacts do by themselves, such a bond is a hook;
+what merely has kept its pose is a rest. A rest shows that the doublet holds, not that no kick could
+open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them in their attraction
+against the load, and shapes, whose contacts no potential tells of, where it takes as much to lift
+one by the smaller spheroradius against it.
+
+Of a hook the contacts carry the load, whatever attraction there is: statics without tension. Every
+closed contact gives body j a force N n + T t, N ≥ 0, |T| ≤ µ N, along its normal n and tangent t,
+and its moment. The load hangs from them where such forces balance it. That is so for all loads that
+the doublet meets, or there is a motion of j against i that no contact forbids and along which a
+load does work (Farkas' lemma); a motion is forbidden where a contact's force could only ever do
+negative work along it. In the plane a motion (v_x, v_y, ω) has three numbers, and those to look at
+are the edges of what is allowed: each is across two of the contacts' forces, so that two loops over
+these find them.
+
+A load is a force f on j and its reverse on i. Of a free doublet that settles askew, and turns, it
+acts along f somewhere between the two centroids, and less of it across their line, as drag takes up
+the rest: all of these are balanced where f at either centroid and a pull along the line of centres
+are. A free doublet turns until its faster body hangs below: its loads go from that of now to one
+along the line of centres. That of a fixed receiver does not turn, and one in a flow, or in a
+cluster, meets loads from everywhere.
+
+Two spheres touch at one point, and no load along their line of centres is carried there: no hook.
 """
 
 import math
 
 import flocsim.arrays as at
-from flocsim.bonds.bond import HOOK, NO_BOND, REST, are_spheres, radii_of
+from flocsim.bonds.bond import (
+    HOOK,
+    NO_BOND,
+    REST,
+    are_spheres,
+    is_closed,
+    radii_of,
+    resting_contact,
+    size_of,
+)
 from flocsim.bonds.certificate import CALM, capacity, lets_out
-from flocsim.bonds.statics import is_hooked
+from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER
+from flocsim.integrators.rhs.views import contact_view
+from flocsim.laws import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
 
 STILL = 1e-3
 """A pair that has moved by less than this share of the drift's way keeps its pose."""
@@ -71,3 +101,131 @@ def kind_at_rest(scene, work, time, bond, load, rested):
         return NO_BOND
     borne, _, _ = capacity(scene, work, time, bond, 0.0, (load.force, -1.0, math.inf))
     return HOOK if borne <= load.force and is_hooked(scene, work, bond, load) else REST
+
+
+GRIP = 10.0
+"""Friction µ of contacts without a Coulomb limit: what holds by less than a tenth of the tangential
+force being normal is not taken to hold by its shape."""
+
+SLACK = 0.05
+"""A pair at rest is as near to its balance as this: so much friction, and so broad a contact, over
+the smaller bounding radius, is granted to every one."""
+
+EDGES = 4
+"""Extreme forces of a contact: both sides of its friction cone, at both ends of its breadth."""
+
+ROUNDING = 1e-9
+"""What counts as nothing of a unit motion."""
+
+
+def grip_of(scene, work):
+    """µ: the least share of their normal forces that the closed contacts hold along the tangent, at
+    least SLACK; 0 without contacts or forces at them."""
+    least = 0.0
+    if not has(scene, CONTACT_FORCE):
+        return least
+    for row in range(work.tally[at.CANDIDATES]):
+        if is_closed(work, row):
+            view = contact_view(scene, work, at.NOW, row)
+            slip, limit = view.overlap, math.inf
+            if has(scene, SLIP_LIMIT):
+                limit = slip_limit(scene, resting_contact(view, 0.0))
+            if limit < math.inf:
+                slip = limit
+            normal, tangential = contact_force(scene, resting_contact(view, slip))
+            grip = abs(tangential) / normal if normal > 0.0 else 0.0
+            if grip > 0.0 and not limit < math.inf:
+                grip = GRIP
+            grip = min(max(grip, SLACK), GRIP)
+            least = grip if least == 0.0 else min(least, grip)
+    return least
+
+
+def normal_on(work, bond, row):
+    """The unit vector along which a contact pushes body j."""
+    x, y = work.geometry[at.NOW, row, at.NORMAL_X], work.geometry[at.NOW, row, at.NORMAL_Y]
+    return (x, y) if work.candidates[row, at.VERTEX_BODY] == bond.j else (-x, -y)
+
+
+def push_of(work, bond, size, grip, edge):
+    """(x, y, moment about j's centroid over ``size``) of an extreme force on j."""
+    row = edge // EDGES
+    nx, ny = normal_on(work, bond, row)
+    x, y = contact_point(work, row, bond.j)
+    aside = SLACK * size if edge % 2 == 0 else -SLACK * size
+    x, y = (x - aside * ny) / size, (y + aside * nx) / size
+    along = grip if edge % EDGES < 2 else -grip
+    px, py = nx - along * ny, ny + along * nx
+    return px, py, x * py - y * px
+
+
+def across(one, other):
+    """The vector product: the motion along which neither of two forces does work."""
+    a, b, c = one
+    d, e, f = other
+    return b * f - c * e, c * d - a * f, a * e - b * d
+
+
+def is_allowed(work, bond, size, grip, motion):
+    """Whether no force of any contact does negative work along a motion (of j's centroid; ``size``
+    times its turn)."""
+    vx, vy, turn = motion
+    for row in range(work.tally[at.CANDIDATES]):
+        if not is_closed(work, row):
+            continue
+        nx, ny = normal_on(work, bond, row)
+        x, y = contact_point(work, row, bond.j)
+        ux, uy = vx - turn * y / size, vy + turn * x / size
+        normal, along = nx * ux + ny * uy, nx * uy - ny * ux
+        # Turning moves the ends of its breadth along the normal.
+        if normal - SLACK * abs(turn) - grip * abs(along) < -ROUNDING:
+            return False
+    return True
+
+
+def load_works(scene, bond, load, size, motion):
+    """Whether one of the loads that the doublet meets does work along a motion."""
+    vx, vy, turn = motion
+    reach = turn * bond.distance / size
+    # There, the motion of j's body where i's centroid is.
+    tx, ty = vx + reach * bond.ny, vy - reach * bond.nx
+    at_j, at_i = load.x * vx + load.y * vy, load.x * tx + load.y * ty
+    if load.x == 0.0 and load.y == 0.0:
+        return vx * vx + vy * vy + tx * tx + ty * ty > ROUNDING * ROUNDING
+    if scene.bodies[bond.i, at.FREE] == 0.0:
+        return at_j > ROUNDING
+    if scene.bodies[bond.j, at.FREE] == 0.0:
+        return at_i > ROUNDING
+    pulling = bond.nx * vx + bond.ny * vy
+    askew = load.x * bond.nx + load.y * bond.ny
+    if askew < 0.0:
+        # It turns by more than a quarter: all loads across the line to that side, and along it.
+        at_j, at_i, pulling = at_j - askew * pulling, at_i - askew * pulling, abs(pulling)
+    return max(at_j, at_i, pulling) > ROUNDING
+
+
+@apart
+def is_hooked(scene, work, bond, load):
+    """Whether the contacts of the two carry every load that the doublet meets."""
+    grip, size = grip_of(scene, work), size_of(scene, bond.i, bond.j)
+    if grip == 0.0 or are_spheres(scene, bond):
+        return False
+    count = EDGES * work.tally[at.CANDIDATES]
+    for first in range(count):
+        if not is_closed(work, first // EDGES):
+            continue
+        one = push_of(work, bond, size, grip, first)
+        for second in range(first):
+            if not is_closed(work, second // EDGES):
+                continue
+            x, y, turn = across(one, push_of(work, bond, size, grip, second))
+            length = math.sqrt(x * x + y * y + turn * turn)
+            if length <= ROUNDING:
+                continue
+            for way in (1.0 / length, -1.0 / length):
+                motion = x * way, y * way, turn * way
+                if load_works(scene, bond, load, size, motion) and is_allowed(
+                    work, bond, size, grip, motion
+                ):
+                    return False
+    return True

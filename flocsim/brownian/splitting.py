@@ -22,7 +22,7 @@ from flocsim.fields import in_unit, is_number
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.outline import asks_for_both, refuse_outlines
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Sphere
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.system import System
 

@@ -12,7 +12,6 @@ from typing import Any
 from flocsim.compiler import waiting
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
-    SerialCommunicator,
     StopRequested,
     find_communicator,
     launched_rank,
@@ -204,20 +203,6 @@ def study(config, comm, arguments):
     return code
 
 
-def run_rank(comm, arguments):
-    config, code = agree(comm, arguments)
-    if config is None:
-        return code
-    if arguments.dry_run:
-        from flocsim.ensembles.kind import kind_of
-
-        if comm.rank == 0:
-            ranks = max(comm.size, arguments.jobs)
-            tell(kind_of(config).dry_run(config, ranks, arguments.pilot))
-        return 0
-    return study(config, comm, arguments)
-
-
 def end_all(comm: Communicator, text: str, code: int) -> int:
     """Print why, and end every rank; returns the exit code where this process is alone."""
     who = f"rank {comm.rank}: " if comm.size > 1 else ""
@@ -231,7 +216,14 @@ def guarded(comm, arguments):
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
     comm.watch(arguments.heartbeat)
     try:
-        code = run_rank(comm, arguments)
+        config, code = agree(comm, arguments)
+        if config is not None and not arguments.dry_run:
+            code = study(config, comm, arguments)
+        elif config is not None and comm.rank == 0:
+            from flocsim.ensembles.kind import kind_of
+
+            ranks = max(comm.size, arguments.jobs)
+            tell(kind_of(config).dry_run(config, ranks, arguments.pilot))
         comm.close()
         return code
     except StopRequested as error:
@@ -274,7 +266,7 @@ def on_process(comm, arguments):
 def run_command(arguments: argparse.Namespace) -> int:
     if arguments.parent is not None:
         end_with_parent(arguments.parent)
-    comm: Communicator = SerialCommunicator()
+    comm: Communicator = Communicator()
     try:
         comm = find_communicator()
         wrong = what_is_wrong(arguments, comm)
@@ -295,7 +287,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     return guarded(comm, arguments)
 
 
-def refused_anywhere(comm: Communicator, code: int | None = None) -> int | None:
+def refused_anywhere(comm: Communicator, code: int | None) -> int | None:
     """The exit code where the arguments of a rank were refused, as the others would wait for it.
 
     ``code``: that of this rank, None where it can go on; 0 where it printed a help.

@@ -14,8 +14,7 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.config.kinds import FILES, STUDIES, contents_of
-from flocsim.ensembles.storage.cpu_kind import describe_kind
-from flocsim.ensembles.storage.stored_json import stored
+from flocsim.ensembles.storage.stored_json import describe_kind, stored
 from flocsim.errors import FileError, visible
 from flocsim.io.files import held
 from flocsim.io.groups import Group

@@ -8,7 +8,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
 from flocsim.ensembles.collision.flocs import read_flocs
-from flocsim.ensembles.collision.pairings import class_facts
+from flocsim.ensembles.collision.pairings import class_facts, pairings_of
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, Config
 from flocsim.ensembles.equivalent_spheres import sphere_facts
@@ -28,7 +28,6 @@ from flocsim.ensembles.preflight import (
     IMPLIED,
     kinds,
     measured_flocs,
-    pairings,
     paper_weight,
     placed_system,
     said_doubts,
@@ -57,28 +56,24 @@ MOST_CHOOSING = 60.0
 def condition_lines(config, flocs):
     """A line for every collision type: sizes, zone, settling of the equivalent spheres."""
     facts = settling_facts(config, flocs)
-    found = pairings(config, flocs)
+    found = pairings_of(config, flocs)
     if classes := class_words(class_facts(found)):
         yield f"  {classes}"
-    spans = {each.name: each.spans for each in found}
     thermal = {each["type"]: each for each in sphere_facts(config, flocs)}
-    for name, pair in sphere_pairs(config, flocs):
+    for pairing, (name, pair) in zip(found, sphere_pairs(config, flocs), strict=True):
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         falls = [1e3 * -velocity[1] for velocity, _ in pair.settling]
         sizes = (
             f"  {name}: r_i = {1e6 * radius_i:.4g} um, r_j = {1e6 * radius_j:.4g} um, "
             f"D_0 = {1e6 * pair.zone_distance:.4g} um"
         )
-        yield (
-            sizes
-            if name in thermal
-            else f"{sizes}; settling {falls[0]:.4g} and {falls[1]:.4g} mm/s, turn time "
-            f"{pair.turn_time:.3g} s"
-        )
         if name in thermal:
-            yield f"    {sphere_words(thermal[name])}"
+            yield from (sizes, f"    {sphere_words(thermal[name])}")
+        else:
+            settling = f"settling {falls[0]:.4g} and {falls[1]:.4g} mm/s"
+            yield f"{sizes}; {settling}, turn time {pair.turn_time:.3g} s"
         if config.shapes.size == "own":
-            (low_i, high_i), (low_j, high_j) = (np.array(each) * 1e6 for each in spans[name])
+            (low_i, high_i), (low_j, high_j) = (np.array(each) * 1e6 for each in pairing.spans)
             yield (
                 f"    measured sizes, r_i {low_i:.4g} to {high_i:.4g} um, r_j {low_j:.4g} to "
                 f"{high_j:.4g} um; delta_max and D_0 are those of each pair"
@@ -110,27 +105,20 @@ def checked_words(config):
     exact = exact_method(method)
     count = count_checks(config.seed, config.replicates, share)
     if config.integrator.is_chosen and count:
-        return checks_of(config, count, "a hundredth of the tolerance chosen by the pilot")
-    if exact is None:
+        how = "a hundredth of the tolerance chosen by the pilot"
+    elif exact is None:
         return f"none, {config.integrator.label} has no tolerance or step to reduce"
-    if not count:
+    elif not count:
         return "none, so the numerical error stays unknown (integrator.check_share)"
-    how = (
-        f"a tolerance of {exact.tolerance:g} m"
-        if exact.tolerance < inf
-        else f"a step of {exact.first_step:g} s"
-    )
-    return checks_of(config, count, how)
-
-
-def checks_of(config, count, how):
-    more = f", {EASILY} times as many of those that flip easily," * (
-        config.integrator.check_share == "auto"
-    )
+    elif exact.tolerance < inf:
+        how = f"a tolerance of {exact.tolerance:g} m"
+    else:
+        how = f"a step of {exact.first_step:g} s"
+    more = f" {EASILY} times as many of those that flip easily," if share == "auto" else ""
     return (
         f"{count} of the {config.replicates} replicates of each condition "
-        f"({100.0 * count / config.replicates:.2g} %){more or ','} at {how}; "
-        f"one in {THIRD_OF} of these a third time, at a still tighter tolerance"
+        f"({100.0 * count / config.replicates:.2g} %),{more} at {how}; one in {THIRD_OF} of these "
+        "a third time, at a still tighter tolerance"
     )
 
 

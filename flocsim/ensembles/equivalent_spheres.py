@@ -62,7 +62,7 @@ def facts_of(pair: Encounter) -> dict[str, Any]:
     return {"release": near, "escape": far, "diffusion": pair.diffusion} | plain
 
 
-def water_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
+def water_facts(config: Config) -> list[dict]:
     """[{type, water, alone}] of the collision types that settling or a flow brings together: the
     share of the rectilinear kernel of their equivalent spheres that touches with the water that
     they push at each other, and without.
@@ -70,7 +70,7 @@ def water_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dic
     UsageError for ratios of radii that the resistance functions do not reach.
     """
     found = []
-    for name, pair in sphere_pairs(config, flocs):
+    for name, pair in sphere_pairs(config):
         if pair.meeting != BROWNIAN:
             try:
                 shares = {key: share_in(pair, key == "water") for key in ("water", "alone")}

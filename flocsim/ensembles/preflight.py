@@ -23,7 +23,7 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.checking import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
-from flocsim.ensembles.collision.pairings import Pairing, pairings_of
+from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.thermal import refuse_release
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
@@ -33,8 +33,7 @@ from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force
 from flocsim.forces.codegen import laws_of
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.rhs.orientation import oriented_view
@@ -160,9 +159,15 @@ def measured_flocs(config: Config) -> list[Floc]:
     return read_flocs(config.shapes) if config.shapes.size == "own" else []
 
 
-def pairings(config: Config, flocs: Sequence[Floc] | None = None) -> tuple[Pairing, ...]:
-    """Who meets whom in a config's study; ``flocs``, where measured ones are read already."""
-    return pairings_of(config, measured_flocs(config) if flocs is None else flocs)
+def resizes(config: Config) -> bool:
+    """Whether flocs are resized to the radii of the scene, their spheroradius given."""
+    shapes = config.shapes
+    return shapes.own is None and shapes.size == "scene" and max(shapes.vertices) > 1
+
+
+def smallest(config: Config) -> float:
+    """The smallest radius of a scene that gives them [m]."""
+    return min(min(radii) for _, radii in config.scene.given)
 
 
 def sphere_pairs(
@@ -171,9 +176,10 @@ def sphere_pairs(
     """(name, Encounter) of the equivalent spheres of every collision type.
 
     ``which`` of flocs of measured sizes: "radii", those that stand for all, "fastest" or "largest"
-    of a Pairing; ``flocs`` as in `pairings`.
+    of a Pairing; ``flocs``, where measured ones are read already.
     """
-    for pairing in pairings(config, flocs):
+    flocs = measured_flocs(config) if flocs is None else flocs
+    for pairing in pairings_of(config, flocs):
         radius_i, radius_j = getattr(pairing, which)
         zone = zone_distance(config.zone, config.forces, radius_i, radius_j)
         spheres = (Sphere(radius_i), Sphere(radius_j))
@@ -189,12 +195,10 @@ def check_study(config: Config) -> None:
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
     flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
-    least = min(min(each.radii) for each in pairings(config, flocs))
-    resized = config.shapes.own is None and config.shapes.size == "scene"
-    if resized and max(config.shapes.vertices) > 1 and config.shapes.radius >= least:
+    if resizes(config) and config.shapes.radius >= smallest(config):
         raise ConfigError(
             f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
-            f"body, of r_eq = {least:g} m: choose a smaller shapes.radius"
+            f"body, of r_eq = {smallest(config):g} m: choose a smaller shapes.radius"
         )
     if config.scene.meeting == BROWNIAN:
         check_release(config, flocs)
@@ -219,7 +223,7 @@ def check_release(config: Config, flocs: Sequence[Floc]) -> None:
     shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
     shapes += [
         pool.shape(place, n, radius)
-        for each in pairings(config, flocs) for radius in each.radii
+        for each in pairings_of(config, flocs, pool) for radius in each.radii
         for place, floc in enumerate(flocs) for n in floc.shapes
     ]  # fmt: skip
     farthest = max(shapes, key=lambda shape: shape.bounding_radius / shape.equivalent_radius)
@@ -327,7 +331,7 @@ def placed_system(config: Config, system: System, shapes: Sequence[Shape]) -> Sy
         attrs.evolve(body, shape=shape, position=place)
         for body, shape, place in zip(system.bodies, shapes, places, strict=True)
     ]
-    return attrs.evolve(system, bodies=bodies)
+    return system.changed(bodies=tuple(bodies))
 
 
 def kinds(config: Config, spheres: Sequence[Shape]) -> Iterator[Sequence[Shape]]:
@@ -376,10 +380,8 @@ def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[st
     systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
     # In a flow bodies meet without their weight.
     lines = doubts_of(systems, names_in(config, systems[0].forces))
-    options = config.shapes
-    if options.own is None and options.size == "scene" and max(options.vertices) > 1:
-        least = min(min(each.radii) for each in pairings(config, flocs))
-        share = options.radius / least
+    if resizes(config):
+        share = config.shapes.radius / smallest(config)
         lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
     return [line for line in lines if line]
 

@@ -19,20 +19,19 @@ from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
-from flocsim.ensembles.estimates.stop_rule import borders
+from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
-    SerialCommunicator,
+    ExitCode,
     StopRequested,
 )
-from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
-from flocsim.ensembles.parallel.messages import ExitCode, Plan
+from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
-from flocsim.ensembles.parallel.worker import run_chunks
 from flocsim.ensembles.pilot.choice import (
     Choice,
     choose,
@@ -41,12 +40,11 @@ from flocsim.ensembles.pilot.choice import (
 )
 from flocsim.ensembles.pilot.trials import Job, try_out
 from flocsim.ensembles.preflight import said_doubts
-from flocsim.ensembles.storage import first_rows
-from flocsim.ensembles.storage.cpu_kind import distinct, mixture_warnings
 from flocsim.ensembles.storage.identity import arithmetic_digest, short
 from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.storage.stored_json import distinct, mixture_warnings
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal.journal import MemoryJournal
@@ -86,14 +84,13 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     ``comm`` has the ranks of the job (default: this process alone). The arrays of the results are
     the same whatever the number of ranks.
     """
-    comm = comm or SerialCommunicator()
+    comm = comm or Communicator()
     try:
-        joint = join(config, comm)
+        study, identity, cpus, accuracy = join(config, comm)
         if comm.rank > 0:
-            return follow(joint.study, comm).results
-        study = joint.study
+            return follow(study, comm).results
         store = RowStore(MemoryJournal(), study.conditions, study.row)
-        start = Beginning(store, joint.identity, cpus_now=joint.cpus, accuracy=joint.accuracy)
+        start = Beginning(store, identity, cpus_now=cpus, accuracy=accuracy)
         return lead(study, start, comm, progress_of(study, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
@@ -112,20 +109,20 @@ def run_to_file(
     study this has to be.
     """
     if comm.rank > 0:
-        return follow(join(config, comm).study, comm)
+        return follow(join(config, comm)[0], comm)
     with sharing_errors(comm):
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
         records = recorded_choices(journal) if config.integrator.is_chosen else ()
-        joint = join(config, comm, records, quiet)
-        study, progress = joint.study, progress_of(joint.study, quiet)
+        study, identity, cpus, accuracy = join(config, comm, records, quiet)
+        progress = progress_of(study, quiet)
         with sharing_errors(comm):
             if plan is not None:
-                refuse_other_part(plan, str(output), joint.identity)
+                refuse_other_part(plan, str(output), identity)
             start = begin(
-                study, joint.identity, output, mode, journal, kind_of(config).old_rows, joint.cpus,
-                overwrite, joint.accuracy,
+                study, identity, output, mode, journal, kind_of(config).old_rows, cpus,
+                overwrite, accuracy,
             )  # fmt: skip
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
@@ -134,7 +131,7 @@ def run_to_file(
         for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
         ended = lead(study, start, comm, progress, output)
-        if ended.code == 0 and start.has_more(ended.count):
+        if ended.code == 0 and (start.unasked or start.farthest > ended.count):
             progress.warn(
                 f"{journal.path} has more rows than were asked for, and is kept: --resume uses "
                 "them when more are asked for"
@@ -144,23 +141,13 @@ def run_to_file(
     return ended
 
 
-@attrs.frozen
-class Joint:
-    """What all ranks have agreed on; ``cpus`` on rank 0 alone: the kinds of CPU of all ranks.
-
-    ``accuracy``: the record of a pilot's choice, where there was one.
-    """
-
-    study: StudyKind
-    identity: dict
-    cpus: list[dict]
-    accuracy: dict = attrs.Factory(dict)
-
-
 def join(
     config: Config, comm: Communicator, records: Sequence[dict] = (), quiet: bool = True
-) -> Joint:
+) -> tuple[StudyKind, dict, list[dict], dict]:
     """Make the Study on every rank, and see that all would compute the same rows.
+
+    (study, identity, the kinds of CPU of all ranks, the record of a pilot's choice where there was
+    one); the kinds are known on rank 0 alone.
 
     Rank 0 grows or reads the flocs for all. Where a pilot chooses the methods, all ranks run it,
     unless one of the ``records`` that rank 0 has is of this study. Where any rank would compute
@@ -184,10 +171,10 @@ def join(
     with sharing_errors(comm):
         kind_of(config).prepare(study, comm)
     if not config.integrator.is_chosen:
-        return Joint(study, leader.identity, cpus)
+        return study, leader.identity, cpus, {}
     choice = chosen(study, comm, records, quiet)
     study = study.by_methods(choice.methods)
-    return Joint(study, identity_of(study), cpus, choice.record)
+    return study, identity_of(study), cpus, choice.record
 
 
 def chosen(study: Any, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:
@@ -246,11 +233,11 @@ def hear(comm: Communicator, value: Any) -> Any:
 
 def follow(study: StudyKind, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
-    plan = hear(comm, None)
-    if plan.remaining:
+    remaining, key = hear(comm, None)
+    if remaining:
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
-    run_chunks(study, RemoteCoordinator(comm), plan.key)
+    run_chunks(study, RemoteCoordinator(comm), key)
     code = assist(study, comm).code
     if code not in (0, STOPPED):
         raise RankZeroFailed(code)
@@ -273,11 +260,11 @@ def lead(
     progress.say(announcement(study, comm.size, study.size - remaining))
     if study.remark:
         progress.say(study.remark)
-    comm.broadcast(Plan(remaining, key))
+    comm.broadcast((remaining, key))
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
-        compile_in_turn(study, comm, first_rows.stored_rows(study, start.store))
+        compile_in_turn(study, comm, agreement.stored_rows(study, start.store))
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):
@@ -322,10 +309,12 @@ def compile_in_turn(study, comm, stored=()):
     in_copies([partial(study.compile, [kind]) for kind in study.uncompiled(own)])
     study.compile(own)
     comm.barrier()
-    rows = first_rows.packed(study, study.compile(study.kinds))
+    rows = agreement.packed(study, study.compile(study.kinds))
     told = comm.gather((rows, arithmetic_digest()))
     with sharing_errors(comm):
-        if told and (line := first_rows.difference(study, *zip(*told, strict=True), dict(stored))):
+        if told and (
+            line := agreement.row_difference(study, *zip(*told, strict=True), dict(stored))
+        ):
             raise UsageError(line)
     if isinstance(go_on := comm.broadcast(None), ExitCode):
         raise RankZeroFailed(go_on.code)

@@ -9,9 +9,17 @@ import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
 from flocsim.ensembles.collision.checking import MORE_STEPS, exact_methods, further_runs
-from flocsim.ensembles.collision.draw import CHECKED, THIRD, Draw, columns_of
+from flocsim.ensembles.collision.draw import (
+    CHECKED,
+    FAILED,
+    FAILURES,
+    NO_FLOC,
+    THIRD,
+    Draw,
+    columns_of,
+    run_safely,
+)
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, NO_FLOC, run_safely
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
 from flocsim.ensembles.collision.start import draws, point, point_facts
@@ -204,7 +212,7 @@ class Study(StudyKind):
         reached = tuple(system.reached.items())
         kind = system.family, reached, type(method), bool(encounter.kick_energy)
         if kind not in self.drivers:
-            made = attrs.evolve(system, integrator=method)
+            made = system.changed(integrator=method)
             self.drivers[kind] = made.compose(observer=encounter.observer)
         return self.drivers[kind]
 
@@ -217,25 +225,25 @@ class Study(StudyKind):
         ``halted()``, looked at now and then, gives the replicate up: None then.
         """
         draw = self.draw(condition, vertices, share, replicate)
-        driver, max_steps = self.driver(draw.encounter), self.config.integrator.max_steps
-        row = draw.run(driver, max_steps, halted)
-        exact = self.exact[self.pairings[condition].name]
+        steps = self.config.integrator.max_steps
+        row = draw.run(self.driver(draw.encounter), steps, halted)
         if row is not None and (attempt := self.second_attempt(condition, row)):
-            row = self.tried_again(draw, attempt, row, halted)
+            second = self.run_carefully(lambda: draw, attempt, halted, row)
+            row = second if second is None or says_outcome(second) else row
         if row is not None and self.is_banded:
             row = self.with_band(row, condition, vertices, share, replicate, halted)
+        exact = self.exact[self.pairings[condition].name]
         if row is None or exact is None:
             return row
         easily = bool(flips_easily(row["outcome"], row["bond"]))
         wanted = self.config.integrator.check_share
         runs = list(zip(exact, (CHECKED, THIRD), strict=True))
-        steps = self.config.integrator.max_steps
         for method, columns in runs[: further_runs(self.config.seed, replicate, wanted, easily)]:
             steps *= MORE_STEPS
-            found = self.run_again(draw, method, steps, columns, halted)
+            found = self.run_carefully(lambda: draw, (steps, method), halted, WITHOUT_OUTCOME)
             if found is None:
                 return None
-            row |= found
+            row |= {name: found[column] for name, column in columns.items()}
         return row
 
     def with_band(
@@ -270,33 +278,12 @@ class Study(StudyKind):
         method = None if ran_out or exact is None else exact[0]
         return MORE_STEPS * self.config.integrator.max_steps, method
 
-    def tried_again(
-        self, draw: Draw, attempt: tuple[int, Integrator | None], row: dict,
-        halted: Callable[[], bool] | None = None,
-    ) -> dict | None:  # fmt: skip
-        """The row of a second attempt where that says something of the outcome, the first where
-        not; None where it was given up."""
-        found = self.run_carefully(lambda: draw, attempt, halted, row)
-        return found if found is None or says_outcome(found) else row
-
-    def run_again(
-        self, draw: Draw, exact: Integrator, steps: int, columns: dict[str, str],
-        halted: Callable[[], bool] | None = None,
-    ) -> dict | None:  # fmt: skip
-        """What a replicate's row holds of a more exact run of so many steps at most, in
-        ``columns``, CHECKED or THIRD; None where it was given up.
-
-        An exception costs no more than this: that run has failed, the first is as it was.
-        """
-        row = self.run_carefully(lambda: draw, (steps, exact), halted, WITHOUT_OUTCOME)
-        return None if row is None else {name: row[column] for name, column in columns.items()}
-
     def run_carefully(
         self, made: Callable[[], Draw], attempt: tuple[int, Integrator | None],
         halted: Callable[[], bool] | None, otherwise: dict,
     ) -> dict | None:  # fmt: skip
         """The row of the Draw that is made, run in so many steps by a method; ``otherwise`` for an
-        exception, None where it was given up."""
+        exception, which costs no more than this run, None where it was given up."""
         steps, method = attempt
         try:
             draw = made()

@@ -18,7 +18,7 @@ from flocsim.forces.base import Force, SurfaceForce
 from flocsim.forces.drag import StokesDrag, is_permeable
 from flocsim.forces.shape_drag import drag_radius, facts_of
 from flocsim.forces.thermal import Thermal
-from flocsim.hydrodynamics import pair, pair_table, two_spheres
+from flocsim.hydrodynamics import pair, two_spheres
 from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
 
 NEAR = 2.0
@@ -107,7 +107,7 @@ class PairResistance(Force):
     cut: float = quantity(
         "",
         at_least=5.0,
-        at_most=0.5 * pair_table.FARTHEST,
+        at_most=0.5 * pair.FARTHEST,
         default=20.0,
         help="gap over r_i + r_j at which it ends; it fades from half of it on",
     )
@@ -176,9 +176,9 @@ def water_between(
         )
     first, second = radii = [drag_radius(forces, body) for body in bodies]
     mean = 0.5 * (first + second)
-    if not pair_table.NEAREST * mean <= force.h_min <= 0.1 * mean:
+    if not pair.NEAREST * mean <= force.h_min <= 0.1 * mean:
         raise UsageError(
-            f"h_min of PairResistance must be {pair_table.NEAREST:g} to .1 of the mean radius of "
+            f"h_min of PairResistance must be {pair.NEAREST:g} to .1 of the mean radius of "
             f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
         )
     water = np.zeros(at.WATER_SIZE)
@@ -187,7 +187,7 @@ def water_between(
     water[at.CUT], water[at.NEAR_CUT] = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
     water[at.FLOW : at.FLOW + 6] = fluid.flow
     water[at.FIRST_RADIUS : at.FIRST_RADIUS + 2] = radii
-    table = unit_table(second / first) * pair_table.scales(fluid.viscosity, mean)[:, None]
+    table = unit_table(second / first) * pair.scales(fluid.viscosity, mean)[:, None]
     return table, water
 
 
@@ -199,20 +199,20 @@ def stand_in(force: PairResistance) -> Lubrication:
 @functools.lru_cache(maxsize=256)
 def unit_table(ratio: float) -> Any:
     """``Scene.pair_table`` of a mean radius and a viscosity of 1, r₂/r₁ = ``ratio``."""
-    if not 1.0 / pair_table.LARGEST_RATIO <= ratio * (1.0 + 1e-9) <= 1.0001 * 50.0:
+    if not 1.0 / pair.LARGEST_RATIO <= ratio * (1.0 + 1e-9) <= 1.0001 * 50.0:
         raise UsageError(
             f"the radii of two bodies with PairResistance must be up to "
-            f"{pair_table.LARGEST_RATIO:g} times each other, found {max(ratio, 1.0 / ratio):.4g}"
+            f"{pair.LARGEST_RATIO:g} times each other, found {max(ratio, 1.0 / ratio):.4g}"
         )
-    values = sum(weight * kept_node(place) for place, weight in pair_table.slots(ratio))
-    return pair_table.cubics(np.asarray(values))
+    values = sum(weight * kept_node(place) for place, weight in pair.slots(ratio))
+    return pair.cubics(np.asarray(values))
 
 
 @functools.cache
 def kept_node(place: int) -> np.ndarray:
     """The columns of a node of the ratio, kept on the disk: a second to compute."""
     if place < 0:
-        return pair_table.exchanged(kept_node(-place))
-    facts = facts_of(pair_table, pair, two_spheres)
-    data = kept("flocsim_pair", f"{place} {facts}", lambda: pair_table.node(place).tobytes())
-    return np.frombuffer(data).reshape(pair_table.NODES, -1)
+        return pair.exchanged(kept_node(-place))
+    facts = facts_of(pair, two_spheres)
+    data = kept("flocsim_pair", f"{place} {facts}", lambda: pair.node(place).tobytes())
+    return np.frombuffer(data).reshape(pair.NODES, -1)

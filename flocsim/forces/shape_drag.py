@@ -16,6 +16,7 @@ from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.errors import UsageError
 from flocsim.forces.base import Force
 from flocsim.forces.drag import StokesDrag
+from flocsim.geometry.shapes import cores
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import prism, prism_drag
 from flocsim.hydrodynamics.permeable import drag_factor
@@ -102,7 +103,7 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         return np.array(numbers, dtype=float).tobytes()
 
     told = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
-    data = kept("flocsim_drag", f"{told} {height} {facts_of(prism)}", made)
+    data = kept("flocsim_drag", f"{told} {height} {facts_of(prism, cores)}", made)
     return tuple(np.frombuffer(data).tolist())
 
 

@@ -2,8 +2,8 @@
 
 two_spheres: the resistance functions of two unequal spheres, exactly; pair: what follows from them
 for motion in a plane; encounters: which of two spheres that meet touch; prism: the drag of a
-floc's outline; clusters: how rigid clusters of bodies move; permeable:
-spheres that water passes through. May import compiler and errors.
+floc's outline; clusters: how rigid clusters of bodies move; permeable: spheres that water passes
+through. May import geometry, compiler and errors.
 """
 
 from flocsim.hydrodynamics.encounters import Meeting, bend

@@ -17,6 +17,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
+from flocsim.geometry.shapes.cores import inside_polygon, inside_rings, signed_area
 
 SPHERES = (150, 300, 600)
 """Of half of a surface, about: three coverings."""
@@ -74,9 +75,10 @@ def prism_drag(rings: Sequence[np.ndarray], depth: float | None = None) -> Prism
     rings = [np.asarray(ring, dtype=float) for ring in rings]
     rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
     # Where rings nest, a hole takes away what it holds.
-    area = sum(
-        ring_area(ring) * (-1.0) ** depth_of(place, rings) for place, ring in enumerate(rings)
-    )
+    nested = [sum(inside_polygon(ring[:1], each)[0] for each in rings if each is not ring)
+              for ring in rings]  # fmt: skip
+    area = sum(abs(signed_area(ring)) * (-1.0) ** level
+               for ring, level in zip(rings, nested, strict=True))  # fmt: skip
     if not 0.0 < area < math.inf:
         raise UsageError(f"an outline must hold an area above 0 m^2, found {area:.3g}")
     radius = math.sqrt(area / math.pi)
@@ -101,31 +103,6 @@ def prism_drag(rings: Sequence[np.ndarray], depth: float | None = None) -> Prism
     return PrismDrag(resistance, whole[:, 3:], float(error), radius)
 
 
-def ring_area(ring: np.ndarray) -> float:
-    """What a ring encloses, whatever its sense."""
-    x, y = ring.T
-    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
-
-
-def depth_of(place: int, rings: Sequence[np.ndarray]) -> int:
-    """How many of the others a ring lies in."""
-    others = [ring for other, ring in enumerate(rings) if other != place]
-    return int(crossings(rings[place][:1], others)[0]) if others else 0
-
-
-def crossings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
-    """In how many rings points (k, 2) lie (k,)."""
-    count = np.zeros(len(points), dtype=int)
-    x, y = points[:, 0, None], points[:, 1, None]
-    for ring in rings:
-        ahead = np.roll(ring, -1, axis=0)
-        passes = (ring[:, 1] > y) != (ahead[:, 1] > y)
-        rise = np.where(ahead[:, 1] == ring[:, 1], 1.0, ahead[:, 1] - ring[:, 1])
-        left = x < ring[:, 0] + (ahead[:, 0] - ring[:, 0]) * (y - ring[:, 1]) / rise
-        count += np.sum(passes & left, axis=1) % 2
-    return count
-
-
 def surface(rings: Sequence[np.ndarray], height: float, spacing: float) -> np.ndarray:
     """Places (k, 3) of spheres that cover the upper half of a prism: its wall, and a face."""
     walls = [along(ring, spacing) for ring in rings]
@@ -140,7 +117,7 @@ def surface(rings: Sequence[np.ndarray], height: float, spacing: float) -> np.nd
     shift = 0.5 * spacing * (np.arange(len(rows)) % 2)
     grid = np.column_stack([(columns + shift[:, None]).ravel(), np.repeat(rows, len(columns))])
     grid = middle + grid @ ACROSS
-    grid = grid[crossings(grid, rings) % 2 == 1]
+    grid = grid[inside_rings(grid, rings)]
     # Wall spheres are as dense as the spacing: the nearest is as far as the outline, nearly.
     gap = np.min(np.hypot(*(grid[:, None] - wall).T), axis=0) if len(grid) else np.empty(0)
     grid = grid[gap > LEAST_LAYER * spacing]
@@ -178,15 +155,9 @@ def pushes(places: np.ndarray, others: np.ndarray, radius: float) -> np.ndarray:
     return found
 
 
-def loads(
-    places: np.ndarray, radius: float, bodies: Any = None, centres: Any = ((0.0, 0.0),)
-) -> np.ndarray:
-    """(3 n, 3 n + 2): forces and torques on n bodies that v_x, v_y and the spin of each, and E_xx
-    and E_xy, take, by unit viscosity.
-
-    ``bodies`` (k,): to which of them the spheres belong, all to one by default, which turn about
-    and are loaded at their ``centres`` (n, 2); the strain is about the origin.
-    """
+def loads(places: np.ndarray, radius: float) -> np.ndarray:
+    """(3, 5): forces and torque on a body that v_x, v_y and its spin, and E_xx and E_xy, take, by
+    unit viscosity, the spin and the strain about the origin."""
     from scipy.linalg import cho_factor, cho_solve
 
     count, mirror = len(places), np.array([1.0, 1.0, -1.0])
@@ -194,15 +165,8 @@ def loads(
     matrix += pushes(places, places * mirror, radius) * mirror
     matrix = np.moveaxis(matrix, 2, 1).reshape(3 * count, 3 * count)
     x, y, _ = places.T
-    none = np.zeros(count)
-    motions = []
-    for body, centre in enumerate(centres):
-        own = np.ones(count) if bodies is None else np.where(bodies == body, 1.0, 0.0)
-        motions += [
-            (own, none, none), (none, own, none),
-            (-own * (y - centre[1]), own * (x - centre[0]), none),
-        ]  # fmt: skip
-    whole = [*motions, (x, -y, none), (y, x, none)]
+    none, ones = np.zeros(count), np.ones(count)
+    whole = [(ones, none, none), (none, ones, none), (-y, x, none), (x, -y, none), (y, x, none)]
     wanted = np.stack([np.column_stack(each).ravel() for each in whole], axis=1)
     found = cho_solve(cho_factor(matrix, overwrite_a=True), wanted)
-    return 2.0 * wanted[:, : len(motions)].T @ found
+    return 2.0 * wanted[:, :3].T @ found

@@ -216,11 +216,7 @@ class TwoSpheres:
         πµ(a_on + a_of)² (B, G), πµ(a_on + a_of)³ (C, H). B, G and H are those of a sphere that sees
         the other one along d: of sphere 2, d points from 2 to 1.
         """
-        return self._functions[family, on, of](xi)
-
-    @property
-    def _functions(self) -> dict[tuple[str, int, int], Series]:
-        return functions_of(self.ratio)
+        return functions_of(self.ratio)[family, on, of](xi)
 
 
 @lru_cache(maxsize=256)

@@ -10,8 +10,7 @@ import attrs
 import numpy as np
 
 from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.exchange import add_vtkhdf, write_gsd
 from flocsim.io.files import Rule, keep, seal, write_file

@@ -18,9 +18,9 @@ import numpy as np
 from flocsim.body import Body, read_position
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit
-from flocsim.geometry.shapes.parts import core_gap, cores_overlap
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.wall import wall_between
+from flocsim.geometry.shapes.spheropolygon import WallShape
 
 MOST_TRIALS = 5_000
 """Places tried for a body before it is said that none is left."""
@@ -102,10 +102,9 @@ class Placement:
             return False
         a = shape.placed_parts(float(way[0]), float(way[1]), float(place[2]))
         b = there.placed_parts(0.0, 0.0, self.places[other, 2])
-        pairs = list(product(a, b))
-        if any(cores_overlap(one, two) for one, two in pairs):
-            return False
-        return all(core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in pairs)
+        return all(
+            core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in product(a, b)
+        )
 
 
 def place_at_random(
@@ -164,7 +163,7 @@ def wall(start: Any, end: Any, radius: float | str | None = None) -> Body:
         raise UsageError(f"a wall needs two different points, found {ends[0].tolist()} twice")
     thickness = THIN * length if radius is None else float(in_unit(radius, "m", "radius"))
     middle = ends.mean(axis=0)
-    shape = wall_between(ends[0] - middle, ends[1] - middle, thickness)
+    shape = WallShape(ends - middle, thickness)
     return Body(shape, (float(middle[0]), float(middle[1])), surface_density=1.0, fixed=True)
 
 

@@ -11,8 +11,7 @@ from flocsim import Sphere
 from flocsim.bonds import certificate
 from flocsim.bonds.bond import HOOK, NO_BOND, REST
 from flocsim.bonds.certificate import SAFETY, capacity, is_certain, is_certain_in_kicks
-from flocsim.bonds.rest import FAR_LONGER, kind_at_rest
-from flocsim.bonds.statics import is_hooked
+from flocsim.bonds.rest import FAR_LONGER, is_hooked, kind_at_rest
 from flocsim.constants import BOLTZMANN
 from flocsim.forces import Contact, VanDerWaals
 from tests.helpers.hydration import Hydration

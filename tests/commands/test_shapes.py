@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.geometry.shapes.measures import ShapeMeasures
+from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.shapes.library import (
     ShapeEntry,
     StoredFit,

@@ -10,11 +10,12 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.estimates.paired import between, newcombe
-from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS
 from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 

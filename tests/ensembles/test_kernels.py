@@ -23,9 +23,8 @@ from flocsim.ensembles.kernels import (
     study_of,
 )
 from flocsim.ensembles.study import Study
-from flocsim.geometry.shapes.composite import Composite
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.shape import Sphere
+from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
 from tests.helpers.kernel_study import kernel_config
 from tests.helpers.small_study import small_config
 

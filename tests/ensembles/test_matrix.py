@@ -264,14 +264,14 @@ def test_what_rows_are_of_is_told_and_held(home, tmp_path, monkeypatch, kind):
     cell, file = Cell(KINDS[kind], f"{kind}.h5"), f"{kind}.h5"
     run = cell.kind.read(file).run
     assert '"features"' in run["cpus"] and run["identity"] and run["history"] == "[]"
-    from flocsim.ensembles.storage import first_rows
+    from flocsim.ensembles.parallel import agreement
 
-    original = first_rows.stored_rows
+    original = agreement.stored_rows
 
     def other(study, store):
         return {code: each[::-1] + b"x" for code, each in original(study, store).items()}
 
-    monkeypatch.setattr(first_rows, "stored_rows", other)
+    monkeypatch.setattr(agreement, "stored_rows", other)
     before = Path(file).read_bytes()
     assert cell.run(*cell.kind.more, "--resume", output=file) == 2
     assert Path(file).read_bytes() == before

@@ -14,7 +14,7 @@ from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Sphere
 from tests.helpers.small_study import load_text, problem_lines, write_star_library
 
 RATIOS = (3.0, 5.0, 8.0, 13.0, 20.0)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import EXACT_RUNS, tabulate
-from flocsim.ensembles.parallel import worker
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS
+from flocsim.ensembles.parallel import coordinator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.schedule import Phase
 from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
@@ -16,6 +16,7 @@ from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results
 from tests.helpers.small_study import small_study
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 
@@ -32,7 +33,7 @@ def beginning(study):
 
 def results_of(study):
     """The Results of a Study that this process runs alone."""
-    comm = SerialCommunicator()
+    comm = Communicator()
     return lead(study, beginning(study), comm, Progress(study.size, True)).results
 
 
@@ -57,7 +58,7 @@ def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone,
     rng = np.random.default_rng(size)
     while any(held):
         rank = rng.choice([rank for rank in range(size) if held[rank]])
-        state.take_in(worker.run_chunk(study, held[rank], lambda: False, 1e-9, "key"))
+        state.take_in(coordinator.run_chunk(study, held[rank], lambda: False, 1e-9, "key"))
         held[rank] = None
         held = [chunk or state.next_chunk() for chunk in held]
     assert state.schedule.remaining == 0

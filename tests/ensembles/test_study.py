@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import run
-from flocsim.ensembles.collision.draw import Draw
-from flocsim.ensembles.collision.failures import FAILED, FAILURES
+from flocsim.ensembles.collision.draw import FAILED, FAILURES, Draw
 from flocsim.ensembles.collision.start import draws
 from flocsim.ensembles.pairs.replicates import replicate_of
 from flocsim.ensembles.storage.identity import identity_of

@@ -4,11 +4,11 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.pairs.kind import table, verdict
 from flocsim.interruption import WITHHELD
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tabulate import tabulate
 
 
 def with_ends(undecided, failed, limit=None, count=40):

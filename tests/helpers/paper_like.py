@@ -4,10 +4,10 @@ import attrs
 import numpy as np
 from scipy.special import ndtri
 
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import Results
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
 from tests.helpers.synthetic_results import bonds_of
+from tests.helpers.tabulate import tabulate
 
 TYPES, VERTICES, DELTA = ("I", "II", "III"), (1, 4, 16, 64), (0.0, 0.25, 0.5, 0.75, 1.0)
 COUNT = 600

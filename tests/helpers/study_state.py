@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.chunks import ROW, Condition, chunk_record
-from flocsim.ensembles.parallel.messages import ChunkResult
+from flocsim.ensembles.parallel.communicator import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.journal.journal import MemoryJournal

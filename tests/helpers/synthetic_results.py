@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.results.file import NOT_APPLICABLE, Results
 from flocsim.io.results.schema import BLANKS, REPLICATES
+from tests.helpers.tabulate import tabulate
 
 FAILURES = ("none", "overlap_too_deep", "step_budget")
 

@@ -10,7 +10,7 @@ import pytest
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
 from flocsim.forces import Contact, Gravity, StokesDrag
-from flocsim.geometry.shapes.cores import distance_between
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators import Status
 from flocsim.swarms.placement import floor, place_at_random, wall
 from flocsim.swarms.swarm import Swarm
@@ -34,9 +34,11 @@ def gaps(shapes, places, area, repeats):
         for j in ((-1, 0, 1) if repeats[1] else (0,))
     ]
     for i, j in combinations(range(len(shapes)), 2):
-        here = shapes[i].placed_vertices(*places[i])
-        there = shapes[j].placed_vertices(*places[j])
-        least = min(distance_between(here + image, there) for image in images)
+        [there] = shapes[j].placed_parts(*places[j])
+        least = min(
+            core_gap(*shapes[i].placed_parts(*(places[i] + (*image, 0.0))), there)
+            for image in images
+        )
         yield least - shapes[i].radius - shapes[j].radius
 
 
@@ -108,8 +110,6 @@ def loads(bodies, position):
         body.shape.placed_parts(*place)
         for body, place in zip(bodies, position.tolist(), strict=True)
     ]
-    from flocsim.geometry.shapes.parts import core_gap
-
     gaps = [core_gap(each[0], parts[-1][0]) - each[0].radius - DISC for each in parts[:-1]]
     return STIFFNESS * np.maximum(0.0, -np.array(gaps))
 

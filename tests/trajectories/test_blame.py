@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import System
 from flocsim.__main__ import main
-from flocsim.ensembles.collision.failures import FAILED, FAILURES, run_safely
+from flocsim.ensembles.collision.draw import FAILED, FAILURES, run_safely
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError, KernelWarning, UsageError

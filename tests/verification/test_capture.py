@@ -15,7 +15,7 @@ from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels import settling_interval, study_of
 from flocsim.ensembles.runner import run
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.integrators import Overdamped

@@ -18,7 +18,7 @@ from flocsim.io.terminal import Progress
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
-    from flocsim.geometry.shapes.measures import ShapeMeasures
+    from flocsim.geometry.shapes.outline import ShapeMeasures
     from flocsim.io.images.pictures import Region, Segmentation
     from flocsim.io.images.stacks import Plane
 

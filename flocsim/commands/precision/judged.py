@@ -13,8 +13,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision.draw import Draw
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.choice import first_methods

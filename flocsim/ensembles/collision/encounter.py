@@ -30,7 +30,7 @@ from flocsim.forces.shape_drag import body_resistance, follows_shape, resistance
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
-from flocsim.hydrodynamics.pair_table import node_radii, slots
+from flocsim.hydrodynamics.pair import node_radii, slots
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER

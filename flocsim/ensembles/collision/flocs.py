@@ -17,10 +17,8 @@ from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config.schema import BAND, CUT, ShapesConfig
 from flocsim.errors import ConfigError
 from flocsim.geometry.fit.fit import fit_mask
-from flocsim.geometry.shapes.resize import resized
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.shape import Shape, Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.results.schema import BAND_ENDS
 
@@ -251,17 +249,16 @@ class FlocPool:
         if self.own_size:
             equivalent_radius = self.flocs[place].measured_size
         key = (place if vertices > 1 else None, vertices, equivalent_radius)
-        if key not in self.made:
-            self.made[key] = self.make(place, vertices, equivalent_radius)
+        if key not in self.made and vertices == 1:
+            self.made[key] = Sphere(equivalent_radius)
+        elif key not in self.made:
+            floc = self.flocs[place]
+            self.made[key] = (
+                floc.measured(vertices)
+                if self.own_size
+                else floc.resized(vertices, equivalent_radius, self.radius)
+            )
         return self.made[key]
-
-    def make(self, place: int, vertices: int, equivalent_radius: float) -> Shape:
-        """A floc, or the sphere, of an equivalent radius [m]."""
-        if vertices == 1:
-            return Sphere(equivalent_radius)
-        if self.own_size:
-            return self.flocs[place].measured(vertices)
-        return self.flocs[place].resized(vertices, equivalent_radius, self.radius)
 
 
 def pool_of(shapes: ShapesConfig, flocs: Sequence[Floc]) -> FlocPool:

@@ -84,10 +84,6 @@ class SizeClass:
     sizes: np.ndarray
     weights: np.ndarray
 
-    def unlike(self, size: float) -> np.ndarray:
-        """The weights, 0 for flocs of this size."""
-        return np.where(self.sizes == size, 0.0, self.weights)
-
 
 @attrs.frozen(eq=False)
 class TwoClasses(Pairing):
@@ -126,7 +122,7 @@ class TwoClasses(Pairing):
             _, inverse = np.unique(own.sizes, return_inverse=True)
             chances = chances * (1.0 - np.bincount(inverse, own.weights)[inverse])
         one = quantile(chances, numbers[2])
-        two = quantile(other.unlike(own.sizes[one]), numbers[3])
+        two = quantile(np.where(other.sizes == own.sizes[one], 0.0, other.weights), numbers[3])
         pair = int(own.places[one]), int(other.places[two])
         return pair if own.sizes[one] < other.sizes[two] else pair[::-1]
 

@@ -117,8 +117,6 @@ class KernelScene(DrivenScene):
     flow_in_fluid = FlowScene.flow_in_fluid
 
     def __attrs_post_init__(self):
-        if not set(self.meeting) <= set(MECHANISMS):
-            raise ConfigError(f"meeting must be one or several of {', '.join(MECHANISMS)}")
         if (self.sizes is None) == (self.pairs is None):
             found = "neither" if self.sizes is None else "both"
             raise ConfigError(

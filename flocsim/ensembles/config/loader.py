@@ -13,7 +13,6 @@ import attrs
 from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.problems import Misfit, Problems, dotted, misfit, show, suggestion
 from flocsim.ensembles.config.schema import (
     ALTERNATIVES,
     FORCES,
@@ -39,7 +38,15 @@ from flocsim.ensembles.config.toml_text import (
     parse,
     text_problem,
 )
-from flocsim.ensembles.config.values import reader_of
+from flocsim.ensembles.config.values import (
+    Misfit,
+    Problems,
+    dotted,
+    misfit,
+    reader_of,
+    show,
+    suggestion,
+)
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
 from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED

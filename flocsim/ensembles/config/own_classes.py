@@ -17,8 +17,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.config.problems import misfit
 from flocsim.ensembles.config.sources import Neighbours, Sources, place
+from flocsim.ensembles.config.values import misfit
 from flocsim.errors import ConfigError
 from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, PairForce
@@ -60,7 +60,7 @@ def full_name(own: object) -> str:
     return f"{type(own).__module__}:{type(own).__qualname__}"
 
 
-def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None = None) -> type:
+def load_class(name: object, folder: Path, kind: Kind, sources: Sources) -> type:
     """The class ``name`` = "module:Class" of a Kind; the module lies in ``folder`` or is installed.
 
     ``sources``: what of it has been read already, by rank 0 of a job. Misfit for a name of another
@@ -72,7 +72,6 @@ def load_class(name: object, folder: Path, kind: Kind, sources: Sources | None =
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise misfit(f"'module:Class' such as {kind.example!r}", name)
-    sources = sources or Sources()
     if sources.consent is not None and not sources.has(folder / f"{module_name}.py", folder):
         sources.consent.check_module(module_name, class_name, folder)
     module = load_module(module_name, folder, sources)
@@ -155,7 +154,11 @@ def load_module(name, folder, sources):
             module = run_file(name, path, sources.module(path, folder))
         else:
             module = importlib.import_module(name)
-            note_installed(module, folder, sources)
+            # The source of what lies elsewhere is known by its name.
+            source = getattr(module, "__file__", None) or ""
+            if source.endswith(".py") and place(source, folder) not in sources.modules:
+                with contextlib.suppress(OSError):
+                    sources.modules[module.__name__] = Path(source).read_bytes()
         if module is not before:
             # Neighbours that an older one had imported are not run again.
             READ[name] = (READ.get(name, {}) if before else {}) | sources.modules
@@ -172,14 +175,6 @@ def load_module(name, folder, sources):
 
 READ: dict[str, dict[str, bytes]] = {}
 """Module of the user's own → what it and its neighbours were when they were run."""
-
-
-def note_installed(module, folder, sources):
-    """Put the source of a module that lies elsewhere into ``sources``, by its name."""
-    path = getattr(module, "__file__", None)
-    if path and path.endswith(".py") and place(path, folder) not in sources.modules:
-        with contextlib.suppress(OSError):
-            sources.modules[module.__name__] = Path(path).read_bytes()
 
 
 def run_file(name, path, source):
@@ -220,17 +215,11 @@ def why_not(name, folder, error):
     what = " ".join(f"{type(error).__name__}: {error}".split())
     if isinstance(error, SyntaxError) and error.filename:
         what = f"{error.filename}:{error.lineno}: {error.msg}"
-    elif frame := frame_to_blame(error, folder):
-        what = f"{frame.filename}:{frame.lineno}: {what}"
+    else:
+        # The innermost frame in the user's folder, or that is not Python's import.
+        frames = [each for each in traceback.extract_tb(error.__traceback__)
+                  if each.filename != __file__ and not each.filename.startswith("<")]  # fmt: skip
+        own = [each for each in frames if Path(each.filename).parent == folder.resolve()]
+        for frame in (own or frames)[-1:]:
+            what = f"{frame.filename}:{frame.lineno}: {what}"
     return f"importing module {name!r} failed: {what}"
-
-
-def frame_to_blame(error, folder):
-    """The innermost frame in the user's folder, else the innermost that is not Python's import."""
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename != __file__ and not frame.filename.startswith("<")
-    ]
-    own = [frame for frame in frames if Path(frame.filename).parent == folder.resolve()]
-    return next(reversed(own or frames), None)

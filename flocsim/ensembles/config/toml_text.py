@@ -5,6 +5,7 @@ grows with the square of a dotted key's parts (90 s for 600 kB of "a.a.a…"), a
 that no config has.
 """
 
+import contextlib
 import itertools
 import json
 import os
@@ -183,30 +184,18 @@ def statements(text: str) -> Iterator[tuple[int, dict, bool]]:
     statement, start, attempts = "", 1, 0
     for number, line in enumerate(text.split("\n"), 1):
         start, attempts = (start, attempts) if statement else (number, 0)
-        may_end = not statement or may_close(line)
-        statement += line + "\n"
+        # A list or a string of many lines may end here: spares a parse of what goes on.
+        goes_on = line.split("#")[0].rstrip().endswith(",")
+        may_end = not goes_on and any(closer in line for closer in CLOSERS)
+        may_end, statement = not statement or may_end, statement + line + "\n"
         if not may_end:
             continue
-        table = parse_or_none(statement)
-        if table is not None:
-            yield start, table, statement.lstrip().startswith("[")
+        with contextlib.suppress(ValueError, RecursionError):
+            yield start, tomllib.loads(statement), statement.lstrip().startswith("[")
             statement = ""
         attempts += 1
         if attempts > MOST_ATTEMPTS:
             return
-
-
-def may_close(line):
-    """Whether a list or a string of many lines can end here; spares a parse of what goes on."""
-    code = line.split("#")[0].rstrip()
-    return not code.endswith(",") and any(closer in line for closer in CLOSERS)
-
-
-def parse_or_none(statement):
-    try:
-        return tomllib.loads(statement)
-    except (ValueError, RecursionError):
-        return None
 
 
 def places_in(table, around=()):

@@ -1,6 +1,6 @@
 """From rows to probabilities with intervals: of single conditions, pooled, paired.
 
-Also the rule that stops a study, and which outcomes change between two runs of one.
+Also the rule that stops a study.
 
 May import ``storage``.
 """

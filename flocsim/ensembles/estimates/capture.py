@@ -160,13 +160,6 @@ def counted(codes: Codes) -> dict[str, Events]:
     return told | {"alpha": Events(touched.least & stays.known, stays.least, ~stays.known)}
 
 
-def student(scrambles: int) -> float:
-    """Half the width of a 95 % interval over the standard error of so many means."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(scrambles - 1, 0.975))
-
-
 def half_width(values: np.ndarray, point: float) -> float:
     """Of the 95 % interval of the mean of what scrambles gave (S,), to which one point of a
     scramble adds ``point``.
@@ -174,8 +167,10 @@ def half_width(values: np.ndarray, point: float) -> float:
     Even points in a simple set are as many in every scramble, up to one: their scatter is taken for
     half a point at least.
     """
+    from scipy.special import stdtrit
+
     scatter = max(float(values.std(ddof=1)), 0.5 * point)
-    return student(len(values)) * scatter / math.sqrt(len(values))
+    return float(stdtrit(len(values) - 1, 0.975)) * scatter / math.sqrt(len(values))
 
 
 def mean_of(
@@ -432,7 +427,12 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         radii = np.array(scene.sizes)
     numerical = numerical_parts(found, shape)
     arrays = {name: np.full(shape, np.nan) for name in KERNEL}
-    fill_alike(arrays, scene.meeting, scene.sizes is not None)
+    if scene.sizes is not None and SETTLING in scene.meeting:
+        # Bodies of one given size do not meet by settling.
+        m, alike = scene.meeting.index(SETTLING), np.arange(len(labels))
+        for name in KERNEL:
+            if name.startswith(("width", "beta")) or name in ("speed", "checked"):
+                arrays[name][m, :, alike, alike] = 0.0
     for cell, each in found.items():
         m, v, i, j = cell
         for name, value in (each.values | numerical[cell]).items():
@@ -440,15 +440,3 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
     water = resistance_of_pairs(study.config.forces) is not None
     fractal = fractal_in(repr(study.config.bodies.density))
     return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water, fractal)
-
-
-def fill_alike(arrays: dict[str, np.ndarray], meetings: Sequence[str], given: bool) -> None:
-    """Bodies of one given size do not meet by settling: widths and rates are 0."""
-    if not given or SETTLING not in meetings:
-        return
-    m = meetings.index(SETTLING)
-    diagonal = np.arange(arrays["alpha"].shape[-1])
-    for name in KERNEL:
-        known = name.startswith(("width", "beta")) or name in ("speed", "checked")
-        if known:
-            arrays[name][m, :, diagonal, diagonal] = 0.0

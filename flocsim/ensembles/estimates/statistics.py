@@ -3,23 +3,26 @@
 Of single conditions, and pooled over all displacements. There a replicate has the same orientations
 at every displacement, so that its collisions are not independent: the interval is Wilson's at the
 number of independent events which the spread between replicates shows (a ratio of cluster totals;
-W. G. Cochran, Sampling Techniques, 1977, ch. 6).
+W. G. Cochran, Sampling Techniques, 1977, ch. 6). And the rule that ends a study early, once these
+are narrow enough, where the config asks for one.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
+import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flocsim.ensembles.estimates.numerical import count_changes, numerical_errors
+from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.paired import sums_of_scrambles
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import UsageError
 from flocsim.io.confidence import (
     bounded_sums,
     clustered_proportion,
     proportion,
     scrambled_proportion,
-    wilson,
 )
 from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import (
@@ -36,8 +39,6 @@ from flocsim.io.results.events import (
 from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
 from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES, last_axis
 
-__all__ = ["probabilities", "tabulate", "wilson"]
-
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
 
@@ -53,34 +54,6 @@ EXACT_RUNS = COUNTED[: 3 * len(CODES)]
 def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:
     """CODES of each run, from columns in the order of COUNTED, all of them or the first ones."""
     return [columns[k : k + len(CODES)] for k in range(0, len(columns), len(CODES))]
-
-
-def tabulate(
-    outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike,
-    checked_outcome: ArrayLike = NOT_APPLICABLE, checked_inside: ArrayLike = NOT_APPLICABLE,
-    checked_bond: ArrayLike = NOT_APPLICABLE, third_outcome: ArrayLike = NOT_APPLICABLE,
-    third_inside: ArrayLike = NOT_APPLICABLE, third_bond: ArrayLike = NOT_APPLICABLE,
-) -> dict[str, np.ndarray]:  # fmt: skip
-    """Counts and probabilities of every condition, over the last axis of the arrays.
-
-    ``outcome``, ``inside``, ``bond``: codes as in the results file, (…, replicate), in practice
-    (type, vertices, delta, replicate). Returns a dict of arrays (…), (…, 4) for the classes A–D and
-    (…, 3) for the kinds of bond: the counts ``n_*`` (see `count`, `count_changes`), the
-    probabilities of `probabilities` and their `numerical_errors`. ``checked_…``, ``third_…``:
-    those of second and third runs, none by default. Raises UsageError for unknown codes, and where
-    they contradict each other.
-    """
-    first = checked_codes(outcome, inside, bond)
-    again, third = (
-        tuple(np.broadcast_to(np.asarray(codes), first[0].shape) for codes in run)
-        for run in (
-            (checked_outcome, checked_inside, checked_bond),
-            (third_outcome, third_inside, third_bond),
-        )
-    )
-    sums = count(*first) | count_changes(first, again, third)
-    counts = {name: values for name, values in sums.items() if name.startswith("n_")}
-    return counts | probabilities(counts) | numerical_errors(sums)
 
 
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
@@ -209,3 +182,48 @@ def scrambled_probabilities(
         if pooled:
             table[f"n_effective_{name}"] = effective
     return table
+
+
+GROWTH = 1.25
+"""Each look is at so many times the replicates of the one before."""
+
+
+def borders(stop: StopConfig, replicates: int) -> list[int]:
+    """The numbers of replicates at which the rule looks; the last is ``replicates``."""
+    looks = []
+    look = stop.least
+    while stop.half_width is not None and look < replicates:
+        looks.append(look)
+        look = math.ceil(GROWTH * look)
+    return [*looks, replicates]
+
+
+@attrs.define
+class StopRule:
+    """Whether the first so many replicates of every condition are enough. Counts as it goes."""
+
+    stop: StopConfig
+    store: RowStore
+    seen: int = 0
+    counts: list[dict[str, np.ndarray]] = attrs.Factory(list)
+
+    def __call__(self, replicates: int) -> bool:
+        """Whether the study may end with this many, all of which exist."""
+        for place in range(len(self.store.conditions)):
+            codes = (self.store.read(place, name, self.seen, replicates) for name in CODES)
+            more = count(*codes)
+            if place == len(self.counts):
+                self.counts.append(more)
+            else:
+                before = self.counts[place]
+                self.counts[place] = {name: more[name] + before[name] for name in more}
+        self.seen = replicates
+        if self.stop.half_width is None:
+            return False
+        return all(self.is_narrow(counts) for counts in self.counts)
+
+    def is_narrow(self, counts):
+        """Whether the intervals of a condition are narrow enough."""
+        table = probabilities(counts)
+        widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]
+        return not np.any(0.5 * np.array(widths) > self.stop.half_width)

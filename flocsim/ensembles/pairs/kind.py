@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
@@ -19,8 +19,7 @@ from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
-from flocsim.ensembles.estimates.statistics import COUNTED
-from flocsim.ensembles.estimates.stop_rule import StopRule
+from flocsim.ensembles.estimates.statistics import COUNTED, StopRule
 from flocsim.ensembles.estimates.summary import (
     BLOCK_ROWS,
     JOINT,

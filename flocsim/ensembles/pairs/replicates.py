@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision.failures import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.choice import final_methods

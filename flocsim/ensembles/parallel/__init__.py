@@ -1,9 +1,8 @@
 """Which rank does what: chunks of replicates handed out, run and taken in again.
 
-Rank 0 keeps what is known of the study (`schedule`: what is done and what is to be done)
-and answers the others (`coordinator`); every rank, rank 0 too, runs chunks (`worker`). Messages go
-through a `communicator`: one process, MPI, or processes of this machine (`processes`); a
-`heartbeat` tells when one of them is lost. Before anything runs the ranks compare what they would
-run (`agreement`).
+Rank 0 keeps what is known of the study (`schedule`: what is done and what is to be done) and
+answers the others; every rank, rank 0 too, runs chunks (`coordinator`). Messages go through a
+`communicator`: one process, MPI, or processes of this machine (`processes`); a `heartbeat` tells
+when one of them is lost. Before anything runs the ranks compare what they would run (`agreement`).
 `flocsim.ensembles.runner` puts them together. May import ``storage`` and ``collision``.
 """

@@ -20,8 +20,7 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
-from flocsim.ensembles.parallel.messages import ExitCode
+from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage.row_store import (
     OldColumns,
     ReadOnlyJournal,
@@ -69,22 +68,8 @@ class Answer:
     host: str = ""
 
 
-class Order:
-    """What a rank is asked to do; `work` may raise, `carry_out` answers with the reason."""
-
-    def work(self, study: Any, comm: Communicator) -> Answer:
-        raise NotImplementedError
-
-    def carry_out(self, study: Any, comm: Communicator) -> Answer:
-        host = platform.node()
-        try:
-            return attrs.evolve(self.work(study, comm), host=host)
-        except (FlocsimError, OSError, ValueError, AssertionError) as error:
-            return Answer(failed=f"rank {comm.rank} on {host}: {error}", host=host)
-
-
 @attrs.frozen(eq=False)
-class Share(Order):
+class Share:
     """The order to write blocks [first, stop).
 
     ``known``: place of a condition → where its rows lie, of those in the blocks; ``journal``: its
@@ -112,7 +97,7 @@ class Share(Order):
 
 
 @attrs.frozen(eq=False)
-class Review(Order):
+class Review:
     """The order to read what others have written: whole blocks, of which ``digests`` are given, and
     outcomes of replicates [first, stop) of all conditions, to be counted.
 
@@ -152,8 +137,13 @@ def is_called(comm: Communicator) -> Callable[[], bool]:
 
 def assist(study: Any, comm: Communicator) -> ExitCode:
     """What every rank but 0 does while the results file is made; how the study has ended."""
+    host = platform.node()
     while not isinstance(order := comm.receive(0, heed_signals=False), ExitCode):
-        comm.send(0, order.carry_out(study, comm))
+        try:
+            answer = attrs.evolve(order.work(study, comm), host=host)
+        except (FlocsimError, OSError, ValueError, AssertionError) as error:
+            answer = Answer(failed=f"rank {comm.rank} on {host}: {error}", host=host)
+        comm.send(0, answer)
     return order
 
 
@@ -261,7 +251,7 @@ class Assembly:
             file.path, file.token, file.plan, self.reader.shape, host, self.reader.scrambles
         )
 
-    def ask(self, orders: dict[int, Order], own: Callable[[], Any]) -> dict[int, Answer]:
+    def ask(self, orders: dict[int, Share | Review], own: Callable[[], Any]) -> dict[int, Answer]:
         """Send orders to ranks, do one's ``own`` part, and wait for the answers."""
         for rank, order in orders.items():
             self.comm.send(rank, order)
@@ -279,7 +269,7 @@ class Assembly:
         parts = parts_of(blocks, max(min(1 if alone else self.comm.size, blocks), 1))
         lengths = [longest(known) for known in self.reader.known]
         journal = os.fspath(Path(store.journal.path).resolve())
-        orders: dict[int, Order] = {
+        orders: dict[int, Share | Review] = {
             rank: Share(self.place, part, known_in(part, self.reader, lengths), journal, old)
             for rank, part in enumerate(parts)
             if rank
@@ -310,7 +300,7 @@ class Assembly:
         replicates = self.reader.shape[-1]
         rows, ranks = self.file.plan.rows, self.comm.size if together else 1
         parts = parts_of(replicates, min(ranks, replicates, max(rows // COUNTED_ROWS, 1)))
-        orders: dict[int, Order] = {}
+        orders: dict[int, Share | Review] = {}
         reread = self.blocks_to_read() if len(self.hosts) > 1 and together else {}
         for rank in range(1, ranks):
             part = parts[rank] if rank < len(parts) else (0, 0)

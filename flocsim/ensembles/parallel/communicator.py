@@ -1,8 +1,17 @@
-"""The ranks of a job behind one interface: one process, MPI's, or processes of this machine. The
-only importer of mpi4py.
+"""The ranks of a job behind one interface: one process, MPI's, or processes of this machine; and
+what they say to each other while a study runs. The only importer of mpi4py.
 
 All ranks talk to rank 0 only. Nobody waits inside a library: a rank that waits looks for a message,
 then sleeps a little, so that it takes no processor from those who compute, and hears signals.
+
+rank 0 → another rank         the flocs and the Facts of its study (or ExitCode, wherever it fails)
+every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
+rank 0 → another rank         how many replicates are to be run, and the key of the study's identity
+                              for their records, once (or ExitCode, where the study cannot begin)
+                              a Chunk in answer to a Request, None where there is no more
+                              Halt, while it works, when its chunk is of no use any more
+                              ExitCode, after the last answer, when all is written
+every other rank → rank 0     Kept and Going, while it works, where replicates take long
 """
 
 import collections
@@ -13,7 +22,9 @@ import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import attrs
 
 from flocsim.ensembles.parallel.heartbeat import Heartbeat
 from flocsim.errors import FlocsimError, UsageError
@@ -24,6 +35,9 @@ from flocsim.interruption import (
     end_with_parent,
     stop_requested,
 )
+
+if TYPE_CHECKING:
+    from flocsim.ensembles.chunks import Chunk
 
 LAUNCHER_SIZES = (
     "PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
@@ -41,8 +55,64 @@ class StopRequested(FlocsimError):
     exit_code = 75
 
 
+@attrs.frozen
+class ChunkResult:
+    """What came of a chunk: its first ``count`` replicates, as a record of the journal.
+
+    ``data_start``: bytes of the record before the rows; ``failed``: how many replicates have
+    failed; ``notes``: what is known of them.
+    """
+
+    chunk: "Chunk"
+    count: int
+    record: bytes
+    data_start: int
+    failed: int = 0
+    notes: tuple[dict, ...] = ()
+
+
+@attrs.frozen
+class Kept:
+    """What is kept of an unfinished replicate of the condition at a place, as a record of the
+    journal; whether progress counts it."""
+
+    condition: int
+    replicate: int
+    record: bytes
+    counts: bool
+
+
+@attrs.frozen
+class Going:
+    """How far a rank's replicate is, in words."""
+
+    words: str
+
+
+@attrs.frozen
+class Request:
+    """A rank has finished its chunk (``result`` None: has had none yet) and asks for another.
+
+    ``interrupted``: a signal has asked it to stop.
+    """
+
+    result: ChunkResult | None
+    interrupted: bool
+
+
+@attrs.frozen
+class Halt:
+    """Give up the replicate at hand, and hand in what is finished."""
+
+
+@attrs.frozen
+class ExitCode:
+    code: int
+
+
 class Communicator:
-    """Messages between rank 0 and the others, and what can be made of them.
+    """Messages between rank 0 and the others, and what can be made of them; by itself one process
+    alone, what a job without a launcher runs on.
 
     A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
     job, and ``arrived()``, which yields (source, message) of all that has come in; ``beat(sign)``
@@ -53,8 +123,8 @@ class Communicator:
     library is for, which may not return, and ``calls`` how many there were.
     """
 
-    rank: int
-    size: int
+    rank = 0
+    size = 1
     threads = True
     concurrent = True
     ends_all = True
@@ -66,13 +136,13 @@ class Communicator:
         self.heartbeat: Heartbeat | None = None
 
     def send(self, to: int, message: Any) -> None:
-        raise NotImplementedError
+        """There is nobody."""
 
     def arrived(self) -> Iterable[tuple[int, Any]]:
-        raise NotImplementedError
+        return ()
 
     def abort(self, code: int) -> None:
-        raise NotImplementedError
+        sys.exit(code)
 
     def beat(self, sign: bytes) -> None:
         """Give a sign of life to rank 0, or from there to all others."""
@@ -136,34 +206,12 @@ class Communicator:
             self.send(rank, value)
         return value
 
-    def all_gather(self, value: Any) -> list:
-        """The values of all ranks, on all ranks."""
-        return self.broadcast(self.gather(value))
-
     def barrier(self) -> None:
-        self.all_gather(None)
+        self.broadcast(self.gather(None))
 
     def close(self) -> None:
         """The work is done: let the others go."""
         self.unwatch()
-
-
-class SerialCommunicator(Communicator):
-    """One process: what a job without a launcher runs on."""
-
-    rank = 0
-    size = 1
-
-    def send(self, to: int, message: Any) -> None:
-        """There is nobody."""
-
-    def arrived(self) -> tuple:
-        return ()
-
-    def abort(self, code: int) -> None:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        sys.exit(code)
 
 
 def launched_size() -> int | None:
@@ -184,10 +232,7 @@ def find_communicator() -> Communicator:
     """The ranks of this job: MPI only where a launcher started more than one."""
     try:
         size = launched_size()
-        if size in (0, 1):
-            return SerialCommunicator()
-
-        return MpiCommunicator(size)
+        return Communicator() if size in (0, 1) else MpiCommunicator(size)
     finally:
         INTERRUPTION.held = False
 
@@ -213,20 +258,15 @@ def load_mpi() -> Any:
     with open(os.devnull, "w") as nowhere:
         faulthandler.dump_traceback_later(JOINING, exit=True, file=nowhere)
         try:
-            return imported_mpi()
+            from mpi4py import MPI
+        except (ImportError, RuntimeError) as error:
+            raise UsageError(
+                f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
+                "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
+                "the launcher"
+            ) from None
         finally:
             faulthandler.cancel_dump_traceback_later()
-
-
-def imported_mpi():
-    try:
-        from mpi4py import MPI
-    except (ImportError, RuntimeError) as error:
-        raise UsageError(
-            f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
-            "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
-            "the launcher"
-        ) from None
     return MPI
 
 

@@ -1,8 +1,8 @@
-"""How rank 0 answers the other ranks while it computes itself, and how they ask it.
+"""What every rank does: take a chunk, run its replicates, hand them in; and how rank 0 answers the
+others while it computes itself.
 
-Every rank, rank 0 too, runs chunks (`flocsim.ensembles.parallel.worker`) and gets them from an
-object with `exchange` and `is_halted`: rank 0 from its Coordinator, the others from a
-RemoteCoordinator, which sends messages to rank 0's.
+All get chunks from an object with `exchange` and `is_halted`: rank 0 from its Coordinator, the
+others from a RemoteCoordinator, which sends messages to rank 0's.
 """
 
 import threading
@@ -10,19 +10,20 @@ import time
 from collections.abc import Callable
 
 import attrs
+import numpy as np
 
-from flocsim.ensembles.chunks import Chunk
-from flocsim.ensembles.parallel.communicator import SLEEP, Communicator
-from flocsim.ensembles.parallel.messages import (
-    Assignment,
+from flocsim.ensembles.chunks import Chunk, chunk_record, kept_record
+from flocsim.ensembles.kind import StudyKind
+from flocsim.ensembles.parallel.communicator import (
+    SLEEP,
     ChunkResult,
-    Dismissal,
+    Communicator,
     Going,
     Halt,
     Kept,
     Request,
 )
-from flocsim.ensembles.parallel.schedule import Phase, StudyState
+from flocsim.ensembles.parallel.schedule import Phase, StudyState, chunk_seconds
 from flocsim.interruption import stop_requested
 
 GOING_SECONDS = 1.0
@@ -147,11 +148,11 @@ class Coordinator:
         chunk = self.next_chunk()
         if chunk is not None:
             self.computing.add(rank)
-            self.comm.send(rank, Assignment(chunk))
+            self.comm.send(rank, chunk)
         elif self.state.is_running:
             return False
         else:
-            self.comm.send(rank, Dismissal())
+            self.comm.send(rank, None)
             self.present -= 1
         return True
 
@@ -175,9 +176,10 @@ class RemoteCoordinator:
     def exchange(self, result: ChunkResult | None) -> Chunk | None:
         """Hand in what is done; the next Chunk, or None where there is none."""
         self.comm.send(0, Request(result, stop_requested()))
-        while isinstance(answer := self.comm.receive(0, heed_signals=False), Halt):
-            pass  # it has crossed the request
-        return answer.chunk if isinstance(answer, Assignment) else None
+        answer: Chunk | Halt | None = Halt()
+        while isinstance(answer, Halt):  # it may have crossed the request
+            answer = self.comm.receive(0, heed_signals=False)
+        return answer
 
     def is_halted(self) -> bool:
         """Whether the replicate at hand is to be given up."""
@@ -185,3 +187,51 @@ class RemoteCoordinator:
         if self.comm.inbox[0]:  # while a rank works, rank 0 says nothing but Halt
             self.halted = True
         return self.halted or stop_requested()
+
+
+MOST_NOTES = 20
+"""Notes on failed replicates that go with one chunk."""
+
+
+def run_chunks(study: StudyKind, coordinator: Coordinator | RemoteCoordinator, key: str) -> None:
+    """Run chunks until the coordinator has none left; ``key`` marks the records as the study's."""
+    seconds = chunk_seconds(coordinator.comm.size)
+    result = None
+    while (chunk := coordinator.exchange(result)) is not None:
+        result = run_chunk(study, chunk, coordinator.is_halted, seconds, key, coordinator.tell)
+
+
+def run_chunk(
+    study: StudyKind, chunk: Chunk, halted: Callable[[], bool], seconds: float, key: str,
+    tell: Callable[[Kept | Going], object] = lambda message: None,
+) -> ChunkResult:  # fmt: skip
+    """Run a chunk until it is done, its time [s] is up or ``halted()``: a ChunkResult.
+
+    ``tell`` takes what is kept of a replicate while it runs, and how far it is.
+    """
+    rows = np.zeros(chunk.stop - chunk.first, study.row)
+    condition, place = study.conditions[chunk.condition], study.places[chunk.condition]
+    notes: list[dict] = []
+    count = 0
+    until = time.monotonic() + seconds
+    for replicate in range(chunk.first, chunk.stop):
+        if halted() or (count and time.monotonic() > until):
+            break
+
+        def keep(description: dict, data: bytes, counts: bool, replicate: int = replicate) -> None:
+            record = kept_record(condition, replicate, description, data, key)
+            tell(Kept(chunk.condition, replicate, record, counts))
+
+        row, note = study.run_task(
+            place, replicate, halted, chunk.left, keep, lambda words: tell(Going(words))
+        )
+        if row is None:
+            break
+        rows[count] = tuple(row[name] for name in rows.dtype.fields or ())
+        notes += [note] if note else []
+        count += 1
+    rows, notes = rows[:count], notes[:MOST_NOTES]
+    record = chunk_record(condition, chunk.first, rows, key, notes)
+    failed = int(np.sum(study.has_failed(rows.__getitem__)))
+    return ChunkResult(chunk._replace(left=None), count, record, len(record) - rows.nbytes, failed,
+                       tuple(notes))  # fmt: skip

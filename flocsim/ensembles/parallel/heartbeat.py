@@ -12,10 +12,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from flocsim.interruption import STOPPED
 from flocsim.io.terminal import tell
+
+if TYPE_CHECKING:
+    from flocsim.ensembles.parallel.communicator import Communicator
 
 SECONDS = 300.0
 """Seconds of silence after which a rank is taken for lost, unless the user gives another time."""
@@ -34,26 +37,6 @@ FIRST_SIGN = 60.0
 
 TURN = 2.0
 """Seconds in which one rank after the other speaks up, where rank 0 is lost and cannot."""
-
-
-class Ranks(Protocol):
-    """What a Heartbeat needs of a Communicator; neither method may wait for another rank."""
-
-    rank: int
-    size: int
-    concurrent: bool
-    ends_all: bool
-    calls: int
-    called: int | None
-
-    def beat(self, sign: bytes) -> None:
-        """Send a sign of life to those that this rank talks to."""
-
-    def signs(self) -> Iterable[tuple[int, bytes]]:
-        """(rank, sign) of all signs that have come."""
-
-    def abort(self, code: int) -> None:
-        """End the job."""
 
 
 class Awake:
@@ -80,7 +63,7 @@ class Heartbeat:
     """
 
     def __init__(
-        self, comm: Ranks, seconds: float, clock: Callable[[], float] = time.monotonic
+        self, comm: "Communicator", seconds: float, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """``seconds``: how long a rank may be silent."""
         self.comm = comm

@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.chunks import MOST_ROWS, Chunk, Interval, missing, total
-from flocsim.ensembles.parallel.messages import ChunkResult, Kept
+from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
 from flocsim.io.journal.records import data_digest, record_at

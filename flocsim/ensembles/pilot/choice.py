@@ -189,8 +189,8 @@ def implicit_ladders(study, share, target):
     ladders = []
     for condition, tasks in enumerate(sample_of(config)):
         length = scene_length(config, condition, study.flocs)
-        ladders.append(Ladder(condition, Implicit(), length, tasks, reference, []))
-        ladders[-1].max_steps = config.integrator.max_steps
+        ladders.append(Ladder(condition, Implicit(), length, tasks, reference, [], {},
+                              config.integrator.max_steps))  # fmt: skip
     jobs = [
         Job(task, at_rung(each.method, reference * each.length), steps)
         for each in ladders

@@ -113,10 +113,10 @@ class Forecast:
     replicates: int
 
 
-def in_turn(config: Config, size: int = MOST) -> list[Task]:
-    """Tasks of all types in turn, at most so many: any first few are spread over all conditions."""
+def in_turn(config: Config) -> list[Task]:
+    """Tasks of all types in turn, at most MOST: any first few are spread over all conditions."""
     types = len(config.scene.names)
-    lists = sample_of(config, max(size // types, LEAST))
+    lists = sample_of(config, max(MOST // types, LEAST))
     return [task for tasks in zip(*lists, strict=True) for task in tasks]
 
 

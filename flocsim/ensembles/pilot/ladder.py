@@ -28,9 +28,10 @@ import numpy as np
 
 from flocsim.ensembles.collision.checking import Z
 from flocsim.ensembles.collision.flocs import Floc
+from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.trials import Job, Task, Trial, is_flip
-from flocsim.ensembles.preflight import measured_flocs, pairings
+from flocsim.ensembles.preflight import measured_flocs
 from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
 
@@ -142,7 +143,7 @@ def scene_length(config: Config, condition: int, flocs: Sequence[Floc] | None = 
     ``flocs``: those of the study, where they have been read.
     """
     shapes, known = config.shapes, measured_flocs(config) if flocs is None else flocs
-    length = CORE * min(pairings(config, known)[condition].radii)
+    length = CORE * min(pairings_of(config, known)[condition].radii)
     if max(shapes.vertices) > 1 and shapes.size == "own":
         measured = [each.radius for floc in known for each in floc.shapes.values()]
         length = min(length, float(np.median(measured)))

@@ -14,8 +14,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision.draw import Draw
-from flocsim.ensembles.collision.failures import FAILED
+from flocsim.ensembles.collision.draw import FAILED, Draw
 from flocsim.ensembles.config.schema import Config, StopConfig
 from flocsim.ensembles.study import Study
 from flocsim.integrators import DormandPrince54, Implicit

@@ -27,8 +27,7 @@ from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import point_columns
 from flocsim.geometry.contact.outlines import outlines_of
-from flocsim.geometry.shapes.resize import resized
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 
@@ -170,23 +169,15 @@ def floc_facts(study):
         weights = np.array([floc.weight for floc in study.flocs])
         if np.any(weights != 1.0):
             facts["flocs.weight"] = digest(weights)
-    return facts | own_shape_facts(study)
-
-
-def own_shape_facts(study):
-    """A digest of all that a replicate reads of the user's own shape, at the sizes of each type.
-
-    Its class computes what is known of others, and how it grows.
-    """
-    config = study.config
-    facts = {}
-    if config.shapes.own is not None and study.flocs:
+    shapes = study.config.shapes
+    if shapes.own is not None and study.flocs:
+        # Its class computes what is known of others, and how it grows, at the sizes of each type.
         [floc] = study.flocs
         [n] = floc.shapes
         for each in study.pairings:
-            shapes = [floc.resized(n, radius, config.shapes.radius) for radius in each.radii]
+            sized = [floc.resized(n, radius, shapes.radius) for radius in each.radii]
             facts[f"flocs.{n} at the sizes of {each.name}"] = digest(
-                np.concatenate([shape_numbers(each) for each in shapes])
+                np.concatenate([shape_numbers(one) for one in sized])
             )
     return facts
 
@@ -213,37 +204,28 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 
 
 def kernel_facts(study):
-    """Fingerprints of the compiled code for spheres and for polygons, by every method."""
-    config = study.config
+    """Fingerprints of the compiled code for spheres and for polygons, by every method, of what
+    the types compile that meet alike."""
+    config, facts = study.config, {}
     meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
     pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
-    return {
-        name: fact
-        for place in sorted(meetings.values())
-        for name, fact in facts_of_code(study, pairs[place]).items()
-    }
-
-
-def facts_of_code(study, pair):
-    """The same for what the types compile that meet as this pair of spheres does."""
-    config, facts = study.config, {}
     methods = {type(each): each for each in study.methods.values()}.values()
-    wanted = [*kinds(config, pair.shapes)]
     several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
-    wanted += [(each, each) for each in several[:1]]
-    for shapes, method in product(wanted, methods):
-        system = placed_system(config, attrs.evolve(pair.system, integrator=method), shapes)
-        name = system.family
-        if config.integrator.is_chosen:
-            name += f" by {type(method).__name__}"
-        if pair.meeting != SETTLING:
-            name += f" in {pair.meeting}"
-        laws = sorted(system.pieces.laws.items())
-        codes = [fingerprint(advance, system.fillings(pair.observer))]
-        codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
-        facts[f"kernels.{name}"] = hashlib.blake2b(
-            "\n".join(codes).encode(), digest_size=12
-        ).hexdigest()
+    for pair in (pairs[place] for place in sorted(meetings.values())):
+        wanted = [*kinds(config, pair.shapes), *((each, each) for each in several[:1])]
+        for shapes, method in product(wanted, methods):
+            system = placed_system(config, pair.system.changed(integrator=method), shapes)
+            name = system.family
+            if config.integrator.is_chosen:
+                name += f" by {type(method).__name__}"
+            if pair.meeting != SETTLING:
+                name += f" in {pair.meeting}"
+            laws = sorted(system.pieces.laws.items())
+            codes = [fingerprint(advance, system.fillings(pair.observer))]
+            codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
+            facts[f"kernels.{name}"] = hashlib.blake2b(
+                "\n".join(codes).encode(), digest_size=12
+            ).hexdigest()
     return facts
 
 

@@ -26,10 +26,9 @@ from flocsim.ensembles.chunks import (
     rows_of,
 )
 from flocsim.ensembles.kind import StudyKind
-from flocsim.ensembles.storage.cpu_kind import distinct
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
-from flocsim.ensembles.storage.stored_json import is_session, stored
+from flocsim.ensembles.storage.stored_json import distinct, is_session, stored
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
@@ -100,10 +99,6 @@ class Beginning:
             and all(condition in old.places for condition in self.store.conditions)
         )
 
-    def has_more(self, count: int) -> bool:
-        """Whether the journal has rows that results of so many replicates will not have."""
-        return bool(self.unasked) or self.farthest > count
-
     def found(self, count: int) -> list[list[Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""
         whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
@@ -162,7 +157,9 @@ def begin(
     that is set aside.
     """
     start = Beginning(RowStore(journal, study.conditions, study.row), identity)
-    start.cpus_now, start.rule, start.accuracy = list(cpus), rule_of(study), accuracy or {}
+    start.cpus_now, start.accuracy = list(cpus), accuracy or {}
+    if (stop := study.config.stop).half_width is not None:
+        start.rule = [stop.half_width, list(stop.of), stop.least]  # as JSON gives it back
     start.resources.callback(journal.release)
     take_rows = partial(take_results, start, study, output, old_rows)
     try:
@@ -211,12 +208,6 @@ def take_place(
         check_free(output)
     elif aside := set_aside(output):
         start.remarks.append(f"{output} is kept as {aside.name}")
-
-
-def rule_of(study):
-    """The rule that ends the study early, as JSON gives it back; None where there is none."""
-    stop = study.config.stop
-    return None if stop.half_width is None else [stop.half_width, list(stop.of), stop.least]
 
 
 def refuse_fewer(start, output, replicates):
@@ -364,9 +355,8 @@ def check_old(study: StudyKind, old: OldTable) -> None:
     for condition in study.conditions:
         for first in range(0, old.count if condition in old.places else 0, BLOCK):
             part = (*old.places[condition], slice(first, first + BLOCK))
-            study.check_rows(partial(values_of, old.columns, part))
 
+            def column(name: str, part: tuple = part) -> Any:
+                return old.columns[name][part]
 
-def values_of(columns, part, name):
-    """Some values of a column."""
-    return columns[name][part]
+            study.check_rows(column)

@@ -10,7 +10,8 @@ is known by its seal.
 import contextlib
 import os
 from collections import OrderedDict, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import attrs
@@ -59,7 +60,7 @@ class OldTable:
     path: str = ""
     before: tuple | None = None
 
-    def read(self, condition: Condition, name: str, first: int, stop: int) -> np.ndarray:
+    def read(self, condition: Condition, first: int, stop: int, name: str) -> np.ndarray:
         """Values of a column; FileError where the open file has been written to meanwhile."""
         values = self.columns[name][(*self.places[condition], slice(first, stop))]
         now = stamp(self.path) if self.before else None
@@ -139,15 +140,8 @@ class RowStore:
         """
         values = np.empty(stop - first, self.row[name])
         known = self.known(place) if known is None else known
-        for start, end, offset, digest in near(known, first, stop).tolist():
-            low, high = max(start, first), min(end, stop)
-            if low < high:
-                if offset < 0:
-                    assert self.old is not None, "rows of an older file, which is open"
-                    part = self.old.read(self.conditions[place], name, low, high)
-                else:
-                    part = self.column(name, (start, end), offset, digest, (low, high))
-                values[low - first : high - first] = part
+        for low, high, part in self.pieces(place, first, stop, known):
+            values[low - first : high - first] = part(name)
         return values
 
     def rows(
@@ -159,24 +153,28 @@ class RowStore:
         where rows are missing.
         """
         reached = []
-        for start, end, offset, digest in near(known, first, stop).tolist():
-            low, high = max(start, first), min(end, stop)
-            if low >= high:
-                continue
+        for low, high, part in self.pieces(place, first, stop, known):
             reached.append((low, high))
-            if offset < 0:
-                assert self.old is not None, "rows of an older file, which is open"
-                condition = self.conditions[place]
-                yield low, {name: self.old.read(condition, name, low, high) for name in self.starts}
-            else:
-                chunk = (start, end), offset, digest
-                yield low, {name: self.column(name, *chunk, (low, high)) for name in self.starts}
+            yield low, {name: part(name) for name in self.starts}
         if missing(merged(reached), first, stop):
             raise FileError(
                 f"{self.journal.path} does not have all rows: run it again with --resume"
             )
 
-    def column(self, name, chunk, offset, digest, wanted):
+    def pieces(
+        self, place: int, first: int, stop: int, known: np.ndarray
+    ) -> Iterator[tuple[int, int, Callable[[str], np.ndarray]]]:
+        """(first, stop, the values of a column) of the runs of rows that lie in [first, stop)."""
+        for start, end, offset, digest in near(known, first, stop).tolist():
+            low, high = max(start, first), min(end, stop)
+            if low < high and offset < 0:
+                assert self.old is not None, "rows of an older file, which is open"
+                condition = self.conditions[place]
+                yield low, high, partial(self.old.read, condition, low, high)
+            elif low < high:
+                yield low, high, partial(self.column, (start, end), offset, digest, (low, high))
+
+    def column(self, chunk, offset, digest, wanted, name):
         """The values of a column that a chunk in the journal has of the wanted replicates."""
         (start, end), (low, high), kind = chunk, wanted, self.row[name]
         data = self.checked(offset, (end - start) * self.row.itemsize, digest)

@@ -20,7 +20,7 @@ from flocsim.forces.gravity import Gravity
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.thermal import Thermal
-from flocsim.geometry.shapes.parts import core_gap
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.overdamped import Overdamped

@@ -82,7 +82,7 @@ def elasticities(
     values = [number_of(study, key) for key in keys]
     found: list[Comparison] = []
     for key, value in zip(keys, values, strict=True):
-        path = named(output, key)
+        path = Path(output).with_name(f"{Path(output).stem}-{key.replace('.', '-')}.h5")
         both = [value / math.sqrt(ratio), value * math.sqrt(ratio)]
         sweep(study, {key: both}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
               tell=tell, ways=ways)  # fmt: skip
@@ -101,12 +101,6 @@ COLUMNS = {
     "value": "difference", "low": "difference_low", "high": "difference_high",
     "change_low": "change_low", "change_high": "change_high",
 }  # fmt: skip
-
-
-def named(output: str | os.PathLike, key: str) -> Path:
-    """The joined file of a parameter's two values."""
-    path = Path(output)
-    return path.with_name(f"{path.stem}-{key.replace('.', '-')}.h5")
 
 
 def number_of(study: Study, key: str) -> float:

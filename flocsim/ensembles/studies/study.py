@@ -57,7 +57,11 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             "Study.run starts its own processes and cannot be run under MPI: use "
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
-    environment = os.environ | {"PYTHONUNBUFFERED": "1", **path_to_flocsim()}
+    environment = os.environ | {"PYTHONUNBUFFERED": "1"}
+    package = Path(__file__).resolve().parents[3]
+    if package.name not in INSTALLED:  # this flocsim is not installed, but lies in a folder
+        known = filter(None, [str(package), os.environ.get("PYTHONPATH")])
+        environment["PYTHONPATH"] = os.pathsep.join(known)
     # On Windows a virtual environment's Python is the child of a process that starts it.
     ends_with_this = [] if os.name == "nt" else ["--parent", str(os.getpid())]
     # -P: what lies beside a config is no part of Python.
@@ -79,16 +83,6 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
         raise KeyboardInterrupt
     if process.returncode not in (0, WITHHELD):  # that is a warning, said already
         raise error_of(process.returncode, said)
-
-
-def path_to_flocsim():
-    """What the environment has to say where this flocsim is not installed, but lies in a folder."""
-    package = Path(__file__).resolve().parents[3]
-    if package.name in INSTALLED:
-        return {}
-    return {
-        "PYTHONPATH": os.pathsep.join(filter(None, [str(package), os.environ.get("PYTHONPATH")]))
-    }
 
 
 def listen(process, text, quiet):

@@ -8,7 +8,8 @@ import numpy as np
 
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.shapes.cores import edges_of, from_edges
-from flocsim.geometry.shapes.parts import Part, core_gap, cores_overlap
+from flocsim.geometry.shapes.outline import core_gap
+from flocsim.geometry.shapes.parts import Part
 from flocsim.geometry.shapes.shape import Shape
 
 TOUCHING = 1e-12
@@ -22,12 +23,11 @@ def overlap_fault(
 
     ``along_outlines``: the overlap [m] up to which what acts all along them is known.
     """
-    pairs = list(product(a, b))
-    if any(cores_overlap(one, other) for one, other in pairs):
+    gaps = [(core_gap(one, other), one.radius + other.radius) for one, other in product(a, b)]
+    if min(gaps)[0] == 0.0:
         return "with one core inside or across the other"
-    for one, other in pairs:
-        contact = one.radius + other.radius
-        overlap = contact - core_gap(one, other)
+    for gap, contact in gaps:
+        overlap = contact - gap
         if overlap > DEEPEST_OVERLAP * contact:
             return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
         if overlap > along_outlines:

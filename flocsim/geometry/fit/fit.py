@@ -23,10 +23,8 @@ from flocsim.geometry.fit.simple import simple_inset
 from flocsim.geometry.fit.starts import even_start
 from flocsim.geometry.shapes.outline import simplicity_fault
 from flocsim.geometry.shapes.parts import Part, Parts
-from flocsim.geometry.shapes.resize import core_factor, parts_factor
-from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.shape import Shape, Sphere
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, parts_factor
 
 METHODS = ("pattern", "paper", "even")
 
@@ -187,7 +185,7 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
                 f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
             )
     elif preserve_area:
-        factor = core_factor(shape.vertices, radius, float(mask.sum()))
+        factor = parts_factor([Part((shape.vertices,), radius)], float(mask.sum()))
         points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
     elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
         points = _settled(mask, points, radius, shape.area)

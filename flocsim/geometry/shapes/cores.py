@@ -106,11 +106,6 @@ def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.n
     return np.stack([x - share * ax, y - share * ay], axis=-1)
 
 
-def distance_to_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    away = from_edges(points, starts, ends)
-    return np.hypot(away[..., 0], away[..., 1])
-
-
 def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """Which of the points (k, 2) lie inside the core polygon (crossing number)."""
     if len(vertices) < 3:
@@ -129,25 +124,3 @@ def inside_rings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
     for ring in rings[1:]:
         found = found ^ inside_polygon(points, ring)
     return found
-
-
-def distance_between(a: np.ndarray, b: np.ndarray) -> float:
-    """Smallest distance [m] between a core point of one and the core of the other."""
-    distances = [np.hypot(*(a[0] - b[0]))]
-    for points, core in ((a, b), (b, a)):
-        starts, ends = edges_of(core)
-        if len(starts):
-            distances.append(distance_to_edges(points, starts, ends).min())
-    return min(distances)
-
-
-def cores_cross(a: np.ndarray, b: np.ndarray) -> bool:
-    """Whether any edge of core a properly crosses any edge of core b."""
-    (p, q), (r, s) = edges_of(a), edges_of(b)
-    p, q = p[:, None], q[:, None]
-
-    def signs(origin, end, point):
-        return np.sign(cross(end - origin, point - origin))
-
-    apart = signs(p, q, r) * signs(p, q, s) < 0
-    return bool(np.any(apart & (signs(r, s, p) * signs(r, s, q) < 0)))

@@ -66,10 +66,16 @@ def ring_pieces(ring, radius, number):
         side_starts, side_units, side_lengths = starts, units, lengths
         at_start = at_end = lengths
     else:
-        side_starts, side_units, side_lengths = sides_of(ring)
+        side_starts, side_units, side_lengths = starts, units, lengths
+        if len(ring) == 2:  # a segment has two sides, one in each sense
+            side_starts = ring
+            side_units, side_lengths = np.vstack([units, -units]), np.tile(lengths, 2)
         before = np.roll(side_units, 1, axis=0)
         first = np.arctan2(-before[:, 0], before[:, 1])
-        bends = bends_of(side_units)
+        # By how much the walk turns at the start of each side: above 0 at convex corners.
+        along = np.einsum("ij,ij->i", before, side_units)
+        bends = np.arctan2(cross(before, side_units), along)
+        bends = np.abs(bends) if len(ring) == 2 else bends
         turn = np.maximum(bends, 0.0)
         at_start, at_end = trims_of(bends, side_lengths, radius)
     each, sides = len(ring), len(side_lengths)
@@ -221,7 +227,10 @@ def covered(points, normals, after, part):
     counts: ``after`` says by how many parts that of each point comes after this one. Where they
     share it back to back, both count, in opposite senses."""
     later = after > 0
-    away = np.concatenate([away_from(points, ring) for ring in part.rings], axis=1)
+    away = np.concatenate([
+        points[:, None] - ring if len(ring) == 1 else from_edges(points, *edges_of(ring))
+        for ring in part.rings
+    ], axis=1)  # fmt: skip
     distance = np.hypot(away[..., 0], away[..., 1])
     nearest = distance.argmin(axis=1)
     least = distance[np.arange(len(points)), nearest]
@@ -234,35 +243,10 @@ def covered(points, normals, after, part):
     return found
 
 
-def away_from(points, ring):
-    """Vectors (k, edges, 2) from the nearest place of each edge of a ring to the points."""
-    if len(ring) == 1:
-        return points[:, None] - ring
-    return from_edges(points, *edges_of(ring))
-
-
 def nodes_on(starts, ends):
     """Quadrature places (k, 16) and weights (k, 16) of intervals."""
     middle, half = 0.5 * (starts + ends), 0.5 * (ends - starts)
     return middle[:, None] + half[:, None] * QUADRATURE_NODES, half[:, None] * QUADRATURE_WEIGHTS
-
-
-def sides_of(vertices):
-    """(starts, units, lengths) of the sides in the order of a walk around the core.
-
-    A segment has two, one in each sense.
-    """
-    starts, units, lengths = unit_edges(vertices)
-    if len(vertices) == 2:
-        return vertices, np.vstack([units, -units]), np.tile(lengths, 2)
-    return starts, units, lengths
-
-
-def bends_of(units):
-    """Angle by which the walk turns at the start of each side: above 0 at convex corners."""
-    before = np.roll(units, 1, axis=0)
-    bends = np.arctan2(cross(before, units), np.einsum("ij,ij->i", before, units))
-    return np.abs(bends) if len(units) == 2 else bends
 
 
 def trims_of(bends, lengths, radius):
@@ -294,15 +278,6 @@ def exposed_chords(parts, found):
     return origins[rows], units[rows], low[seen], high[seen], found.side_radius[rows]
 
 
-def chord_nodes(parts, found):
-    """Points, tangents and weights of the exposed parts of the sides' offsets."""
-    origins, units, low, high, _ = exposed_chords(parts, found)
-    place, weights = nodes_on(low, high)
-    points = origins[:, None] + place[..., None] * units[:, None]
-    tangents = np.broadcast_to(units[:, None], points.shape)
-    return points.reshape(-1, 2), tangents.reshape(-1, 2), weights.ravel()
-
-
 def exposed_arcs(parts, found):
     """The exposed parts of the arcs around convex corners: centres (k, 2), radii (k,), and from
     which angle to which.
@@ -324,17 +299,6 @@ def exposed_arcs(parts, found):
     return points[rows], radius[rows], first[rows] + low[seen], first[rows] + high[seen]
 
 
-def arc_nodes(parts, found):
-    """Points, tangents and weights of the exposed parts of the arcs."""
-    centres, radius, low, high = exposed_arcs(parts, found)
-    place, weights = nodes_on(low, high)
-    outward = np.stack([np.cos(place), np.sin(place)], axis=-1)
-    reach = radius[:, None]
-    met = centres[:, None] + reach[..., None] * outward
-    tangents = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
-    return met.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
-
-
 def area_and_growth(parts: Sequence[Part]) -> tuple[float, float]:
     """Area [m²] of what parts of one radius cover together, and by how much it grows with that
     radius [m]: the length of the outline, holes included."""
@@ -354,7 +318,19 @@ def outline_nodes(parts):
     origin = np.concatenate([ring for part in parts for ring in part.rings]).mean(axis=0)
     placed = [Part(tuple(ring - origin for ring in part.rings), part.radius) for part in parts]
     found = pieces_of(placed)
-    points, tangents, weights = joined(chord_nodes(placed, found), arc_nodes(placed, found))
+    origins, units, low, high, _ = exposed_chords(placed, found)
+    place, weights = nodes_on(low, high)
+    points = origins[:, None] + place[..., None] * units[:, None]
+    tangents = np.broadcast_to(units[:, None], points.shape)
+    chords = points.reshape(-1, 2), tangents.reshape(-1, 2), weights.ravel()
+    centres, radius, low, high = exposed_arcs(placed, found)
+    place, weights = nodes_on(low, high)
+    outward = np.stack([np.cos(place), np.sin(place)], axis=-1)
+    reach = radius[:, None]
+    points = centres[:, None] + reach[..., None] * outward
+    tangents = np.stack([-outward[..., 1], outward[..., 0]], axis=-1)
+    arcs = points.reshape(-1, 2), tangents.reshape(-1, 2), (reach * weights).ravel()
+    points, tangents, weights = joined(chords, arcs)
     return points.T, (tangents * weights[:, None]).T, weights, origin
 
 

@@ -1,8 +1,10 @@
-"""Outlines as point lists, and whether a polygon is simple. The only room that imports shapely."""
+"""Outlines as point lists, whether a polygon is simple, how far cores are apart; and shape measures
+of an outline, as they are published of flocs. The only file that imports shapely."""
 
 from collections.abc import Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 
 from flocsim.errors import ShapeError
@@ -18,14 +20,44 @@ def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> 
     return None if polygon.is_valid else shapely.is_valid_reason(polygon)
 
 
-def require_simple(vertices: np.ndarray) -> None:
-    """Raise ShapeError where edges of the closed polygon cross or touch."""
-    fault = simplicity_fault(vertices)
+def require_simple(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> None:
+    """Raise ShapeError where edges of the closed polygon cross or touch, or a hole is none."""
+    fault = simplicity_fault(vertices, holes)
+    if fault is not None and holes:
+        raise ShapeError(
+            f"a polygon with {len(holes)} holes is not simple ({fault}): holes must lie inside of "
+            "it and apart from each other, and no edges may cross"
+        )
     if fault is not None:
         raise ShapeError(
             f"the polygon of {len(vertices)} vertices is not simple ({fault}); "
             "its edges must not cross or touch: reorder or move the vertices"
         )
+
+
+def core_gap(a: Part, b: Part) -> float:
+    """Smallest distance [m] between the cores of two parts, 0 where they overlap."""
+    if len(a.points) == len(b.points) == 1:
+        return float(np.hypot(*(a.points[0] - b.points[0])))
+    return float(core_geometry(a.rings).distance(core_geometry(b.rings)))
+
+
+def loose_parts(parts: Sequence[Part], slack: float) -> np.ndarray:
+    """The numbers of the parts that do not hang together with the first; what is nearer than a
+    share ``slack`` of the smaller radius touches."""
+    import shapely
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    radius = np.array([part.radius for part in parts])
+    cores = np.array([core_geometry(part.rings) for part in parts])
+    farthest = (2.0 + slack) * radius.max()
+    one, other = shapely.STRtree(cores).query(cores, "dwithin", farthest)
+    reach = radius[one] + radius[other] + slack * np.minimum(radius[one], radius[other])
+    near = shapely.distance(cores[one], cores[other]) <= reach
+    joins = coo_array((near[near], (one[near], other[near])), shape=(len(parts),) * 2)
+    _, group = connected_components(joins)
+    return np.flatnonzero(group != group[0])
 
 
 def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np.ndarray]:
@@ -68,3 +100,50 @@ def core_geometry(rings: Sequence[np.ndarray]) -> Any:
     if len(rings[0]) < 3:
         return {1: shapely.Point, 2: shapely.LineString}[len(rings[0])](rings[0])
     return shapely.Polygon(rings[0], rings[1:])
+
+
+@attrs.frozen
+class ShapeMeasures:
+    """Measures of an outline; lengths in the unit of the outline.
+
+    - ``perimeter``: length of the outline, that of holes included;
+    - ``aspect_ratio`` ≥ 1: long over short axis of the ellipse with the same second moments;
+    - ``circularity``: 4πA/P², 1 for a disc (the form factor of ISO 9276-6);
+    - ``solidity``: area over that of the convex hull;
+    - ``feret_max``, ``feret_min``: largest and smallest distance of two parallel tangents.
+    """
+
+    perimeter: float
+    aspect_ratio: float
+    circularity: float
+    solidity: float
+    feret_max: float
+    feret_min: float
+
+
+def measures_of(parts: Sequence[Part], elongation: float) -> ShapeMeasures:
+    """The ShapeMeasures of all parts, each core ⊕ disk [m], of an area of this ``elongation``
+    B = (M₁ − M₂)/(M₁ + M₂): the ellipse of these moments has the axes (a/b)² = (1 + B)/(1 − B).
+
+    Arcs are replaced by chords of 1.4°: lengths and areas are right to 1e-4.
+    """
+    aspect = float(np.sqrt((1.0 + elongation) / (1.0 - elongation)))
+    if len(parts) == 1 and len(parts[0].points) == 1:
+        width = 2.0 * parts[0].radius
+        return ShapeMeasures(np.pi * width, 1.0, 1.0, 1.0, width, width)
+    area, perimeter, hull_area, hull = outline_sizes(parts)
+    circularity = 4.0 * np.pi * area / perimeter**2
+    return ShapeMeasures(perimeter, aspect, circularity, area / hull_area, *feret_diameters(hull))
+
+
+def feret_diameters(hull: np.ndarray) -> tuple[float, float]:
+    """(largest, smallest) distance of two parallel tangents of a convex ring (k, 2).
+
+    The largest is that of two corners; the smallest has one tangent along an edge.
+    """
+    points = hull[:, 0] + 1j * hull[:, 1]
+    largest = np.abs(points[:, np.newaxis] - points).max()
+    edges = np.roll(points, -1) - points
+    edges = edges[np.abs(edges) > 0.0]
+    across = (points[:, np.newaxis] * np.conj(edges / np.abs(edges))).imag
+    return float(largest), float(np.ptp(across, axis=0).min())

@@ -9,8 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.geometry.shapes.cores import cores_cross, distance_between, inside_rings
-
 
 class Part(NamedTuple):
     """``rings``: (k, 2) [m] each, a point, the ends of a segment or the corners of a polygon, the
@@ -48,20 +46,6 @@ def scaled_parts(parts: Sequence[Part], factor: float, radii: float | None = Non
     return tuple(
         Part(tuple(ring * factor for ring in part.rings), part.radius * wider) for part in parts
     )
-
-
-def cores_overlap(a: Part, b: Part) -> bool:
-    """Whether a core point of one lies inside the other, or their edges cross."""
-    return bool(
-        inside_rings(a.points, b.rings).any()
-        or inside_rings(b.points, a.rings).any()
-        or any(cores_cross(one, other) for one in a.rings for other in b.rings)
-    )
-
-
-def core_gap(a: Part, b: Part) -> float:
-    """Smallest distance [m] between the cores of two parts that do not overlap."""
-    return min(distance_between(one, other) for one in a.rings for other in b.rings)
 
 
 class PointTable(NamedTuple):

@@ -1,19 +1,27 @@
-"""Shape: what every body outline has, core points swept by a disk, and what follows from them."""
+"""Shape: what every body outline has, core points swept by a disk, and what follows from them; and
+the plainest one, Sphere."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from inspect import getattr_static
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.errors import RangeError, ShapeError
 from flocsim.fields import in_unit, is_number
 from flocsim.geometry.shapes.cores import signed_area
-from flocsim.geometry.shapes.measures import ShapeMeasures, measures_of
 from flocsim.geometry.shapes.moments import all_moments
-from flocsim.geometry.shapes.outline import require_simple, swept_rings
-from flocsim.geometry.shapes.parts import Part, Parts, moved_parts
+from flocsim.geometry.shapes.outline import (
+    ShapeMeasures,
+    loose_parts,
+    measures_of,
+    require_simple,
+    swept_rings,
+)
+from flocsim.geometry.shapes.parts import Part, Parts, is_compound, moved_parts
 
 ROUND = 1e-12
 """Shapes whose principal moments differ by less than this share of their sum have no long axis."""
@@ -21,177 +29,8 @@ ROUND = 1e-12
 TOO_CLOSE = 1e-12
 """Core points nearer than this share of the core's extent count as repeated."""
 
-
-class Swept(NamedTuple):
-    """What follows from a core and a radius.
-
-    Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
-    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
-    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments; the angle of the long axis [rad];
-    ``parts``, around the centroid as well, where there is more than one ring.
-    """
-
-    vertices: np.ndarray
-    centroid: np.ndarray
-    area: float
-    second_moment: float
-    elongation: float
-    long_axis: float
-    parts: Parts = ()
-
-
-class Shape:
-    """Core points swept by a disk: all that the disk covers while its centre goes over the core.
-
-    All shapes are one family: a sphere is one core point. A core may have holes, and a shape may
-    be of several parts (Composite): those have all their core points one after another in
-    ``vertices``, and in ``parts`` which of them belong together.
-
-    A shape of one's own is a frozen subclass that gives two things, each a field or a property
-    (examples/own_shape.py):
-
-    - ``core``: (N, 2) [m], one point, the two ends of a segment, or the corners of a simple
-      polygon, convex or not, in any frame and either sense;
-    - ``radius`` [m] > 0, the spheroradius.
-
-    All the rest follows, is computed once, and is the same for the same core: ``vertices``, the
-    core points around the centroid of the swept area, which is the origin of the shape's frame,
-    ``area`` and ``second_moment``. ShapeError where the core is no such polygon.
-    """
-
-    if TYPE_CHECKING:
-
-        @property
-        def core(self) -> np.ndarray: ...
-
-        @property
-        def radius(self) -> float: ...
-
-    def __new__(cls, *values: object, **named: object) -> "Shape":
-        """TypeError of Shape itself, which has no outline."""
-        if cls is Shape:
-            raise TypeError("Shape is abstract: subclass it, and give `core` and `radius`")
-        return super().__new__(cls)
-
-    @cached_property
-    def swept(self) -> Swept:
-        for name in ("core", "radius"):
-            if getattr_static(self, name, None) is None:
-                raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
-        return swept_by(read_points("core", self.core), positive_radius(self.radius))
-
-    @property
-    def vertices(self) -> np.ndarray:
-        """Core points (N, 2) [m] around the centroid, counter-clockwise, read-only."""
-        return self.swept.vertices
-
-    @property
-    def centroid(self) -> np.ndarray:
-        """Where the centroid of the swept area lies in the frame of the core given (2,) [m]."""
-        return self.swept.centroid
-
-    @property
-    def parts(self) -> Parts:
-        """The parts, each of one or more rings, around the centroid of the whole."""
-        return self.swept.parts or (Part((self.vertices,), self.radius),)
-
-    @property
-    def is_compound(self) -> bool:
-        """Whether the core has more than one ring: holes, or parts."""
-        return False
-
-    @property
-    def area(self) -> float:
-        """Area A of the swept outline [m²]: what parts share counts once, holes do not count."""
-        return self.swept.area
-
-    @property
-    def second_moment(self) -> float:
-        """Second moment of area J = ∫ρ² dA about the centroid [m⁴]."""
-        return self.swept.second_moment
-
-    @property
-    def elongation(self) -> float:
-        """B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area M₁ ≥ M₂ [-].
-
-        0 for a sphere, (a² − b²)/(a² + b²) for an ellipse with the half axes a ≥ b.
-        """
-        return self.swept.elongation
-
-    @property
-    def long_axis(self) -> float:
-        """Angle of the axis of the largest extent (of M₁) in the shape's frame, in (−π/2, π/2]
-        [rad]; 0 where no axis is longer."""
-        return self.swept.long_axis
-
-    @property
-    def equivalent_radius(self) -> float:
-        """r_eq = √(A/π) [m]."""
-        return float(np.sqrt(self.area / np.pi))
-
-    @property
-    def bounding_radius(self) -> float:
-        """R, the largest distance from the centroid to the outline [m]."""
-        if self.is_compound:
-            return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
-        return float(np.hypot(*self.vertices.T).max() + self.radius)
-
-    @cached_property
-    def measures(self) -> ShapeMeasures:
-        """Perimeter and Feret diameters [m], aspect ratio, circularity and solidity [-] of the
-        outline."""
-        return measures_of(self.parts, self.elongation)
-
-    def scaled(self, factor: float) -> "Shape":
-        """The same outline, ``factor`` times as large: a Sphere, a SpheroPolygon or a Composite."""
-        from flocsim.geometry.shapes.spheropolygon import scaled_outline
-
-        return scaled_outline(self, factor)
-
-    def placed_vertices(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
-        """Core points (N, 2) [m] of the body at (x, y), turned by ``angle`` [rad]."""
-        c, s = np.cos(angle), np.sin(angle)
-        return self.vertices @ np.array([[c, s], [-s, c]]) + (x, y)
-
-    def placed_parts(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> Parts:
-        """The parts of the body at (x, y), turned by ``angle`` [rad]."""
-        if self.is_compound:
-            return moved_parts(self.parts, x, y, angle)
-        return (Part((self.placed_vertices(x, y, angle),), self.radius),)
-
-    def outline(
-        self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
-    ) -> list[np.ndarray]:
-        """Closed rings [(k, 2), …] of the placed outline, for drawing: the outer one, or several of
-        parts that touch in a point, then the rings of holes."""
-        return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
-
-
-def swept_by(core: np.ndarray, radius: float) -> Swept:
-    """The Swept of core points (N, 2) and a radius [m]; ShapeError where they make no body."""
-    if len(core) > 1:
-        require_distinct(core)
-    if len(core) > 2:
-        require_simple(core)
-        if signed_area(core - core.mean(axis=0)) < 0.0:
-            # Counter-clockwise, the first one kept.
-            core = np.roll(core[::-1], 1, axis=0)
-    # A unit-sized copy keeps fourth powers of micrometres far from underflow.
-    extent = np.ptp(core, axis=0).max() + radius
-    unit = Part((core / extent,), radius / extent)
-    area, centroid, moment, stretch = all_moments((unit,))
-    centroid = centroid * extent
-    vertices = read_only(core - centroid)
-    size = float(area * extent**2), float(moment * extent**4)
-    return Swept(vertices, centroid, *size, *stretched(stretch, moment))
-
-
-def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:
-    """(elongation, long axis) of how an area is stretched (2,) and its polar second moment."""
-    elongation = float(np.hypot(*stretch)) / moment
-    if elongation <= ROUND:
-        return 0.0, 0.0
-    return elongation, 0.5 * float(np.arctan2(stretch[1], stretch[0]))
+TOUCHING = 1e-6
+"""Parts nearer to each other than this share of the smaller radius are fixed to each other."""
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -240,3 +79,210 @@ def require_distinct(vertices):
             f"vertices {k} and {(k + 1) % len(vertices)} repeat the same point "
             f"{tuple(vertices[k].tolist())}; leave one out"
         )
+
+
+class Swept(NamedTuple):
+    """What follows from a core and a radius.
+
+    Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
+    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
+    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments; the angle of the long axis [rad];
+    ``parts``, around the centroid as well.
+    """
+
+    vertices: np.ndarray
+    centroid: np.ndarray
+    area: float
+    second_moment: float
+    elongation: float
+    long_axis: float
+    parts: Parts
+
+
+class Shape:
+    """Core points swept by a disk: all that the disk covers while its centre goes over the core.
+
+    All shapes are one family: a sphere is one core point. A core may have holes, and a shape may
+    be of several parts (Composite): those have all their core points one after another in
+    ``vertices``, and in ``parts`` which of them belong together.
+
+    A shape of one's own is a frozen subclass that gives two things, each a field or a property
+    (examples/own_shape.py):
+
+    - ``core``: (N, 2) [m], one point, the two ends of a segment, or the corners of a simple
+      polygon, convex or not, in any frame and either sense;
+    - ``radius`` [m] > 0, the spheroradius.
+
+    All the rest follows, is computed once, and is the same for the same core: ``vertices``, the
+    core points around the centroid of the swept area, which is the origin of the shape's frame,
+    ``area`` and ``second_moment``. ShapeError where the core is no such polygon.
+    """
+
+    if TYPE_CHECKING:
+
+        @property
+        def core(self) -> np.ndarray: ...
+
+        @property
+        def radius(self) -> float: ...
+
+    def __new__(cls, *values: object, **named: object) -> "Shape":
+        """TypeError of Shape itself, which has no outline."""
+        if cls is Shape:
+            raise TypeError("Shape is abstract: subclass it, and give `core` and `radius`")
+        return super().__new__(cls)
+
+    @cached_property
+    def swept(self) -> Swept:
+        for name in ("core", "radius"):
+            if getattr_static(self, name, None) is None:
+                raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
+        core, radius = read_points("core", self.core), positive_radius(self.radius)
+        return swept_parts([Part((core,), radius)])
+
+    @property
+    def vertices(self) -> np.ndarray:
+        """Core points (N, 2) [m] around the centroid, counter-clockwise, read-only."""
+        return self.swept.vertices
+
+    @property
+    def centroid(self) -> np.ndarray:
+        """Where the centroid of the swept area lies in the frame of the core given (2,) [m]."""
+        return self.swept.centroid
+
+    @property
+    def parts(self) -> Parts:
+        """The parts, each of one or more rings, around the centroid of the whole."""
+        return (Part((self.vertices,), self.radius),)
+
+    @property
+    def is_compound(self) -> bool:
+        """Whether the core has more than one ring: holes, or parts."""
+        return is_compound(self.parts)
+
+    @property
+    def area(self) -> float:
+        """Area A of the swept outline [m²]: what parts share counts once, holes do not count."""
+        return self.swept.area
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area J = ∫ρ² dA about the centroid [m⁴]."""
+        return self.swept.second_moment
+
+    @property
+    def elongation(self) -> float:
+        """B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area M₁ ≥ M₂ [-].
+
+        0 for a sphere, (a² − b²)/(a² + b²) for an ellipse with the half axes a ≥ b.
+        """
+        return self.swept.elongation
+
+    @property
+    def long_axis(self) -> float:
+        """Angle of the axis of the largest extent (of M₁) in the shape's frame, in (−π/2, π/2]
+        [rad]; 0 where no axis is longer."""
+        return self.swept.long_axis
+
+    @property
+    def equivalent_radius(self) -> float:
+        """r_eq = √(A/π) [m]."""
+        return float(np.sqrt(self.area / np.pi))
+
+    @property
+    def bounding_radius(self) -> float:
+        """R, the largest distance from the centroid to the outline [m]."""
+        return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
+
+    @cached_property
+    def measures(self) -> ShapeMeasures:
+        """Perimeter and Feret diameters [m], aspect ratio, circularity and solidity [-] of the
+        outline."""
+        return measures_of(self.parts, self.elongation)
+
+    def scaled(self, factor: float) -> "Shape":
+        """The same outline, ``factor`` times as large: a Sphere, a SpheroPolygon or a Composite."""
+        from flocsim.geometry.shapes.spheropolygon import scaled_outline
+
+        return scaled_outline(self, factor)
+
+    def placed_vertices(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
+        """Core points (N, 2) [m] of the body at (x, y), turned by ``angle`` [rad]."""
+        c, s = np.cos(angle), np.sin(angle)
+        return self.vertices @ np.array([[c, s], [-s, c]]) + (x, y)
+
+    def placed_parts(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> Parts:
+        """The parts of the body at (x, y), turned by ``angle`` [rad]."""
+        return moved_parts(self.parts, x, y, angle)
+
+    def outline(
+        self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
+    ) -> list[np.ndarray]:
+        """Closed rings [(k, 2), …] of the placed outline, for drawing: the outer one, or several of
+        parts that touch in a point, then the rings of holes."""
+        return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
+
+
+@attrs.frozen(eq=False)
+class Sphere(Shape):
+    """A disk of ``radius`` [m] in the plane of motion, one core point at its centre."""
+
+    radius: float = attrs.field(converter=positive_radius)
+
+    @property
+    def core(self) -> np.ndarray:
+        return np.zeros((1, 2))
+
+
+def swept_parts(parts: Sequence[Part]) -> Swept:
+    """The Swept of some parts fixed to each other; ShapeError where they make no body."""
+    parts = tuple(checked_part(part) for part in parts)
+    if len(parts) > 1 and len(loose := loose_parts(parts, TOUCHING)):
+        raise ShapeError(
+            f"part {loose[0]} of {len(parts)} touches none of those that hang together with the "
+            "first: move it nearer"
+        )
+    points = parts[0].points if len(parts) == 1 else np.concatenate([p.points for p in parts])
+    # A unit-sized copy keeps fourth powers of micrometres far from underflow.
+    extent = np.ptp(points, axis=0).max() + max(part.radius for part in parts)
+    unit = [Part(tuple(ring / extent for ring in p.rings), p.radius / extent) for p in parts]
+    area, centroid, moment, stretch = all_moments(unit)
+    centroid = centroid * extent
+    around = tuple(
+        Part(tuple(read_only(ring - centroid) for ring in part.rings), part.radius)
+        for part in parts
+    )
+    return Swept(
+        read_only(points - centroid), centroid, float(area * extent**2),
+        float(moment * extent**4), *stretched(stretch, moment), around,
+    )  # fmt: skip
+
+
+def checked_part(part: Part) -> Part:
+    """A part with its outer ring counter-clockwise and its holes clockwise; ShapeError where it is
+    none."""
+    outer, *holes = part.rings
+    for ring in part.rings:
+        if len(ring) > 1:
+            require_distinct(ring)
+    if len(outer) < 3:
+        if holes:
+            raise ShapeError("a point or a segment has no holes")
+        return part
+    require_simple(outer, holes)
+    return Part((facing(outer, 1.0), *(facing(ring, -1.0) for ring in holes)), part.radius)
+
+
+def facing(ring: np.ndarray, sense: float) -> np.ndarray:
+    """The ring counter-clockwise (1) or clockwise (−1), the first point kept."""
+    if sense * signed_area(ring - ring.mean(axis=0)) > 0.0:
+        return ring
+    return np.roll(ring[::-1], 1, axis=0)
+
+
+def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:
+    """(elongation, long axis) of how an area is stretched (2,) and its polar second moment."""
+    elongation = float(np.hypot(*stretch)) / moment
+    if elongation <= ROUND:
+        return 0.0, 0.0
+    return elongation, 0.5 * float(np.arctan2(stretch[1], stretch[0]))

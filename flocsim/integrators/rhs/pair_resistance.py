@@ -1,6 +1,6 @@
 """What two bodies' motion and a flow's strain put on both through the water between them.
 
-The resistance is a sum of squares (hydrodynamics/pair_table.py), each of a sum of the velocities of
+The resistance is a sum of squares (hydrodynamics/pair.py), each of a sum of the velocities of
 both bodies: three of common motion, at the distance of the centres, and three of relative motion,
 at a gap between that of the outlines and that of spheres of the same drag. So it is positive
 whatever the shapes. All are along and across the line of centres: the normal of the nearest points
@@ -14,7 +14,7 @@ from collections.abc import Callable
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import hook
-from flocsim.hydrodynamics.pair_table import COLUMNS, NEAREST, NODES_A_UNIT
+from flocsim.hydrodynamics.pair import COLUMNS, NEAREST, NODES_A_UNIT
 from flocsim.hydrodynamics.two_spheres import fading
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.surface_gap import soften

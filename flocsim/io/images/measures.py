@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.geometry.shapes.measures import ShapeMeasures, feret_diameters
+from flocsim.geometry.shapes.outline import ShapeMeasures, feret_diameters
 
 PIXEL_MOMENT = 1.0 / 12.0
 """Second moment of a pixel about its own centre, over its area [px²]."""

@@ -33,7 +33,7 @@ SHAPE_MEASURES = {
     "circularity": "circularity 4 pi A/P^2",
     "solidity": "solidity, the share of the convex hull,",
 }
-"""Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.measures`)."""
+"""Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.outline`)."""
 SHAPE_COLUMNS = tuple(f"{name}_{body}" for name in SHAPE_MEASURES for body in "ij")
 
 BAND_ENDS = ("closer", "wider")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.geometry.shapes.measures import ShapeMeasures
+from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.shapes.library import ShapeEntry
 
 SHARES = (0.1, 0.5, 0.9)

@@ -14,8 +14,7 @@ from flocsim.ensembles.collision.checking import (
     expected_checks,
     further_runs,
 )
-from flocsim.ensembles.collision.draw import Draw
-from flocsim.ensembles.collision.failures import FAILED, run_safely
+from flocsim.ensembles.collision.draw import FAILED, Draw, run_safely
 from flocsim.ensembles.dry_run import checked_words
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of

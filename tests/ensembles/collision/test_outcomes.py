@@ -12,9 +12,8 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.bonds.bond import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.encounter import make_encounter
-from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
     CLEARANCE,
@@ -26,7 +25,6 @@ from flocsim.ensembles.collision.outcomes import (
     watch_pair,
 )
 from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
@@ -35,6 +33,7 @@ from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from tests.helpers.small_study import small_config, small_study
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 

@@ -13,7 +13,7 @@ from flocsim.ensembles.collision.start import (
     orientations,
     place_pair,
 )
-from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+from flocsim.geometry.shapes.cores import edges_of, from_edges
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import small_study
 
@@ -174,7 +174,10 @@ def ends_of(core):
 def core_distance(shapes, places):
     """Smallest distance of a core point of one to the core of the other, by all pairs."""
     cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
-    tables = [distance_to_edges(points, *ends_of(core)) for points, core in (cores, cores[::-1])]
+    tables = [
+        np.linalg.norm(from_edges(points, *ends_of(core)), axis=-1)
+        for points, core in (cores, cores[::-1])
+    ]
     return min(table.min() for table in tables)
 
 

@@ -22,7 +22,7 @@ from flocsim.ensembles.config.schema import (
 )
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import ConfigError, FileError, UsageError
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Sphere
 from tests.helpers.small_study import write_star_library
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -11,11 +11,12 @@ from flocsim.ensembles.estimates.paired import (
     newcombe,
     paired_differences,
 )
-from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums, tabulate
+from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums
 from flocsim.io.confidence import scrambled_difference, wilson
 from flocsim.io.results.events import events
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.synthetic_results import bonds_of, draw_codes
+from tests.helpers.tabulate import tabulate
 
 CELLS = st.tuples(*[st.integers(0, 60)] * 4).filter(any)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import CODES, COUNTED, tabulate
+from flocsim.ensembles.estimates.statistics import CODES, COUNTED
 from flocsim.ensembles.estimates.summary import (
     added,
     outline_changes,
@@ -12,6 +12,7 @@ from flocsim.ensembles.estimates.summary import (
     tables_of,
 )
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, OUTLINES
+from tests.helpers.tabulate import tabulate
 
 A, B, C, D, MISSED, UNDECIDED = (
     OUTCOMES.index(name) for name in ("A", "B", "C", "D", "missed", "undecided")

@@ -18,8 +18,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, sums_of
 from flocsim.ensembles.pairs.kind import results_of
 from flocsim.ensembles.parallel import assembly
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
-from flocsim.ensembles.parallel.messages import ExitCode
+from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError

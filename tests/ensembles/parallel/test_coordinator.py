@@ -4,9 +4,8 @@ import pytest
 
 from flocsim.ensembles.chunks import Chunk
 from flocsim.ensembles.parallel import communicator
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
+from flocsim.ensembles.parallel.communicator import Communicator, Halt, Request, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
-from flocsim.ensembles.parallel.messages import Assignment, Dismissal, Halt, Request
 from flocsim.ensembles.parallel.schedule import TooManyFailures
 from tests.helpers.study_state import make_state, result_of
 
@@ -55,16 +54,16 @@ def chunk(k):
 
 def test_every_request_gets_a_chunk_and_at_the_end_all_are_dismissed():
     rank0 = coordinator()
-    assert asked(rank0, 1) == [(1, Assignment(chunk(0)))]
-    assert asked(rank0, 2) == [(2, Assignment(chunk(1)))]
+    assert asked(rank0, 1) == [(1, chunk(0))]
+    assert asked(rank0, 2) == [(2, chunk(1))]
     assert rank0.exchange(None) == chunk(2)
-    assert asked(rank0, 1, result_of(chunk(0))) == [(1, Assignment(chunk(3)))]
+    assert asked(rank0, 1, result_of(chunk(0))) == [(1, chunk(3))]
     assert asked(rank0, 2, result_of(chunk(1))) == []  # nothing to do now, but it may come back
-    assert asked(rank0, 1, result_of(chunk(3), 0)) == [(2, Assignment(chunk(3)))]
+    assert asked(rank0, 1, result_of(chunk(3), 0)) == [(2, chunk(3))]
     assert asked(rank0, 2, result_of(chunk(3))) == []
     assert rank0.exchange(result_of(chunk(2))) is None
     assert rank0.is_halted()
-    assert rank0.comm.new() == [(1, Dismissal()), (2, Dismissal())]
+    assert rank0.comm.new() == [(1, None), (2, None)]
     rank0.finish()  # has nobody to wait for
     assert rank0.state.computed == 4
 
@@ -74,21 +73,21 @@ def test_a_signal_to_one_rank_halts_the_others_once():
     for rank in (1, 2, 3):
         asked(rank0, rank)
     assert asked(rank0, 1, result_of(chunk(0)), interrupted=True) == [
-        (1, Dismissal()), (2, Halt()), (3, Halt()),
+        (1, None), (2, Halt()), (3, Halt()),
     ]  # fmt: skip
-    assert asked(rank0, 2, result_of(chunk(1))) == [(2, Dismissal())]
-    assert asked(rank0, 3, result_of(chunk(2))) == [(3, Dismissal())]
+    assert asked(rank0, 2, result_of(chunk(1))) == [(2, None)]
+    assert asked(rank0, 3, result_of(chunk(2))) == [(3, None)]
     assert (rank0.present, rank0.state.computed) == (0, 3)
 
 
 def test_when_it_is_enough_those_who_work_on_a_later_stage_are_halted():
     rank0 = coordinator(2, borders=(1, 4), is_enough=lambda stop: True)
     assert rank0.exchange(None) == chunk(0)
-    assert asked(rank0, 1) == [(1, Assignment(chunk(1)))]
+    assert asked(rank0, 1) == [(1, chunk(1))]
     assert rank0.exchange(result_of(chunk(0))) is None
     rank0.serve()
     assert rank0.comm.new() == [(1, Halt())]
-    assert asked(rank0, 1, result_of(chunk(1), 0)) == [(1, Dismissal())]
+    assert asked(rank0, 1, result_of(chunk(1), 0)) == [(1, None)]
 
 
 def test_an_error_calls_all_back_and_takes_in_nothing_more():
@@ -99,7 +98,7 @@ def test_an_error_calls_all_back_and_takes_in_nothing_more():
         asked(rank0, 1, result_of(chunk(0), failed=1))
     rank0.comm.arriving.append((2, Request(result_of(chunk(1)), False)))
     assert rank0.give_up()
-    assert rank0.comm.new() == [(1, Dismissal()), (2, Dismissal())]
+    assert rank0.comm.new() == [(1, None), (2, None)]
     assert rank0.state.computed == 1
 
 
@@ -123,17 +122,17 @@ def test_on_a_signal_rank_0_waits_no_longer_and_the_others_wait_for_it(monkeypat
 def test_another_rank_asks_and_works_until_it_is_halted():
     wire = Wire(1, 2)
     remote = RemoteCoordinator(wire)
-    wire.arriving = [(0, Assignment(chunk(0)))]
+    wire.arriving = [(0, chunk(0))]
     assert remote.exchange(None) == chunk(0)
     assert not remote.is_halted()
     wire.arriving = [(0, Halt())]
     assert remote.is_halted()
-    wire.arriving = [(0, Dismissal())]
+    wire.arriving = [(0, None)]
     assert remote.exchange(result_of(chunk(0), 0)) is None
     assert [type(message) for _, message in wire.sent] == [Request, Request]
 
 
 def test_a_halt_that_crosses_a_request_is_no_answer():
     wire = Wire(1, 2)
-    wire.arriving = [(0, Halt()), (0, Dismissal())]
+    wire.arriving = [(0, Halt()), (0, None)]
     assert RemoteCoordinator(wire).exchange(result_of(chunk(0))) is None

@@ -8,7 +8,7 @@ import pytest
 from flocsim.ensembles import runner
 from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.errors import ConfigError
@@ -34,7 +34,7 @@ def first(tmp_path_factory):
     """(the folder, Results of the study of spheres)."""
     folder = tmp_path_factory.mktemp("auto")
     config = small_config(folder, SPHERES)
-    run_to_file(config, SerialCommunicator(), folder / "one.h5", NEW)
+    run_to_file(config, Communicator(), folder / "one.h5", NEW)
     return folder, read_results(folder / "one.h5")
 
 
@@ -45,7 +45,7 @@ def test_the_file_has_the_choice_and_its_rows_are_of_it(first):
     assert (chosen["name"], chosen["method"], chosen["replicates"]) == ("III", "implicit", 15)
     fixed = {"integrator": {"tolerance": chosen["tolerance"], "check_share": 0.0}}
     config = small_config(folder, SPHERES | fixed)
-    run_to_file(config, SerialCommunicator(), folder / "fixed.h5", NEW)
+    run_to_file(config, Communicator(), folder / "fixed.h5", NEW)
     assert same_rows(found, read_results(folder / "fixed.h5"))
 
 
@@ -78,9 +78,9 @@ def test_what_was_stopped_goes_on_with_the_choice_it_had(first, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(runner, "make_results", stopped)
         with pytest.raises(RuntimeError):
-            run_to_file(config, SerialCommunicator(), output, NEW)
+            run_to_file(config, Communicator(), output, NEW)
     monkeypatch.setattr(runner, "choose", stopped)
-    run_to_file(config, SerialCommunicator(), output, RESUME)
+    run_to_file(config, Communicator(), output, RESUME)
     again = read_results(output)
     assert same_rows(found, again)
     assert again.run["accuracy"] == found.run["accuracy"]
@@ -92,7 +92,7 @@ def test_a_file_of_another_choice_is_not_extended(first):
     before = (folder / "one.h5").read_bytes()
     more = small_config(folder, SPHERES | {"replicates": 60_000})
     with pytest.raises(SharedError, match=r"types\.III\.integrator is .* in the file"):
-        run_to_file(more, SerialCommunicator(), folder / "one.h5", RESUME)
+        run_to_file(more, Communicator(), folder / "one.h5", RESUME)
     assert (folder / "one.h5").read_bytes() == before
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.collision.checking import expected_checks
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.pilot.forecast import (
     CLOCK,
     LEAST,
@@ -121,7 +121,7 @@ def test_the_size_is_that_of_the_file(tmp_path):
     for count in (3, 300):
         config = small_config(tmp_path, SPHERES | short | {"replicates": count})
         path = tmp_path / f"{count}.h5"
-        run_to_file(config, SerialCommunicator(), path, "new")
+        run_to_file(config, Communicator(), path, "new")
         study = Study(config)
         assert file_size(study, count) == pytest.approx(path.stat().st_size, rel=0.05)
 

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.faults.fuzz_readers import JournalReader
 from flocsim.ensembles.chunks import ROW, named
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME, Beginning, take_journal
 from flocsim.ensembles.storage.row_store import RowStore
@@ -129,7 +129,7 @@ def test_any_shuffled_journal_is_taken_or_refused(reader, tmp_path):
 def finished(tmp_path_factory):
     """The bytes of a finished study's results file."""
     folder = tmp_path_factory.mktemp("finished")
-    run_to_file(small_config(folder, SPHERES), SerialCommunicator(), folder / "r.h5", NEW)
+    run_to_file(small_config(folder, SPHERES), Communicator(), folder / "r.h5", NEW)
     return read_sealed(folder / "r.h5")
 
 
@@ -174,7 +174,7 @@ def test_results_that_no_run_has_written_are_not_extended(tmp_path, finished, ch
     (tmp_path / "r.h5").write_bytes(before)
     config = small_config(tmp_path, SPHERES | {"replicates": 4})
     with pytest.raises(SharedError) as caught:
-        run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", RESUME)
+        run_to_file(config, Communicator(), tmp_path / "r.h5", RESUME)
     error = caught.value.args[0]
     assert isinstance(error, FlocsimError)
     assert str(error).isprintable()

@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.ensembles import cli
 from flocsim.ensembles.pairs import kind as pairs
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.errors import FileError, UsageError
@@ -21,7 +21,7 @@ SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}
 def go(folder, mode=NEW, overwrite=False, **more):
     """Run the study of spheres in the folder into r.h5; how it Ended."""
     config = small_config(folder, SPHERES | more)
-    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode, overwrite=overwrite)
+    return run_to_file(config, Communicator(), folder / "r.h5", mode, overwrite=overwrite)
 
 
 @pytest.fixture(scope="module")

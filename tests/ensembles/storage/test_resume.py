@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles import runner
-from flocsim.ensembles.parallel import worker
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel import coordinator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.schedule import StudyState, TooManyFailures
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage import identity
@@ -29,21 +29,21 @@ SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch):
     """Chunks of one replicate or two, so that there are many."""
-    monkeypatch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+    monkeypatch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """The results file of an undisturbed run of 2 × 1 × 2 × 20 replicates."""
     folder = tmp_path_factory.mktemp("whole")
-    run_to_file(small_config(folder, SPHERES), SerialCommunicator(), folder / "r.h5", NEW)
+    run_to_file(small_config(folder, SPHERES), Communicator(), folder / "r.h5", NEW)
     return folder / "r.h5"
 
 
 def go_on(folder, mode=RESUME, overrides=None, **more):
     """Run the study of spheres in the folder; how it Ended."""
     config = small_config(folder, SPHERES | (overrides or {}) | more)
-    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode)
+    return run_to_file(config, Communicator(), folder / "r.h5", mode)
 
 
 def stop_after(monkeypatch, chunks):
@@ -64,7 +64,7 @@ def left(tmp_path_factory):
     """The journal of a study that was stopped after 30 of its 80 replicates."""
     folder = tmp_path_factory.mktemp("left")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+        patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
         stop_after(patch, 30)
         ended = go_on(folder, NEW)
     assert (ended.code, ended.kept) == (STOPPED, 30)
@@ -172,7 +172,7 @@ def test_the_digest_of_the_physics_sees_code_and_nothing_else():
 
 def test_other_flocs_are_refused(tmp_path, monkeypatch):
     config = small_config(tmp_path, {"shapes": {"vertices": [4]}, "replicates": 1})
-    run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", NEW)
+    run_to_file(config, Communicator(), tmp_path / "r.h5", NEW)
     original = runner.flocs_of
 
     def grown(config):
@@ -181,7 +181,7 @@ def test_other_flocs_are_refused(tmp_path, monkeypatch):
 
     monkeypatch.setattr(runner, "flocs_of", grown)
     with pytest.raises(SharedError, match="the flocs with N = 4 have changed"):
-        run_to_file(config, SerialCommunicator(), tmp_path / "r.h5", RESUME)
+        run_to_file(config, Communicator(), tmp_path / "r.h5", RESUME)
 
 
 def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):

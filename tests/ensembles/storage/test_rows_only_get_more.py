@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from flocsim.ensembles import runner
-from flocsim.ensembles.parallel import worker
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel import coordinator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage import row_store
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
@@ -37,13 +37,13 @@ FEWER = [
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch):
     """Chunks of one replicate or two, so that there are many."""
-    monkeypatch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+    monkeypatch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
 
 
 def go_on(folder, mode=RESUME, **more):
     """Run the study of 2 × 1 × 2 × 20 spheres in the folder; how it Ended."""
     config = small_config(folder, SPHERES | more)
-    return run_to_file(config, SerialCommunicator(), folder / "r.h5", mode)
+    return run_to_file(config, Communicator(), folder / "r.h5", mode)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def left(tmp_path_factory):
     """The journal of a study that was stopped after 50 of its 80 replicates."""
     folder = tmp_path_factory.mktemp("left")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker, "chunk_seconds", lambda size: 1e-9)
+        patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
         stop_after(patch, 50)
         assert go_on(folder, NEW).code == STOPPED
     return folder / "r.h5.journal"

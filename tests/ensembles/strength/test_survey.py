@@ -13,7 +13,7 @@ from flocsim import __main__ as program
 from flocsim.commands import plot
 from flocsim.commands.strength import places
 from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, table_of
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run, run_to_file
 from flocsim.ensembles.strength import kind as module
 from flocsim.ensembles.strength.kind import (
@@ -77,7 +77,7 @@ def survey(results, output="", mode="new", overwrite=False, **given):
     config = config_of(Bonds(results, **given), str(output or "s.h5"))
     if not output:
         return run(config)
-    return run_to_file(config, SerialCommunicator(), output, mode, overwrite=overwrite).results
+    return run_to_file(config, Communicator(), output, mode, overwrite=overwrite).results
 
 
 def test_the_bound_ones_are_those_of_classes_a_and_c(fake):

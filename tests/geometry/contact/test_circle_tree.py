@@ -28,7 +28,7 @@ from flocsim.geometry.contact.circle_tree import (
 )
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
 from flocsim.geometry.contact.outlines import outlines_of
-from flocsim.geometry.shapes.cores import distance_to_edges, edges_of
+from flocsim.geometry.shapes.cores import edges_of, from_edges
 from tests.helpers.tiers import given_often
 
 COUNTS = (1, 2, 3, 4, 5, 7, 16, 33, 64, 512)
@@ -88,7 +88,7 @@ def one_way_distances(shapes, places, a, b):
     starts, ends = edges_of(core)
     if len(points) == len(core) == 1:
         return np.hypot(*(points - core).T)[:, None]
-    return distance_to_edges(points, starts, ends)
+    return np.linalg.norm(from_edges(points, starts, ends), axis=-1)
 
 
 def all_distances(shapes, places):

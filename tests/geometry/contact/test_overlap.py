@@ -12,7 +12,7 @@ from flocsim.geometry.contact.overlap import (
     placed_contacts,
     touching_points,
 )
-from flocsim.geometry.shapes.cores import distance_between
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.parts import Part
 from tests.reference.contacts import contacts
 from tests.reference.outline import core_geometry
@@ -36,7 +36,9 @@ def test_fault_and_distance_are_those_of_shapely(seed, make_a, make_b, x, y, ang
     if distance == 0.0:
         assert fault is not None
     else:
-        assert distance_between(a, b) == pytest.approx(distance, rel=1e-9, abs=1e-14)
+        assert core_gap(Part((a,), 0.1), Part((b,), 0.2)) == pytest.approx(
+            distance, rel=1e-9, abs=1e-14
+        )
         assert (fault is not None) == (distance < 0.15)
 
 

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.geometry.shapes.cores import distance_to_edges, edges_of, inside_polygon
+from flocsim.geometry.shapes.cores import edges_of, from_edges, inside_polygon
 from flocsim.geometry.shapes.moments import all_moments, area_and_growth
 from flocsim.geometry.shapes.parts import Part
 from tests.helpers.tiers import rest_slow
@@ -160,7 +160,7 @@ def test_five_hundred_vertices(radius):
 def test_distances_and_insides_are_those_of_shapely(seed, x, y):
     core = random_core(star, np.random.default_rng(seed))
     polygon, point = shapely.Polygon(core), shapely.Point(x, y)
-    nearest = distance_to_edges(np.array([[x, y]]), *edges_of(core)).min()
+    nearest = np.linalg.norm(from_edges(np.array([[x, y]]), *edges_of(core)), axis=-1).min()
     assert nearest == pytest.approx(polygon.exterior.distance(point), rel=1e-12, abs=1e-15)
     if nearest > 1e-12:
         assert inside_polygon(np.array([[x, y]]), core)[0] == polygon.contains(point)

@@ -26,8 +26,8 @@ from flocsim.ensembles.storage.identity import (
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
 from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import flocs_of
-from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.geometry.shapes.wall import wall_between
+from flocsim.geometry.shapes.shape import Sphere
+from flocsim.geometry.shapes.spheropolygon import WallShape
 from flocsim.integrators.base import Status
 from flocsim.io.terminal import aligned
 from flocsim.system import System
@@ -57,7 +57,7 @@ class LoneStudy(StudyKind):
             floc = self.flocs[int(numbers[0] * len(self.flocs))]
             shape = floc.resized(n, radius, config.shapes.radius)
         angle, half = 2.0 * np.pi * float(numbers[1]), LONG * radius
-        wall = wall_between((0.0, -half), (0.0, half), THIN * radius)
+        wall = WallShape([(0.0, -half), (0.0, half)], THIN * radius)
         away = THIN * radius + scene.gap + shape.bounding_radius
         body = Body(shape, (away, 0.0), angle=angle, **config.body_options(shape))
         fixed = Body(wall, (0.0, 0.0), surface_density=1.0, fixed=True)

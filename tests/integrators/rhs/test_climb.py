@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.body import Body
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
-from flocsim.geometry.shapes.sphere import Sphere
+from flocsim.geometry.shapes.shape import Sphere
 from flocsim.integrators.rhs.climb import can_climb
 from flocsim.system import System
 

@@ -13,7 +13,7 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import Contact, Gravity, OutlineForce, StokesDrag, VanDerWaals
-from flocsim.geometry.shapes.parts import core_gap, cores_overlap
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.surfaces.energy import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
 from flocsim.integrators.rhs.forces import add_outline_forces
@@ -37,9 +37,10 @@ def rough(corners, size, seed):
 
 def gap_of(one, other, pose):
     pairs = [(p, q) for p in one.placed_parts(*pose) for q in other.placed_parts(0.0, 0.0, 0.0)]
-    if any(cores_overlap(p, q) for p, q in pairs):
+    gaps = [core_gap(p, q) for p, q in pairs]
+    if min(gaps) == 0.0:
         return -math.inf
-    return min(core_gap(p, q) - p.radius - q.radius for p, q in pairs)
+    return min(gap - p.radius - q.radius for gap, (p, q) in zip(gaps, pairs, strict=True))
 
 
 def at_gap(one, other, gap, bearing, angle):

@@ -6,7 +6,6 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import tabulate
 from flocsim.io.labelled import Column
 from flocsim.io.plots.outcomes import COLOURS, INSIDE, MARK_AT, causes_of
 from flocsim.io.plots.results import FIGURES
@@ -16,6 +15,7 @@ from flocsim.io.results.events import ends_of
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.sweep_file import SweepResults, Swept
 from tests.helpers.synthetic_results import make_results
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 HELD = OUTCOMES.index("held")

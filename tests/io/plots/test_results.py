@@ -6,11 +6,12 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.estimates.statistics import tabulate, wilson
+from flocsim.io.confidence import wilson
 from flocsim.io.plots.results import FEW, FIGURES, against_size, figure_4, figure_6, figure_8
 from flocsim.io.plots.style import save
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
+from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
 OF_COLLISIONS = ("4", "5", "6", "8", "bonds", "delta", "overview")

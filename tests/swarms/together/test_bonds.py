@@ -18,7 +18,7 @@ from flocsim.ensembles.collision.outcomes import REST_TIME, bond_of, start_rest
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.shapes.parts import core_gap
+from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators.events.modes import set_modes
 from flocsim.swarms.together.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
-from flocsim.bonds import statics
+from flocsim.bonds import rest
 from flocsim.bonds.bond import is_closed, size_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.slip_transfer import contact_point
@@ -35,7 +35,7 @@ def drawn(points_i, points_j, shift=(0.0, 0.0), friction="none", **options):
 
 
 def hooked(two, drift=(0.0, -1e-3)):
-    return statics.is_hooked(two.scene, two.work, two.bond, load(1e-12, drift))
+    return rest.is_hooked(two.scene, two.work, two.bond, load(1e-12, drift))
 
 
 @pytest.mark.parametrize("fixed", [True, False])
@@ -129,9 +129,9 @@ def by_linear_program(two, drift, grip):
     for row in range(work.tally[at.CANDIDATES]):
         if not is_closed(work, row):
             continue
-        n = np.array(statics.normal_on(work, bond, row))
+        n = np.array(rest.normal_on(work, bond, row))
         t = np.array([-n[1], n[0]])
-        for aside in (-statics.SLACK * size, statics.SLACK * size):
+        for aside in (-rest.SLACK * size, rest.SLACK * size):
             place = np.array(contact_point(work, row, 1)) + aside * t
             for along in (-grip, grip):
                 force = n + along * t
@@ -158,7 +158,7 @@ def by_linear_program(two, drift, grip):
 @pytest.mark.parametrize("friction", rest_slow(["none", 0.3, 0.0], lambda mu: mu == 0.3))
 def test_hooks_are_those_of_a_linear_program(friction):
     rng = np.random.default_rng(4)
-    grip = {"none": statics.GRIP, 0.0: statics.SLACK}.get(friction, friction)
+    grip = {"none": rest.GRIP, 0.0: rest.SLACK}.get(friction, friction)
     found = []
     for case in range(25):
         _, _, two = entangled(rng, friction)

@@ -10,14 +10,14 @@ import pytest
 from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles import runner
 from flocsim.ensembles.pairs import kind as pairs
-from flocsim.ensembles.parallel.communicator import SerialCommunicator
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run, run_to_file
-from flocsim.ensembles.storage.cpu_kind import (
+from flocsim.ensembles.storage.resume import NEW, RESUME
+from flocsim.ensembles.storage.stored_json import (
     describe_kind,
     distinct,
     mixture_warnings,
 )
-from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.io.journal.journal import journal_path
 from flocsim.io.journal.records import SESSION, scan
 from flocsim.io.results.file import read_results
@@ -93,9 +93,7 @@ def test_a_mixture_is_told_in_one_line():
 def run_on(folder, monkeypatch, kind, mode=RESUME, **more):
     """Run the study as on a kind of CPU; how it Ended."""
     monkeypatch.setattr(runner, "cpu_kind", lambda: kind)
-    return run_to_file(
-        small_config(folder, SPHERES | more), SerialCommunicator(), folder / "r.h5", mode
-    )
+    return run_to_file(small_config(folder, SPHERES | more), Communicator(), folder / "r.h5", mode)
 
 
 def cpus_of(path):
