@@ -59,7 +59,7 @@ from flocsim.interruption import WITHHELD
 from flocsim.io.journal.records import CHUNK, Record
 from flocsim.io.json_text import matches
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened, read_results, scalar_of
+from flocsim.io.results.file import opened, scalar_of
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.older import why_apart
@@ -246,8 +246,8 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
 KIND = Kind(
     scenes=(*PAIR_SCENES.values(), KernelScene),
     make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
-    prepare=lambda study, comm: None, doubts=lambda study: study_doubts(study.config, study.flocs),
-    facts=facts, old_rows=old_rows, results=results, read=partial(read_results, replicates=False),
-    table=table, total=lambda found: int(found.probabilities["n_total"].sum()), verdict=verdict,
-    dry_run=dry_run, enough=lambda study, store: StopRule(study.config.stop, store), so_far=so_far,
+    doubts=lambda study: study_doubts(study.config, study.flocs), facts=facts, old_rows=old_rows,
+    results=results, table=table, total=lambda found: int(found.probabilities["n_total"].sum()),
+    verdict=verdict, dry_run=dry_run, so_far=so_far,
+    enough=lambda study, store: StopRule(study.config.stop, store),
 )  # fmt: skip

@@ -317,11 +317,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
 
 KIND = Kind(
     scenes=(Bonds,),
-    make=lambda config, flocs=None, methods=None: StrengthStudy(config),
-    flocs=lambda config: [], identity=about_of, code=TESTING, check=lambda config: None,
-    prepare=lambda study, comm: None, doubts=lambda study: [], facts=lambda study: {},
-    old_rows=old_rows, results=results, read=read_strengths, table=table_of,
-    total=lambda found: len(found.column("status")), verdict=lambda found: (0, ""),
-    dry_run=lambda config, ranks, pilot: StrengthStudy(config).title,
-    so_far=so_far, asked={"strength": SURVEY},
+    make=lambda config, flocs, methods: StrengthStudy(config), identity=about_of, code=TESTING,
+    old_rows=old_rows, results=results, table=table_of,
+    total=lambda found: len(found.column("status")), so_far=so_far, asked={"strength": SURVEY},
 )  # fmt: skip
