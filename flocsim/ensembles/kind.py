@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ROW, Condition, Interval
+from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ORDER, ROW, Condition, Interval
 from flocsim.ensembles.config.kinds import STUDIES
 from flocsim.ensembles.config.schema import Config
 from flocsim.io.journal.records import Record
@@ -125,7 +125,7 @@ class StudyKind:
 
     def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
         """{name: what all parts of a sweep have in common} of what `asked` says of one of them."""
-        return {name: asked[name] for name in ("types", "vertices", "delta")}
+        return {name: asked[name] for name in ORDER}
 
     def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
@@ -145,6 +145,13 @@ class StudyKind:
         ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
         """
         raise NotImplementedError
+
+    def note(self, place: Place, replicate: int, why: str) -> dict[str, Any]:
+        """What is needed to run a replicate again, and why one would, as JSON can hold it."""
+        condition, vertices, share = place
+        name = self.config.scene.names[condition]
+        about = {"type": name, "vertices": vertices, "delta": share}
+        return about | {"replicate": replicate, "why": why}
 
     def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
         """ValueError for rows that no run can have given."""

@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
+from flocsim.ensembles.chunks import (
+    COLUMNS,
+    ORDER,
+    ROW,
+    Condition,
+    condition_of,
+    fits,
+    places_in,
+    total,
+)
 from flocsim.ensembles.collision.failures import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
@@ -52,7 +61,7 @@ from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import WITHHELD

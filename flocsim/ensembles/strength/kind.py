@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, Interval, missing, places_in
+from flocsim.ensembles.chunks import ORDER, Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
 from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
 from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
@@ -19,7 +19,7 @@ from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
@@ -211,8 +211,7 @@ class StrengthStudy(StudyKind):
         words = in_words(Opening(**{each: row[each] for each in row if each != "bond"}))
         if going is not None:
             going(f"type {name}, N = {n}, delta {delta:g}, replicate {replicate}: {words}")
-        note = {"type": name, "vertices": n, "delta": delta, "replicate": replicate, "why": words}
-        return row, note if row["status"] == FAILED else None
+        return row, self.note(place, replicate, words) if row["status"] == FAILED else None
 
     def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
         """ValueError for rows that no run can have given."""

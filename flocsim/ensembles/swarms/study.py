@@ -171,9 +171,7 @@ class SwarmStudy(StudyKind):
             f"{ended['status'].lower()} at {ended['time']:.4g} s, in an island of bodies "
             f"{', '.join(map(str, ended['failed'][:6]))}"
         )
-        name, vertices, share = self.conditions[0]
-        about = {"type": name, "vertices": vertices, "delta": share, "replicate": replicate}
-        return row, about | {"why": why}
+        return row, self.note(place, replicate, why)
 
     def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
         """ValueError for rows that no run can have given."""
