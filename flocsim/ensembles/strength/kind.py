@@ -123,6 +123,7 @@ class StrengthStudy(StudyKind):
     compared: ClassVar[tuple[str, ...]] = tuple(ROW.fields or ())
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "doublets"
+    check_rows = staticmethod(check_opened)
 
     def __attrs_post_init__(self):
         refuse_outlines(self.config.forces, "the strength of a bond")
@@ -212,10 +213,6 @@ class StrengthStudy(StudyKind):
         if going is not None:
             going(f"type {name}, N = {n}, delta {delta:g}, replicate {replicate}: {words}")
         return row, self.note(place, replicate, words) if row["status"] == FAILED else None
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        check_opened(column)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Which doublets have a run that failed."""

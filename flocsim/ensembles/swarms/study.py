@@ -80,6 +80,7 @@ class SwarmStudy(StudyKind):
     compared: ClassVar[tuple[str, ...]] = ("trial",)
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
+    check_rows = staticmethod(check_ends)
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -172,10 +173,6 @@ class SwarmStudy(StudyKind):
             f"{', '.join(map(str, ended['failed'][:6]))}"
         )
         return row, self.note(place, replicate, why)
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        check_ends(column)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Which replicates ended before their time."""
