@@ -23,6 +23,7 @@ from flocsim.ensembles.contents import (
 )
 from flocsim.ensembles.report import (
     EFFICIENCY,
+    MOST_UNDECIDED,
     change_lines,
     checked_line,
     efficiency_lines,
@@ -64,6 +65,9 @@ SHOWN = {
     "pr_hangs": "Pr[A, hangs]",
 }  # fmt: skip
 """The probabilities of a condition that have columns of their own, and their headings."""
+
+SAID_APART = (MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
+"""Facts of the group ``run`` that the summary has in its own words."""
 
 ERRORS_TEXT = (
     "Each probability is followed by its 95 % interval, which covers sampling (Wilson's) and the "
@@ -150,7 +154,7 @@ def summary(results: Overview) -> Summary:
     failed = [describe_note(note) for note in stored(run, "failed")]
     facts += settling(run) + thermal(run)
     facts += [("touched", line) for line in touch_lines(results)]
-    return Summary(facts, origin(run), warnings, failed)
+    return Summary(facts, origin(run, SAID_APART), warnings, failed)
 
 
 def table(results: Results) -> str:
