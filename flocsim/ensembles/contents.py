@@ -102,6 +102,8 @@ class Contents:
     """(found) → the figures that it has."""
     drawn: Mapping[str, Figures]
     """{what has them, in words: all figures}."""
+    told: Callable[[Any], str] | None = None
+    """(found) → what is printed where a study has been run, instead of the table."""
     overview: Callable[[Any], Any] | None = None
     """(path) → found, with what only `summary` needs."""
     with_rows: Callable[[Any, Any, float], Any] = lambda path, found, most: found

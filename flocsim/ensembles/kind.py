@@ -195,8 +195,6 @@ class Kind:
     results: Callable[..., Any]
     """(study, beginning, count, run, communicator, output or None, warn, whether all rows are to
     be in memory) → results, written to the output."""
-    table: Callable[[Any], str]
-    """The results for the terminal."""
     total: Callable[[Any], int]
     """How many replicates results have."""
     so_far: Callable[..., Any]

@@ -167,6 +167,18 @@ def table(results: Results) -> str:
     return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
 
 
+def told(found: Results) -> str:
+    """What is printed of a study that has been run."""
+    if found.kernel is not None:
+        lines = kernel_lines(found.kernel)
+    else:
+        axes = found.types, found.vertices, found.delta
+        lines = [format_table(*axes, found.probabilities, found.outlines)]
+    return "\n".join(
+        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
+    )
+
+
 def conditions(results: Results) -> Facts:
     """What was simulated."""
     over = stored(results.run, "overrides")
@@ -298,7 +310,7 @@ OPENED = later("ensembles.pairs.opened", "open_results")
 CONTENTS = Contents(
     title="results of a collision ensemble",
     read=partial(read_results, replicates=False), overview=read_overview, summary=summary,
-    table=table, figures=figures, tables=tables_of,
+    table=table, told=told, figures=figures, tables=tables_of,
     examples=later("ensembles.pairs.opened", "examples_of"),
     drawn={
         "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":

@@ -49,12 +49,7 @@ from flocsim.ensembles.preflight import check_study, settling_facts, study_doubt
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
     SCRAMBLES,
-    change_lines,
-    checked_line,
-    format_table,
-    kernel_lines,
     too_many_undecided,
-    touch_lines,
     undecided_line,
 )
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
@@ -154,18 +149,6 @@ def facts(study: Study) -> dict[str, Any]:
     }
 
 
-def table(found: Results) -> str:
-    """The results for the terminal."""
-    if found.kernel is not None:
-        lines = kernel_lines(found.kernel)
-    else:
-        axes = found.types, found.vertices, found.delta
-        lines = [format_table(*axes, found.probabilities, found.outlines)]
-    return "\n".join(
-        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
-    )
-
-
 def verdict(found: Results) -> tuple[int, str]:
     """0, or the code of an error where not one replicate has come to an outcome, or where more are
     undecided than may be; and what to say of those that have none."""
@@ -256,7 +239,7 @@ KIND = Kind(
     scenes=(*PAIR_SCENES.values(), KernelScene),
     make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
     doubts=lambda study: study_doubts(study.config, study.flocs), facts=facts, old_rows=old_rows,
-    results=results, table=table, total=lambda found: int(found.probabilities["n_total"].sum()),
+    results=results, total=lambda found: int(found.probabilities["n_total"].sum()),
     verdict=verdict, dry_run=dry_run, so_far=so_far,
     enough=lambda study, store: StopRule(study.config.stop, store),
 )  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 
 from flocsim.ensembles.chunks import ORDER, Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
-from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
+from flocsim.ensembles.estimates.strengths import FAILED, strengths_in
 from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
@@ -314,6 +314,6 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
 KIND = Kind(
     scenes=(Bonds,),
     make=lambda config, flocs, methods: StrengthStudy(config), identity=about_of, code=TESTING,
-    old_rows=old_rows, results=results, table=table_of,
+    old_rows=old_rows, results=results,
     total=lambda found: len(found.column("status")), so_far=so_far, asked={"strength": SURVEY},
 )  # fmt: skip
