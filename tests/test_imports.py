@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from flocsim.ensembles.config.kinds import STUDIES
+
 ROOT = Path(__file__).resolve().parents[1]
 
 # From the top of the house to its ground: a room may import from the rows below it, never from
@@ -73,7 +75,7 @@ INNER_ROWS = {
     "ensembles": [
         ["cli", "studies"],
         ["runner"],
-        ["pairs", "strength", "swarms"],
+        [folder.name for folder in STUDIES.values()],
         ["comparison", "dry_run", "report"],
         ["parallel"],
         ["pilot"],

@@ -7,7 +7,7 @@ from typing import Any
 
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.kinds import FILES, contents_of
-from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.contents import file_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import held, make_folder
 from flocsim.io.journal.journal import journal_of
@@ -88,8 +88,9 @@ def animation_of(args, kind):
     if not args.animation:
         return []
     if kind.animate is None:
+        able = " or ".join(each.title for each in studies() if each.animate)
         raise UsageError(
-            "--animation is for swarm studies; for one collision use flocsim trajectory --animation"
+            f"--animation is for {able}; for one collision use flocsim trajectory --animation"
         )
     if Path(args.animation).suffix.lower() != ".gif":
         raise UsageError(f"--animation {args.animation} must end in .gif")

@@ -38,6 +38,9 @@ KEPT = {"type": str, "vertices": int, "delta": float, "replicate": int, "identit
 
 LARGEST_REPLICATE = 2**40
 
+ORDER = ("types", "vertices", "delta")
+"""Axes of the conditions of a study, as what was asked for names them."""
+
 Interval = tuple[int, int]
 
 

@@ -168,6 +168,7 @@ def own_config(comm, arguments):
 
 def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
+    from flocsim.ensembles.contents import file_kind
     from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
 
@@ -194,7 +195,8 @@ def study(config, comm, arguments):
         return 0
     kind, found, seconds = kind_of(config), ended.results, ended.wall_time
     if not arguments.quiet:
-        tell(kind.table(found))
+        shown = file_kind(output)
+        tell((shown.told or shown.table)(found))
         tell(f"{output}: {kind.total(found)} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
     code, line = kind.verdict(found)

@@ -28,9 +28,8 @@ Figures = Mapping[str, Callable[..., Figure]]
 """{name: function}, the first line of whose docstring is its help."""
 
 SAID_APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-              "warnings", "trial", "modules", "settling", "size_classes", "equivalent_spheres",
-              "most_undecided")  # fmt: skip
-"""What the group ``run`` holds besides what is printed as it is."""
+              "warnings", "modules")  # fmt: skip
+"""What the group ``run`` holds, of any kind, besides what is printed as it is."""
 
 MOST_FAILURES = 10
 
@@ -102,6 +101,8 @@ class Contents:
     """(found) → the figures that it has."""
     drawn: Mapping[str, Figures]
     """{what has them, in words: all figures}."""
+    told: Callable[[Any], str] | None = None
+    """(found) → what is printed where a study has been run, instead of the table."""
     overview: Callable[[Any], Any] | None = None
     """(path) → found, with what only `summary` needs."""
     with_rows: Callable[[Any, Any, float], Any] = lambda path, found, most: found
@@ -212,12 +213,12 @@ def fact_lines(facts: Facts) -> list[str]:
     return [f"{visible(name, ''):<{width}}  {visible(value, '')}" for name, value in facts]
 
 
-def origin(run: Mapping[str, Any]) -> Facts:
-    """All that the group ``run`` knows and a person wants to; ValueError where it cannot be
-    read."""
+def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
+    """All that the group ``run`` knows and a person wants to, but for what a kind says ``apart``;
+    ValueError where it cannot be read."""
     facts = []
     for name, value in run.items():
-        if name in SAID_APART or value == "":
+        if name in SAID_APART or name in apart or value == "":
             continue
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"

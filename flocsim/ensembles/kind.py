@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ROW, Condition, Interval
+from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ORDER, ROW, Condition, Interval
 from flocsim.ensembles.config.kinds import STUDIES
 from flocsim.ensembles.config.schema import Config
 from flocsim.io.journal.records import Record
@@ -125,7 +125,7 @@ class StudyKind:
 
     def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
         """{name: what all parts of a sweep have in common} of what `asked` says of one of them."""
-        return {name: asked[name] for name in ("types", "vertices", "delta")}
+        return {name: asked[name] for name in ORDER}
 
     def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
@@ -145,6 +145,13 @@ class StudyKind:
         ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
         """
         raise NotImplementedError
+
+    def note(self, place: Place, replicate: int, why: str) -> dict[str, Any]:
+        """What is needed to run a replicate again, and why one would, as JSON can hold it."""
+        condition, vertices, share = place
+        name = self.config.scene.names[condition]
+        about = {"type": name, "vertices": vertices, "delta": share}
+        return about | {"replicate": replicate, "why": why}
 
     def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
         """ValueError for rows that no run can have given."""
@@ -178,38 +185,34 @@ class Kind:
     scenes: Sequence[type]
     """The classes of its [scene]."""
     make: Callable[..., Any]
-    """(config, flocs, methods) → study."""
-    flocs: Callable[[Config], list]
-    """The flocs that a config's study needs, grown or read."""
+    """(config, flocs, methods or None) → study."""
     identity: Callable[..., dict]
     """(study, facts of the machine or None) → all that its rows follow from."""
     code: Sequence[str]
     """Modules of flocsim whose code decides what is in a row."""
-    check: Callable[[Config], object]
-    """Raises the FlocsimError that a config's study would meet."""
-    prepare: Callable[[Any, Any], object]
-    """(study, communicator): the same, of what takes all ranks to look at."""
-    doubts: Callable[[Any], list[str]]
-    """Lines on what is implausible in a study."""
-    facts: Callable[[Any], dict[str, Any]]
-    """(study) → what the results say of it besides their tables, as JSON can hold it."""
     old_rows: Callable[[Any, ExitStack], Any]
     """(path, resources) → the rows of its results file that is to be extended, an OldTable."""
     results: Callable[..., Any]
     """(study, beginning, count, run, communicator, output or None, warn, whether all rows are to
     be in memory) → results, written to the output."""
-    read: Callable[[Any], Any]
-    """Results from a path."""
-    table: Callable[[Any], str]
-    """The results for the terminal."""
     total: Callable[[Any], int]
     """How many replicates results have."""
-    verdict: Callable[[Any], tuple[int, str]]
-    """(exit code, what to say of replicates without an outcome; "" for nothing)."""
-    dry_run: Callable[[Config, int, bool], str]
-    """(config, ranks, with a pilot) → what a study would do."""
     so_far: Callable[..., Any]
     """(path, sessions, records) of a journal → Unfinished, what it has so far."""
+    flocs: Callable[[Config], list] = lambda config: []
+    """The flocs that a config's study needs, grown or read."""
+    check: Callable[[Config], object] = lambda config: None
+    """Raises the FlocsimError that a config's study would meet."""
+    prepare: Callable[[Any, Any], object] = lambda study, comm: None
+    """(study, communicator): the same, of what takes all ranks to look at."""
+    doubts: Callable[[Any], list[str]] = lambda study: []
+    """Lines on what is implausible in a study."""
+    facts: Callable[[Any], dict[str, Any]] = lambda study: {}
+    """(study) → what the results say of it besides their tables, as JSON can hold it."""
+    verdict: Callable[[Any], tuple[int, str]] = lambda found: (0, "")
+    """(exit code, what to say of replicates without an outcome; "" for nothing)."""
+    dry_run: Callable[[Config, int, bool], str] = lambda config, *_: study_of(config, []).title
+    """(config, ranks, with a pilot) → what a study would do."""
     asked: dict[str, Any] = attrs.Factory(dict)
     """What a session of a study of this kind alone says of what was asked, as a pattern."""
     enough: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda count: False
@@ -230,7 +233,7 @@ def kind_of(config: Config) -> Kind:
 
 def study_of(config: Config, flocs: list | None = None, methods: dict | None = None) -> StudyKind:
     """The study of a config of any kind; ``flocs`` are grown or read unless given."""
-    study: Any = kind_of(config).make(config, flocs, methods)
+    study: Any = kind_of(config).make(config, flocs_of(config) if flocs is None else flocs, methods)
     return study
 
 

@@ -19,6 +19,7 @@ from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
+from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.parallel import agreement
@@ -357,7 +358,7 @@ def make_results(
     count, kind, in_memory = state.schedule.final, kind_of(study.config), output is None
     if output and (old := start.store.old) is not None and start.is_covered(count):
         if (tuple(old.places), old.count) == (study.conditions, count):
-            return kind.read(output)  # as it is: nothing has been added
+            return file_kind(output).read(output)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
     run = facts(study, start, state.notes, ended, comm.size)
     return kind.results(study, start, count, run, comm, output, progress.warn, in_memory)

@@ -1,10 +1,12 @@
 """A kind of study is one folder and its name in one table: with tests/helpers/lone_flocs, single
-flocs that settle past a wall, and a line, all commands run it and show it."""
+flocs that settle past a wall, and a line, all commands run it and show it, or say why not."""
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,31 +16,45 @@ KIND = ROOT / "tests/helpers/lone_flocs"
 TABLE = "flocsim/ensembles/config/kinds.py"
 BEFORE = '    "flocsim strength": Folder("strength"),\n'
 LINE = '    "flocsim lone": Folder("lone", "lone"),\n'
-MOST_LINES = 450
+MOST_LINES = 325
 
 
-@pytest.fixture
-def home(tmp_path):
-    """A folder with a package that has the kind, and a study of it."""
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """A folder with a package that has the kind, and a study of it that has been run."""
+    folder = tmp_path_factory.mktemp("kind")
     shutil.copytree(
-        ROOT / "flocsim", tmp_path / "flocsim", ignore=shutil.ignore_patterns("__pycache__")
+        ROOT / "flocsim", folder / "flocsim", ignore=shutil.ignore_patterns("__pycache__")
     )
-    shutil.copytree(KIND, tmp_path / "flocsim/ensembles/lone")
-    text = (tmp_path / TABLE).read_text("utf-8")
+    shutil.copytree(KIND, folder / "flocsim/ensembles/lone")
+    text = (folder / TABLE).read_text("utf-8")
     assert text.count(BEFORE) == 1
-    (tmp_path / TABLE).write_text(text.replace(BEFORE, BEFORE + LINE), "utf-8")
-    shutil.copy(KIND / "study.toml", tmp_path / "s.toml")
-    return tmp_path
+    (folder / TABLE).write_text(text.replace(BEFORE, BEFORE + LINE), "utf-8")
+    shutil.copy(KIND / "study.toml", folder / "s.toml")
+    code, said = run(folder, "ensemble s.toml -o a.h5")
+    assert code == 0 and "speed [um/s]" in said, said
+    return folder
 
 
-def run(home, *words):
-    """(exit code, what a command says) with that package."""
-    known = os.environ | {"PYTHONPATH": str(home)}
-    done = subprocess.run(
-        [sys.executable, "-m", "flocsim", *words], cwd=home, env=known, capture_output=True,
-        text=True,
+def python(home, *words, **options):
+    """A process of Python with that package."""
+    return subprocess.Popen(
+        [sys.executable, *words], cwd=home, env=os.environ | {"PYTHONPATH": str(home)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options,
     )  # fmt: skip
-    return done.returncode, done.stdout + done.stderr
+
+
+def run(home, words):
+    """(exit code, what a command says)."""
+    with python(home, "-m", "flocsim", *words.split()) as process:
+        said = process.communicate()[0]
+    return process.returncode, said
+
+
+def flocs(home, file):
+    """The rows of a results file as text, read by a script."""
+    with python(home, "-c", f"import flocsim; print(flocsim.open('{file}').to_pandas())") as script:
+        return script.communicate()[0]
 
 
 def test_it_is_one_folder_of_readable_size():
@@ -47,33 +63,75 @@ def test_it_is_one_folder_of_readable_size():
 
 
 @pytest.mark.slow
-def test_a_folder_and_a_line_are_a_kind_of_study(home):
-    for words, told in (
-        ("ensemble s.toml -o a.h5 --dry-run", "8 flocs past a wall"),
-        ("ensemble s.toml -o a.h5", "speed [um/s]"),
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("ensemble s.toml -o b.h5 --dry-run", "8 replicates: 1 type x 2 vertex counts"),
         ("info a.h5", "results of single flocs past a wall"),
         ("info a.h5 --config", 'kind = "lone"'),
         ("plot a.h5", "a-speeds.png"),
         ("report a.h5", "a.html"),
-        ("ensemble s.toml --replicates 6 -o a.h5 --resume", "12 replicates, 4 of them run"),
-        ("ensemble s.toml --replicates 6 --jobs 2 -o b.h5", "12 replicates"),
-        ("compare a.h5 b.h5", "+0"),
-        ("sweep s.toml --over fluid.viscosity=1e-3,2e-3 -o swept.h5", "swept.h5"),
-        ("info swept.h5", "0.002"),
-        ("plot swept.h5", "swept-sweep.png"),
-    ):
-        code, said = run(home, *words.split())
-        assert code == 0, (words, said)
-        assert told in said, (words, said)
-    assert "<h1>a.h5: results of single flocs past a wall</h1>" in (home / "a.html").read_text()
-    code, said = run(home, "export", "csv", "a.h5")
-    assert code != 0 and "holds a flocsim lone: name a file of" in said
-    found = (
-        "import flocsim; a = flocsim.open('a.h5'); b = flocsim.Study('s.toml').run(output='c.h5');"
-        "print(a.to_xarray().sizes['replicate'], a.columns['speed'][:, :4] == b.columns['speed'])"
-    )
-    known = os.environ | {"PYTHONPATH": str(home)}
-    done = subprocess.run(
-        [sys.executable, "-c", found], cwd=home, env=known, capture_output=True, text=True
-    )
-    assert done.stdout.startswith("6 [[ True") and "False" not in done.stdout, done.stderr
+    ],
+)
+def test_its_files_are_shown(home, words, told):
+    code, said = run(home, words)
+    assert code == 0 and told in said, said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("compare a.h5 a.h5", "holds a flocsim lone: name a file of flocsim results or"),
+        ("export csv a.h5", "holds a flocsim lone: name a file of flocsim results"),
+        ("plot a.h5 --animation a.gif", "--animation is for results of a swarm study"),
+        ("kernel s.toml", 's.toml has scene.kind = "lone"'),
+    ],
+)
+def test_what_it_cannot_do_is_refused_in_one_line(home, words, why):
+    code, said = run(home, words)
+    assert code in (2, 74) and why in said and said.count("\n") == 1, said
+
+
+@pytest.mark.slow
+def test_it_is_extended_by_processes_and_run_by_a_script(home):
+    shutil.copy(home / "a.h5", home / "more.h5")
+    code, said = run(home, "ensemble s.toml --replicates 6 -o more.h5 --resume")
+    assert code == 0 and "12 replicates, 4 of them run" in said
+    code, said = run(home, "ensemble s.toml --replicates 6 --jobs 2 -o whole.h5")
+    assert code == 0 and "12 replicates, 12 of them run" in said
+    assert flocs(home, "more.h5") == flocs(home, "whole.h5") != flocs(home, "a.h5")
+    script = "import flocsim; flocsim.Study('s.toml').run(output='script.h5')"
+    with python(home, "-c", script) as process:
+        assert process.communicate()[0] == ""
+    assert flocs(home, "script.h5") == flocs(home, "a.h5")
+
+
+@pytest.mark.slow
+def test_what_it_has_when_killed_is_shown_and_continued(home):
+    words = "ensemble s.toml --replicates 60 -o long.h5"
+    journal, until = home / "long.h5.journal", time.monotonic() + 60.0
+    with python(home, "-m", "flocsim", *words.split(), start_new_session=True) as process:
+        while time.monotonic() < until and process.poll() is None:
+            if journal.exists() and journal.read_bytes().count(b'"vertices": 8') > 1:
+                break
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+    code, said = run(home, "info long.h5")
+    assert code == 0 and "of 120 replicates so far" in said, said
+    code, said = run(home, "plot long.h5")
+    assert code == 0 and "long-speeds.png" in said, said
+    code, said = run(home, f"{words} --resume")
+    assert code == 0 and "of them exist already" in said, said
+    code, said = run(home, "ensemble s.toml --replicates 60 -o at_once.h5")
+    assert code == 0 and flocs(home, "long.h5") == flocs(home, "at_once.h5")
+
+
+@pytest.mark.slow
+def test_it_is_swept(home):
+    code, said = run(home, "sweep s.toml --over fluid.viscosity=1e-3,2e-3 -o swept.h5")
+    assert code == 0, said
+    code, said = run(home, "info swept.h5")
+    assert code == 0 and "0.002" in said
+    code, said = run(home, "report swept.h5")
+    assert code == 0 and "swept.html" in said

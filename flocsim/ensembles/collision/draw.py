@@ -121,7 +121,7 @@ def run_safely(
     except Exception as error:
         angles = orientations(study.numbers(replicate))
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
-        return failed_row("exception", angles), make_note(study, place, replicate, why)
+        return failed_row("exception", angles), study.note(place, replicate, why)
     if row is None:
         return None, None
     why = row.pop(WHY, "")
@@ -130,7 +130,7 @@ def run_safely(
         row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | drawn
     if row["outcome"] == FAILED:
         reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
-        return row, make_note(study, place, replicate, reason)
+        return row, study.note(place, replicate, reason)
     return row, None
 
 
@@ -138,15 +138,6 @@ def failed_row(reason, angles):
     blank = {name: BLANKS[kind] for name, (kind, _, _) in REPLICATES.items()}
     told = {"outcome": FAILED, "failure": FAILURES.index(reason)}
     return blank | {"angle_i": angles[0], "angle_j": angles[1]} | told
-
-
-def make_note(study, place, replicate, why):
-    """What is needed to run a replicate again, and why one would, as JSON can hold it."""
-    condition, vertices, share = place
-    name = study.config.scene.names[condition]
-    return {
-        "type": name, "vertices": vertices, "delta": share, "replicate": replicate, "why": why,
-    }  # fmt: skip
 
 
 def columns_of(run: str) -> dict[str, str]:

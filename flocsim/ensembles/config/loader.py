@@ -1,34 +1,43 @@
 """A config file → Config: TOML read strictly, every problem told at once with its line; what
-is laid over it, preset, file, `--set key=value` of the command line.
+is laid over it, preset, file, `--set key=value` of the command line; what keys exclude and imply.
 """
 
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import attrs
 
+from flocsim.body import Fluid, FractalDensity
 from flocsim.ensembles.config.own_classes import FORCE, load_class
-from flocsim.ensembles.config.pair_scene import PairScene
+from flocsim.ensembles.config.pair_scene import (
+    MEASURED,
+    PAIR_SCENES,
+    SOBOL,
+    SOBOL_SCRAMBLES,
+    PairScene,
+    Problem,
+    SettlingScene,
+    uneven_points,
+)
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
     ALTERNATIVES,
+    BAND,
+    FOLLOWING,
     FORCES,
     INSTEAD_OF,
+    SCENES,
+    SOBOL_REPLICATES,
     STUDY_KEYS,
     TABLES,
     TOP_KEYS,
+    WATER,
+    BodiesConfig,
     Config,
-    contradictions,
-    elsewhere,
-    excluded_by,
-    implied,
     keys_of,
-    of_water,
-    scene_class,
-    without_following,
 )
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import (
@@ -55,8 +64,7 @@ from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
 def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict[str, Any]:
     """``below`` with everything that ``above`` gives put over it; tables are merged.
 
-    A key replaces those below that it excludes (`schema.excluded_by`), or that follow from it
-    (`schema.without_following`). A value None in ``above``
+    A key replaces those below that it excludes, or that follow from it. A value None in ``above``
     counts as not given. A table over ``false`` starts afresh.
     """
     given = {key: value for key, value in above.items() if value is not None}
@@ -69,6 +77,89 @@ def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict
             value = lay_over(under if isinstance(under, dict) else {}, value, (*path, key))
         merged[key] = value
     return merged
+
+
+def excluded_by(table: str, given: Collection[str]) -> set[str]:
+    """The keys of a table that do not go with the given ones."""
+    alternatives = ALTERNATIVES.get(table, ())
+    chosen = [keys for keys in alternatives if keys & set(given)]
+    found = set().union(*(keys for keys in alternatives if chosen and keys not in chosen))
+    for key, others in INSTEAD_OF.get(table, {}).items():
+        found |= others if key in given else set()
+        found |= {key} if others & set(given) else set()
+    return found
+
+
+def without_following(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """A config's nested dicts without what follows from the water that those above them tell."""
+    left: dict[str, Any] = dict(below)
+    fluid = above.get("fluid")
+    told = {key for key in WATER if isinstance(fluid, Mapping) and fluid.get(key) is not None}
+    for (*tables, key), sources in FOLLOWING.items() if told else ():
+        table = left
+        for name in tables:
+            inner = table.get(name)
+            if not isinstance(inner, Mapping):
+                break
+            table[name] = table = dict(inner)
+        else:
+            if told & set(sources):
+                table.pop(key, None)
+    return left
+
+
+def of_water(fluid: Fluid) -> dict[tuple[str, str], float]:
+    """(force, key) → value that follows from the water: each holds where its force is."""
+    values = {
+        ("double_layer", "permittivity"): fluid.permittivity,
+        ("double_layer", "debye_length"): fluid.debye_length,
+        ("thermal", "temperature"): fluid.temperature,
+    }
+    told = {key for key in WATER if getattr(fluid, key) is not None}
+    return {
+        place: value
+        for place, value in values.items()
+        if value is not None and told & set(FOLLOWING["forces", *place])
+    }
+
+
+def implied(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that follow from others of a config's nested dicts, where they are not given."""
+    scene, shapes = (table.get(name) for name in ("scene", "shapes"))
+    found: dict[str, Any] = {}
+    if usual := scene_class(table).usual_replicates:
+        found["replicates"] = usual
+    elif table.get("sampling") == SOBOL:
+        found["replicates"] = SOBOL_REPLICATES
+    if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
+        return found
+    if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
+        return found
+    return found | {"shapes": {"size": "own"}}
+
+
+def scene_class(table: Mapping[str, Any]) -> Any:
+    """The class of a config's [scene], by its kind and meeting; of unknown ones SettlingScene,
+    whose keys tell that."""
+    scene = table.get("scene")
+    given = scene if isinstance(scene, Mapping) else {}
+    kind, meeting = (str(given.get(key)) for key in ("kind", "meeting"))
+    if kind in SCENES and kind not in PAIR_SCENES:
+        return SCENES[kind]
+    return PAIR_SCENES.get(meeting, SettlingScene)
+
+
+def elsewhere(key: str, scene: type) -> dict[str, attrs.Attribute]:
+    """{`meeting = "brownian"`: field} of every other kind of [scene] that has a key."""
+    found = {}
+    for word, each in SCENES.items():
+        if key in keys_of(each):
+            tag = f'kind = "{word}"'
+            if word in PAIR_SCENES:
+                binary = scene in PAIR_SCENES.values()
+                tag = f'meeting = "{word}"' if binary else 'kind = "binary"'
+            found[tag] = keys_of(each)[key]
+    return found
 
 
 def parse_setting(text: str) -> tuple[list[str], Any]:
@@ -370,3 +461,30 @@ class Reader:
             text = error.args[0] if error.args and isinstance(error.args[0], str) else error
             self.problems.note(place, " ".join(str(text).split()) or type(error).__name__)
             return None
+
+
+def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
+    """What does not go together though each is right by itself; ``parts``: a config's tables."""
+    yield from weight_contradictions(parts["bodies"], parts["fluid"])
+    if parts.get("sampling") == SOBOL and isinstance(parts["scene"], tuple(PAIR_SCENES.values())):
+        yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
+    if parts["shapes"].outlines == BAND and parts["scene"].kind != "binary":
+        text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
+        yield ("shapes", "outlines"), f"{text}, and compare the results"
+    yield from parts["scene"].problems(parts)
+
+
+def weight_contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[Problem]:
+    """What of the bodies' weight does not go with buoyancy."""
+    if not fluid.buoyancy:
+        return
+    if bodies.density is None:
+        text = "true needs bodies.density, but bodies.surface_density is given: give density and "
+        yield ("fluid", "buoyancy"), text + "depth instead, or buoyancy = false"
+        return
+    fractal = isinstance(bodies.density, FractalDensity)
+    solid = bodies.density.solid if isinstance(bodies.density, FractalDensity) else bodies.density
+    if solid <= fluid.density:
+        text = f"{solid:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
+        place = ("bodies", "density", "solid") if fractal else ("bodies", "density")
+        yield place, text + "give a larger density, or fluid.buoyancy = false"

@@ -162,8 +162,7 @@ class PairScene:
     kind: str = one_tag(
         "binary",
         of=KINDS_OF_SCENES,
-        help='"binary": encounters of two bodies; "swarm": many bodies in a box; "kernel": rates '
-        "of encounters; the latter two have keys of their own, below",
+        help='"binary": encounters of two bodies; the other kinds have keys of their own, below',
     )
     pairs: tuple[tuple[float, float], ...] | str | None = read_by(
         either(

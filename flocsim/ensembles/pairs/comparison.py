@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
+from flocsim.ensembles.chunks import ORDER
 from flocsim.ensembles.comparison import Differences, changes_between, common, labelled_of, starred
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
 from flocsim.ensembles.estimates.paired import (
@@ -127,9 +128,6 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
         paired, pairs if paired else 0, arrays, changes_between(first, second),
         types=tuple(wanted[0]), vertices=np.array(wanted[1]), delta=np.array(wanted[2]),
     )  # fmt: skip
-
-
-ORDER = ("types", "vertices", "delta")
 
 
 def places(results, wanted):

@@ -23,6 +23,7 @@ from flocsim.ensembles.contents import (
 )
 from flocsim.ensembles.report import (
     EFFICIENCY,
+    MOST_UNDECIDED,
     change_lines,
     checked_line,
     efficiency_lines,
@@ -64,6 +65,9 @@ SHOWN = {
     "pr_hangs": "Pr[A, hangs]",
 }  # fmt: skip
 """The probabilities of a condition that have columns of their own, and their headings."""
+
+SAID_APART = (MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
+"""Facts of the group ``run`` that the summary has in its own words."""
 
 ERRORS_TEXT = (
     "Each probability is followed by its 95 % interval, which covers sampling (Wilson's) and the "
@@ -150,7 +154,7 @@ def summary(results: Overview) -> Summary:
     failed = [describe_note(note) for note in stored(run, "failed")]
     facts += settling(run) + thermal(run)
     facts += [("touched", line) for line in touch_lines(results)]
-    return Summary(facts, origin(run), warnings, failed)
+    return Summary(facts, origin(run, SAID_APART), warnings, failed)
 
 
 def table(results: Results) -> str:
@@ -161,6 +165,18 @@ def table(results: Results) -> str:
     axes = results.types, results.vertices, results.delta
     counts = format_table(*axes, results.probabilities, results.outlines)
     return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
+
+
+def told(found: Results) -> str:
+    """What is printed of a study that has been run."""
+    if found.kernel is not None:
+        lines = kernel_lines(found.kernel)
+    else:
+        axes = found.types, found.vertices, found.delta
+        lines = [format_table(*axes, found.probabilities, found.outlines)]
+    return "\n".join(
+        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
+    )
 
 
 def conditions(results: Results) -> Facts:
@@ -294,7 +310,7 @@ OPENED = later("ensembles.pairs.opened", "open_results")
 CONTENTS = Contents(
     title="results of a collision ensemble",
     read=partial(read_results, replicates=False), overview=read_overview, summary=summary,
-    table=table, figures=figures, tables=tables_of,
+    table=table, told=told, figures=figures, tables=tables_of,
     examples=later("ensembles.pairs.opened", "examples_of"),
     drawn={
         "a results file, with bars of Wilson's 95 % and thin outer ones with the numerical error":

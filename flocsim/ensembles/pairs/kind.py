@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, condition_of, fits, places_in, total
+from flocsim.ensembles.chunks import (
+    COLUMNS,
+    ORDER,
+    ROW,
+    Condition,
+    condition_of,
+    fits,
+    places_in,
+    total,
+)
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
@@ -39,26 +48,21 @@ from flocsim.ensembles.preflight import check_study, settling_facts, study_doubt
 from flocsim.ensembles.report import (
     MOST_UNDECIDED,
     SCRAMBLES,
-    change_lines,
-    checked_line,
-    format_table,
-    kernel_lines,
     too_many_undecided,
-    touch_lines,
     undecided_line,
 )
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import WITHHELD
 from flocsim.io.journal.records import CHUNK, Record
 from flocsim.io.json_text import matches
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened, read_results, scalar_of
+from flocsim.io.results.file import opened, scalar_of
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.older import why_apart
@@ -142,18 +146,6 @@ def facts(study: Study) -> dict[str, Any]:
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),
     }
-
-
-def table(found: Results) -> str:
-    """The results for the terminal."""
-    if found.kernel is not None:
-        lines = kernel_lines(found.kernel)
-    else:
-        axes = found.types, found.vertices, found.delta
-        lines = [format_table(*axes, found.probabilities, found.outlines)]
-    return "\n".join(
-        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
-    )
 
 
 def verdict(found: Results) -> tuple[int, str]:
@@ -245,8 +237,8 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
 KIND = Kind(
     scenes=(*PAIR_SCENES.values(), KernelScene),
     make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
-    prepare=lambda study, comm: None, doubts=lambda study: study_doubts(study.config, study.flocs),
-    facts=facts, old_rows=old_rows, results=results, read=partial(read_results, replicates=False),
-    table=table, total=lambda found: int(found.probabilities["n_total"].sum()), verdict=verdict,
-    dry_run=dry_run, enough=lambda study, store: StopRule(study.config.stop, store), so_far=so_far,
+    doubts=lambda study: study_doubts(study.config, study.flocs), facts=facts, old_rows=old_rows,
+    results=results, total=lambda found: int(found.probabilities["n_total"].sum()),
+    verdict=verdict, dry_run=dry_run, so_far=so_far,
+    enough=lambda study, store: StopRule(study.config.stop, store),
 )  # fmt: skip

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flocsim.ensembles.chunks import ORDER
 from flocsim.ensembles.storage.identity import differences
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Old, write_file
@@ -19,7 +20,6 @@ from flocsim.io.json_text import matches, read_json
 Facts = dict[str, Any]
 
 NAME = "sweep.json"
-AXES = ("types", "vertices", "delta")
 ASKED = {"types": [str], "vertices": [int], "delta": [float], "replicates": int}
 PLAN: Facts = {"common": {}, "parts": {}}
 
@@ -78,7 +78,7 @@ def apart(there: Mapping[str, Any], planned: Mapping[str, Any], whole: bool = Fa
     if unlike := differences(*identities):
         return unlike[0]
     has, wants = there["asked"], planned["asked"]
-    for axis in AXES:
+    for axis in ORDER:
         if has[axis] != wants[axis] if whole else not set(has[axis]) <= set(wants[axis]):
             return f"{axis} are {listed(has[axis])} in the file, {listed(wants[axis])} now"
     if has["replicates"] > wants["replicates"] or (

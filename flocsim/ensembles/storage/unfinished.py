@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, condition_of, fits, layout, rows_of
+from flocsim.ensembles.chunks import ORDER, Condition, condition_of, fits, layout, rows_of
 from flocsim.ensembles.kind import kinds
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
@@ -24,9 +24,6 @@ from flocsim.io.json_text import matches
 
 MOST_CONDITIONS = 20_000
 """Of a study that is read while it runs."""
-
-ORDER = ("types", "vertices", "delta")
-"""Axes of conditions, as a session has them."""
 
 
 @attrs.frozen(eq=False)

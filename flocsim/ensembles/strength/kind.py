@@ -11,15 +11,15 @@ from typing import Any, ClassVar, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Condition, Interval, missing, places_in
+from flocsim.ensembles.chunks import ORDER, Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
-from flocsim.ensembles.estimates.strengths import FAILED, strengths_in, table_of
+from flocsim.ensembles.estimates.strengths import FAILED, strengths_in
 from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
-from flocsim.ensembles.storage.unfinished import ORDER, Unfinished, store_of
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
@@ -123,6 +123,7 @@ class StrengthStudy(StudyKind):
     compared: ClassVar[tuple[str, ...]] = tuple(ROW.fields or ())
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "doublets"
+    check_rows = staticmethod(check_opened)
 
     def __attrs_post_init__(self):
         refuse_outlines(self.config.forces, "the strength of a bond")
@@ -211,12 +212,7 @@ class StrengthStudy(StudyKind):
         words = in_words(Opening(**{each: row[each] for each in row if each != "bond"}))
         if going is not None:
             going(f"type {name}, N = {n}, delta {delta:g}, replicate {replicate}: {words}")
-        note = {"type": name, "vertices": n, "delta": delta, "replicate": replicate, "why": words}
-        return row, note if row["status"] == FAILED else None
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        check_opened(column)
+        return row, self.note(place, replicate, words) if row["status"] == FAILED else None
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Which doublets have a run that failed."""
@@ -317,11 +313,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
 
 KIND = Kind(
     scenes=(Bonds,),
-    make=lambda config, flocs=None, methods=None: StrengthStudy(config),
-    flocs=lambda config: [], identity=about_of, code=TESTING, check=lambda config: None,
-    prepare=lambda study, comm: None, doubts=lambda study: [], facts=lambda study: {},
-    old_rows=old_rows, results=results, read=read_strengths, table=table_of,
-    total=lambda found: len(found.column("status")), verdict=lambda found: (0, ""),
-    dry_run=lambda config, ranks, pilot: StrengthStudy(config).title,
-    so_far=so_far, asked={"strength": SURVEY},
+    make=lambda config, flocs, methods: StrengthStudy(config), identity=about_of, code=TESTING,
+    old_rows=old_rows, results=results,
+    total=lambda found: len(found.column("status")), so_far=so_far, asked={"strength": SURVEY},
 )  # fmt: skip

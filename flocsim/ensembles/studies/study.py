@@ -218,7 +218,7 @@ class Study:
         if not isinstance(self.config.scene, PairScene):
             raise UsageError(
                 f"a replicate of a {self.config.scene.kind} is not a collision: run the study, and "
-                "look at the group snapshots of its results"
+                "look at its results"
             )
         place = place_of(self.config, type, vertices, delta)
         return replicate_of(replicate, place, one_count_study(self.config, place[1]))

@@ -46,7 +46,6 @@ from flocsim.io.results.swarm_file import (
     SwarmResults,
     check_swarm,
     read_swarm,
-    table_of,
     write_swarm,
 )
 from flocsim.io.terminal import duration
@@ -286,13 +285,10 @@ def form_of(asked: dict) -> Form:
 
 
 KIND = Kind(
-    scenes=(SwarmScene,),
-    make=lambda config, flocs=None, methods=None: SwarmStudy(
-        config, **({} if flocs is None else {"flocs": flocs})
-    ),
+    scenes=(SwarmScene,), make=lambda config, flocs, methods: SwarmStudy(config, flocs),
     flocs=flocs_of, identity=identity_of, code=CODE, check=check_study, prepare=check_room,
-    doubts=doubts, facts=facts, old_rows=old_rows, results=results, read=read_swarm,
-    table=table_of, total=lambda found: len(found.scales["replicate"]), verdict=verdict,
+    doubts=doubts, facts=facts, old_rows=old_rows, results=results,
+    total=lambda found: len(found.scales["replicate"]), verdict=verdict,
     dry_run=lambda config, ranks, pilot: dry_run(config, ranks),
     so_far=so_far, asked={"swarm": FORM},
 )  # fmt: skip

@@ -80,6 +80,7 @@ class SwarmStudy(StudyKind):
     compared: ClassVar[tuple[str, ...]] = ("trial",)
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
+    check_rows = staticmethod(check_ends)
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -171,13 +172,7 @@ class SwarmStudy(StudyKind):
             f"{ended['status'].lower()} at {ended['time']:.4g} s, in an island of bodies "
             f"{', '.join(map(str, ended['failed'][:6]))}"
         )
-        name, vertices, share = self.conditions[0]
-        about = {"type": name, "vertices": vertices, "delta": share, "replicate": replicate}
-        return row, about | {"why": why}
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        check_ends(column)
+        return row, self.note(place, replicate, why)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Which replicates ended before their time."""

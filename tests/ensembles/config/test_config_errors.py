@@ -3,9 +3,13 @@
 import pytest
 
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.pair_scene import KINDS_OF_SCENES
 from flocsim.ensembles.config.toml_text import key_lines
 from flocsim.errors import ConfigError
+from flocsim.fields import list_words
 from tests.helpers.small_study import VALID, load_text, problem_lines
+
+KINDS = list_words(KINDS_OF_SCENES)
 
 # One wrong entry laid into an otherwise valid file → what its line says.
 WRONG = {
@@ -82,8 +86,8 @@ WRONG = {
     "0.1": 'scene.area_fraction: applies only with kind = "swarm": remove it',
     "[scene]\nsizes = [1e-6]": 'scene.sizes: applies only with kind = "kernel": remove it',
     "[scene]\nrelease = '3 kg'": "scene.release must be a finite number above 1, found '3 kg'",
-    "[scene]\nkind = 'swarn'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'swarn'",
-    "[scene]\nkind = 'shear'": "scene.kind must be 'binary', 'swarm' or 'kernel', found 'shear'",
+    "[scene]\nkind = 'swarn'": f"scene.kind must be {KINDS}, found 'swarn'",
+    "[scene]\nkind = 'shear'": f"scene.kind must be {KINDS}, found 'shear'",
     "[scene]\nmeeting = 'swarm'": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = ['shear']": "scene.meeting must be 'settling', 'shear', 'extension' or ",
     "[scene]\nmeeting = 'shear'": "scene: needs rate, how fast the flow shears or ",

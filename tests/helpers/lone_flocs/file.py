@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
 from flocsim.io.hdf5.expected import hold_against
 from flocsim.io.labelled import Labelled, Tables
@@ -16,7 +16,6 @@ FORMAT, SCHEMA_VERSION = "flocsim lone", 1
 COLUMNS = {
     "speed": ("f8", "m s-1", "mean downward velocity"),
     "drift": ("f8", "m", "how far it has moved away from the wall"),
-    "turned": ("f8", "rad", "how far it has turned"),
     "steps": ("i8", "1", "accepted integrator steps"),
     "failed": ("u1", "1", "1: its run came to no end"),
 }
@@ -24,14 +23,14 @@ SCALES = {
     "vertices": ("i8", "1", "number of vertices N"),
     "replicate": ("i8", "1", "number of the replicate"),
 }
-GROUPS = {"flocs": Group.of(declared(COLUMNS, ("vertices", "replicate")), SCALES)}
-INDICES = {name: group.index for name, group in GROUPS.items()}
+GROUP = Group.of(declared(COLUMNS, ("vertices", "replicate")), SCALES)
+INDICES = {"flocs": GROUP.index}
 ROW = np.dtype([(name, kind) for name, (kind, _, _) in COLUMNS.items()])
 
 
 @attrs.frozen(eq=False)
 class LoneResults(Tables):
-    """What became of single flocs: ``vertices``, ``columns`` {name: (vertices, replicate)}."""
+    """What became of single flocs: ``columns`` {name: (vertices, replicate)}."""
 
     vertices: np.ndarray
     columns: dict[str, np.ndarray]
@@ -46,14 +45,12 @@ class LoneResults(Tables):
 
     def labelled(self, group: str = "flocs") -> Labelled:
         """The one group with its axes; UsageError for another."""
+        self.known(group)
         scales = {"vertices": self.vertices, "replicate": np.arange(self.count)}
-        return GROUPS[self.known(group)].labelled(scales | self.columns)
-
-    def __repr__(self) -> str:
-        return f"LoneResults({len(self.vertices)} numbers of vertices × {self.count} flocs)"
+        return GROUP.labelled(scales | self.columns)
 
 
-def write_lone(path: Any, results: LoneResults, rule: Rule = keep) -> None:
+def write_lone(path: Any, results: LoneResults, rule: Rule) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
     attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION}
     write_groups(path, attributes, {"flocs": results.labelled()}, results.run, rule)
@@ -64,8 +61,8 @@ def read_lone(path: str | os.PathLike) -> LoneResults:
     complaint = f"{path} holds no readable results of single flocs: "
     with opened_file(path, lambda why: complaint + why) as (file, nodes):
         check_format(file, nodes, FORMAT, SCHEMA_VERSION)
-        wanted = {"flocs": GROUPS["flocs"].arrays, "run": scalars_in(nodes, "run")}
+        wanted = {"flocs": GROUP.arrays, "run": scalars_in(nodes, "run")}
         hold_against(nodes, wanted, wanted)
-        found = GROUPS["flocs"].read(file["flocs"])
+        found = GROUP.read(file["flocs"])
         run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
         return LoneResults(found["vertices"], {name: found[name] for name in COLUMNS}, run)
