@@ -5,7 +5,7 @@ import pytest
 
 from flocsim.compiler import composer, disk_cache, units
 from flocsim.compiler.composer import compose
-from flocsim.compiler.linker import apart
+from flocsim.compiler.linker import apart, postponed
 
 
 @apart
@@ -47,6 +47,24 @@ def checked(x):
 def drive_checked(x):
     number, large = checked(x)
     return number if large else -number
+
+
+def not_there(x):
+    return -1.0
+
+
+@postponed(not_there)
+def rare(x):
+    return law(x) + 100.0
+
+
+@apart
+def common(x):
+    return x
+
+
+def drive_rarely(x):
+    return x, common(x)
 
 
 VALUES = np.array([1.0, 2.0, 3.0])
@@ -150,3 +168,25 @@ def test_functions_to_compile_are_those_of_units_that_are_not_there(made):
     assert units.to_compile(driver.code.entry) == 3
     driver(VALUES, 2.0)
     assert units.to_compile(compose(watched, {}).code.entry) == 1
+
+
+def test_what_is_postponed_is_compiled_where_it_is_asked_for_and_nothing_else_anew(made):
+    function = compose(drive_rarely, {common: rare})
+    assert function(2.0) == (2.0, -1.0)
+    assert made == ["not_there", "drive_rarely"]
+    assert function.whole(2.0) == (2.0, 104.0)
+    assert made == ["not_there", "drive_rarely", "law", "rare"]
+    assert function(2.0) == (2.0, -1.0)
+    composer._composed.clear()
+    again = compose(drive_rarely, {common: rare})
+    assert again.whole(2.0) == (2.0, 104.0)
+    assert again(2.0) == (2.0, -1.0)
+    assert len(made) == 4
+    assert compose(drive_rarely, {common: rare}, jit=False)(2.0) == (2.0, 104.0)
+
+
+def test_what_is_postponed_is_compiled_also_where_nothing_can_be_kept(made, monkeypatch):
+    monkeypatch.setattr(disk_cache, "write", lambda *words: None)
+    function = compose(drive_rarely, {common: rare})
+    assert function(2.0) == (2.0, -1.0)
+    assert function.whole(2.0) == (2.0, 104.0)

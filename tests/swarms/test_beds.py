@@ -67,6 +67,22 @@ def test_steps_across_switches_are_taken_and_change_no_bit_with_threads():
     assert runs[0] == runs[1]
 
 
+def test_where_steps_across_switches_are_compiled_changes_no_bit():
+    """In the middle of a window, which is run again, or before the first one."""
+    runs = []
+    for early in (True, False):
+        progress = falling(30, 1)[0].begin(0.5)
+        runner = progress.runner
+        begun = runner.driver
+        if early:
+            runner.driver = begun.whole
+        while progress.advance(0.5) == Status.PAUSED:
+            pass
+        assert runner.driver is begun.whole
+        runs.append(progress.swarm.motion.tobytes())
+    assert runs[0] == runs[1]
+
+
 @pytest.mark.slow
 def test_a_bed_goes_on_from_a_state_to_the_same_bytes():
     swarm, _ = falling(30, 2)
