@@ -103,7 +103,7 @@ def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.n
     ax, ay = (ends - starts).T
     x, y = points.T[..., None] - starts.T[:, None]
     share = np.clip((x * ax + y * ay) / (ax * ax + ay * ay), 0.0, 1.0)
-    return np.stack([x - share * ax, y - share * ay], axis=-1)
+    return np.moveaxis(np.stack([x - share * ax, y - share * ay]), 0, -1)
 
 
 def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:

@@ -231,9 +231,9 @@ def covered(points, normals, after, part):
         points[:, None] - ring if len(ring) == 1 else from_edges(points, *edges_of(ring))
         for ring in part.rings
     ], axis=1)  # fmt: skip
-    distance = np.hypot(away[..., 0], away[..., 1])
-    nearest = distance.argmin(axis=1)
-    least = distance[np.arange(len(points)), nearest]
+    squared = away[..., 0] ** 2 + away[..., 1] ** 2
+    nearest = squared.argmin(axis=1)
+    least = np.sqrt(squared[np.arange(len(points)), nearest])
     depth = np.where(after == 0, ROUNDED * np.abs(points).max(initial=0.0), SHARED * part.radius)
     found = (least < part.radius - depth) | inside_rings(points, part.rings)
     if later.any():
