@@ -155,9 +155,15 @@ def pushes(places: np.ndarray, others: np.ndarray, radius: float) -> np.ndarray:
     return found
 
 
-def loads(places: np.ndarray, radius: float) -> np.ndarray:
-    """(3, 5): forces and torque on a body that v_x, v_y and its spin, and E_xx and E_xy, take, by
-    unit viscosity, the spin and the strain about the origin."""
+def loads(
+    places: np.ndarray, radius: float, bodies: Any = None, centres: Any = ((0.0, 0.0),)
+) -> np.ndarray:
+    """(3 n, 3 n + 2): forces and torques on n bodies that v_x, v_y and the spin of each, and E_xx
+    and E_xy, take, by unit viscosity.
+
+    ``bodies`` (k,): to which of them the spheres belong, all to one by default, which turn about
+    and are loaded at their ``centres`` (n, 2); the strain is about the origin.
+    """
     from scipy.linalg import cho_factor, cho_solve
 
     count, mirror = len(places), np.array([1.0, 1.0, -1.0])
@@ -165,8 +171,15 @@ def loads(places: np.ndarray, radius: float) -> np.ndarray:
     matrix += pushes(places, places * mirror, radius) * mirror
     matrix = np.moveaxis(matrix, 2, 1).reshape(3 * count, 3 * count)
     x, y, _ = places.T
-    none, ones = np.zeros(count), np.ones(count)
-    whole = [(ones, none, none), (none, ones, none), (-y, x, none), (x, -y, none), (y, x, none)]
+    none = np.zeros(count)
+    motions = []
+    for body, centre in enumerate(centres):
+        own = np.ones(count) if bodies is None else np.where(bodies == body, 1.0, 0.0)
+        motions += [
+            (own, none, none), (none, own, none),
+            (-own * (y - centre[1]), own * (x - centre[0]), none),
+        ]  # fmt: skip
+    whole = [*motions, (x, -y, none), (y, x, none)]
     wanted = np.stack([np.column_stack(each).ravel() for each in whole], axis=1)
     found = cho_solve(cho_factor(matrix, overwrite_a=True), wanted)
-    return 2.0 * wanted[:, :3].T @ found
+    return 2.0 * wanted[:, : len(motions)].T @ found
