@@ -558,14 +558,16 @@ class OutlineView(NamedTuple):
 
     ``gap`` [m] is how far the other outline is from the point, below 0 inside of it;
     ``parted_gap`` the same of outlines that are moved apart to d_min where they are nearer;
-    ``plate_gap`` that of two plates which van der Waals forces pull at as strongly there; ``depth``
-    [m] that of the bodies along the third direction; radii are equivalent radii of both.
+    ``plate_gap`` that of two plates which van der Waals forces pull at as strongly there, and
+    ``depth_gap`` that of plates which lose as large a share to their depth; ``depth`` [m] that of
+    the bodies along the third direction; radii are equivalent radii of both.
     """
 
     time: float
     gap: float
     parted_gap: float
     plate_gap: float
+    depth_gap: float
     depth: float
     radius_i: float
     radius_j: float

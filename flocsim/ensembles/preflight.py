@@ -258,7 +258,9 @@ def check_numbers(system: System) -> None:
     ]  # fmt: skip
     bodies = [body_view(scene, work, 0.0, at.NOW, body) for body in range(2)]
     points = [
-        OutlineView(0.0, gap, gap, max(gap, 1e-10), radii[0], *radii, reduced, mass)
+        OutlineView(
+            0.0, gap, gap, max(gap, 1e-10), max(gap, 1e-10), radii[0], *radii, reduced, mass
+        )
         for gap in CLOSE_GAPS
     ]
     oriented = [

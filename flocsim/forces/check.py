@@ -80,7 +80,9 @@ def sample_points(force: PairForce) -> tuple[OutlineView, ...]:
     """OutlineViews with gaps of either sign, within the reach of a force between outlines [m]."""
     gaps = [min(gap, 0.5 * reach_of(force)) for gap in SAMPLE_GAPS]
     return tuple(
-        OutlineView(1e-3, gap, gap, max(gap, 1e-10), 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
+        OutlineView(
+            1e-3, gap, gap, max(gap, 1e-10), max(gap, 1e-10), 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10
+        )
         for gap in gaps
     )
 

@@ -95,12 +95,17 @@ class VanDerWaals(PairForce):
 
     @staticmethod
     def pressure(point, hamaker, retarded):
-        """−H_A/(6π d³) (1 + 3x/2)/(1 + x)² q(d) [Pa], d = ``point.plate_gap``, x = 5.32 d/λ, and q
-        what a depth W leaves of it."""
+        """−H_A/(6π d³) (1 + 3x/2)/(1 + x)² q [Pa], d = ``point.plate_gap``, x = 5.32 d/λ, and q
+        what a depth W leaves of plates ``point.depth_gap`` apart."""
         d = point.plate_gap
         x = retarded * d
         share = (1.0 + 1.5 * x) / ((1.0 + x) * (1.0 + x))
-        return -hamaker / (6.0 * math.pi * d * d * d) * share * depth_share(d / point.depth)
+        return (
+            -hamaker
+            / (6.0 * math.pi * d * d * d)
+            * share
+            * depth_share(point.depth_gap / point.depth)
+        )
 
     @staticmethod
     def kernel(pair, hamaker, d_min):

@@ -15,6 +15,7 @@ from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerW
 from flocsim.geometry.surfaces.charges import layer_energy
 from flocsim.geometry.surfaces.energy import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
+from tests.helpers.tiers import rest_slow
 
 KT = 1.380649e-23 * 298.15
 SMALL = (1e-7, 1e-7)
@@ -112,10 +113,11 @@ def test_colder_bodies_meet_less_often_across_a_barrier():
     assert np.all(np.diff(found) > 0.0)
 
 
-def energies(shape, gaps, depth):
-    """V [J] of two equal bodies of an outline about 100 nm wide, by the sums over outlines."""
+def energies(shape, gaps, depth, potential=14e-3, debye_length=3.04e-9):
+    """V [J] of two equal bodies of an outline, by the sums over outlines."""
     pieces = outline_pieces(shape.parts)
-    kappa, strength = 1.0 / 3.04e-9, 2.0 * math.pi * 78.5 * VACUUM_PERMITTIVITY * 14e-3**2
+    strength = 2.0 * math.pi * 78.5 * VACUUM_PERMITTIVITY * potential**2
+    kappa = 1.0 / debye_length
     reach = 2.0 * shape.bounding_radius
     return np.array([
         attraction_energy(pieces, pieces, (reach + h, 0.0, 0.0), 1e-20, depth)
@@ -131,17 +133,28 @@ def regular(count, radius):
     return SpheroPolygon(0.7 * radius * core, 0.3 * radius)
 
 
-def test_w_of_forces_along_outlines_is_the_integral_over_their_energy():
-    """Within a tenth: the factor for a depth no larger than the gap is that of plates, .1 k_B T."""
-    radius = SMALL[0]
-    forces = [VanDerWaals(1e-20, 1e-9, law="outline"), DoubleLayer(14e-3, 3.04e-9, law="outline")]
-    found = stability_ratio(forces, SMALL)
-    gaps = np.geomspace(1e-9, 3e-7, 120)
-    potential = energies(Sphere(radius), gaps, 4.0 / 3.0 * radius) / KT
-    inner = np.trapezoid(np.exp(potential) * gaps / (2e-7 + gaps) ** 2, np.log(gaps))
+@pytest.mark.parametrize(
+    ("radius", "layer", "least"),
+    rest_slow(
+        [
+            (1e-7, (14e-3, 3.04e-9), 140.0),
+            (1e-7, (10e-3, 9.6e-9), 17.0),
+            (5e-8, (16e-3, 3.04e-9), 39.0),
+            (3e-7, (7e-3, 9.6e-9), 1.4),
+        ],
+        lambda radius, layer, least: least == 140.0,
+    ),
+)
+def test_w_of_forces_along_outlines_is_the_integral_over_their_energy(radius, layer, least):
+    """Within a hundredth, though the bodies are no deeper than the gaps that count."""
+    forces = [VanDerWaals(1e-20, 1e-9, law="outline"), DoubleLayer(*layer, law="outline")]
+    found = stability_ratio(forces, (radius, radius))
+    gaps, touch = np.geomspace(1e-9, 3.0 * radius, 120), 2.0 * radius
+    potential = energies(Sphere(radius), gaps, 4.0 / 3.0 * radius, *layer) / KT
+    inner = np.trapezoid(np.exp(potential) * gaps / (touch + gaps) ** 2, np.log(gaps))
     # Nearer than d_min the attraction grows no more; the barrier is at some nanometres.
-    assert found == pytest.approx(2e-7 * (inner + 1.0 / 5e-7), rel=0.1)
-    assert found > 50.0
+    assert found == pytest.approx(touch * (inner + 1.0 / (5.0 * radius)), rel=0.01)
+    assert found > least
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(512, marks=pytest.mark.slow)])

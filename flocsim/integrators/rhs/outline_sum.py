@@ -288,8 +288,11 @@ def add_nodes(scene, work, total, count, numbers):
     for k in range(count):
         gap = nodes[at.NODE_GAP, k]
         if gap < lens:
+            parted, plates = gap + inset, nodes[at.NODE_PLATES, k]
+            # The more an outline bends away, the more of what attracts is near: of circles the
+            # share of a depth is that of plates within 1 % up to a gap of a third of it.
             point = OutlineView(
-                view.time, gap, gap + inset, nodes[at.NODE_PLATES, k], view.depth, view.radius_i,
+                view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
                 view.radius_j, view.reduced_radius, view.effective_mass,
             )  # fmt: skip
             size = -outline_pressure(scene, point) * nodes[at.NODE_WEIGHT, k]
@@ -347,7 +350,7 @@ def look_around(scene, work, time, a, b, pose):
             list_near(scene, work, a, b, pose, (1.0 + SKIN) * lens)
     radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
-        time, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
+        time, least, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
     return max(0.0, floor - least), lens, view
