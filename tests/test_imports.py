@@ -57,7 +57,7 @@ INNER_ROWS = {
     ],
     "brownian": [["meeting"], ["splitting"]],
     "hydrodynamics": [["encounters", "pair_table", "prism"], ["pair"], ["two_spheres"]],
-    "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
+    "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit"],

@@ -16,7 +16,7 @@ from flocsim.commands.fitting.pictures import (
     titles_of,
 )
 from flocsim.errors import UsageError
-from flocsim.fields.quantities import read_number
+from flocsim.fields import read_number
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
@@ -26,7 +26,7 @@ from flocsim.io.plots.style import checked_format
 from flocsim.io.shapes.fit_report import coarse_line, errors_of, format_errors, plural, summary_text
 from flocsim.io.shapes.library import make_entry, write_library
 from flocsim.io.shapes.population import population_lines
-from flocsim.plausibility.ranges import PIXEL_SIZE
+from flocsim.plausibility.doubts import PIXEL_SIZE
 
 DESCRIPTION = """\
 Find the flocs in pictures, fit a spheropolygon to each at every requested number of vertices, and

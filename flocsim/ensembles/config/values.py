@@ -14,8 +14,15 @@ import attrs
 
 from flocsim.ensembles.config.problems import Misfit, dotted, misfit, suggestion
 from flocsim.errors import ConfigError
-from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
-from flocsim.fields.quantities import kind_of, read_quantity
+from flocsim.fields import (
+    is_number,
+    is_whole,
+    kind_of,
+    list_words,
+    may_be_none,
+    number_range,
+    read_quantity,
+)
 
 Reader = Callable[[Any], Any]
 

@@ -50,8 +50,7 @@ from flocsim.io.results.swarm_file import (
     write_swarm,
 )
 from flocsim.io.terminal import duration
-from flocsim.plausibility.doubts import doubts_of
-from flocsim.plausibility.reynolds import settled
+from flocsim.plausibility.doubts import doubts_of, settled
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import Swarm, check_box
 from flocsim.system import System

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, UsageError
-from flocsim.fields.quantities import read_number
+from flocsim.fields import read_number
 
 LONGEST_TEXT = 2**22
 """Letters of a description beyond which it is not read."""

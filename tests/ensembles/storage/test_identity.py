@@ -20,8 +20,6 @@ NOT_PHYSICS = {
     "water.py": "what follows of [fluid] and forces is compared itself",
     "explain.py": "text for people",
     "plausibility/doubts.py": "text for people",
-    "plausibility/ranges.py": "text for people",
-    "plausibility/reynolds.py": "numbers for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shapes/library.py": "reads flocs, and these are compared themselves",
     "io/hdf5/": "reads flocs, and these are compared themselves",
