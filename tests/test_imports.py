@@ -89,16 +89,9 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
-        ["outputs", "opening", "groups"],
-        [
-            "files",
-            "hdf5",
-            "json_text",
-            "labelled",
-            "confidence",
-            "terminal",
-        ],
-        ["pieces"],
+        ["outputs", "groups", "records"],
+        ["files", "hdf5", "json_text", "labelled", "confidence", "terminal"],
+        ["seals"],
     ],
 }
 
@@ -106,7 +99,6 @@ INNER_ROWS = {
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/communicator.py"],
     "h5py": [
-        "io/opening.py",
         "io/groups.py",
         "io/results/layout.py",
         "io/trajectory.py",

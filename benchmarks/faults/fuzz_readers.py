@@ -150,7 +150,7 @@ class SwarmJournalReader:
     def __init__(self, folder):
         from flocsim.ensembles.chunks import chunk_record, kept_record
         from flocsim.ensembles.swarms.study import SwarmStudy
-        from flocsim.io.journal.records import CHUNK, SNAPSHOT, record_at
+        from flocsim.io.records import CHUNK, SNAPSHOT, record_at
         from tests.helpers.swarm_study import swarm_config
 
         self.study, self.identity, self.parts = SwarmStudy(swarm_config(folder)), {"seed": 1}, []
@@ -176,7 +176,7 @@ class SwarmJournalReader:
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.ensembles.swarms.kind import results
-        from flocsim.io.journal.journal import Journal
+        from flocsim.io.journal import Journal
         from flocsim.io.results.swarm_file import table_of
 
         journal = Journal(path)
@@ -237,7 +237,7 @@ class JournalReader:
         from flocsim.ensembles.collision.failures import FAILURES
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.io.journal.journal import Journal
+        from flocsim.io.journal import Journal
         from flocsim.io.results.checks import check_rows
 
         journal = Journal(path)

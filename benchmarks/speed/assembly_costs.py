@@ -27,7 +27,7 @@ from flocsim.ensembles.parallel.communicator import SerialCommunicator
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.journal import MemoryJournal
 from flocsim.io.results.layout import frame_of
 from flocsim.io.results.row_file import ROWS, RowFile, new_row_file, plan_of
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind, studies
-from flocsim.io.files import held
+from flocsim.io.seals import held
 
 
 def add_parser(subparsers: Any) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.files import held, write_file
+from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
 from flocsim.io.results.kernel_tables import (
@@ -21,6 +21,7 @@ from flocsim.io.results.kernel_tables import (
     kernel_csv,
     kernel_matrix,
 )
+from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
 SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS} | {"csv": ".csv", "matrix": ".csv"}

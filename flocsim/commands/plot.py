@@ -9,11 +9,12 @@ from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.kinds import FILES, contents_of
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.files import held, make_folder
-from flocsim.io.journal.journal import journal_of
+from flocsim.io.files import make_folder
+from flocsim.io.journal import journal_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import MOST_ROWS
 from flocsim.io.plots.style import FORMATS, mark_figure, save
+from flocsim.io.seals import held
 
 
 def listed(figures):

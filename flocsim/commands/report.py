@@ -8,9 +8,10 @@ from flocsim.commands import FOLDER_HELP, SUMMARIES
 from flocsim.commands.reporting.page import report_page
 from flocsim.ensembles.contents import overview_of
 from flocsim.errors import UsageError
-from flocsim.io.files import held, write_file
+from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule, marked
 from flocsim.io.plots.results import MOST_ROWS
+from flocsim.io.seals import held
 
 DESCRIPTION = """\
 Write one HTML page on a file that needs no other file: the figures of flocsim plot, the numbers

@@ -20,7 +20,7 @@ import attrs
 
 from flocsim.errors import UsageError
 from flocsim.io.files import Old, Rule, check_writable, keep, ordinary_target
-from flocsim.io.pieces import digest_of
+from flocsim.io.seals import digest_of
 
 NAME = b"flocsim blake2b-256"
 

@@ -14,10 +14,10 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.exchange import add_vtkhdf, write_gsd
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.groups import write_labelled
+from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.groups import opened_file, write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of
-from flocsim.io.opening import opened_file
+from flocsim.io.seals import seal
 
 KIND = "flocsim trajectory"
 SCHEMA_VERSION = 2

@@ -39,7 +39,7 @@ from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.explain import force_lines, scale_lines
 from flocsim.fields import is_whole
 from flocsim.forces import ContactForce
-from flocsim.io.journal.records import CHUNK, SNAPSHOT, Record
+from flocsim.io.records import CHUNK, SNAPSHOT, Record
 from flocsim.io.results.swarm_file import (
     ENDS,
     FORMAT,

@@ -14,7 +14,7 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 - ``run``            scalars: config text, versions, machine, wall times
 
 All that may differ between two runs of one config is in ``run``, so the rest can be compared byte
-for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.pieces`), is checked
+for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.seals`), is checked
 before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
 """
 
@@ -27,8 +27,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError
-from flocsim.io.groups import scalar_of, values_of
-from flocsim.io.opening import opened_file, text_of
+from flocsim.io.groups import opened_file, run_of, text_of, values_of
 from flocsim.io.results import older
 from flocsim.io.results.checks import (
     CODED,
@@ -107,7 +106,7 @@ def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -
 def results_in(file, replicates):
     """The Results in an open file."""
     table, rows = GROUPS["probabilities"].read(file["probabilities"]), file["replicates"]
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    run = run_of(file)
     results = Results(
         types=table["type"],
         vertices=table["vertices"],

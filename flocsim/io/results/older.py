@@ -16,9 +16,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.groups import Group, scalar_of, values_of
-from flocsim.io.hdf5.structure import Node
-from flocsim.io.opening import parsed
+from flocsim.io.groups import Group, parsed, run_of, values_of
+from flocsim.io.hdf5 import Node
 from flocsim.io.results import schema
 from flocsim.io.results.checks import check_coordinates, check_structure
 from flocsim.io.results.kernel_group import CHANGE, ESTIMATES, KERNEL_GROUP, read_kernel
@@ -143,7 +142,7 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
 
 def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
     """The Results in an open file of an older version."""
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    run = run_of(file)
     kernel = read_kernel(file, str(run.get("identity", "")), groups["kernel"])
     found = {name: group.read(file[name]) for name, group in groups.items()
              if name in file and name != "kernel"}  # fmt: skip

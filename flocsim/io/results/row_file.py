@@ -2,7 +2,7 @@
 
 Where each value goes is known before any value (`layout`). Rows are counted through all
 conditions in the order of the file; ROWS of them are a *block*, and the part of a block that lies
-in one column is a piece of the seal (`flocsim.io.pieces`): whoever writes a block seals it as well.
+in one column is a piece of the seal (`flocsim.io.seals`): whoever writes a block seals it as well.
 What is between the columns, and the tables, come last, from the process that began the file; until
 then it starts with a token, by which others know that they see the same file, and is no HDF5 file.
 """
@@ -18,9 +18,9 @@ import numpy as np
 
 from flocsim.errors import FileError
 from flocsim.io.files import Rule, keep, reserve, unfinished
-from flocsim.io.pieces import PIECE, digest_of, seal_of_pieces, seal_size
 from flocsim.io.results.layout import Frame, frame_of
 from flocsim.io.results.schema import REPLICATES, Results
+from flocsim.io.seals import PIECE, digest_of, seal_of_pieces, seal_size
 
 ROWS = 32_768
 """Rows of a block, 3.7 MB."""

@@ -9,8 +9,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.groups import Group, declared
-from flocsim.io.hdf5.expected import Declared
+from flocsim.io.groups import Declared, Group, declared
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import Kernel
 

@@ -20,11 +20,9 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, declared, write_groups
-from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.groups import Group, check_format, declared, hold_against, opened_file, write_groups
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import opened_file
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
 FORMAT = "flocsim strength"

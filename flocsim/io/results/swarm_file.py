@@ -20,10 +20,17 @@ import numpy as np
 
 from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
-from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.groups import (
+    Group,
+    check_format,
+    declared,
+    hold_against,
+    opened_file,
+    run_of,
+    scalars_in,
+    write_groups,
+)
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import opened_file
 from flocsim.io.terminal import aligned
 
 FORMAT = "flocsim swarm"
@@ -241,7 +248,7 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
             groups["events"] = events_of(groups["snapshots"]["cluster"])
             scales["event"] = np.arange(len(groups["events"]["event_time"]))
         scales.setdefault("row", np.zeros(0, dtype=np.int64))
-        run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+        run = run_of(file)
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)
 

@@ -60,11 +60,18 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.sphere import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import column_of, declared, values_of, write_groups
-from flocsim.io.hdf5.expected import Declared, hold_against
-from flocsim.io.hdf5.structure import Node
+from flocsim.io.groups import (
+    Declared,
+    column_of,
+    declared,
+    hold_against,
+    opened_file,
+    text_of,
+    values_of,
+    write_groups,
+)
+from flocsim.io.hdf5 import Node
 from flocsim.io.labelled import Labelled
-from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results.schema import BAND_ENDS
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from flocsim.ensembles.parallel.messages import ExitCode
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import journal_path
+from flocsim.io.journal import journal_path
 from flocsim.io.results import row_file
 from flocsim.io.results.row_file import RowFile, new_row_file, shared_row_file
 from tests.helpers.results_files import same_data

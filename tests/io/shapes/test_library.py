@@ -9,9 +9,9 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.geometry.shapes.sphere import Sphere
-from flocsim.io.files import read_sealed, seal
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import with_holes
+from flocsim.io.seals import read_sealed, seal
 from flocsim.io.shapes.library import (
     FIT_COLUMNS,
     StoredFit,
