@@ -58,21 +58,23 @@ FIXED_TEXT = re.compile(rb"\x13[\x00-\x02\x10-\x12]\0\0(.{4})", re.DOTALL)
 LONGEST_FIXED = 256
 
 
-def type_name(message: bytes) -> str | None:
-    """What a datatype message names: a key of SIZES or "fixed N"; None for all else.
+class Unfit(ValueError):
+    """What a file holds that flocsim does not write, in a line without the file's name."""
+
+
+def checked_type(where: str, message: bytes) -> str:
+    """What a datatype message names: a key of SIZES or "fixed N"; Unfit for all else.
 
     Messages may be padded with zeros.
     """
-    if message in KNOWN:
-        return KNOWN[message]
     for known, name in KNOWN.items():
         if message.startswith(known) and not any(message[len(known) :]):
             return name
     match = FIXED_TEXT.match(message)
-    if match and not any(message[8:]):
-        size = int.from_bytes(match[1], "little")
-        return f"fixed {size}" if 0 < size <= LONGEST_FIXED else None
-    return None
+    size = int.from_bytes(match[1], "little") if match and not any(message[8:]) else 0
+    if not 0 < size <= LONGEST_FIXED:
+        raise Unfit(f"{where} holds values of a type that flocsim does not write")
+    return f"fixed {size}"
 
 
 def size_of(name: str) -> int:
@@ -88,70 +90,35 @@ END_OF_FREE = 1
 
 
 def name_table(take: Callable[[int, int], bytes], address: int) -> Callable[[int], bytes]:
-    """place → name, of the heap of names at an address; ValueError where that is none.
+    """place → name, of the heap of names at an address; Unfit where that is none.
 
     ``take(start, length)`` gives bytes of the file.
     """
     mark, version, length, free, start = struct.unpack("<4sB3xQQQ", take(address, 32))
     if mark != b"HEAP" or version != 0 or length > LARGEST:
-        raise ValueError("a group has no heap of names")
+        raise Unfit("a group has no heap of names")
     names = take(start, length)
     check_free(names, free)
 
     def name(place):
         stop = names.find(b"\0", place) if place < length else -1
         if stop < 0:
-            raise ValueError("a name in it has no end")
+            raise Unfit("a name in it has no end")
         return names[place:stop]
 
     return name
 
 
 def check_free(names, free):
-    """ValueError unless the list of the heap's free pieces goes up and ends."""
+    """Unfit unless the list of the heap's free pieces goes up and ends."""
     least = 0
     while free not in (END_OF_FREE, 2**64 - 1):
         if not least <= free <= len(names) - 16:
-            raise ValueError("a group's heap of names is damaged")
+            raise Unfit("a group's heap of names is damaged")
         following, size = struct.unpack_from("<QQ", names, free)
         if size < 16 or free + size > len(names):
-            raise ValueError("a group's heap of names is damaged")
+            raise Unfit("a group's heap of names is damaged")
         free, least = following, free + size
-
-
-@attrs.define
-class TextHeap:
-    """The collections of text and references of a file, each text being of one value."""
-
-    take: Callable[[int, int], bytes]
-    known: dict[int, dict[int, bytes]] = attrs.Factory(dict)
-
-    def content(self, address: int, number: int) -> bytes:
-        """What lies at a number of the collection at an address; ValueError where nothing does.
-
-        Each is given out once: many values that share a long one would fill the memory.
-        """
-        if address not in self.known:
-            self.known[address] = self.collection(address)
-        found = self.known[address].pop(number, None)
-        if found is None:
-            raise ValueError("a text in it is missing, or is that of several values")
-        return found
-
-    def collection(self, address):
-        mark, version, size = struct.unpack("<4sB3xQ", self.take(address, 16))
-        if mark != b"GCOL" or version != 1 or not 16 <= size <= LARGEST:
-            raise ValueError("a text in it is missing")
-        data, place, found = self.take(address + 16, size - 16), 0, {}
-        while place + 16 <= len(data):
-            number, _, length = struct.unpack_from("<HH4xQ", data, place)
-            step = length if number == 0 else 16 + -(-length // 8) * 8
-            if step < 16 or place + step > len(data) or number in found:
-                raise ValueError("its texts are damaged")
-            if number:
-                found[number] = data[place + 16 : place + 16 + length]
-            place += step
-        return found
 
 
 NOWHERE = 2**64 - 1
@@ -176,10 +143,6 @@ FOREIGN = {
     7: "values in another file",
     11: "filters or compression",
 }
-
-
-class Unfit(ValueError):
-    """What a file holds that flocsim does not write, in a line without the file's name."""
 
 
 @attrs.frozen
@@ -216,11 +179,11 @@ class Walk:
     size: int
     nodes: dict[str, Node] = attrs.Factory(dict)
     claims: list[tuple[int, int]] = attrs.Factory(list)
+    texts: dict[int, dict[int, bytes]] = attrs.Factory(dict)
+    """The collections of text and references, each text being of one value."""
     left: int = attrs.field(init=False)
-    texts: TextHeap = attrs.field(init=False)
 
     def __attrs_post_init__(self):
-        self.texts = TextHeap(self.take)
         self.left = self.size
 
     def claim(self, start, length):
@@ -411,15 +374,42 @@ class Walk:
             self.text_values(inside, values)
         elif kind == "references":
             for count, heap, number in struct.iter_unpack("<IQI", values):
-                if count != 1 or len(self.texts.content(heap, number)) != 8:
+                if count != 1 or len(self.content(heap, number)) != 8:
                     raise Unfit(f"{inside} does not lead to a dataset")
         return decoded(name), (kind, shape)
+
+    def content(self, address, number):
+        """What lies at a number of the collection at an address; Unfit where nothing does.
+
+        Each is given out once: many values that share a long one would fill the memory.
+        """
+        if address not in self.texts:
+            self.texts[address] = self.collection(address)
+        found = self.texts[address].pop(number, None)
+        if found is None:
+            raise Unfit("a text in it is missing, or is that of several values")
+        return found
+
+    def collection(self, address):
+        mark, version, size = struct.unpack("<4sB3xQ", self.take(address, 16))
+        if mark != b"GCOL" or version != 1 or not 16 <= size <= LARGEST:
+            raise Unfit("a text in it is missing")
+        data, place, found = self.take(address + 16, size - 16), 0, {}
+        while place + 16 <= len(data):
+            number, _, length = struct.unpack_from("<HH4xQ", data, place)
+            step = length if number == 0 else 16 + -(-length // 8) * 8
+            if step < 16 or place + step > len(data) or number in found:
+                raise Unfit("its texts are damaged")
+            if number:
+                found[number] = data[place + 16 : place + 16 + length]
+            place += step
+        return found
 
     def text_values(self, where, values):
         if len(values) > 16 * MOST_TEXTS:
             raise Unfit(f"{where} has more than {MOST_TEXTS} texts")
         for length, heap, number in struct.iter_unpack("<IQI", values):
-            if length and len(self.texts.content(heap, number)) != length:
+            if length and len(self.content(heap, number)) != length:
                 raise Unfit(f"a text of {where} is not as long as stated")
 
 
@@ -436,13 +426,6 @@ def decoded(name):
     if not text.isprintable() or "/" in text or text in ("", ".", ".."):
         raise Unfit(f"a name in it is not one that flocsim writes: {text!r}")
     return text
-
-
-def checked_type(where, message):
-    name = type_name(message)
-    if name is None:
-        raise Unfit(f"{where} holds values of a type that flocsim does not write")
-    return name
 
 
 def shape_of(where, message):
