@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.sphere import Sphere
     from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
     from flocsim.integrators.base import Integrator, Status
-    from flocsim.io.results.curvilinear import curvilinear_factor
+    from flocsim.io.results.kernel_tables import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
     from flocsim.io.results.sweep_file import SweepResults
     from flocsim.swarms.placement import floor, wall

@@ -12,12 +12,13 @@ from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
 from flocsim.io.results.kernel_tables import (
+    CORRECTIONS,
     MODELS,
     OF_MODELS,
     QUANTITIES,
     REFERENCES,
+    SPHERES,
     kernel_csv,
     kernel_matrix,
 )
@@ -128,7 +129,7 @@ def run_matrices(args):
         if args.what in OF_MODELS and args.model not in REFERENCES.get(mechanism, {}):
             continue
         formulas = CORRECTIONS.get(args.curvilinear)
-        if formulas is not None and mechanism not in formulas.mechanisms:
+        if formulas is not None and mechanism not in formulas:
             without.append(mechanism)
             continue
         for count in kernel.vertices.tolist():

@@ -333,3 +333,36 @@ def kind_of(path: str | os.PathLike) -> str:
                 return text_of(file, nodes, "kind") or text_of(file, nodes, "format")
         except UNREADABLE:
             return ""
+
+
+def checked_arrays(
+    group: str, arrays: Mapping[str, Any], declared: Mapping[str, Declared],
+    lengths: Mapping[str, int],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """A group's arrays in the order and of the types declared; UsageError for an array that is
+    missing, unknown, misshapen or would lose its values."""
+    if set(arrays) != set(declared):
+        strange = ", ".join(sorted(set(arrays) ^ set(declared)))
+        raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
+    found = {
+        name: exact(arrays[name], each.type, f"{group}/{name}") for name, each in declared.items()
+    }
+    for name, array in found.items():
+        shape = tuple(lengths[str(axis)] for axis in declared[name].axes)
+        if array.shape != shape:
+            raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shape}")
+    return found
+
+
+def exact(values, dtype, name):
+    """``values`` as an array of ``dtype``; UsageError if a value would change."""
+    try:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):
+            converted = given.astype(dtype)
+        same = np.array_equal(given, converted, equal_nan=converted.dtype.kind == "f")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise UsageError(f"{name} must hold numbers of type {dtype}: {error}") from error
+    if not same:
+        raise UsageError(f"{name} holds values that do not fit the type {dtype}")
+    return converted

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from flocsim.ensembles.estimates.statistics import tabulate
-from flocsim.io.results.file import Results
+from flocsim.io.results.schema import Results
 from flocsim.io.shapes.library import ShapeEntry, StoredFit
 from tests.helpers.synthetic_results import bonds_of
 

@@ -5,8 +5,7 @@ from functools import cache
 import numpy as np
 
 from flocsim.ensembles.estimates.statistics import tabulate
-from flocsim.io.results.file import NOT_APPLICABLE, Results
-from flocsim.io.results.schema import BLANKS, REPLICATES
+from flocsim.io.results.schema import BLANKS, NOT_APPLICABLE, REPLICATES, Results
 
 FAILURES = ("none", "overlap_too_deep", "step_budget")
 

@@ -62,9 +62,8 @@ from flocsim.io.records import CHUNK, Record
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import opened, read_results
 from flocsim.io.results.kernel_group import Kernel
-from flocsim.io.results.layout import FORMAT
+from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.older import why_apart
-from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import OUTLINES, Results, as_words, blank
 
 

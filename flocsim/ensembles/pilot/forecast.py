@@ -30,8 +30,7 @@ from flocsim.ensembles.pilot.trials import (
 )
 from flocsim.ensembles.study import Study
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.layout import frame_of
-from flocsim.io.results.row_file import plan_of
+from flocsim.io.results.layout import frame_of, plan_of
 from flocsim.io.results.schema import (
     BAND_ENDS,
     DIFFERENCES,

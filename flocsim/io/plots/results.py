@@ -43,7 +43,7 @@ from flocsim.io.plots.style import (
 )
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.events import ENDS_COUNTED, events, events_of
-from flocsim.io.results.file import Results
+from flocsim.io.results.schema import Results
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)

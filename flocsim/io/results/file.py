@@ -15,7 +15,7 @@ dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_
 
 All that may differ between two runs of one config is in ``run``, so the rest can be compared byte
 for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.seals`), is checked
-before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
+before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.layout`).
 """
 
 import contextlib
@@ -27,7 +27,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError
-from flocsim.io.groups import opened_file, run_of, text_of, values_of
+from flocsim.io.groups import opened_file, text_of
 from flocsim.io.results import older
 from flocsim.io.results.checks import (
     CODED,
@@ -37,36 +37,9 @@ from flocsim.io.results.checks import (
     check_structure,
     check_tables,
 )
-from flocsim.io.results.kernel_group import read_kernel
+from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
-from flocsim.io.results.schema import (
-    CLASSES,
-    DIFFERENCES,
-    GROUPS,
-    NOT_APPLICABLE,
-    NUMERICS,
-    OUTCOMES,
-    OUTLINES,
-    POOLED,
-    RADII,
-    REPLICATES,
-    TABLE,
-    Results,
-)
-
-__all__ = [
-    "CLASSES",
-    "NOT_APPLICABLE",
-    "OUTCOMES",
-    "REPLICATES",
-    "TABLE",
-    "Results",
-    "first_of_each",
-    "read_overview",
-    "read_results",
-    "read_row",
-    "with_rows",
-]
+from flocsim.io.results.schema import GROUPS, OUTCOMES, REPLICATES, Results
 
 BLOCK = 262_144
 """Replicates of a condition that are read together."""
@@ -105,25 +78,7 @@ def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -
 
 def results_in(file, replicates):
     """The Results in an open file."""
-    table, rows = GROUPS["probabilities"].read(file["probabilities"]), file["replicates"]
-    run = run_of(file)
-    results = Results(
-        types=table["type"],
-        vertices=table["vertices"],
-        delta=table["delta"],
-        replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
-        probabilities={name: table[name] for name in TABLE},
-        run=run,
-        failures=rows["failure"].attrs["flag_meanings"].split(),
-        flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
-        pooled=read_group(file, "pooled", POOLED),
-        differences=read_group(file, "differences", DIFFERENCES),
-        numerics=read_group(file, "numerics", NUMERICS),
-        outlines=read_group(file, "outlines", OUTLINES),
-        count=len(rows["replicate"]),
-        radii={name: table[name] for name in RADII},
-        kernel=read_kernel(file, str(run.get("identity", ""))),
-    )
+    results = older.results_of(file, {**GROUPS, "kernel": KERNEL_GROUP}, replicates)
     check_tables(results)
     if results.replicates is not None:
         check_rows(
@@ -136,11 +91,6 @@ def results_in(file, replicates):
 def lacking_in(file):
     """The columns that the replicates of an open file do not have, as it is of an older version."""
     return older.lacking(older.version_of(file), "replicates")
-
-
-def read_group(file, name, schema):
-    """The arrays of a group that a file may lack."""
-    return {each: file[name][each][()] for each in schema} if name in file else {}
 
 
 def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:

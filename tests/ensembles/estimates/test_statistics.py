@@ -11,8 +11,7 @@ from flocsim.ensembles.report import format_table
 from flocsim.errors import UsageError
 from flocsim.io.confidence import bounds_quantile, proportion
 from flocsim.io.results.events import events, events_of
-from flocsim.io.results.file import NOT_APPLICABLE
-from flocsim.io.results.schema import PROBABILITIES
+from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 from tests.helpers.rounding import to_rounding
 from tests.helpers.synthetic_results import bonds_of, draw_codes, make_results
 

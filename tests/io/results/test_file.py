@@ -13,9 +13,10 @@ import pytest
 
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io import files, seals
-from flocsim.io.results.file import OUTCOMES, REPLICATES, TABLE, read_results
+from flocsim.io.results.file import read_results
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.run_group import provenance
+from flocsim.io.results.schema import OUTCOMES, REPLICATES, TABLE
 from tests.helpers.results_files import same_data, write_results
 from tests.helpers.synthetic_results import FAILURES, make_results
 
