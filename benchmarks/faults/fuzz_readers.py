@@ -96,7 +96,8 @@ def read_library_file(path):
 def read_picture_file(path):
     """Read it as a picture and as a mask, and look for flocs."""
     from flocsim.io.images.masks import read_masks, segment_mask
-    from flocsim.io.images.pictures import read_grey, segment
+    from flocsim.io.images.pictures import segment
+    from flocsim.io.images.reading import read_grey
 
     try:
         grey = read_grey(path)

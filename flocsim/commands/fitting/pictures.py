@@ -12,14 +12,15 @@ import numpy as np
 
 from flocsim.commands.fitting.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
-from flocsim.io.images.correction import Correction, check_names, corrected
+from flocsim.io.images.selection import Correction, check_names, corrected
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
     from flocsim.geometry.shapes.measures import ShapeMeasures
-    from flocsim.io.images.pictures import Region, Segmentation
+    from flocsim.io.images.pictures import Segmentation
+    from flocsim.io.images.regions import Region
     from flocsim.io.images.stacks import Plane
 
     Fits = dict[float, dict[int, Fit]]
@@ -208,9 +209,9 @@ def find_flocs(task):
     try:
         if options.masks:
             return masked(path, name, options)
+        from flocsim.io.images.masks import is_mask
         from flocsim.io.images.pictures import segment
         from flocsim.io.images.reading import grey_of, read_pixels
-        from flocsim.io.images.recognition import is_mask
 
         size, pictures = None, []
         for page, plane in planes_in(path, options):
@@ -227,7 +228,7 @@ def find_flocs(task):
 
 def planes_in(path, options):
     """[(what is put behind its name, Plane)] of the pictures of a file that are asked for."""
-    from flocsim.io.images.limits import check_file
+    from flocsim.io.images.reading import check_file
     from flocsim.io.images.stacks import planes_of, stack_of
 
     check_file(path, "picture file")
@@ -262,8 +263,7 @@ def masked(path, name, options):
 
 def chosen(path, name, found, options, pixel_size, plane=None):
     """A Picture of a Segmentation, corrected as the user wants it."""
-    from flocsim.io.images.measures import mask_measures
-    from flocsim.io.images.regions import with_holes
+    from flocsim.io.images.regions import mask_measures, with_holes
 
     found = corrected(name, found, options.correction)
     if options.holes:
@@ -334,8 +334,8 @@ def find_background(paths, options):
     if options.background == "surface" or options.masks:
         return None
     from flocsim.io.images.background import FEWEST_FRAMES
+    from flocsim.io.images.masks import is_mask
     from flocsim.io.images.reading import grey_of, read_pixels
-    from flocsim.io.images.recognition import is_mask
 
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:

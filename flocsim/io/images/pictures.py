@@ -4,20 +4,17 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, UsageError
-from flocsim.io.images.annotations import without_annotations
 from flocsim.io.images.background import (
     light_surface,
     low_pass,
     robust_deviation,
     sampled,
     smooth_surface,
+    without_annotations,
 )
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at, quietened
-from flocsim.io.images.reading import read_grey
 from flocsim.io.images.regions import Filters, Region, Rejection, find_regions
-
-__all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -63,13 +60,16 @@ class Segmentation:
     @property
     def alarms(self) -> list[str]:
         """What speaks against the outlines, each in a few words; empty where nothing does."""
+        from scipy.ndimage import binary_dilation, label
+
         found = []
         kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area is left out")
         pieces = len(self.regions) + len(self.rejected)
         if pieces >= MANY_PIECES:
-            bodies = self._bodies()
+            # Gaps of up to 2 APART pixels are none.
+            bodies = int(label(binary_dilation(self.foreground, iterations=APART))[1])
             if pieces >= MANY_PIECES * bodies:
                 found.append(f"{pieces} pieces lie as if broken from {bodies}")
         bands = [each.band for each in self.regions if each.band is not None]
@@ -79,12 +79,6 @@ class Segmentation:
                 f"outlines are undecided over {100 * undecided / kept:.0f} % of their area"
             )
         return found
-
-    def _bodies(self):
-        """The number of bodies if gaps of up to 2 APART pixels are none."""
-        from scipy.ndimage import binary_dilation, label
-
-        return int(label(binary_dilation(self.foreground, iterations=APART))[1])
 
     def rejected_by_reason(self) -> dict[str, int]:
         """{reason: number of regions}, reasons in alphabetical order."""

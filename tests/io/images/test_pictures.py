@@ -7,7 +7,8 @@ import pytest
 from PIL import Image
 
 from flocsim.errors import ImageError, UsageError
-from flocsim.io.images.pictures import read_grey, segment
+from flocsim.io.images.pictures import segment
+from flocsim.io.images.reading import read_grey
 from tests.helpers.real_images import real_image
 from tests.helpers.tiers import rest_slow
 

@@ -45,7 +45,7 @@ def entries():
 
 
 def test_measures_survive_the_file_and_have_to_be_numbers_of_a_floc(tmp_path, entries):
-    from flocsim.io.images.measures import mask_measures
+    from flocsim.io.images.regions import mask_measures
 
     region = segment(picture(), noise_scale=0).regions[0]
     measured = attrs.evolve(entries[0], measures=mask_measures(region.mask))
