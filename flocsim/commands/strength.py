@@ -80,7 +80,7 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
 
 def run(args: Namespace) -> int:
     """Survey, write, print, and draw; the exit code."""
-    from flocsim.io.plots.strength import over_rate
+    from flocsim.io.plots.rates import over_rate
     from flocsim.io.plots.style import save
     from flocsim.io.results.strength_file import read_strengths
 

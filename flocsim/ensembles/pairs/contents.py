@@ -35,7 +35,7 @@ from flocsim.ensembles.report import (
 )
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, visible
-from flocsim.io.plots.kernel import KERNEL_FIGURES
+from flocsim.io.plots.rates import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.sweep import SWEEP_FIGURES
 from flocsim.io.results.events import ENDS_COUNTED, ends_of

@@ -15,10 +15,9 @@ from flocsim.io.plots.style import (
     BODY_COLOURS,
     CONTACT_COLOUR,
     Figure,
+    drawing,
     frame_of,
-    house_style,
     keep_titles_whole,
-    new_figure,
     plain,
     save_gif,
 )
@@ -75,8 +74,7 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
     count, names = len(frames.times), body_names(len(frames.outlines[0]))
     centres, half = windows(frames.outlines)
     unit, factor = time_unit(frames.times)
-    with house_style():
-        figure = new_figure(1.65 * count + 0.1, (2.4 if title else 2.15) + 0.3)
+    with drawing(1.65 * count + 0.1, (2.4 if title else 2.15) + 0.3) as figure:
         row = figure.subplots(1, count, squeeze=False)[0]
         for number, axes in enumerate(row):
             draw_frame(axes, frames.paths, frames.outlines[number], frames.contacts[number])
@@ -158,8 +156,7 @@ def over_time(
 ) -> Iterator[tuple[Any, np.ndarray, float]]:
     """(axes of a new figure, times (k,) in a unit that suits them, that unit per second)."""
     unit, factor = time_unit(times)
-    with house_style():
-        figure = new_figure(width, height)
+    with drawing(width, height) as figure:
         axes = figure.subplots()
         axes.set(xlabel=f"time [{unit}]", ylabel=label, title=title)
         yield axes, np.asarray(times) * factor, factor
@@ -263,8 +260,7 @@ def picture_of(frames, place, motion, zone_distance, title):
     """One frame, beside the centre distance, as a Pillow image of 64 colours."""
     unit, factor = time_unit(motion[0])
     centres, half = windows(frames.outlines)
-    with house_style():
-        figure = new_figure(6.4, 3.0)
+    with drawing(6.4, 3.0) as figure:
         bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
         draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
         frame_axes(bodies, centres[place], half)

@@ -7,7 +7,7 @@ import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.images.regions import Region, Rejection
-from flocsim.io.plots.style import MOST_OF_TITLE, Figure, house_style, new_figure, plain
+from flocsim.io.plots.style import MOST_OF_TITLE, Figure, drawing, house_style, plain
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
@@ -178,9 +178,8 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     outlines = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, ROUND_POINTS)]
     inside = covered_by(outlines, mask.shape)
     count = len(fit.vertices)
-    with house_style():
-        height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
-        figure = new_figure(9.2, height + 0.6)
+    height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
+    with drawing(9.2, height + 0.6) as figure:
         panels = figure.subplots(1, 4, sharex=True, sharey=True)
         for axes in panels:
             axes.imshow(np.where(mask, 0.78, 1.0), cmap="gray", vmin=0.0, vmax=1.0,

@@ -5,6 +5,7 @@ FIGURES at the end, under the name that `flocsim plot` gives it; the first line 
 the command's help.
 """
 
+import contextlib
 import textwrap
 from collections.abc import Callable
 
@@ -29,9 +30,8 @@ from flocsim.io.plots.style import (
     Figure,
     add_line_legend,
     dodge,
+    drawing,
     graded_colours,
-    house_style,
-    new_figure,
     note,
     place_legend,
     plain,
@@ -112,8 +112,7 @@ def figure_6(results: Results) -> Figure:
 
 def probability_figure(results, name):
     """One panel per type, one line per delta, against N, with bars for both errors."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], 1.35)
+    with panel_grid(type_titles(results.types), LABELS[name], 1.35) as (figure, panels, last):
         marked = set()
         for number, axes in enumerate(panels):
             marked |= draw_probability(axes, results, number, name)
@@ -136,8 +135,8 @@ def bonds(results: Results) -> Figure:
 
 def shares_figure(results, name, legend_width):
     """One panel per type, one line for each class or kind of bond, against N."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], legend_width)
+    titles = type_titles(results.types)
+    with panel_grid(titles, LABELS[name], legend_width) as (figure, panels, last):
         for number, axes in enumerate(panels):
             draw_shares(axes, results, number, name)
         add_shares_legend(last, name, results)
@@ -147,9 +146,8 @@ def shares_figure(results, name, legend_width):
 def overview(results: Results) -> Figure:
     """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", *SHARES)
-    with house_style():
-        count, marked = len(results.types), set()
-        figure = new_figure(2.1 * count + 2.2, 7.1)
+    count, marked = len(results.types), set()
+    with drawing(2.1 * count + 2.2, 7.1) as figure:
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
@@ -168,9 +166,8 @@ def overview(results: Results) -> Figure:
 
 def against_delta(results: Results) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
-    with house_style():
-        titles = type_titles(results.types)
-        figure, panels, last = panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL)
+    titles = type_titles(results.types)
+    with panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL) as (figure, panels, last):
         colours = graded_colours(len(results.vertices))
         order, marked = np.argsort(results.delta), set()
         places = results.delta[order]
@@ -196,8 +193,8 @@ def against_delta(results: Results) -> Figure:
 
 def outcomes(results: Results) -> Figure:
     """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), "share of replicates", 1.35)
+    titles = type_titles(results.types)
+    with panel_grid(titles, "share of replicates", 1.35) as (figure, panels, last):
         count = results.delta.size
         order = np.argsort(results.vertices)
         places = vertex_positions(results.vertices)[order]
@@ -224,8 +221,7 @@ def efficiencies(results: Results) -> Figure:
 
     docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
     """
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), "efficiency $E$", 1.9)
+    with panel_grid(type_titles(results.types), "efficiency $E$", 1.9) as (figure, panels, last):
         words = [
             r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
         ]  # fmt: skip
@@ -236,7 +232,7 @@ def efficiencies(results: Results) -> Figure:
             for index, axial in enumerate((False, True)):
                 found = efficiency(results.probabilities, results.delta, axial)
                 if found is None:
-                    note_if_empty(axes, np.array([np.nan]), "delta does not\nspan 0 to 1")
+                    note(axes, "delta does not\nspan 0 to 1")
                     break
                 bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
@@ -257,21 +253,20 @@ def against_size(results: Results) -> Figure:
     r_i, r_j = (1e6 * np.asarray(results.radii[name]) for name in ("r_i", "r_j"))
     known = (r_i > 0.0) & (r_j > 0.0)
     receivers = np.unique(r_i[known].round(9))
-    with house_style():
-        titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
-        figure, panels, _ = panel_grid(titles, LABELS["pr_a"], x_label="approaching $r_j$ [µm]")
+    titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
+    x_label = "approaching $r_j$ [µm]"
+    with panel_grid(titles, LABELS["pr_a"], x_label=x_label) as (figure, panels, _):
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
         missing = "sizes unknown" if results.pooled else "not yet pooled"
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
-            axes.set_xscale("log")
+            axes.set(xscale="log", xlim=room_for(r_j[known]))
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.minorticks_off()
-            axes.set_xlim(*room_for(r_j[known]))
             if not (known.any() and results.pooled):
-                note_if_empty(axes, np.array([np.nan]), missing)
+                note(axes, missing)
                 continue
             for index, receiver in enumerate(receivers):
                 rows = np.flatnonzero(known & (r_i.round(9) == receiver))
@@ -295,24 +290,26 @@ def room_for(sizes):
     return low / margin, high * margin
 
 
+@contextlib.contextmanager
 def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
     """(a figure with equal panels of these titles, at most three a row, and room for a legend, the
     panels, the last one of the first row, beside which the legend stands)."""
     count = len(titles)
     columns = min(count, PANELS_PER_ROW)
     rows = -(-count // PANELS_PER_ROW)
-    figure = new_figure(PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes in grid[count:]:
-        axes.set_visible(False)
-    for axes in grid[max(count - columns, 0) : count]:
-        axes.xaxis.set_tick_params(labelbottom=True)
-        axes.set_xlabel(x_label)
-    for axes, title in zip(grid, titles, strict=False):
-        axes.set_title(title)
-    for axes in grid[:count:PANELS_PER_ROW]:
-        axes.set_ylabel(y_label)
-    return figure, list(grid[:count]), grid[columns - 1]
+    width, height = PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25
+    with drawing(width, height) as figure:
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes in grid[count:]:
+            axes.set_visible(False)
+        for axes in grid[max(count - columns, 0) : count]:
+            axes.xaxis.set_tick_params(labelbottom=True)
+            axes.set_xlabel(x_label)
+        for axes, title in zip(grid, titles, strict=False):
+            axes.set_title(title)
+        for axes in grid[:count:PANELS_PER_ROW]:
+            axes.set_ylabel(y_label)
+        yield figure, list(grid[:count]), grid[columns - 1]
 
 
 def draw_probability(axes, results, number, name):

@@ -13,8 +13,7 @@ from flocsim.io.plots.style import (
     MARKERS,
     Figure,
     add_line_legend,
-    house_style,
-    new_figure,
+    drawing,
     note,
     plain,
     set_probability_axis,
@@ -123,9 +122,8 @@ def shape_effects(results: Results) -> Figure:
     at the end of a row that which is explained by which two flocs met.
     """
     number = int(np.argmax(results.vertices))
-    with house_style():
-        count = len(results.types)
-        figure = new_figure(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5)
+    count = len(results.types)
+    with drawing(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5) as figure:
         grid = figure.subplots(count, len(PAIR_MEASURES), sharey=True, sharex="col", squeeze=False)
         for t, (row, title) in enumerate(zip(grid, type_titles(results.types), strict=True)):
             row[0].set_ylabel(f"{title}\nprobability")
