@@ -14,7 +14,7 @@ from typing import Any
 import attrs
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.precision.judged import (
+from flocsim.commands.judged import (
     HEADER,
     RIGHT,
     STATED,

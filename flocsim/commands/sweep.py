@@ -1,4 +1,6 @@
-"""`flocsim sweep s.toml --over KEY=1,2,3`: one study at several values of its keys, in one file."""
+"""`flocsim ensemble s.toml`: a study, the same as `python -m flocsim.ensemble s.toml`, by another
+name, `flocsim swarm` and `flocsim kernel`, of that kind of scene; `flocsim sweep s.toml --over
+KEY=1,2,3`: one study at several values of its keys, in one file."""
 
 import os
 import re
@@ -9,7 +11,8 @@ from shlex import quote
 from types import FrameType
 from typing import Any
 
-from flocsim.commands import SUMMARIES
+from flocsim.commands import ENSEMBLES, SUMMARIES
+from flocsim.ensembles.cli import add_arguments, run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
@@ -48,6 +51,10 @@ def add_parser(subparsers: Any) -> None:
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--dry-run", action="store_true", help="print a command for each value, and stop")
     parser.set_defaults(run=run)
+    for name in ENSEMBLES:
+        words = SUMMARIES[name]
+        parser = subparsers.add_parser(name, help=words, description=words)
+        add_arguments(parser).set_defaults(run=run_command)
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:

@@ -6,12 +6,13 @@ Lengths in it are µm, y points up, and everything is seen from the receiving bo
 import json
 import math
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 
 import numpy as np
 
-from flocsim.commands.reporting.markup import text
 from flocsim.ensembles.contents import Example
+from flocsim.errors import visible
 from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
@@ -26,7 +27,12 @@ FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)
 """Left, top, right and bottom of the graph's panel in its drawing of 320 × 320."""
 
-SCRIPT = Path(__file__).with_name("motion.js").read_text("utf-8")
+SCRIPT = Path(__file__).with_name("templates").joinpath("motion.js").read_text("utf-8")
+
+
+def text(value: object) -> str:
+    """Any text as HTML shows it: escaped, letters that steer a display written out."""
+    return escape(visible(str(value), ""))
 
 
 def motion_of(example: Example) -> str:
