@@ -141,37 +141,31 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def summary_text(pictures: Iterable[Any], fits: Sequence[Mapping[float, Mapping[int, Any]]]) -> str:
+def summary_text(pictures: Sequence[Any]) -> str:
     """The table of all regions as CSV: flocs with their shape measures and RE [%] for every r [px]
     and N, others with why.
 
-    pictures: with name, pixel_size [m], found (Segmentation), regions, the fitted ones of
-    found.regions, and measures {label: ShapeMeasures} of found.regions;
-    fits: {r: {N: Fit}} of these regions in their order.
+    pictures: with name, pixel_size [m], found (Segmentation), measures {label: ShapeMeasures} of
+    found.regions, and fits {label: [{r: {N: Fit}}, …]} of those of them that are fitted.
     """
-    radii = list(fits[0]) if fits else []
-    pairs = [(radius, count) for radius in radii for count in fits[0][radius]]
+    every = (fits[0] for picture in pictures for fits in picture.fits.values())
+    pairs = [(radius, count) for radius, fits in next(every, {}).items() for count in fits]
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow([*COLUMNS, *(f"re_percent_r{r:g}_N{n}" for r, n in pairs)])
-    results = iter(fits)
     for picture in pictures:
-        fitted = {region.label: next(results) for region in picture.regions}
         for region in picture.found.regions:
-            why = "" if region.label in fitted else "not among the largest"
+            fits = picture.fits.get(region.label)
+            why = "" if fits else "not among the largest"
+            found = picture.measures[region.label]
             row = [picture.name, region.label, why, *_facts(region, picture.pixel_size),
-                   *_measures(picture.measures[region.label])]  # fmt: skip
-            errors = [f"{fitted[region.label][r][n].relative_error:.4f}" for r, n in pairs
-                      if region.label in fitted]  # fmt: skip
-            table.writerow([*row, *(errors or [""] * len(pairs))])
+                   *(f"{getattr(found, name):.5g}" for name in MEASURE_COLUMNS)]  # fmt: skip
+            errors = [f"{fits[0][r][n].relative_error:.4f}" if fits else "" for r, n in pairs]
+            table.writerow([*row, *errors])
         for region in picture.found.rejected:
             row = [picture.name, region.label, region.reason, *_facts(region, picture.pixel_size)]
             table.writerow([*row, *[""] * (len(MEASURE_COLUMNS) + len(pairs))])
     return text.getvalue()
-
-
-def _measures(found):
-    return (f"{getattr(found, name):.5g}" for name in MEASURE_COLUMNS)
 
 
 def _facts(region, pixel_size):

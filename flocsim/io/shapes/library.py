@@ -43,12 +43,12 @@ Every dataset has the attributes
 """
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -249,61 +249,45 @@ def population_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
     return {name: values.tolist() for name, values in columns.items()}
 
 
-class OptionalGroup(NamedTuple):
-    """A group that a library may lack: its columns, whether it says anything of an entry, what of
-    an entry has its values, and these, once they were checked, as attributes of entries."""
-
-    columns: Mapping[str, Declared]
-    is_known: Callable[[ShapeEntry], bool]
-    owner: Callable[[ShapeEntry], Any]
-    read: Callable[[dict[str, np.ndarray]], dict[str, list]]
-
-
 OPTIONAL = {
-    "measures": OptionalGroup(
-        MEASURE_COLUMNS, lambda entry: entry.measures is not None,
-        lambda entry: entry.measures or UNMEASURED, measures_in,
-    ),
-    "population": OptionalGroup(
-        POPULATION_COLUMNS,
-        lambda entry: entry.radius_low < entry.radius_high or entry.weight != 1.0,
-        lambda entry: entry, population_in,
-    ),
+    "measures": (MEASURE_COLUMNS, measures_in), "population": (POPULATION_COLUMNS, population_in)
 }  # fmt: skip
+"""Groups that a library may lack: their columns, and the attributes of entries that these give,
+once they were checked."""
 
 
 def make_entry(
-    image: str,
-    region: Any,
-    fits: "Mapping[int, Fit]",
-    pixel_size: float,
-    spheroradius: float,
-    name_radius: bool = False,
-    measures: ShapeMeasures | None = None,
-    band: "tuple[Mapping[int, Fit], ...]" = (),
-) -> ShapeEntry:
-    """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
+    picture: Any, region: Any, fits: "Sequence[Mapping[float, Mapping[int, Fit]]]",
+    spheroradius: float, name_radius: bool = False,
+) -> ShapeEntry:  # fmt: skip
+    """The ShapeEntry of a Region (flocsim.io.images) of a picture, which has a name, pixel_size [m]
+    and measures {label: ShapeMeasures}.
 
-    name_radius: its id names the spheroradius, for libraries with several of one floc; band: the
-    fits of the two masks of the region's band, where they were made.
+    fits: {r: {N: Fit}} [px] of its mask, and of the two masks of its band, where they were made;
+    name_radius: its id names the spheroradius, for libraries with several of one floc.
     """
     top, left = region.bbox[:2]
-    # The mask has a margin of one pixel, and y counts downwards there.
-    centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
 
-    def stored(fits, centroid):
-        return {count: stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
+    def stored(found, margin):
+        # y counts downwards in the picture, from the margin of its mask.
+        x, y = region.centroid[0] - left + margin, -(region.centroid[1] - top + margin)
+        return {
+            count: stored_fit(fit, np.array([x, y]), picture.pixel_size)
+            for count, fit in found[spheroradius].items()
+        }
 
+    own, *band = fits
+    # The masks of a band have a wider margin, the same on every side.
     ends = {
-        # The masks of a band have a wider margin, the same on every side.
-        name: stored(each, centroid + np.array([1, -1]) * (len(mask) - len(region.mask)) // 2)
+        name: stored(each, 1 + (len(mask) - len(region.mask)) // 2)
         for name, each, mask in zip(BAND_ENDS, band, region.band or (), strict=bool(band))
     }
-    floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
+    floc_id = f"{picture.name}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     low, high = region.radius_band
     return ShapeEntry(
-        floc_id, image, float(pixel_size), region.centroid, region.area,
-        region.equivalent_radius, float(spheroradius), stored(fits, centroid), measures,
+        floc_id, picture.name, float(picture.pixel_size), region.centroid, region.area,
+        region.equivalent_radius, float(spheroradius), stored(own, 1),
+        picture.measures.get(region.label),
         weight=region.weight, radius_low=low, radius_high=high, **ends,
     )  # fmt: skip
 
@@ -354,9 +338,11 @@ def write_library(
     for kind, count in product(kinds, sorted(entries[0].fits)):
         fits = [getattr(entry, kind)[count] for entry in entries]
         groups[f"{kind}/{count}"] = labelled(fits_at(count, compound), fits)
-    for name, group in OPTIONAL.items():
-        if any(map(group.is_known, entries)):
-            groups[name] = labelled(group.columns, [group.owner(entry) for entry in entries])
+    if any(entry.measures is not None for entry in entries):
+        measures = [entry.measures or UNMEASURED for entry in entries]
+        groups["measures"] = labelled(MEASURE_COLUMNS, measures)
+    if any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
+        groups["population"] = labelled(POPULATION_COLUMNS, entries)
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
     attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
     write_groups(path, attributes, groups, rule=rule)
@@ -433,7 +419,7 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
                 raise ValueError(f"{path} is not a number of vertices up to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
             counts[group].add(count)
-    optional = {name: group.columns for name, group in OPTIONAL.items()}
+    optional = {name: columns for name, (columns, _) in OPTIONAL.items()}
     lengths = hold_against(nodes, groups | optional, groups)
     if lengths["floc"] < 1 or not counts["fits"]:
         raise ValueError("there are no flocs")
@@ -459,9 +445,9 @@ def _entries(file):
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have the same id")
-    for name, group in OPTIONAL.items():
+    for name, (columns, read) in OPTIONAL.items():
         if name in file:
-            flocs |= group.read({each: file[name][each][()] for each in group.columns})
+            flocs |= read({each: file[name][each][()] for each in columns})
     rows = range(len(flocs["floc_id"]))
     for kind in ("fits", *BAND_ENDS):
         if kind in file:
