@@ -22,9 +22,15 @@ from flocsim.io.images.selection import Correction, label_image, read_names
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
-from flocsim.io.shapes.fit_report import coarse_line, errors_of, format_errors, plural, summary_text
+from flocsim.io.shapes.fit_report import (
+    coarse_line,
+    errors_of,
+    format_errors,
+    plural,
+    population_lines,
+    summary_text,
+)
 from flocsim.io.shapes.library import make_entry, write_library
-from flocsim.io.shapes.population import population_lines
 from flocsim.plausibility.doubts import PIXEL_SIZE
 
 DESCRIPTION = """\

@@ -11,9 +11,14 @@ from flocsim.commands import SUMMARIES
 from flocsim.commands.fit import number
 from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.shapes.fit_report import coarse_line, errors_of, plural
+from flocsim.io.shapes.fit_report import (
+    coarse_line,
+    errors_of,
+    measures_in,
+    plural,
+    population_lines,
+)
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
-from flocsim.io.shapes.population import measures_in, population_lines
 
 DESCRIPTION = """\
   flocsim shapes list shapes.h5

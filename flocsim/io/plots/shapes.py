@@ -15,15 +15,15 @@ from flocsim.io.plots.style import (
     set_vertex_axis,
     vertex_positions,
 )
-from flocsim.io.shapes.fit_report import CLASS_LIMIT
-from flocsim.io.shapes.library import ShapeEntry
-from flocsim.io.shapes.population import (
+from flocsim.io.shapes.fit_report import (
+    CLASS_LIMIT,
     SHARES,
     diameters_at,
     measures_in,
     one_each,
     perimeter_dimension,
 )
+from flocsim.io.shapes.library import ShapeEntry
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))

@@ -81,7 +81,7 @@ NAME_OF_SHIPPED = "synthetic"
 """What a config calls the library that ships with flocsim."""
 
 SHIPPED = Path(__file__).with_name("synthetic.h5")
-"""Its place; flocsim.io.shapes.shipped made it."""
+"""Its place; tests/helpers/shipped_library.py made it."""
 
 KIND = "flocsim shape library"
 SCHEMA_VERSION, COMPOUND_VERSION = 1, 2
@@ -448,30 +448,20 @@ def _entries(file):
     for name, (columns, read) in OPTIONAL.items():
         if name in file:
             flocs |= read({each: file[name][each][()] for each in columns})
-    rows = range(len(flocs["floc_id"]))
     for kind in ("fits", *BAND_ENDS):
         if kind in file:
-            flocs[kind] = _stored_fits(file[kind], rows)
+            fits = {n: _fits(n, file[f"{kind}/{n}"]) for n in sorted(map(int, file[kind]))}
+            flocs[kind] = [
+                dict(zip(fits, each, strict=True)) for each in zip(*fits.values(), strict=True)
+            ]
     return [
-        ShapeEntry(**{attribute: column[row] for attribute, column in flocs.items()})
-        for row in rows
-    ]
-
-
-def _stored_fits(group, rows):
-    """[{N: StoredFit}] of all flocs in an open group of fits."""
-    fits = {int(count): _fits(int(count), each) for count, each in group.items()}
-    return [
-        {
-            count: StoredFit(vertices[row], float(radius[row]), float(error[row]), tables[row])
-            for count, (vertices, radius, error, tables) in sorted(fits.items())
-        }
-        for row in rows
+        ShapeEntry(**dict(zip(flocs, row, strict=True)))
+        for row in zip(*flocs.values(), strict=True)
     ]
 
 
 def _fits(count, group):
-    """(vertices, radius, relative error, tables of points) of all flocs at N = ``count``."""
+    """The StoredFits of all flocs at N = ``count``."""
     vertices, radius, error = (group[name][()] for name in FIT_COLUMNS)
     for name, values, most in (
         ("vertices", np.abs(vertices), LARGEST),
@@ -482,7 +472,9 @@ def _fits(count, group):
             raise ValueError(f"{group.name[1:]}/{name} has values that a floc cannot have")
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
-    return vertices, radius, error, _tables(count, group, vertices, radius)
+    tables = _tables(count, group, vertices, radius)
+    columns = vertices, radius.tolist(), error.tolist(), tables
+    return [StoredFit(*each) for each in zip(*columns, strict=True)]
 
 
 def _tables(count, group, vertices, radius):

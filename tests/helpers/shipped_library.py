@@ -1,6 +1,6 @@
 """The shape library that ships with flocsim: synthetic flocs, to be used without growing any.
 
-Named by ``[shapes] source = "library", file = "synthetic"``. `python -m flocsim.io.shapes.shipped`
+Named by ``[shapes] source = "library", file = "synthetic"``. `python -m tests.helpers.shipped_library`
 makes it anew: the first FLOCS clusters of `flocsim.geometry.shapes.synthetic` with 60 primary
 particles and a fractal dimension of 1.8 in the plane, the defaults of ``[shapes]``, fitted at
 VERTICES. Their pixel size, and so their measured sizes, are nominal: equivalent radii from 5 to
