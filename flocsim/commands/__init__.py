@@ -35,7 +35,7 @@ FOLDER_HELP = (
 ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""
 
-FILES = {"compare": "info"} | dict.fromkeys(ENSEMBLES, "sweep")
+FILES = {"compare": "plot"} | dict.fromkeys(ENSEMBLES, "sweep")
 """{command: the file that it shares}."""
 
 

@@ -1,5 +1,4 @@
-"""`flocsim info`: what a file holds, for a person to read; `flocsim compare`: what one study has
-more of than another."""
+"""`flocsim info`: what a file holds, for a person to read."""
 
 import sys
 from argparse import Namespace
@@ -7,7 +6,7 @@ from typing import Any
 
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.sources import read_sources
-from flocsim.ensembles.contents import file_kind, studies, text_of, unfinished_text
+from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
 from flocsim.errors import FileError, visible
 from flocsim.io.journal import journal_of
 from flocsim.io.seals import held
@@ -36,7 +35,6 @@ def add_parser(subparsers: Any) -> None:
         "of a shape library, how fast its flocs settle and turn",
     )  # fmt: skip
     parser.set_defaults(run=run)
-    add_compare(subparsers)
 
 
 def run(args: Namespace) -> int:
@@ -76,37 +74,3 @@ def print_kept(args, run):
                 "version of flocsim that kept none")  # fmt: skip
         for place, each in modules.items():
             sys.stdout.write(f"# {visible(place, '')}\n{each['source'].rstrip()}\n")
-
-
-def add_compare(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "compare",
-        help=SUMMARIES["compare"],
-        description="Print the differences between two results files, at every condition, or time, "
-        "that both have, with 95 % intervals: of paired replicates where both have drawn the same "
-        "ones (the same seed), otherwise of independent samples. What the studies differ in is "
-        "printed first.",
-    )
-    parser.add_argument("first", help="results file written by flocsim ensemble")
-    parser.add_argument("second", help="results file to compare with it")
-    known = "; ".join(
-        f"of {kind.title} "
-        + ", ".join(f"{name} ({words})" for name, words in kind.compared.items())
-        for kind in studies() if kind.compared
-    ).replace("%", "%%")  # fmt: skip
-    parser.add_argument(
-        "--quantity", "--probability", metavar="NAME",
-        help=f"what to compare: {known} (default: the first)",
-    )  # fmt: skip
-    parser.set_defaults(run=run_compare)
-
-
-def run_compare(args: Namespace) -> int:
-    """Print the comparison; the exit code."""
-    from flocsim.ensembles.comparison import compare
-
-    both = [file_kind(source := held(path), "compare").opened(source)
-            for path in (args.first, args.second)]  # fmt: skip
-    comparison = compare(*both)
-    print(comparison.table(*filter(None, [args.quantity])))
-    return 0

@@ -12,8 +12,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-import attrs
-
 from flocsim.errors import FileError
 from flocsim.io.seals import digest_of
 
@@ -56,17 +54,10 @@ def keep(_: Path) -> Old:
     return Old.KEPT
 
 
-@attrs.frozen
-class Unfinished:
-    """A file that is being written: where it lies until it is whole, and open for writing."""
-
-    path: Path
-    file: BinaryIO
-
-
 @contextlib.contextmanager
-def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinished]:
-    """A fresh file beside ``path`` that takes its place, whole and synced, at the end of the block.
+def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[tuple[Path, BinaryIO]]:
+    """(path, open file) of a fresh file beside ``path`` that takes its place, whole and synced, at
+    the end of the block.
 
     A reader meets the old file or the new one, never a part. ``rule`` says what becomes of a file
     that lies at the place; one that is kept ends the block before it begins, with a FileError. If
@@ -83,7 +74,7 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinishe
         temporary, descriptor = fresh_beside(target)
         try:
             with os.fdopen(descriptor, "w+b") as file:
-                yield Unfinished(temporary, file)
+                yield temporary, file
                 file.flush()
                 os.fsync(file.fileno())
                 if os.name == "nt":
@@ -102,8 +93,8 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinishe
 
 def write_file(path: str | os.PathLike, data: bytes, rule: Rule = keep) -> None:
     """Put ``data`` at ``path``, whole or not at all; FileError and ``rule`` as in `unfinished`."""
-    with unfinished(path, rule) as new:
-        new.file.write(data)
+    with unfinished(path, rule) as (_, file):
+        file.write(data)
 
 
 def make_folder(path: str | os.PathLike, option: str = "") -> None:

@@ -331,11 +331,11 @@ def new_row_file(path: str | Path, draft: Results, rule: Rule = keep) -> Iterato
     """
     frame = frame_of(draft)
     plan = plan_of(frame, int(np.prod(draft.shape)) * draft.count)
-    with unfinished(path, rule) as new:
-        token = secrets.token_bytes(TOKEN_SIZE)
-        reserve(new.file.fileno(), plan.size + seal_size(len(plan.cuts())))
-        write_all(new.file.fileno(), memoryview(token), 0)
-        yield RowFile(os.fspath(new.path), token, plan, new.file.fileno(), draft, frame)
+    with unfinished(path, rule) as (beside, file):
+        token, descriptor = secrets.token_bytes(TOKEN_SIZE), file.fileno()
+        reserve(descriptor, plan.size + seal_size(len(plan.cuts())))
+        write_all(descriptor, memoryview(token), 0)
+        yield RowFile(os.fspath(beside), token, plan, descriptor, draft, frame)
 
 
 @contextlib.contextmanager
