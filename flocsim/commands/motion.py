@@ -52,7 +52,10 @@ def motion_of(example: Example) -> str:
     instants = instants_along(times, trajectory.position, reaches, FRAMES, touch)
     rows = np.unique([np.abs(times - each).argmin() for each in instants])
     shown = int(np.abs(times[rows] - touch).argmin()) if math.isfinite(touch) else 0
-    eyes, half = windows_of(relative[rows], MICRO * np.array(reaches))
+    # The middle of both bodies in every frame, and one half width that fits them all.
+    seen, reach = relative[rows, :, :2], MICRO * np.array(reaches)[:, None]
+    low, high = (seen - reach).min(axis=1), (seen + reach).max(axis=1)
+    eyes, half = 0.5 * (low + high), 0.52 * float(np.max(high - low))
     distance = np.hypot(*(relative[:, 1, :2] - relative[:, 0, :2]).T)
     unit, factor = time_unit(times)
     zone = MICRO * example.zone_distance
@@ -81,13 +84,6 @@ def rounded(values):
     return [
         [*rounded(each)] if np.ndim(each) else float(f"{each:.6g}") for each in np.asarray(values)
     ]
-
-
-def windows_of(places, reaches):
-    """The middle (f, 2) of both bodies in every frame, and one half width that fits them all."""
-    reach = np.array(reaches)[None, :, None]
-    low, high = (places[:, :, :2] - reach).min(axis=1), (places[:, :, :2] + reach).max(axis=1)
-    return 0.5 * (low + high), 0.52 * float(np.max(high - low))
 
 
 def drawing_of(shapes: Sequence, data: dict, half: float, shown: int) -> str:

@@ -9,7 +9,7 @@ import argparse
 import base64
 import hashlib
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +96,11 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
         shown += [f"and {more} more in run/failed"] if more > 0 else []
         content = list_of(said.warnings, "warnings") + list_of(shown, "failed")
         sections.append(("warnings", "Warnings", content))
-    sections.append(("figures", "Figures", figures_of(kind.figures(found), found)))
+    # Outcomes and the figure of everything come first.
+    figures, first = kind.figures(found), ("outcomes", "overview")
+    names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
+    drawn = "\n".join(figure_of(name, figures[name], found) for name in names)
+    sections.append(("figures", "Figures", drawn))
     tables = "\n".join(map(numbers_of, kind.tables(found) or filter(None, [kind.table(found)])))
     if tables:
         sections.append(("tables", "Numbers", tables))
@@ -127,13 +131,6 @@ def verbatim(words: str) -> str:
     """Lines as they are."""
     lines = "\n".join(map(text, words.splitlines()))
     return f"<pre>{lines}</pre>"
-
-
-def figures_of(figures: Mapping[str, Callable[..., Any]], results: Any) -> str:
-    """Figures of `flocsim plot`, outcomes and that of everything first."""
-    first = ("outcomes", "overview")
-    names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
-    return "\n".join(figure_of(name, figures[name], results) for name in names)
 
 
 def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:

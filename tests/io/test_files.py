@@ -135,7 +135,7 @@ def test_what_a_killed_job_left_is_removed_and_what_is_being_written_is_not(tmp_
     code = (
         "import os, sys\n"
         "from flocsim.io.files import unfinished\n"
-        "with unfinished(sys.argv[1]) as (_, file):\n"
+        "with unfinished(sys.argv[1]) as (beside, file):\n"
         "    file.write(b'x' * 100)\n"
         "    print(beside, flush=True)\n"
         "    sys.stdin.readline()\n"

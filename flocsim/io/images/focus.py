@@ -34,16 +34,6 @@ SPREADS = np.geomspace(0.3, 60.0, 240)
 """Softness [px] among which that of an outline is looked up."""
 
 
-def disk_slope(radius, spread):
-    """Slope at the rim of a disk (radius [px], height 1) blurred by spreads [px] [1/px].
-
-    (r/σ²) exp(−x) I₁(x), x = (r/σ)²; for a large disk 1/(√(2π) σ).
-    """
-    from scipy.special import ive
-
-    return radius / spread**2 * ive(1, (radius / spread) ** 2)
-
-
 def rim(mask):
     """The pixels of a mask that have one outside beside, above or below them."""
     from scipy.ndimage import binary_erosion
@@ -53,8 +43,15 @@ def rim(mask):
 
 @lru_cache(maxsize=1000)
 def left_by_blur(radius, blur, more):
-    """Slopes at the rim of a disk blurred by each of SPREADS and `blur`, over those with `more`."""
-    before, after = (disk_slope(radius, np.hypot(SPREADS, s)) for s in (blur, more))
+    """Slopes at the rim of a disk blurred by each of SPREADS and `blur`, over those with `more`.
+
+    A disk of radius r and height 1 that is blurred by σ has (r/σ²) exp(−x) I₁(x), x = (r/σ)²; a
+    large one 1/(√(2π) σ).
+    """
+    from scipy.special import ive
+
+    squares = SPREADS**2 + np.array([[blur], [more]]) ** 2
+    before, after = radius / squares * ive(1, radius**2 / squares)
     return before / after
 
 
@@ -86,10 +83,6 @@ class Focus:
             self.blurred[blur] = gaussian_filter(self.contrast, blur, mode="nearest")
         return along(self.blurred[blur], mask, (rows.start, columns.start), 1)
 
-    def noise_slope(self, blur: float) -> float:
-        """Root mean square slope of the noise after so much more blur: ∝ 1/(scale² + blur²)."""
-        return np.sqrt(self.noise) / (1.0 + (blur / self.scale) ** 2)
-
     def softness(self, mask: np.ndarray, box: tuple[slice, slice]) -> float:
         """Softness σ [px] that half of a region's outline does not exceed; mask: bool array of the
         box.  inf where the outline is not clear of noise."""
@@ -98,7 +91,9 @@ class Focus:
         for blur in SMOOTHINGS:
             if blur > WIDEST * radius:
                 break
-            noise, more = self.noise_slope(blur), float(np.hypot(blur, step))
+            # The root mean square slope of the noise goes with 1/(scale² + blur²).
+            noise = np.sqrt(self.noise) / (1.0 + (blur / self.scale) ** 2)
+            more = float(np.hypot(blur, step))
             slope = self.slopes(blur, mask, box)
             if np.median(slope) <= CLEAR * noise:
                 continue

@@ -133,7 +133,11 @@ def _mask(array, name):
         raise ImageError(f"{name}: holds {len(values)} labels, more than {MOST_LABELS}")
     # Numbered anew from 1: a label may be any number, and a table as long as the largest is made.
     labels = np.searchsorted(values, array) + (values[0] > 0)
-    check_labels(name, labels, len(values))
+    if (share := agreement(labels)) < AGREEING:
+        raise ImageError(
+            f"{name}: is a photograph, not a mask: {len(values)} grey levels, and only "
+            f"{100 * share:.0f} % of neighbouring pixels agree; {WAY}"
+        )
     check_spread(name, array.shape, find_objects(labels))
     return labels.astype(np.int64) if values[-1] > LARGEST_KEPT else array.astype(np.int64)
 
@@ -203,16 +207,6 @@ def agreement(labels: np.ndarray) -> float:
         unlike += np.bincount(other[~same], minlength=length)
     pairs = like + unlike
     return float(np.median(like[pairs > 0] / pairs[pairs > 0])) if pairs.any() else float("nan")
-
-
-def check_labels(name: object, labels: np.ndarray, count: int) -> None:
-    """ImageError for labels, numbered from 0, that are ``count`` grey levels of a photograph."""
-    share = agreement(labels)
-    if share < AGREEING:
-        raise ImageError(
-            f"{name}: is a photograph, not a mask: {count} grey levels, and only "
-            f"{100 * share:.0f} % of neighbouring pixels agree; {WAY}"
-        )
 
 
 def check_halves(name: object, grey: np.ndarray) -> None:

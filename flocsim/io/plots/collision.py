@@ -71,7 +71,9 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
     lies; contacts are ringed in red. A legend names the bodies (i and j where there are two) and
     says what the lines are. All frames have one scale and are centred on their bodies.
     """
-    count, names = len(frames.times), body_names(len(frames.outlines[0]))
+    count, bodies = len(frames.times), len(frames.outlines[0])
+    # The numbers of bodies are places in the list that System was given.
+    names = ["i", "j"] if bodies == 2 else [str(number) for number in range(bodies)]
     centres, half = windows(frames.outlines)
     unit, factor = time_unit(frames.times)
     with drawing(1.65 * count + 0.1, (2.4 if title else 2.15) + 0.3) as figure:
@@ -81,8 +83,11 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
             frame_axes(axes, centres[number], half)
             time = f"{frames.times[number] * factor:.4g} {unit}"
             axes.set_title(time, loc="center", fontsize=8)
-            if len(names) == 2:
-                axes.set_xlabel(distance_words(frames.centre_distance[number], zone_distance))
+            if bodies == 2:
+                distance = frames.centre_distance[number]
+                side = r" $<D_0$" if distance < zone_distance else r" $\geq D_0$"
+                side = side if math.isfinite(zone_distance) else ""
+                axes.set_xlabel(f"$d_c$ = {distance * MICRO:.1f} µm{side}")
         draw_scale_bar(row[0], centres[0], half)
         name_bodies(row[0], frames.outlines[0], names)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
@@ -90,17 +95,6 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
                       ncols=len(names) + 2 if count > 3 else 2)  # fmt: skip
         keep_titles_whole(figure)
         return figure
-
-
-def distance_words(distance, zone_distance):
-    """d_c and, if a zone is known, its side of D_0."""
-    side = r" $<D_0$" if distance < zone_distance else r" $\geq D_0$"
-    return f"$d_c$ = {distance * MICRO:.1f} µm{side if math.isfinite(zone_distance) else ''}"
-
-
-def body_names(count):
-    """ "i" and "j" of two bodies; the numbers of more, as in the list that System was given."""
-    return ["i", "j"] if count == 2 else [str(number) for number in range(count)]
 
 
 def name_bodies(axes, frame, names):

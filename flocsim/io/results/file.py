@@ -227,8 +227,5 @@ def read_version(file, known):
     """The schema version of an open file; "unknown" where it is not a number or word."""
     if known.get("schema_version") not in (("i8", ()), ("text", ())):
         return "unknown"
-    return (
-        str(file.attrs["schema_version"])[:20]
-        if known["schema_version"][0] == "text"
-        else (int(file.attrs["schema_version"]))
-    )
+    version = file.attrs["schema_version"]
+    return str(version)[:20] if isinstance(version, str) else int(version)

@@ -191,25 +191,21 @@ def kernel_matrix(
     return text.getvalue()
 
 
-def settling_factor(p: np.ndarray) -> np.ndarray:
-    """½ (p/(1 + p))²."""
-    return 0.5 * (p / (1.0 + p)) ** 2
-
-
-def fitted_shear_factor(p: np.ndarray) -> np.ndarray:
-    """9.8/1.3 (p/(1 + 2p))²."""
-    return 9.8 / 1.3 * (p / (1.0 + 2.0 * p)) ** 2
-
-
-def strain_factor(p: np.ndarray) -> np.ndarray:
-    """1 − (1 + 5p + 2.5p²)/(1 + p)⁵, as p² (7.5 + 10p + 5p² + p³)/(1 + p)⁵, which rounds less."""
-    return p**2 * (7.5 + p * (10.0 + p * (5.0 + p))) / (1.0 + p) ** 5
-
-
-SETTLING = (settling_factor, "1/2 (p/(1 + p))^2")
-CORRECTIONS = {
-    "hill": {"settling": SETTLING, "shear": (fitted_shear_factor, "9.8/1.3 (p/(1 + 2p))^2")},
-    "burd": {"settling": SETTLING, "shear": (strain_factor, "1 - (1 + 5p + 2.5p^2)/(1 + p)^5")},
+Factor = tuple[Callable[[np.ndarray], np.ndarray], str]
+SETTLING: Factor = lambda p: 0.5 * (p / (1.0 + p)) ** 2, "1/2 (p/(1 + p))^2"
+CORRECTIONS: dict[str, dict[str, Factor]] = {
+    "hill": {
+        "settling": SETTLING,
+        "shear": (lambda p: 9.8 / 1.3 * (p / (1.0 + 2.0 * p)) ** 2, "9.8/1.3 (p/(1 + 2p))^2"),
+    },
+    "burd": {
+        "settling": SETTLING,
+        # As p² (7.5 + 10p + 5p² + p³)/(1 + p)⁵, which rounds less.
+        "shear": (
+            lambda p: p**2 * (7.5 + p * (10.0 + p * (5.0 + p))) / (1.0 + p) ** 5,
+            "1 - (1 + 5p + 2.5p^2)/(1 + p)^5",
+        ),
+    },
 }
 """{name: {mechanism: (function of p, formula)}}."""
 
@@ -231,7 +227,7 @@ ABOUT_SPHERES = [
 """Lines for whoever gets numbers with that factor in them."""
 
 
-def formula(name: str, mechanism: str) -> tuple[Callable[[np.ndarray], np.ndarray], str]:
+def formula(name: str, mechanism: str) -> Factor:
     """(function of p, how it is written); UsageError for a name or a mechanism that has none."""
     if name not in CORRECTIONS:
         raise UsageError(

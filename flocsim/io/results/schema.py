@@ -227,11 +227,6 @@ def last_axis(name: str) -> tuple[str, ...]:
     return tuple(axis for axis in LAST_AXES if axis in name)
 
 
-def tail_of(name: str) -> tuple[int, ...]:
-    """The length of `last_axis`, or nothing."""
-    return tuple(len(LAST_AXES[axis]) for axis in last_axis(name))
-
-
 def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Declared]:
     """Arrays with a value, or one for each word of a last axis, for every condition."""
     return {
@@ -260,7 +255,8 @@ def blank(
     schema: Mapping[str, tuple[str, str, str]], shape: tuple[int, ...]
 ) -> dict[str, np.ndarray]:
     """Tables of a results file without any number in them."""
-    return {name: np.zeros((*shape, *tail_of(name)), about[0]) for name, about in schema.items()}
+    tails = {name: [len(LAST_AXES[axis]) for axis in last_axis(name)] for name in schema}
+    return {name: np.zeros((*shape, *tails[name]), about[0]) for name, about in schema.items()}
 
 
 def as_names(names: Iterable) -> tuple[str, ...]:

@@ -147,19 +147,14 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
         wanted = {name: group.arrays for name, group in GROUPS.items()}
         hold_against(nodes, wanted, wanted, {"quantile": len(QUANTILES)})
         doublets, conditions = (group.read(file[name]) for name, group in GROUPS.items())
-        check_places(doublets, tuple(len(conditions[axis]) for axis in AXES))
+        for axis in AXES:
+            if np.any((doublets[axis] < 0) | (doublets[axis] >= len(conditions[axis]))):
+                raise ValueError(f"a doublet has a {axis} that the file does not have")
+        check_opened(doublets.__getitem__)
         return Strengths(
             known, GROUPS["doublets"].labelled(doublets),
             GROUPS["conditions"].labelled(conditions | {"quantile": QUANTILES}),
         )  # fmt: skip
-
-
-def check_places(columns, shape):
-    """ValueError for doublets of conditions that the file does not have, or of unknown codes."""
-    for name, length in zip(AXES, shape, strict=True):
-        if np.any((columns[name] < 0) | (columns[name] >= length)):
-            raise ValueError(f"a doublet has a {name} that the file does not have")
-    check_opened(columns.__getitem__)
 
 
 def check_opened(column: Callable[[str], np.ndarray]) -> None:
