@@ -111,18 +111,16 @@ def summary_of_motion(found: StoredTrajectory) -> Summary:
     return Summary(facts)
 
 
-def strip(trajectory: Any) -> Any:
+def strip(trajectory: Any, figure: str = "strip") -> Any:
     """Frames of the motion, evenly along the way of the bodies against each other."""
     from flocsim.trajectories.figures import drawn
 
-    return drawn(trajectory, "strip", STRIP_FRAMES)
+    return drawn(trajectory, figure, STRIP_FRAMES)
 
 
 def distance(trajectory: Any) -> Any:
     """Distance of the two centres against time."""
-    from flocsim.trajectories.figures import drawn
-
-    return drawn(trajectory, "distance", STRIP_FRAMES)
+    return strip(trajectory, "distance")
 
 
 MOTION_FIGURES: Figures = {"strip": strip, "distance": distance}

@@ -6,9 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.fitting.overlays import draw, draw_fits, expected_overlays, pictures_beneath
+from flocsim.commands.fitting.overlays import (
+    draw,
+    draw_fits,
+    expected_overlays,
+    pictures_beneath,
+    stem_of,
+)
 from flocsim.commands.fitting.pictures import (
     LOST,
+    distinct,
     fit_pictures,
     list_pictures,
     report,
@@ -309,15 +316,8 @@ def whole(option, text):
 
 def label_paths(folder, names):
     """{name of a picture: path of its label image}, all different."""
-    paths: dict[str, Path] = {}
-    for name in names:
-        plain = name.replace(":", "-").replace("/", "-")
-        stem = Path(plain).stem if Path(plain).suffix.lower() in MASK_SUFFIXES else plain
-        path = Path(folder, f"{stem}.png")
-        while path in paths.values():  # a.png and a.tif
-            path = path.with_name(f"{path.stem}'.png")
-        paths[name] = path
-    return paths
+    made = distinct((stem_of(name, MASK_SUFFIXES) for name in names), ".png")
+    return {name: Path(folder, file) for name, file in zip(names, made, strict=True)}
 
 
 def write_labels(folder, pictures, titles, rule):

@@ -67,18 +67,32 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 
 def run(args: Namespace) -> int:
-    """Run what is missing and join it; the exit code."""
+    """Run what is missing and join it, or find elasticities; the exit code."""
     from flocsim.ensembles.storage.resume import WAYS
-    from flocsim.ensembles.studies.study import Study, settings_of
-    from flocsim.ensembles.studies.sweep import planned, sweep
+    from flocsim.ensembles.studies.study import Study
 
     if bool(args.elasticities) == bool(args.over):
         raise UsageError("sweep needs one of --over KEY=VALUE,VALUE and --elasticities KEY,KEY")
     study = Study(args.config)
     if args.settings:
         study = study.with_(nested(map(parse_setting, args.settings)))
-    if args.elasticities:
-        return run_elasticities(args, study)
+    how = {
+        "jobs": args.jobs, "mode": "resume" if args.resume else "new",
+        "overwrite": args.overwrite, "tell": tell, "ways": WAYS,
+    }  # fmt: skip
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        return (run_elasticities if args.elasticities else run_sweep)(args, study, how)
+    except KeyboardInterrupt:
+        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
+        return STOPPED
+
+
+def run_sweep(args, study, how):
+    """Run what is missing and join it, or say what there is to run."""
+    from flocsim.ensembles.studies.study import settings_of
+    from flocsim.ensembles.studies.sweep import planned, sweep
+
     if args.ratio is not None:
         raise UsageError("--ratio is for --elasticities: leave it out")
     pairs = [values_of(text) for text in args.over]
@@ -91,22 +105,13 @@ def run(args: Namespace) -> int:
             words = " ".join(f"--set {quote(f'{k}={v}')}" for k, v in settings_of(part.overrides))
             tell(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        sweep(
-            study, over, output, jobs=args.jobs, mode="resume" if args.resume else "new",
-            overwrite=args.overwrite, tell=tell, ways=WAYS,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
-        return STOPPED
+    sweep(study, over, output, **how)
     tell(os.fspath(output))
     return 0
 
 
-def run_elasticities(args: Namespace, study: Any) -> int:
-    """Run both values of each key, print the table and write the figure; the exit code."""
-    from flocsim.ensembles.storage.resume import WAYS
+def run_elasticities(args, study, how):
+    """Run both values of each key, print the table and write the figure."""
     from flocsim.ensembles.studies.elasticity import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
     from flocsim.io.plots.style import checked_format, save
@@ -119,16 +124,8 @@ def run_elasticities(args: Namespace, study: Any) -> int:
     rule = figure_rule(args.overwrite)
     check_outputs([Output(picture, rule)], [args.config])
     keys = [key.strip() for key in args.elasticities.split(",") if key.strip()]
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        found = elasticities(
-            study, keys, picture, ratio=RATIO if args.ratio is None else args.ratio,
-            jobs=args.jobs, mode="resume" if args.resume else "new", overwrite=args.overwrite,
-            tell=tell, ways=WAYS,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
-        return STOPPED
+    ratio = RATIO if args.ratio is None else args.ratio
+    found = elasticities(study, keys, picture, ratio=ratio, **how)
     tell(found.table())
     save(figure_of(found), picture, rule)
     tell(os.fspath(picture))

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from flocsim.commands.fitting.pictures import report, some_of, titles_of
+from flocsim.commands.fitting.pictures import distinct, report, some_of, titles_of
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.reading import SUFFIXES, read_grey
 from flocsim.io.plots.overlay import draw_overlay, single_fit
@@ -63,15 +63,15 @@ def overlay_paths(overlay, names, several):
     """A path for the overlay of each of the pictures that have these (name, path of the file)."""
     if not several:
         return [overlay] * len(names)
-    paths: list[Path] = []
-    for name, file in names:
-        plain = Path(name.replace(":", "-").replace("/", "-"))
-        stem = plain.stem if plain.suffix.lower() == file.suffix.lower() else plain.name
-        path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
-        while path in paths:  # pictures a/b.png and a-b.png
-            path = path.with_name(f"{path.stem}'{path.suffix}")
-        paths.append(path)
-    return paths
+    stems = [stem_of(name, [file.suffix.lower()]) for name, file in names]
+    made = distinct((f"{overlay.stem}-{stem}" for stem in stems), overlay.suffix)
+    return [overlay.with_name(name) for name in made]
+
+
+def stem_of(name, suffixes):
+    """The name of a picture in names of files, without one of these endings."""
+    plain = Path(name.replace(":", "-").replace("/", "-"))
+    return plain.stem if plain.suffix.lower() in suffixes else plain.name
 
 
 def expected_overlays(overlay, paths):
@@ -83,11 +83,10 @@ def expected_overlays(overlay, paths):
 def draw_fits(folder, pictures, options, rule):
     """Write a picture of every fit at the largest N and the smallest spheroradius."""
     for picture in pictures:
-        stem = picture.name.replace(":", "-").replace("/", "-")
         for region in picture.regions:
             fit = finest(picture, region, options)
             figure = single_fit(region.mask, fit, f"{picture.name}#{region.label}")
-            save(figure, Path(folder, f"{stem}-{region.label}.png"), rule)
+            save(figure, Path(folder, f"{stem_of(picture.name, ())}-{region.label}.png"), rule)
 
 
 def finest(picture, region, options):

@@ -5,7 +5,7 @@ import os
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import attrs
@@ -136,13 +136,20 @@ def titles_of(paths: Sequence[Path]) -> list[str]:
     is written as \\xe9.
     """
     names = [printable(path.name) for path in paths]
-    titles: list[str] = []
-    for name, path in zip(names, paths, strict=True):
-        title = name if names.count(name) == 1 else printable(path.as_posix())
-        while title in titles:
-            title += "'"
-        titles.append(title)
-    return titles
+    pairs = zip(names, paths, strict=True)
+    return distinct(
+        (name if names.count(name) == 1 else printable(path.as_posix())) for name, path in pairs
+    )
+
+
+def distinct(names: Iterable[str], suffix: str = "") -> list[str]:
+    """The names, of which those that have come before get as many primes as they need."""
+    found: list[str] = []
+    for name in names:
+        while name + suffix in found:
+            name += "'"
+        found.append(name + suffix)
+    return found
 
 
 def printable(text):

@@ -120,23 +120,6 @@ class Totals:
     rejected: int = 0
     spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
 
-    def span(self, name: str, values: np.ndarray) -> None:
-        """Take the values of a column into its span."""
-        known = values[np.isfinite(values)]
-        if known.size:
-            low, high = self.spans.get(name, (np.inf, -np.inf))
-            self.spans[name] = min(low, float(known.min())), max(high, float(known.max()))
-
-    def add(
-        self, outcome: np.ndarray, failure: np.ndarray, steps: np.ndarray, rejected: np.ndarray
-    ) -> None:
-        self.outcomes += np.bincount(outcome, minlength=len(self.outcomes))
-        self.failures += np.bincount(failure, minlength=len(self.failures))
-        self.count += outcome.size
-        self.steps += int(steps.sum())
-        self.most_steps = max(self.most_steps, int(steps.max(initial=0)))
-        self.rejected += int(rejected.sum())
-
 
 @attrs.frozen(eq=False)
 class Overview(Results):
@@ -147,14 +130,23 @@ class Overview(Results):
 
 def totals_in(rows, reasons):
     """The Totals of an open table of replicates with so many reasons of failure."""
-    totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
+    found = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
     for part in parts_of(rows["outcome"].shape):
         columns = {name: rows[name][part] for name in CODED}
         check_codes(columns, reasons)
-        totals.add(*columns.values())
+        outcome, failure, steps, rejected = columns.values()
+        found.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
+        found.failures += np.bincount(failure, minlength=reasons)
+        found.count += outcome.size
+        found.steps += int(steps.sum())
+        found.most_steps = max(found.most_steps, int(steps.max(initial=0)))
+        found.rejected += int(rejected.sum())
         for name in SPANNED:
-            totals.span(name, rows[name][part])
-    return totals
+            values = rows[name][part]
+            known = np.append(values[np.isfinite(values)], found.spans.get(name, ()))
+            if known.size:
+                found.spans[name] = float(known.min()), float(known.max())
+    return found
 
 
 def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
