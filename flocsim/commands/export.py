@@ -66,7 +66,10 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(
             f"--curvilinear is for matrices, not {args.format}: export matrix, or leave it out"
         )
-    path = named(args)
+    suffix = SUFFIXES[args.format]
+    path = Path(args.output or f"{Path(args.source).stem}{suffix}")
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"--output {path}: the name must end in {suffix}")
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.source])
     if args.format == "csv":
@@ -77,15 +80,6 @@ def run(args: argparse.Namespace) -> int:
         WRITERS[path.suffix.lower()](path, t, position, velocity, shapes, rule)
     print(path)
     return 0
-
-
-def named(args):
-    """The file to write; UsageError where its name has another ending."""
-    suffix = SUFFIXES[args.format]
-    path = Path(args.output or f"{Path(args.source).stem}{suffix}")
-    if path.suffix.lower() != suffix:
-        raise UsageError(f"--output {path}: the name must end in {suffix}")
-    return path
 
 
 def kernel_in(path):

@@ -52,15 +52,6 @@ def list_of(lines: Iterable[str], kind: str) -> str:
     return f"<ul class='{kind}'>{items}</ul>" if items else ""
 
 
-def picture_of(svg: bytes, caption: str) -> str:
-    """An SVG as a picture inside the page, with its caption."""
-    data = base64.b64encode(svg).decode()
-    return (
-        f"<figure><img alt='{text(caption)}' src='data:image/svg+xml;base64,{data}'>"
-        f"<figcaption>{text(caption)}</figcaption></figure>"
-    )
-
-
 def page_of(title: str, sections: Sequence[tuple[str, str, str]], script: str) -> str:
     """The whole page of (anchor, heading, HTML) sections; ``script`` is the only one that runs."""
     allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
@@ -138,8 +129,13 @@ def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:
     picture = io.BytesIO()
     with house_style():
         draw(results).savefig(picture, format="svg", metadata=METADATA["svg"])
+    data = base64.b64encode(picture.getvalue()).decode()
     title = f"Figure {name}" if name.isdigit() else name.capitalize()
-    return picture_of(picture.getvalue(), f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}")
+    caption = text(f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}")
+    return (
+        f"<figure><img alt='{caption}' src='data:image/svg+xml;base64,{data}'>"
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
 
 
 DESCRIPTION = """\

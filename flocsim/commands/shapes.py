@@ -74,9 +74,13 @@ def run_list(args: argparse.Namespace) -> int:
         print(f"{library}: {plural(len(entries), 'floc')}")
         print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
         for each in entries:
+            found = measures_in(each)
+            lengths = (found.perimeter, found.feret_max, found.feret_min)
+            shares = (found.aspect_ratio, found.circularity, found.solidity)
             cells = [
                 f"{MICRO * each.measured_radius:8.4g}", f"{MICRO * each.pixel_size:8.4g}",
-                f"{each.spheroradius:8g}", *measure_cells(each),
+                f"{each.spheroradius:8g}", *(f"{MICRO * length:8.4g}" for length in lengths),
+                *(f"{share:8.3f}" for share in shares),
                 *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
             ]  # fmt: skip
             print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
@@ -87,14 +91,6 @@ def run_list(args: argparse.Namespace) -> int:
         if any(each.measures is None for each in entries):
             print("shape measures of the finest fit where the library has none of the picture")
     return 0
-
-
-def measure_cells(entry):
-    """What stands under the heads of MEASURES."""
-    found = measures_in(entry)
-    lengths = (found.perimeter, found.feret_max, found.feret_min)
-    shares = (found.aspect_ratio, found.circularity, found.solidity)
-    return [*(f"{MICRO * each:8.4g}" for each in lengths), *(f"{each:8.3f}" for each in shares)]
 
 
 def run_write(args: argparse.Namespace) -> int:
@@ -117,29 +113,24 @@ def run_write(args: argparse.Namespace) -> int:
 
 
 def read_all(paths):
-    """[(path, entries)] of libraries, and the settings on which all of them agree."""
+    """[(path, entries)] of libraries, and their settings, all values where they do not agree."""
     libraries = [(path, read_library(path)) for path in paths]
     first = tuple(libraries[0][1][0].fits)
     for path, entries in libraries:
         if tuple(entries[0].fits) != first:
+            here, there = (", ".join(map(str, counts)) for counts in (entries[0].fits, first))
             raise UsageError(
-                f"{path} has fits at N = {numbers(entries[0].fits)}, {paths[0]} at N = "
-                f"{numbers(first)}: fit both at the same --vertices"
+                f"{path} has fits at N = {here}, {paths[0]} at N = {there}: fit both at the same "
+                "--vertices"
             )
     settings = [read_settings(path) for path in paths]
     keys = dict.fromkeys(key for each in settings for key in each)
-    return libraries, {
-        key: agreed(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
+    found = {
+        key: list(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
     }
-
-
-def agreed(values):
-    """The one value of a setting, or all of them in words."""
-    return next(iter(values)) if len(values) == 1 else ", ".join(map(str, values))
-
-
-def numbers(counts):
-    return ", ".join(map(str, counts))
+    return libraries, {
+        key: each[0] if len(each) == 1 else ", ".join(map(str, each)) for key, each in found.items()
+    }
 
 
 def merged_entries(libraries):

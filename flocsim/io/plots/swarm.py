@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flocsim.geometry.shapes.parts import PointTable, parts_in
+from flocsim.geometry.shapes.parts import parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
@@ -23,7 +23,7 @@ from flocsim.io.plots.style import (
     save_gif,
     set_log_axis,
 )
-from flocsim.io.results.swarm_file import GONE, SwarmResults, mean
+from flocsim.io.results.swarm_file import GONE, SwarmResults, mean, points_of
 
 MICRO = 1e6
 MOST_POINTS = 160
@@ -188,14 +188,7 @@ def sizes_of(labels: np.ndarray) -> np.ndarray:
 
 def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
     """The shape of a body, made of what the file has of it."""
-    bodies = results.groups["bodies"]
-    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
-    rows = slice(first, first + count)
-    columns = (
-        bodies[name][replicate, rows]
-        for name in ("points", "point_part", "point_ring", "point_radius")
-    )
-    return shape_of_parts(parts_in(PointTable(*columns)))
+    return shape_of_parts(parts_in(points_of(results.groups["bodies"], replicate, body)))
 
 
 def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]:

@@ -107,40 +107,42 @@ class Frame:
 
 def frame_of(results: Results) -> Frame:
     """The Frame of Results, the same bytes whenever the results are."""
-    import h5py
-
     frame = Frame()
-    with h5py.File(frame.image, "w") as file:
-        write_tables(file, results)
-        frame.streams = reserve_replicates(file, results)
-        # Last, so that its length moves no byte of the groups before it.
-        write_run(file, results)
+    frame.streams = write_groups(frame.image, results, {}, empty_dataset)
     return frame
 
 
 def image_of(results: Results, attributes: Mapping[str, Any]) -> io.BytesIO:
     """A whole results file in memory, with further attributes, and without a seal."""
-    import h5py
-
     image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        write_tables(file, results)
-        write_labelled(file.create_group("replicates"), results.labelled("replicates"))
-        write_run(file, results)
-        file.attrs.update(attributes)
+    write_groups(image, results, attributes)
     return image
 
 
-def write_tables(file, results):
-    """All groups but the replicates and where they came from."""
-    file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
-    for name in ("probabilities", "pooled", "differences", "numerics", "outlines"):
-        if getattr(results, name):
-            write_labelled(file.create_group(name), results.labelled(name))
-    if results.kernel is not None:
-        write_labelled(file.create_group("kernel"), results.kernel.labelled())
-    if results.flocs:
-        write_labelled(file.create_group("flocs"), FLOCS.labelled({"floc": results.flocs}))
+def write_groups(image, results, attributes, create=None):
+    """Write a file of Results into an image; of the table of replicates, whose datasets are made by
+    ``create``, where that is given, [(offset, length [bytes], name)]."""
+    import h5py
+
+    streamed = ("replicate", *REPLICATES)
+    with h5py.File(image, "w") as file:
+        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION, **attributes})
+        for name in ("probabilities", "pooled", "differences", "numerics", "outlines"):
+            if getattr(results, name):
+                write_labelled(file.create_group(name), results.labelled(name))
+        if results.kernel is not None:
+            write_labelled(file.create_group("kernel"), results.kernel.labelled())
+        if results.flocs:
+            write_labelled(file.create_group("flocs"), FLOCS.labelled({"floc": results.flocs}))
+        group, labelled = file.create_group("replicates"), results.labelled("replicates")
+        datasets = write_labelled(group, labelled, create, streamed)
+        file.flush()
+        # Last, so that its length moves no byte of the groups before it.
+        write_run(file, results)
+        named = [(each, each.name.rsplit("/", 1)[1]) for each in datasets if each.nbytes]
+        return [
+            (each.id.get_offset(), each.nbytes, name) for each, name in named if name in streamed
+        ]
 
 
 def write_run(file, results):
@@ -152,19 +154,6 @@ def write_run(file, results):
             raise UsageError(f"run/{name} must be text or a number, found {value!r}")
         # A bool would become an HDF5 enumeration, which few readers know.
         group[name] = int(value) if isinstance(value, bool) else value
-
-
-def reserve_replicates(file, results):
-    """The group of replicates, all but its values; where in the file they go."""
-    labelled, streamed = results.labelled("replicates"), ("replicate", *REPLICATES)
-    group = file.create_group("replicates")
-    datasets = write_labelled(group, labelled, empty_dataset, streamed)
-    file.flush()
-    return [
-        (dataset.id.get_offset(), dataset.nbytes, name)
-        for dataset in datasets
-        if (name := dataset.name.rsplit("/", 1)[1]) in streamed and dataset.nbytes
-    ]
 
 
 def empty_dataset(group, name, values):

@@ -64,7 +64,6 @@ COUNTS = {
 }  # fmt: skip
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
 
-BY_CLASS = {"n_class": ("f8", "1", "clusters of each size class")}
 SNAPSHOTS = {
     "position": ("f8", "m, m, rad", "x, y and angle; positions continue through a periodic box"),
     "velocity": ("f8", "m s-1, m s-1, rad s-1", "velocity and spin"),
@@ -167,7 +166,9 @@ COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
 GROUPS = {
     "counts": Group.of(
-        declared(COUNTS, MOMENTS) | declared(BY_CLASS, (*MOMENTS, "class")), SCALES
+        declared(COUNTS, MOMENTS)
+        | declared({"n_class": ("f8", "1", "clusters of each size class")}, (*MOMENTS, "class")),
+        SCALES,
     ),
     "snapshots": Group.of(
         declared(SNAPSHOTS, (*MOMENTS, "body", "component"))
@@ -298,6 +299,13 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
     return events
 
 
+def points_of(bodies: Mapping[str, np.ndarray], replicate: int, body: int) -> PointTable:
+    """The core points of a body."""
+    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
+    rows = slice(first, first + count)
+    return PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
+
+
 def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:
     """ValueError for what no swarm can have been."""
     bodies = groups["bodies"]
@@ -309,11 +317,7 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
             raise ValueError(f"bodies/{name} has values that are not radii")
     for replicate, body in np.ndindex(*first.shape):
-        begin, many = int(first[replicate, body]), int(count[replicate, body])
-        columns = (
-            bodies[name][replicate, begin : begin + many] for name in (*POINTS, *RINGS)
-        )  # fmt: skip
-        table = PointTable(*columns)
+        table = points_of(bodies, replicate, body)
         if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
             raise ValueError("bodies/point_radius has values that are not radii")
         parts_in(table)
