@@ -14,7 +14,7 @@ from flocsim.io.images.background import (
 )
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at, quietened
-from flocsim.io.images.regions import Filters, Region, Rejection, find_regions
+from flocsim.io.images.regions import Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -49,7 +49,7 @@ class Segmentation:
 
     foreground: np.ndarray
     regions: tuple[Region, ...]
-    rejected: tuple[Rejection, ...]
+    rejected: tuple[Region, ...]
     flocs: str
     threshold: float
     left_whole: int = 0

@@ -20,7 +20,7 @@ import numpy as np
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.outlines import SHARP
 from flocsim.io.images.pictures import Segmentation
-from flocsim.io.images.regions import Region, Rejection
+from flocsim.io.images.regions import Region
 
 
 def weighed(found: Sequence[Segmentation], max_blur: float) -> list[Segmentation]:
@@ -144,20 +144,17 @@ def corrected(picture: str, found: Segmentation, correction: Correction) -> Segm
         return {number for name, number in names if name in (None, picture)}
 
     drop, keep, add = (named(names) for names in (correction.drop, correction.keep, correction.add))
-    regions, rejected = [], []
+    regions: list[Region] = []
+    rejected: list[Region] = []
     for each in (*found.regions, *found.rejected):
-        reason = each.reason if isinstance(each, Rejection) else ""
+        reason = each.reason
         if each.label in drop:
             reason = reason or DROPPED
         elif each.label in (keep | add):
             reason = ""
         elif correction.keep:
             reason = reason or NOT_CHOSEN
-        about = {field.name: getattr(each, field.name) for field in attrs.fields(Region)}
-        if reason:
-            rejected.append(Rejection(**about, reason=reason))
-        else:
-            regions.append(Region(**about))
+        (rejected if reason else regions).append(attrs.evolve(each, reason=reason))
     return attrs.evolve(found, regions=tuple(regions), rejected=tuple(rejected))
 
 

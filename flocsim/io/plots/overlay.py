@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
-from flocsim.io.images.regions import Region, Rejection
+from flocsim.io.images.regions import Region
 from flocsim.io.plots.style import MOST_OF_TITLE, Figure, drawing, house_style, plain
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def draw_overlay(
     grey: np.ndarray,
     flocs: "Iterable[tuple[Region, Fit]]",
     title: str,
-    rejected: Iterable[Rejection] = (),
+    rejected: Iterable[Region] = (),
 ) -> Figure:
     """A figure of the picture with the outline of every floc, and dashed those of the others.
 
