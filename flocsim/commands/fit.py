@@ -25,7 +25,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import read_number
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.images.masks import MASK_SUFFIXES
-from flocsim.io.images.selection import Correction, label_image, read_names
+from flocsim.io.images.selection import label_image, read_names
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
@@ -233,7 +233,7 @@ def read_numbers(args: argparse.Namespace) -> None:
     threshold, neck = args.threshold, args.neck
     if threshold is not None:
         threshold = number("--threshold", threshold, "a contrast above 0, to 1", 5e-324, 1.0)
-    names = {
+    args.correction = {
         key: () if text is None else read_names(f"--{key}", text)
         for key, text in (("drop", args.drop), ("keep", args.keep), ("add", args.add))
     }
@@ -253,7 +253,6 @@ def read_numbers(args: argparse.Namespace) -> None:
     args.radii = sorted({positive("--radius", each, "pixels") for each in args.radius.split(",")})
     args.max_flocs = None if args.max_flocs is None else whole("--max-flocs", args.max_flocs)
     args.jobs = whole("--jobs", args.jobs)
-    args.correction = Correction(**names)
 
 
 def number(option, text, meaning, least, most):

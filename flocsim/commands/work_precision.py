@@ -115,16 +115,6 @@ LADDER_HEADER = (
 )
 
 
-@attrs.define
-class Measured:
-    """A Ladder's trials with the motions that they ended with: {rung: distances} [m] from the
-    reference, of d_c at the last time that both have."""
-
-    ladder: Ladder
-    motions: list = attrs.Factory(list)
-    distances: dict[float, np.ndarray] = attrs.Factory(dict)
-
-
 def part_of(config: Config, args: Namespace) -> Config:
     """The config with the type, N and δ alone that were named."""
     place, vertices, delta = select(config, args)
@@ -162,8 +152,11 @@ def distance_at(motion: tuple, instant: float) -> float:
     return float(CubicHermiteSpline(times, values, rates)(instant))
 
 
-def climb(study: Study, condition: int, tasks: Sequence) -> Iterator[Measured]:
-    """Both methods' ladders of a type, from the loosest rung to the tightest."""
+def climb(
+    study: Study, condition: int, tasks: Sequence
+) -> Iterator[tuple[Ladder, dict[float, np.ndarray]]]:
+    """(ladder, {rung: by how much d_c is off the reference's [m]}) of both methods of a type, from
+    the loosest rung to the tightest."""
     length, budget = (
         scene_length(study.config, condition, study.flocs),
         study.config.integrator.max_steps,
@@ -178,13 +171,13 @@ def climb(study: Study, condition: int, tasks: Sequence) -> Iterator[Measured]:
         ladder.max_steps = budget if isinstance(method, Implicit) else int(PATIENCE * steps)
         # Compiled, or loaded, before the first is timed.
         measured(study, ladder.jobs(1.0)[0])
-        climbed = Measured(ladder)
+        distances = {}
         for rung in DECADES:
             found = [measured(study, job) for job in ladder.jobs(rung)]
             ladder.tried[rung] = [each for each, _ in found]
             pairs = zip([motion for _, motion in found], motions, strict=True)
-            climbed.distances[rung] = np.array([apart(*pair) for pair in pairs])
-        yield climbed
+            distances[rung] = np.array([apart(*pair) for pair in pairs])
+        yield ladder, distances
 
 
 def apart(motion, exact):
@@ -195,12 +188,10 @@ def apart(motion, exact):
     return abs(distance_at(motion, instant) - distance_at(exact, instant))
 
 
-def rung_of(climbed: Measured, rung: float) -> Rung:
+def rung_of(ladder: Ladder, distances: np.ndarray, rung: float) -> Rung:
     """What is printed and drawn of a rung."""
-    ladder = climbed.ladder
     trials, flips = ladder.tried[rung], ladder.flips(rung)
     low, high = (float(end) for end in wilson(flips, len(trials)))
-    distances = climbed.distances[rung]
     known = distances[np.isfinite(distances)]
     median, most = np.quantile(known, [0.5, 0.9]) if len(known) else (math.nan, math.nan)
     undecided = sum(OUTCOMES[each.outcome] in UNKNOWN for each in trials)
@@ -233,18 +224,17 @@ def run_ladder(args: Namespace) -> int:
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
     study = study_of(config, methods=first_methods(config))
     target = ALLOWED * sampling_error(config)
-    climbed: list[Measured] = []
+    ladders: list[Ladder] = []
     panels: dict[str, list[Rung]] = {}
     for condition, tasks in enumerate(sample_of(config, args.count or COUNT)):
         name = config.scene.names[condition]
         tell(f"\ntype {name}, {len(tasks)} replicates over all N and delta\n{LADDER_HEADER}")
         panels[name] = []
-        for ladder in climb(study, condition, tasks):
-            climbed.append(ladder)
-            panels[name] += [rung_of(ladder, rung) for rung in DECADES]
+        for ladder, distances in climb(study, condition, tasks):
+            ladders.append(ladder)
+            panels[name] += [rung_of(ladder, distances[rung], rung) for rung in DECADES]
             for rung in panels[name][-len(DECADES) :]:
                 tell(rung_line(rung))
-    ladders = [each.ladder for each in climbed]
     methods, types = settled(config, ladders[::2], ladders[1::2], target)
     tell(
         f"\nwith {config.replicates} replicates the sampling error is "

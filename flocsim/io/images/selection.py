@@ -12,7 +12,7 @@ within its own.
 
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
 import numpy as np
@@ -80,16 +80,9 @@ Names = tuple[tuple[str | None, int], ...]
 """(picture, number) of regions; None where only the number was given."""
 
 
-@attrs.frozen
-class Correction:
-    """Regions by name: `drop` leaves flocs out, `keep`, if any, all others, `add` takes regions in.
-
-    A region is named as in the overlay and the table, "023.png#7", also if it was left out.
-    """
-
-    drop: Names = ()
-    keep: Names = ()
-    add: Names = ()
+Correction = Mapping[str, Names]
+"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in. They
+are named as in the overlay and the table, "023.png#7", also if they were left out."""
 
 
 def read_names(option: str, text: str) -> Names:
@@ -116,7 +109,7 @@ def read_names(option: str, text: str) -> Names:
 def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]]) -> None:
     """UsageError for a name that none of the (picture's name, Segmentation) has, or several."""
     known = dict(found)
-    for option, names in attrs.asdict(correction, recurse=False).items():
+    for option, names in correction.items():
         for picture, number in names:
             if picture is None and len(known) != 1:
                 raise UsageError(
@@ -143,7 +136,7 @@ def corrected(picture: str, found: Segmentation, correction: Correction) -> Segm
     def named(names):
         return {number for name, number in names if name in (None, picture)}
 
-    drop, keep, add = (named(names) for names in (correction.drop, correction.keep, correction.add))
+    drop, keep, add = (named(correction[key]) for key in ("drop", "keep", "add"))
     regions: list[Region] = []
     rejected: list[Region] = []
     for each in (*found.regions, *found.rejected):
@@ -152,7 +145,7 @@ def corrected(picture: str, found: Segmentation, correction: Correction) -> Segm
             reason = reason or DROPPED
         elif each.label in (keep | add):
             reason = ""
-        elif correction.keep:
+        elif correction["keep"]:
             reason = reason or NOT_CHOSEN
         (rejected if reason else regions).append(attrs.evolve(each, reason=reason))
     return attrs.evolve(found, regions=tuple(regions), rejected=tuple(rejected))
