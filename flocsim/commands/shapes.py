@@ -19,6 +19,7 @@ from flocsim.io.shapes.fit_report import (
     population_lines,
 )
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
+from flocsim.io.terminal import aligned
 
 DESCRIPTION = """\
   flocsim shapes list shapes.h5
@@ -69,21 +70,20 @@ def run_list(args: argparse.Namespace) -> int:
     for library in args.libraries:
         entries = selected(read_library(library), args, library)
         counts = [count for count in entries[0].fits if count > 1] if entries else []
-        heads = ["r_eq um", "pixel um", "r px", *MEASURES, *(f"RE% N={count}" for count in counts)]
-        wide = max([len(visible(each.floc_id, keep="")) for each in entries] + [4])
-        print(f"{library}: {plural(len(entries), 'floc')}")
-        print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
+        rows = [["name", "r_eq um", "pixel um", "r px", *MEASURES,
+                 *(f"RE% N={count}" for count in counts)]]  # fmt: skip
         for each in entries:
             found = measures_in(each)
-            lengths = (found.perimeter, found.feret_max, found.feret_min)
+            lengths = (each.measured_radius, each.pixel_size)
+            sizes = (found.perimeter, found.feret_max, found.feret_min)
             shares = (found.aspect_ratio, found.circularity, found.solidity)
-            cells = [
-                f"{MICRO * each.measured_radius:8.4g}", f"{MICRO * each.pixel_size:8.4g}",
-                f"{each.spheroradius:8g}", *(f"{MICRO * length:8.4g}" for length in lengths),
-                *(f"{share:8.3f}" for share in shares),
-                *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
-            ]  # fmt: skip
-            print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
+            rows.append([
+                visible(each.floc_id, keep=""), *(f"{MICRO * length:.4g}" for length in lengths),
+                f"{each.spheroradius:g}", *(f"{MICRO * length:.4g}" for length in sizes),
+                *(f"{share:.3f}" for share in shares),
+                *(f"{each.fits[count].relative_error:.2f}" for count in counts),
+            ])  # fmt: skip
+        print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
         if entries:
             print("\n".join(population_lines(entries)))
         if coarse := coarse_line(errors_of(entries)):

@@ -38,10 +38,13 @@ def duration(seconds: float) -> str:
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table, each column as wide as its widest word and set to the right."""
+def aligned(rows: Sequence[Sequence[str]], left: int = 0) -> list[str]:
+    """Lines of a table, each column as wide as its widest word and set to the right, but for the
+    first ``left`` columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
+    sides = "<" * left + ">" * (len(widths) - left)
+    forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
+    return ["  ".join(map(format, row, forms)) for row in rows]
 
 
 @contextlib.contextmanager

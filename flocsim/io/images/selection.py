@@ -81,8 +81,8 @@ Names = tuple[tuple[str | None, int], ...]
 
 
 Correction = Mapping[str, Names]
-"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in. They
-are named as in the overlay and the table, "023.png#7", also if they were left out."""
+"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in.
+Named as in the overlay and the table, "023.png#7", also if they were left out."""
 
 
 def read_names(option: str, text: str) -> Names:

@@ -17,6 +17,7 @@ from flocsim.geometry.shapes.measures import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
 from flocsim.io.shapes.library import MEASURE_COLUMNS, ShapeEntry
+from flocsim.io.terminal import aligned
 
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
@@ -116,27 +117,19 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
     lines = []
     for radius in sorted({entry.spheroradius for entry in entries}):
         members = [entry for entry in entries if entry.spheroradius == radius]
-        classes = {
-            f"r_eq <= {CLASS_LIMIT:g} px": [
-                e for e in members if e.equivalent_radius <= CLASS_LIMIT
-            ],
-            f"r_eq > {CLASS_LIMIT:g} px": [e for e in members if e.equivalent_radius > CLASS_LIMIT],
-            "all": members,
-        }
-        heads = [f"{name} ({len(flocs)})" for name, flocs in classes.items()]
+        small = [entry for entry in members if entry.equivalent_radius <= CLASS_LIMIT]
+        large = [entry for entry in members if entry.equivalent_radius > CLASS_LIMIT]
+        below, above = (f"r_eq {sign} {CLASS_LIMIT:g} px" for sign in ("<=", ">"))
+        classes = {below: small, above: large, "all": members}
+        rows = [["N", *(f"{name} ({len(flocs)})" for name, flocs in classes.items())]]
+        for count in members[0].fits:
+            errors = ([e.fits[count].relative_error for e in each] for each in classes.values())
+            means = (f"{sum(each) / len(each):.2f}" if each else "-" for each in errors)
+            rows.append(["1 (circle)" if count == 1 else str(count), *means])
         lines += [
             "mean relative error [%] by vertices and size class (number of flocs), "
-            f"r = {radius:g} px",
-            "  ".join([f"{'N':>10}", *(f"{head:>18}" for head in heads)]),
-        ]
-        for count in members[0].fits:
-            label = "1 (circle)" if count == 1 else str(count)
-            cells = [f"{label:>10}"]
-            for flocs in classes.values():
-                errors = [entry.fits[count].relative_error for entry in flocs]
-                mean = f"{sum(errors) / len(errors):.2f}" if errors else "-"
-                cells.append(f"{mean:>18}")
-            lines.append("  ".join(cells))
+            f"r = {radius:g} px", *aligned(rows),
+        ]  # fmt: skip
     return "\n".join(lines)
 
 
