@@ -83,10 +83,10 @@ def write_trajectory(
                 ("point_radius", table.radius, "m"),
             ):  # fmt: skip
                 columns[f"{name}_{body}"] = Column(of_points[:1], values, {"units": unit})
-    coordinates = {}
-    for name, values in scales.items():
-        said = DATASETS.get(name, ("1", name.replace("_", " of body ")))
-        coordinates[name] = Column((name,), values, about_of(said))
+    said = {name: DATASETS.get(name, ("1", name.replace("_", " of body "))) for name in scales}
+    coordinates = {
+        name: Column((name,), each, about_of(said[name])) for name, each in scales.items()
+    }
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
         file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})

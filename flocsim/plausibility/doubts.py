@@ -98,10 +98,10 @@ def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cur
 
 def about_kicks(forces: dict[str, Any]) -> str:
     """A line where random forces are not balanced by the resistance that belongs to them."""
+    drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
     for name, thermal in forces.items():
         if not isinstance(thermal, Thermal):
             continue
-        drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
         if not drags:
             return (
                 f"{name} kicks the bodies continually, but no StokesDrag takes up the energy, so "

@@ -98,26 +98,19 @@ class Instant:
     def contacts(self) -> list[Contact]:
         """All contact points."""
         work, found = self.work, []
-        for row in range(work.tally[at.CANDIDATES]):
-            if work.candidates[row, at.CLOSED] == 1:
-                a, b = (
-                    int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY)
-                )
-                geometry = work.geometry[at.NOW, row]
-                dx, dy = contact_point(work, row, a)
-                force = (0.0, 0.0)
-                if has(self.scene, CONTACT_FORCE):
-                    force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
-                motion = work.motion[at.NOW, a]
-                found.append(
-                    Contact(
-                        (a, b),
-                        (float(motion[0] + dx), float(motion[1] + dy)),
-                        (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
-                        float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
-                        (float(force[0]), float(force[1])),
-                    )
-                )  # fmt: skip
+        for row in np.flatnonzero(work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] == 1):
+            a, b = (int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY))
+            geometry, motion = work.geometry[at.NOW, row], work.motion[at.NOW, a]
+            dx, dy = contact_point(work, row, a)
+            force = (0.0, 0.0)
+            if has(self.scene, CONTACT_FORCE):
+                force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
+            found.append(Contact(
+                (a, b), (float(motion[0] + dx), float(motion[1] + dy)),
+                (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
+                float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
+                (float(force[0]), float(force[1])),
+            ))  # fmt: skip
         return found
 
 
@@ -219,13 +212,8 @@ class Replay:
 
 
 def key_of(work, row):
-    pair = work.candidates[row]
-    return (
-        int(pair[at.VERTEX_BODY]),
-        int(pair[at.VERTEX]),
-        int(pair[at.EDGE_BODY]),
-        int(pair[at.EDGE_START]),
-    )
+    columns = [at.VERTEX_BODY, at.VERTEX, at.EDGE_BODY, at.EDGE_START]
+    return tuple(work.candidates[row, columns].tolist())
 
 
 def step_motion(

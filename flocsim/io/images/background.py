@@ -233,18 +233,12 @@ def burnt_in(grey, labels):
 
 def stands_out(grey, box):
     """Whether a rectangle differs at once from what lies two pixels beside its long sides."""
-    top, left, bottom, right = box[0].start, box[1].start, box[0].stop, box[1].stop
-    inside = np.median(grey[box])
-    wide = right - left >= bottom - top
-    lines = []
-    if wide:
-        lines = [grey[row, left:right] for row in (top - 3, bottom + 2) if 0 <= row < len(grey)]
-    else:
-        lines = [grey[top:bottom, column] for column in (left - 3, right + 2)
-                 if 0 <= column < grey.shape[1]]  # fmt: skip
-    return bool(lines) and all(
-        np.mean(np.abs(line - inside) > STANDING_OUT) > 0.9 for line in lines
-    )
+    rows, columns = box
+    if rows.stop - rows.start > columns.stop - columns.start:
+        return stands_out(grey.T, (columns, rows))
+    beside = (row for row in (rows.start - 3, rows.stop + 2) if 0 <= row < len(grey))
+    apart = [np.abs(grey[row, columns] - np.median(grey[box])) for row in beside]
+    return bool(apart) and all(np.mean(each > STANDING_OUT) > 0.9 for each in apart)
 
 
 def writing(labels, boxes, bar, shape):
