@@ -1,45 +1,17 @@
 """The shape library: flocs fitted at several numbers of vertices, in one HDF5 file.
 
-Layout, schema versions 1 and 2; n flocs, in the order in which they were written:
+- ``flocs``              each floc in its picture (FLOC_COLUMNS), in the order of writing; of several
+                         spheroradii each has a row, e.g. "023.png#7 r=2"
+- ``fits/N``             for every N, so that between conditions nothing changes but N
+                         (FIT_COLUMNS); in version 2, of holes or several parts, POINT_COLUMNS too
+- ``measures``           of flocs that have been measured (MEASURE_COLUMNS); NaN for one without
+- ``population``         of flocs from pictures (POPULATION_COLUMNS)
+- ``closer/N, wider/N``  as ``fits/N``, of the outlines cut closer and wider, about the centroid of
+                         the floc as it was cut, where these were fitted as well
 
-    /                       attributes: kind = "flocsim shape library", schema_version = 1,
-                            and what the fits were made with, as far as given: method, …
-    /flocs/id               (n) text, picture and region, e.g. "023.png#7"; of several
-                            spheroradii each has a row, e.g. "023.png#7 r=2"
-    /flocs/image            (n) text, the picture's file name
-    /flocs/pixel_size       (n) [m]
-    /flocs/centroid         (n, 2) [px] x right, y down, in the picture
-    /flocs/area             (n) [px], pixels of the mask
-    /flocs/equivalent_radius(n) [px], √(area/π)
-    /flocs/spheroradius     (n) [px], asked for
-    /fits/N/vertices        (n, N, 2) [m] x right, y up, origin at the floc's centroid
-    /fits/N/radius          (n) [m], spheroradius; for N = 1 the circle's radius
-    /fits/N/relative_error  (n) [%], paper eq. 2
-
-and, in version 2, where flocs have holes or several parts:
-
-    /fits/N/part            (n, N) part that a vertex belongs to, from 0
-    /fits/N/ring            (n, N) its ring in there: 0 the outline, from 1 holes
-    /fits/N/point_radius    (n, N) [m] spheroradius of its part
-
-for every N, so that between conditions nothing changes but N; where the flocs have been measured
-
-    /measures/perimeter     (n) [px] of the mask, as are feret_max and feret_min; aspect_ratio,
-                            circularity and solidity [-]; NaN for a floc without
-
-and of flocs from pictures
-
-    /population/weight      (n) how many flocs each stands for, of which the filters kept it alone
-    /population/radius_low  (n) [px], r_eq as it would have been cut closer
-    /population/radius_high (n) [px], and wider
-
-and where the ends of the bands were fitted as well
-
-    /closer/N, /wider/N     as /fits/N, of the outlines cut closer and wider; the origin is the
-                            centroid of the floc as it was cut
-
-Every dataset has the attributes
-`units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
+Attributes of the file say its kind, its schema version and what the fits were made with, as far as
+given; those of every dataset `units` and `long_name`.  The file ends in flocsim's checksum and is
+the same from run to run.
 """
 
 import os
