@@ -1,7 +1,7 @@
 """The shape library: flocs fitted at several numbers of vertices, in one HDF5 file.
 
-- ``flocs``              each floc in its picture (FLOC_COLUMNS), in the order of writing; of several
-                         spheroradii each has a row, e.g. "023.png#7 r=2"
+- ``flocs``              each floc in its picture (FLOC_COLUMNS), in the order of writing; of
+                         several spheroradii each has a row, e.g. "023.png#7 r=2"
 - ``fits/N``             for every N, so that between conditions nothing changes but N
                          (FIT_COLUMNS); in version 2, of holes or several parts, POINT_COLUMNS too
 - ``measures``           of flocs that have been measured (MEASURE_COLUMNS); NaN for one without
