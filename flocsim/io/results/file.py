@@ -1,21 +1,12 @@
 """The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
 
-Layout (`SCHEMA_VERSION`). Every group holds its own coordinates as dimension scales, and every
-dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_meanings``:
-
-- ``probabilities``  (type, vertices, delta[, class or bond]): counts, probabilities, bounds
-- ``pooled``         (type, vertices): probabilities over all displacements
-- ``differences``    (against, event, type, vertices, delta): between conditions, replicates paired
-- ``kernel``         (mechanism, vertices, i, j): rates of a kernel study (`kernel_group`)
-- ``replicates``     (type, vertices, delta, replicate): what became of every single collision
-- ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
-- ``numerics``       (type, vertices, delta): by how much numerics change each probability
-- ``outlines``       (type, vertices, delta): by how much outlines cut otherwise change it
-- ``run``            scalars: config text, versions, machine, wall times
-
-All that may differ between two runs of one config is in ``run``, so the rest can be compared byte
-for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.seals`), is checked
-before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.layout`).
+Every group of `schema.GROUPS`, and ``kernel`` (`kernel_group`), holds its own coordinates as
+dimension scales, and every dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and
+``flag_meanings``. ``flocs`` has the names of the flocs that ``replicates/floc_i`` and ``floc_j``
+number, ``run`` scalars: config text, versions, machine, wall times. All that may differ between two
+runs of one config is in ``run``, so the rest can be compared byte for byte. The file ends in
+checksums behind the HDF5 data (see `flocsim.io.seals`), is checked before HDF5 parses it, and is
+written a block at a time (see `flocsim.io.results.layout`).
 """
 
 import contextlib
