@@ -6,22 +6,17 @@ from typing import Any
 import numpy as np
 
 from flocsim.io.plots.outcomes import (
+    ENDS,
+    bands_in,
     causes_of,
+    draw_bars,
     draw_ends,
     end_handles,
     mark_causes,
+    note_if_empty,
     words_of,
 )
-from flocsim.io.plots.results import (
-    BARS,
-    ENDS,
-    LABELS,
-    PANEL_SIZE,
-    ROOM,
-    bands_in,
-    draw_bars,
-    note_if_empty,
-)
+from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM
 from flocsim.io.plots.style import (
     MARKERS,
     Figure,
