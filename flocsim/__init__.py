@@ -56,7 +56,7 @@ HOMES = {
     "System": "system",
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.comparison",
-    "curvilinear_factor": "io.results.curvilinear",
+    "curvilinear_factor": "io.results.kernel_tables",
     "floor": "swarms.placement",
     "open": "ensembles.contents:open_any",
     "sweep": "ensembles.studies.sweep",
