@@ -119,9 +119,11 @@ def fresh_beside(target: Path, length: int = 0) -> tuple[Path, int]:
         name = left_over_prefix(target) + secrets.token_hex(8)
         path = target.with_name(name.ljust(length - len(UNFINISHED), "-") + UNFINISHED)
         descriptor = os.open(path, flags, 0o666)
-        if lock(descriptor) is not False and names(path, descriptor):
-            return path, descriptor
-        os.close(descriptor)  # another process took it for one that was left over
+        with contextlib.suppress(OSError):  # as where no file can be locked
+            if lock(descriptor) is False or not names(path, descriptor):
+                os.close(descriptor)  # another process took it for one that was left over
+                continue
+        return path, descriptor
 
 
 def left_over_prefix(target):
