@@ -177,14 +177,14 @@ def output_problem() -> str:
     return f"standard output could not be written: {problem.strerror or problem}"
 
 
-def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
+def tell(text: str, stream: TextIO | None = None) -> None:
     """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
 
     What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
     """
     stream = sys.stdout if stream is None else stream
     try:
-        print(text, end=end, file=stream, flush=True)
+        print(text, file=stream, flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 

@@ -17,14 +17,6 @@ LONGEST_TEXT = 2**22
 """Letters of a description beyond which it is not read."""
 
 MOST_PLANES = 100_000
-UNITS = {
-    "micron": "um",
-    "microns": "um",
-    "µm": "um",
-    "μm": "um",
-    "\\u00b5m": "um",
-    "\\u00B5m": "um",
-}
 UNEQUAL = 1e-3
 """By this share the sides of a pixel may differ, and it counts as square."""
 
@@ -145,10 +137,12 @@ def imagej_stack(page, text):
 def side_of(value, unit):
     """A length [m]; None where it is none above 0, or its unit none of length."""
     try:
-        found = read_number(f"{float(value)!r} {UNITS.get(unit.strip(), unit.strip())}", "m")
+        # Some programs write the letter as its code.
+        unit = re.sub(r"\\u00b5", "µ", unit.strip(), flags=re.IGNORECASE)
+        found = read_number(f"{float(value)!r} {unit}", "m")
     except (TypeError, ValueError):
         return None
-    return found if unit.strip() and 0.0 < found < float("inf") else None
+    return found if unit and 0.0 < found < float("inf") else None
 
 
 def pair_of(sides):
