@@ -18,6 +18,52 @@ import attrs
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import RangeError
 
+KINDS = {
+    "m": ("a length", "16.41 um"),
+    "s": ("a time", "5 s"),
+    "J": ("an energy", "1e-18 J"),
+    "V": ("an electric potential", "15 mV"),
+    "N/m": ("a stiffness", "20 N/m"),
+    "Pa s": ("a viscosity", "0.89 mPa s"),
+    "kg/m^2": ("a mass per area", "2 kg/m^2"),
+    "kg/m^3": ("a density", "2650 kg/m^3"),
+    "m/s": ("a velocity", "1 mm/s"),
+    "m/s^2": ("an acceleration", "9.81 m/s^2"),
+    "1/s": ("a rate", "1e6 1/s"),
+    "rad": ("an angle", "90 deg"),
+    "rad/s": ("an angular velocity", "1 rad/s"),
+    "N": ("a force", "1 pN"),
+    "N m": ("a torque", "1e-18 N m"),
+    "K": ("a temperature", "25 degC"),
+    "g/kg": ("a salinity", "35 g/kg"),
+    "mol/m^3": ("a concentration", "0.1 mol/l"),
+    "1/m": ("a reciprocal length", "1.02 1/um"),
+}
+"""What a quantity of a unit is called, and how one is written."""
+
+NUMBER = re.compile(
+    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)(.*)", re.DOTALL
+)
+EXPONENT = r"(?:(?:\^|\*\*)?([+-]?[0-9](?:\.[0-9]{1,3})?)|(?:\^|\*\*)\(([+-]?[0-9])/([1-9])\))?"
+THERMAL = re.compile(
+    r"\s*([*·./]?)\s*k(?:_?[Bb])?T(?![^\W\d_])(?:\s*@\s*([0-9]+\.?[0-9]*)\s*K(?![^\W\d_]))?"
+    + EXPONENT
+)
+UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)" + EXPONENT)
+SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
+
+PIXELS = ("px", "pixel", "dot", "pel", "picture_element", "css_pixel")
+"""What pint takes for a length, of screens and paper."""
+
+CELSIUS = ("degc", "deg c", "celsius")
+"""Degrees that do not count from zero, as `read_quantity` has them in lower case ("°" is "deg")."""
+
+LONGEST = 100
+"""Letters of a number and its unit."""
+
+DIGITS = 60
+"""Far more than a float has, so that the only rounding is the last one."""
+
 
 def is_number(value: Any) -> bool:
     """A finite real number that a float can hold; True and False are not numbers."""
@@ -180,53 +226,6 @@ def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:
     return checked_field(
         lambda value: isinstance(value, bool), "true or false", default, flag=True, help=help
     )
-
-
-KINDS = {
-    "m": ("a length", "16.41 um"),
-    "s": ("a time", "5 s"),
-    "J": ("an energy", "1e-18 J"),
-    "V": ("an electric potential", "15 mV"),
-    "N/m": ("a stiffness", "20 N/m"),
-    "Pa s": ("a viscosity", "0.89 mPa s"),
-    "kg/m^2": ("a mass per area", "2 kg/m^2"),
-    "kg/m^3": ("a density", "2650 kg/m^3"),
-    "m/s": ("a velocity", "1 mm/s"),
-    "m/s^2": ("an acceleration", "9.81 m/s^2"),
-    "1/s": ("a rate", "1e6 1/s"),
-    "rad": ("an angle", "90 deg"),
-    "rad/s": ("an angular velocity", "1 rad/s"),
-    "N": ("a force", "1 pN"),
-    "N m": ("a torque", "1e-18 N m"),
-    "K": ("a temperature", "25 degC"),
-    "g/kg": ("a salinity", "35 g/kg"),
-    "mol/m^3": ("a concentration", "0.1 mol/l"),
-    "1/m": ("a reciprocal length", "1.02 1/um"),
-}
-"""What a quantity of a unit is called, and how one is written."""
-
-NUMBER = re.compile(
-    r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?)(.*)", re.DOTALL
-)
-EXPONENT = r"(?:(?:\^|\*\*)?([+-]?[0-9](?:\.[0-9]{1,3})?)|(?:\^|\*\*)\(([+-]?[0-9])/([1-9])\))?"
-THERMAL = re.compile(
-    r"\s*([*·./]?)\s*k(?:_?[Bb])?T(?![^\W\d_])(?:\s*@\s*([0-9]+\.?[0-9]*)\s*K(?![^\W\d_]))?"
-    + EXPONENT
-)
-UNIT_FACTOR = re.compile(r"\s*([*·./]?)\s*([^\W\d_]+)" + EXPONENT)
-SIGNS = str.maketrans({"°": " deg", "⁻": "-"} | dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789", strict=True)))
-
-PIXELS = ("px", "pixel", "dot", "pel", "picture_element", "css_pixel")
-"""What pint takes for a length, of screens and paper."""
-
-CELSIUS = ("degc", "deg c", "celsius")
-"""Degrees that do not count from zero, as `read_quantity` has them in lower case ("°" is "deg")."""
-
-LONGEST = 100
-"""Letters of a number and its unit."""
-
-# Far more digits than a float has, so that the only rounding is the last one.
-DIGITS = 60
 
 
 def kind_of(unit: str) -> str:

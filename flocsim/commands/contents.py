@@ -18,6 +18,8 @@ from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings
 from flocsim.io.terminal import aligned
 from flocsim.io.trajectory import StoredTrajectory, centre_distance, read_trajectory
 
+STRIP_FRAMES = 7
+
 
 @attrs.frozen(eq=False)
 class Library:
@@ -84,9 +86,6 @@ LIBRARY = Contents(
     drawn={"a shape library written by flocsim fit": FIGURES},
     water=water,
 )
-
-
-STRIP_FRAMES = 7
 
 
 def summary_of_motion(found: StoredTrajectory) -> Summary:

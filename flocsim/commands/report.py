@@ -25,6 +25,13 @@ from flocsim.io.seals import held
 
 STYLE = Path(__file__).with_name("templates").joinpath("page.css").read_text("utf-8")
 
+MOST_FAILURES = 20
+
+DESCRIPTION = """\
+Write one HTML page on a file that needs no other file: the figures of flocsim plot, the numbers
+with their errors, warnings, and where it came from; of pairs one replicate of each class (A to D)
+to watch, which is run again for it."""
+
 
 def table_of(
     heads: Sequence[str], rows: Iterable[Sequence[object]], groups: Iterable[int] = ()
@@ -72,9 +79,6 @@ def page_of(title: str, sections: Sequence[tuple[str, str, str]], script: str) -
         f"<h1>{text(title)}</h1>\n<nav>{links}</nav>\n{body}\n"
         f"<script>{script}</script>\n</body></html>\n"
     )
-
-
-MOST_FAILURES = 20
 
 
 def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Example]) -> str:
@@ -136,12 +140,6 @@ def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:
         f"<figure><img alt='{caption}' src='data:image/svg+xml;base64,{data}'>"
         f"<figcaption>{caption}</figcaption></figure>"
     )
-
-
-DESCRIPTION = """\
-Write one HTML page on a file that needs no other file: the figures of flocsim plot, the numbers
-with their errors, warnings, and where it came from; of pairs one replicate of each class (A to D)
-to watch, which is run again for it."""
 
 
 def add_parser(subparsers: Any) -> None:

@@ -47,6 +47,17 @@ STEP_COUNTS = (1_000, 10_000, 100_000)
 MOST_STEPS = 1_000_000
 """Steps after which a method counts as having failed."""
 
+COUNT = 60
+"""Replicates of each type, where nothing else is asked for."""
+
+PATIENCE = 20
+"""Times the mean steps of the implicit method's reference that an explicit run may take."""
+
+LADDER_HEADER = (
+    f"{'method':<18}{'tolerance':>11}{'flips':>7}{'[%]':>7}{'95 %':>14}"
+    f"{'d_c error [m]':>17}{'of 90 %':>10}{'CPU [ms]':>10}{'undecided':>11}"
+)
+
 
 def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
@@ -101,18 +112,6 @@ def run(args: Namespace) -> int:
         case = Case(place[0], place[1], math.nan, method, place[2], args.replicate)
         print(line_of(config, case, checker.judge(case, TIGHTEST)), flush=True)
     return 0
-
-
-COUNT = 60
-"""Replicates of each type, where nothing else is asked for."""
-
-PATIENCE = 20
-"""Times the mean steps of the implicit method's reference that an explicit run may take."""
-
-LADDER_HEADER = (
-    f"{'method':<18}{'tolerance':>11}{'flips':>7}{'[%]':>7}{'95 %':>14}"
-    f"{'d_c error [m]':>17}{'of 90 %':>10}{'CPU [ms]':>10}{'undecided':>11}"
-)
 
 
 def part_of(config: Config, args: Namespace) -> Config:

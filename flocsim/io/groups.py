@@ -32,6 +32,18 @@ SCALE_ATTRIBUTES = {
 }
 """Attributes that a dataset may have, and their types."""
 
+Schema = Mapping[str, tuple[str, str, str]]
+"""{name: (type, unit, meaning)}."""
+
+UNREADABLE = (
+    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
+    OverflowError, IndexError, EOFError,
+)  # fmt: skip
+"""What h5py raises for what it cannot read."""
+
+LONGEST_WORDS = 80
+"""Letters of what a file says that it is."""
+
 
 @attrs.frozen
 class Declared:
@@ -103,10 +115,6 @@ def check_column(path, node, column, lengths):
         known = SCALE_ATTRIBUTES.get(name)
         if known is None or kind.split()[0] != known or len(shape) > 1:
             raise Unfit(f"{path} has an attribute {name} that flocsim does not write")
-
-
-Schema = Mapping[str, tuple[str, str, str]]
-"""{name: (type, unit, meaning)}."""
 
 
 def declared(
@@ -270,16 +278,6 @@ def check_format(
             raise Unfit(f"its attribute {attribute} is missing, or is of another type")
     if (str(file.attrs["format"]), int(file.attrs["schema_version"])) != (name, version):
         raise ValueError(f"its format is not {name} of version {version}")
-
-
-UNREADABLE = (
-    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
-    OverflowError, IndexError, EOFError,
-)  # fmt: skip
-"""What h5py raises for what it cannot read."""
-
-LONGEST_WORDS = 80
-"""Letters of what a file says that it is."""
 
 
 @contextlib.contextmanager

@@ -18,6 +18,47 @@ import attrs
 
 from flocsim.io.seals import HDF5_SIGNATURE
 
+REFERENCE = struct.pack("<BBBBI", 0x17, 0, 0, 0, 8)
+MEMBER = bytes(28)
+"""Of a compound's member: what it says of dimensions, of which it has none."""
+
+SIZES = {
+    "u1": 1, "i4": 4, "i8": 8, "f8": 8, "text": 16, "flag": 1, "references": 16, "scales": 16
+}  # fmt: skip
+"""Bytes of one value, by the name of its type."""
+
+FIXED_TEXT = re.compile(rb"\x13[\x00-\x02\x10-\x12]\0\0(.{4})", re.DOTALL)
+LONGEST_FIXED = 256
+
+LARGEST = 2**28
+"""Bytes of a heap: far more than flocsim writes into one."""
+
+END_OF_FREE = 1
+"""In a heap of names, instead of the place of the next free piece."""
+
+NOWHERE = 2**64 - 1
+SUPERBLOCK = struct.Struct("<8s8BHHI4Q2QII16s")
+LINK = struct.Struct("<QQII16s")
+LEAF_SIZE, NODE_SIZE = 8, 32
+"""Entries of a leaf and of a node of a group's tree."""
+
+MOST_OBJECTS = 20_000
+MOST_ATTRIBUTES = 100
+MOST_LEVELS = 4
+MOST_DIMENSIONS = 6
+MOST_TEXTS = 2_000_000
+LONGEST_HEADER = 2**20
+
+NIL, SPACE, TYPE, FILL, LAYOUT, ATTRIBUTE, MORE, TABLE, TIME = 0, 1, 3, 5, 8, 12, 16, 17, 18
+"""Messages of an object's header that flocsim writes."""
+
+FOREIGN = {
+    2: "links of the new kind",
+    6: "links of the new kind",
+    7: "values in another file",
+    11: "filters or compression",
+}
+
 
 def integer(size: int, signed: bool) -> bytes:
     """The message of an integer type, little-endian."""
@@ -28,10 +69,6 @@ def text(charset: int) -> bytes:
     """The message of text of variable length, ASCII (0) or UTF-8 (1)."""
     return struct.pack("<BBBBI", 0x19, 1, charset, 0, 16) + integer(1, False)
 
-
-REFERENCE = struct.pack("<BBBBI", 0x17, 0, 0, 0, 8)
-MEMBER = bytes(28)
-"""Of a compound's member: what it says of dimensions, of which it has none."""
 
 KNOWN = {
     integer(1, False): "u1",
@@ -49,13 +86,6 @@ KNOWN = {
     + b"dataset\0" + bytes(4) + MEMBER + REFERENCE
     + b"dimension\0\0\0\0\0\0\0" + struct.pack("<I", 8) + MEMBER + integer(4, False): "scales",
 }  # fmt: skip
-SIZES = {
-    "u1": 1, "i4": 4, "i8": 8, "f8": 8, "text": 16, "flag": 1, "references": 16, "scales": 16
-}  # fmt: skip
-"""Bytes of one value, by the name of its type."""
-
-FIXED_TEXT = re.compile(rb"\x13[\x00-\x02\x10-\x12]\0\0(.{4})", re.DOTALL)
-LONGEST_FIXED = 256
 
 
 class Unfit(ValueError):
@@ -80,13 +110,6 @@ def checked_type(where: str, message: bytes) -> str:
 def size_of(name: str) -> int:
     """Bytes of one value of a type."""
     return SIZES[name] if name in SIZES else int(name.removeprefix("fixed "))
-
-
-LARGEST = 2**28
-"""Bytes of a heap: far more than flocsim writes into one."""
-
-END_OF_FREE = 1
-"""In a heap of names, instead of the place of the next free piece."""
 
 
 def name_table(take: Callable[[int, int], bytes], address: int) -> Callable[[int], bytes]:
@@ -119,30 +142,6 @@ def check_free(names, free):
         if size < 16 or free + size > len(names):
             raise Unfit("a group's heap of names is damaged")
         free, least = following, free + size
-
-
-NOWHERE = 2**64 - 1
-SUPERBLOCK = struct.Struct("<8s8BHHI4Q2QII16s")
-LINK = struct.Struct("<QQII16s")
-LEAF_SIZE, NODE_SIZE = 8, 32
-"""Entries of a leaf and of a node of a group's tree."""
-
-MOST_OBJECTS = 20_000
-MOST_ATTRIBUTES = 100
-MOST_LEVELS = 4
-MOST_DIMENSIONS = 6
-MOST_TEXTS = 2_000_000
-LONGEST_HEADER = 2**20
-
-NIL, SPACE, TYPE, FILL, LAYOUT, ATTRIBUTE, MORE, TABLE, TIME = 0, 1, 3, 5, 8, 12, 16, 17, 18
-"""Messages of an object's header that flocsim writes."""
-
-FOREIGN = {
-    2: "links of the new kind",
-    6: "links of the new kind",
-    7: "values in another file",
-    11: "filters or compression",
-}
 
 
 @attrs.frozen

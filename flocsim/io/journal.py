@@ -27,6 +27,17 @@ SUFFIX = ".journal"
 SYNC_SECONDS = 5.0
 """Seconds between two syncs to the disk: what a power cut may cost. A kill costs nothing."""
 
+LOCK_SECONDS = 10.0
+"""Seconds to wait for a job that is just dying, or just finishing, to let go of the file."""
+
+LOOK_SECONDS = 0.05
+"""Seconds between two tries to get the lock."""
+
+MOST_COPIES = 1000
+"""Names NAME.1, NAME.2, … that are tried for a file that is put aside."""
+
+OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+
 
 def journal_path(results: str | Path) -> Path:
     """Where the journal of a results file lies: beside it."""
@@ -203,18 +214,6 @@ def journal_of(path: str | Path) -> Path | None:
     except FileError:
         return None
     return beside if not os.path.lexists(path) and beside.is_file() else None
-
-
-LOCK_SECONDS = 10.0
-"""Seconds to wait for a job that is just dying, or just finishing, to let go of the file."""
-
-LOOK_SECONDS = 0.05
-"""Seconds between two tries to get the lock."""
-
-MOST_COPIES = 1000
-"""Names NAME.1, NAME.2, … that are tried for a file that is put aside."""
-
-OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def open_regular(path: Path) -> int:

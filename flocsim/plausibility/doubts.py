@@ -25,6 +25,14 @@ from flocsim.forces.thermal import Thermal, thermal_in
 from flocsim.forces.van_der_waals import VanDerWaals
 from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
+CHECK = "check the number and its unit"
+
+HOLDS = {
+    "stokes": "Stokes's drag is accurate to 15 %",
+    "shape": "slow flow around a shape is accurate to 15 %",
+    "schiller_naumann": "the drag of Schiller and Naumann is accurate to 5 %",
+}
+
 
 @attrs.frozen
 class Names:
@@ -145,9 +153,6 @@ def warn_of(system: Any, stacklevel: int) -> None:
         warnings.warn(line, PlausibilityWarning, stacklevel=stacklevel + 1)
 
 
-CHECK = "check the number and its unit"
-
-
 @attrs.frozen
 class Usual:
     """The usual range, ends included, of ``what`` in a unit; where that is known from; and what to
@@ -254,13 +259,6 @@ def unusual(owner: object, place: str) -> list[str]:
         found = USUAL.get(each, {}) | found
     lines = [usual.doubt(f"{place}.{name}", getattr(owner, name)) for name, usual in found.items()]
     return [line for line in lines if line]
-
-
-HOLDS = {
-    "stokes": "Stokes's drag is accurate to 15 %",
-    "shape": "slow flow around a shape is accurate to 15 %",
-    "schiller_naumann": "the drag of Schiller and Naumann is accurate to 5 %",
-}
 
 
 class Settled(NamedTuple):

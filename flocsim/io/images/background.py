@@ -41,6 +41,30 @@ others keep the cores busy these wait for each other, and take thirty times as l
 STRIP = 64
 """Rows of a picture that are worked on at once: what is made of them stays in the cache."""
 
+SAME = 0.02
+"""Greys that differ by less are one: packing as JPEG scatters them."""
+
+STANDING_OUT = 0.1
+"""Least contrast of a bar against what lies beside it."""
+
+FULL = 0.97
+"""Share of its box that a rectangle fills."""
+
+LONG, SLENDER = 16, 4.0
+"""Least length [px], and times the width, of a bar."""
+
+BOXED = 0.02
+"""Least share of a rectangle that writing on it covers: a plain stout one may be anything."""
+
+LARGEST = 0.25
+"""Share of the picture above which a rectangle of one grey is its background."""
+
+AROUND, TALL = 0.6, 60
+"""Writing lies within this share of a bar's length, and letters are no taller [px]."""
+
+MARGIN = 2
+"""Pixels around what is burnt in whose greys are mixed with it."""
+
 
 def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
     """`grey` with detail finer than `scale` [px] removed: exp(−½ (k·scale)²) in Fourier space.
@@ -159,31 +183,6 @@ def _reweighted_fit(basis, values, told, weights):
         solution = np.linalg.lstsq(normal, np.einsum("nk,n->k", weighted, values), rcond=None)[0]
         weights = _weights(values - np.einsum("nk,k->n", basis, solution), told)
     return solution
-
-
-SAME = 0.02
-"""Greys that differ by less are one: packing as JPEG scatters them."""
-
-STANDING_OUT = 0.1
-"""Least contrast of a bar against what lies beside it."""
-
-FULL = 0.97
-"""Share of its box that a rectangle fills."""
-
-LONG, SLENDER = 16, 4.0
-"""Least length [px], and times the width, of a bar."""
-
-BOXED = 0.02
-"""Least share of a rectangle that writing on it covers: a plain stout one may be anything."""
-
-LARGEST = 0.25
-"""Share of the picture above which a rectangle of one grey is its background."""
-
-AROUND, TALL = 0.6, 60
-"""Writing lies within this share of a bar's length, and letters are no taller [px]."""
-
-MARGIN = 2
-"""Pixels around what is burnt in whose greys are mixed with it."""
 
 
 def without_annotations(grey: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

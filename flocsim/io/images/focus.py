@@ -33,6 +33,9 @@ CLEAR = 5.0
 SPREADS = np.geomspace(0.3, 60.0, 240)
 """Softness [px] among which that of an outline is looked up."""
 
+NEAR = 2
+"""Steps around a mask within which the picture tells how steep its edge is."""
+
 
 def rim(mask):
     """The pixels of a mask that have one outside beside, above or below them."""
@@ -102,10 +105,6 @@ class Focus:
             ratio = np.median(clean / np.maximum(self.slopes(more, mask, box), 1e-12))
             return float(np.interp(-ratio, -left_by_blur(float(radius), blur, more), SPREADS))
         return float("inf")
-
-
-NEAR = 2
-"""Steps around a mask within which the picture tells how steep its edge is."""
 
 
 compiled: Callable[..., Any] = cache(lambda kernel: compose(kernel, {}))

@@ -39,6 +39,22 @@ LARGEST_KEPT = 2**31 - 1
 MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)
 """Endings that are taken for masks when a folder is given."""
 
+AGREEING = 0.75
+"""Least share of like neighbours, in the median over labels.
+
+Of ten photographs, listed in docs/images.md, the median grey level has .25 at most, and .70
+smoothed by 2 px or more; labels have 1 where flocs lie apart, and .8 where squares of 5 px cover
+everything.
+"""
+
+BETWEEN = 0.02
+"""Share of pixels that are neither black nor white, away from all edges, that no JPEG mask has."""
+
+EDGE = 2
+"""Pixels on either side of an edge that packing as JPEG makes grey."""
+
+WAY = "fit it without --masks, or give a mask of two values or labels, one value for each floc"
+
 
 def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     """The masks of a file: [(name, (h, w) integer array)], 0 outside.
@@ -171,23 +187,6 @@ def segment_mask(
     seen = mask > 0
     holes = filled(seen) & ~seen
     return Segmentation(labels > 0, regions, rejected, "masked", float("nan"), holes=holes)
-
-
-AGREEING = 0.75
-"""Least share of like neighbours, in the median over labels.
-
-Of ten photographs, listed in docs/images.md, the median grey level has .25 at most, and .70
-smoothed by 2 px or more; labels have 1 where flocs lie apart, and .8 where squares of 5 px cover
-everything.
-"""
-
-BETWEEN = 0.02
-"""Share of pixels that are neither black nor white, away from all edges, that no JPEG mask has."""
-
-EDGE = 2
-"""Pixels on either side of an edge that packing as JPEG makes grey."""
-
-WAY = "fit it without --masks, or give a mask of two values or labels, one value for each floc"
 
 
 def agreement(labels: np.ndarray) -> float:

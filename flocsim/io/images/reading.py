@@ -32,6 +32,20 @@ CHOOSE = "choose with --page and --channel, or save the picture that you want as
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
 
+MOST_PIXELS = 2**27
+"""134 million: some 4 GB while its flocs are looked for."""
+
+PIXELS_PER_BYTE = 10_000
+"""More than any packing makes of a byte of the file: the pixels are not there."""
+
+LARGEST_FILE = 2**32
+MOST_LABELS = 100_000
+MOST_SPREAD = 20
+"""Times the picture's pixels that the boxes around all labels may cover."""
+
+MOST_ARRAYS = 10_000
+LONGEST_NAME = 200
+
 
 def read_grey(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
     """The luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float64 in [0, 1].
@@ -210,21 +224,6 @@ def _luminance(pixels, path):
     opaque = grey[alpha > 0.5]
     backdrop = np.median(opaque) if opaque.size else 0.0
     return alpha * grey + (1.0 - alpha) * backdrop
-
-
-MOST_PIXELS = 2**27
-"""134 million: some 4 GB while its flocs are looked for."""
-
-PIXELS_PER_BYTE = 10_000
-"""More than any packing makes of a byte of the file: the pixels are not there."""
-
-LARGEST_FILE = 2**32
-MOST_LABELS = 100_000
-MOST_SPREAD = 20
-"""Times the picture's pixels that the boxes around all labels may cover."""
-
-MOST_ARRAYS = 10_000
-LONGEST_NAME = 200
 
 
 def check_file(path: Path, what: str) -> None:

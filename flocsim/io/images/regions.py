@@ -29,6 +29,9 @@ STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 NAN = float("nan")
 
+PIXEL_MOMENT = 1.0 / 12.0
+"""Second moment of a pixel about its own centre, over its area [px²]."""
+
 
 @attrs.frozen(eq=False)
 class Region:
@@ -330,10 +333,6 @@ def joined(basins, depth, neck, min_radius):
     left = np.unique(owner[1:])
     share = deepest[np.ix_(left, left)] / np.minimum.outer(peak[left], peak[left])
     return np.concatenate([[0], numbers])[basins], float(share.max())
-
-
-PIXEL_MOMENT = 1.0 / 12.0
-"""Second moment of a pixel about its own centre, over its area [px²]."""
 
 
 def mask_measures(mask: np.ndarray) -> ShapeMeasures:

@@ -22,6 +22,18 @@ from flocsim.io.images.outlines import SHARP
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
 
+DROPPED = "dropped"
+NOT_CHOSEN = "not among those kept"
+MOST_LABEL = 65535
+"""The largest number that a label image of 16 bits has."""
+
+Names = tuple[tuple[str | None, int], ...]
+"""(picture, number) of regions; None where only the number was given."""
+
+Correction = Mapping[str, Names]
+"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in.
+Named as in the overlay and the table, "023.png#7", also if they were left out."""
+
 
 def weighed(found: Sequence[Segmentation], max_blur: float) -> list[Segmentation]:
     """The Segmentations, all of one study, with the weights of their flocs.
@@ -69,20 +81,6 @@ def focus_weights(blur: np.ndarray, limit: np.ndarray) -> np.ndarray:
     softer = np.searchsorted(-blur[order], -limit, side="left")
     weights[known] = 1.0 / shares[softer]
     return weights
-
-
-DROPPED = "dropped"
-NOT_CHOSEN = "not among those kept"
-MOST_LABEL = 65535
-"""The largest number that a label image of 16 bits has."""
-
-Names = tuple[tuple[str | None, int], ...]
-"""(picture, number) of regions; None where only the number was given."""
-
-
-Correction = Mapping[str, Names]
-"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in.
-Named as in the overlay and the table, "023.png#7", also if they were left out."""
 
 
 def read_names(option: str, text: str) -> Names:

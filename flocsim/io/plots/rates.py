@@ -29,6 +29,8 @@ MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
 WATER_WORDS = "with hydrodynamic interaction"
 
+FAILED = STATUS.index("failed")
+
 
 def kernel_of(results: Results) -> Kernel:
     """The rates of results that are known to have some."""
@@ -116,7 +118,6 @@ KERNEL_FIGURES: dict[str, Callable[[Results], Figure]] = {
 
 
 OPENED = [STATUS.index(name) for name in ("opened", "opens_at_least_rate")]
-FAILED = STATUS.index("failed")
 
 
 def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tuple:

@@ -76,6 +76,25 @@ QUANTITIES = (
 )  # fmt: skip
 """What a matrix can hold: also ends of 95 % intervals, and the share that is undecided."""
 
+Factor = tuple[Callable[[np.ndarray], np.ndarray], str]
+
+SOURCES = {
+    "hill": "after P. S. Hill (1992) and G. A. Jackson (1995), as in the codes SLAMS-OIL and CSIRO "
+    "EMS",
+    "burd": "as in A. Burd's coagulation model (2009, BurdLab/MatlabCoagThorium)",
+}
+
+SPHERES = "spheres"
+"""The name of what two spheres in water do, which no formula says."""
+
+ABOUT_SPHERES = [
+    "curvilinear factor 'spheres': how often equivalent spheres touch with hydrodynamic "
+    "interaction, over how often they do without; resistance functions of Jeffrey and "
+    "Onishi (1984) and Jeffrey (1992), the study's own forces, no inertia",
+    "it is for solid spheres: how it changes for shapes and permeable flocs is not known",
+]
+"""Lines for whoever gets numbers with that factor in them."""
+
 
 def number(value: float) -> str:
     """A number with all its digits; nothing where it is not known."""
@@ -191,7 +210,6 @@ def kernel_matrix(
     return text.getvalue()
 
 
-Factor = tuple[Callable[[np.ndarray], np.ndarray], str]
 SETTLING: Factor = lambda p: 0.5 * (p / (1.0 + p)) ** 2, "1/2 (p/(1 + p))^2"
 CORRECTIONS: dict[str, dict[str, Factor]] = {
     "hill": {
@@ -208,23 +226,6 @@ CORRECTIONS: dict[str, dict[str, Factor]] = {
     },
 }
 """{name: {mechanism: (function of p, formula)}}."""
-
-SOURCES = {
-    "hill": "after P. S. Hill (1992) and G. A. Jackson (1995), as in the codes SLAMS-OIL and CSIRO "
-    "EMS",
-    "burd": "as in A. Burd's coagulation model (2009, BurdLab/MatlabCoagThorium)",
-}
-
-SPHERES = "spheres"
-"""The name of what two spheres in water do, which no formula says."""
-
-ABOUT_SPHERES = [
-    "curvilinear factor 'spheres': how often equivalent spheres touch with hydrodynamic "
-    "interaction, over how often they do without; resistance functions of Jeffrey and "
-    "Onishi (1984) and Jeffrey (1992), the study's own forces, no inertia",
-    "it is for solid spheres: how it changes for shapes and permeable flocs is not known",
-]
-"""Lines for whoever gets numbers with that factor in them."""
 
 
 def formula(name: str, mechanism: str) -> Factor:

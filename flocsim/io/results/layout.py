@@ -35,6 +35,14 @@ SCHEMA_VERSION = 7
 
 PAGE = 16_384
 
+ROWS = 32_768
+"""Rows of a block, 3.7 MB."""
+
+NUMBERS = "replicate"
+"""The column of replicates' numbers, which is as long as one condition."""
+
+TOKEN_SIZE = 32
+
 
 class SparseImage(io.RawIOBase):
     """A file in memory of which only what is written takes space, in pages of PAGE bytes; h5py
@@ -165,15 +173,6 @@ def empty_dataset(group, name, values):
     plan.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
     little = values.dtype.newbyteorder("<")
     return group.create_dataset(name, values.shape, little, dcpl=plan)
-
-
-ROWS = 32_768
-"""Rows of a block, 3.7 MB."""
-
-NUMBERS = "replicate"
-"""The column of replicates' numbers, which is as long as one condition."""
-
-TOKEN_SIZE = 32
 
 
 @attrs.frozen(eq=False)

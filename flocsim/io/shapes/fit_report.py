@@ -22,6 +22,24 @@ from flocsim.io.terminal import aligned
 CLASS_LIMIT = 5.0
 """r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
 
+MOST_ERROR = 5.0
+"""RE [%] above which the form of a floc is lost on its outline of so few vertices."""
+
+LEAST_FALL, MOST_FALL = 1.0, 2.0
+"""Powers of N by which RE falls at least and at most: of ragged and of smooth outlines."""
+
+COLUMNS = (
+    "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
+    "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted", "weight",
+    "perimeter_px", "aspect_ratio", "circularity", "solidity", "feret_max_px", "feret_min_px",
+)  # fmt: skip
+
+SHARES = (0.1, 0.5, 0.9)
+"""Of the flocs, or of their volume, that are smaller than D10, D50 and D90."""
+
+FEWEST = 3
+"""Flocs of different sizes from which on a slope has an error."""
+
 
 def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
@@ -64,13 +82,6 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
                 "a smaller --radius",
                 file=sys.stderr,
             )
-
-
-MOST_ERROR = 5.0
-"""RE [%] above which the form of a floc is lost on its outline of so few vertices."""
-
-LEAST_FALL, MOST_FALL = 1.0, 2.0
-"""Powers of N by which RE falls at least and at most: of ragged and of smooth outlines."""
 
 
 def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
@@ -133,13 +144,6 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
     return "\n".join(lines)
 
 
-COLUMNS = (
-    "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
-    "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted", "weight",
-    "perimeter_px", "aspect_ratio", "circularity", "solidity", "feret_max_px", "feret_min_px",
-)  # fmt: skip
-
-
 def summary_text(pictures: Sequence[Any]) -> str:
     """The table of all regions as CSV: flocs with their shape measures and RE [%] for every r [px]
     and N, others with why.
@@ -176,13 +180,6 @@ def _facts(region, pixel_size):
     parted = "" if region.parted != region.parted else f"{region.parted:.2f}"
     size = region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}"
     return f"{x:.2f}", f"{y:.2f}", *size, *told, low, high, parted, f"{region.weight:.4g}"
-
-
-SHARES = (0.1, 0.5, 0.9)
-"""Of the flocs, or of their volume, that are smaller than D10, D50 and D90."""
-
-FEWEST = 3
-"""Flocs of different sizes from which on a slope has an error."""
 
 
 class Slope(NamedTuple):
