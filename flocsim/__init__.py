@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from flocsim.geometry.shapes.shape import Shape, Sphere
     from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
     from flocsim.integrators.base import Integrator, Status
-    from flocsim.io.results.curvilinear import curvilinear_factor
+    from flocsim.io.results.kernel_tables import curvilinear_factor
     from flocsim.io.results.swarm_file import SwarmResults
     from flocsim.io.results.sweep_file import SweepResults
     from flocsim.swarms.placement import floor, wall
@@ -54,7 +54,7 @@ HOMES = {
     "System": "system",
     "Trajectory": "trajectories.trajectory",
     "compare": "ensembles.comparison",
-    "curvilinear_factor": "io.results.curvilinear",
+    "curvilinear_factor": "io.results.kernel_tables",
     "floor": "swarms.placement",
     "open": "ensembles.contents:open_any",
     "sweep": "ensembles.studies.sweep",

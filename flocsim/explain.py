@@ -29,8 +29,7 @@ from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.plausibility.doubts import doubts_of
-from flocsim.plausibility.reynolds import all_settled, settled
+from flocsim.plausibility.doubts import all_settled, doubts_of, settled
 from flocsim.plausibility.settling import lone_view
 
 LAWLESS = (
@@ -70,7 +69,7 @@ def explain(system: Any) -> str:
             *machinery_lines(system),
             "in:  recording: every accepted step; run(record=False) keeps start and end only",
             "out: events and observer: a plain run has none; an ensemble adds its own",
-            *settling_lines(system),
+            *(f"settling: a body of {each.words}" for each in all_settled(system) if each.speed),
             *scale_lines(system),
             *(f"warning: {line}" for line in doubts_of([system])),
         ]
@@ -239,11 +238,6 @@ def history_line(system):
     if any(holds_slip(system, force) for force in forces):
         return "in:  tangential history: displacements are kept while a contact lasts"
     return "idle: tangential history: no tangential stiffness, displacements carry no force"
-
-
-def settling_lines(system):
-    """A line for every kind of body that settles: its speed, Reynolds and Stokes number."""
-    return [f"settling: a body of {each.words}" for each in all_settled(system) if each.speed > 0.0]
 
 
 def exerts_torque(system, force):

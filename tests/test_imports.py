@@ -61,7 +61,7 @@ INNER_ROWS = {
     ],
     "brownian": [["meeting"], ["splitting"]],
     "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
-    "plausibility": [["doubts"], ["ranges", "reynolds"], ["settling"]],
+    "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],
         ["implicit"],
@@ -93,16 +93,9 @@ INNER_ROWS = {
         ["plots"],
         ["shapes", "trajectory"],
         ["images", "results", "journal", "exchange"],
-        ["outputs", "opening", "groups"],
-        [
-            "files",
-            "hdf5",
-            "json_text",
-            "labelled",
-            "confidence",
-            "terminal",
-        ],
-        ["pieces"],
+        ["outputs", "groups", "records"],
+        ["files", "hdf5", "json_text", "labelled", "confidence", "terminal"],
+        ["seals"],
     ],
 }
 
@@ -110,7 +103,6 @@ INNER_ROWS = {
 HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/communicator.py"],
     "h5py": [
-        "io/opening.py",
         "io/groups.py",
         "io/results/layout.py",
         "io/trajectory.py",

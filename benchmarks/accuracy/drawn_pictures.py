@@ -14,7 +14,8 @@ from scipy.ndimage import gaussian_filter, label
 from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.io.images.outlines import EIGHT, filled
-from flocsim.io.images.pictures import read_grey, segment
+from flocsim.io.images.pictures import segment
+from flocsim.io.images.reading import read_grey
 
 SOOT = "soot_tem/201805A_A6_004_half"
 FRAME = (600, 800)

@@ -33,11 +33,11 @@ from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.storage.resume import RESUME, begin, claim
 from flocsim.ensembles.study import Study
-from flocsim.io.files import read_sealed
-from flocsim.io.journal.journal import journal_path
-from flocsim.io.journal.records import SESSION, encode
+from flocsim.io.journal import journal_path
+from flocsim.io.records import SESSION, encode
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import NOT_APPLICABLE
+from flocsim.io.seals import read_sealed
 from tests.helpers.results_files import same_data
 
 SHARE_OLD = 0.2

@@ -16,8 +16,8 @@ from flocsim.ensembles.storage.resume import Beginning, take_journal
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
-from flocsim.io.journal.journal import Journal
-from flocsim.io.journal.records import Damage, scan
+from flocsim.io.journal import Journal
+from flocsim.io.records import Damage, scan
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 

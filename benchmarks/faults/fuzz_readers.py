@@ -71,7 +71,7 @@ def read_kernel_file(path):
 def read_strengths_file(path):
     """Read it, describe it, draw it."""
     from flocsim.ensembles.estimates.strengths import table_of
-    from flocsim.io.plots.strength import over_rate
+    from flocsim.io.plots.rates import over_rate
     from flocsim.io.results.strength_file import read_strengths
 
     found = read_strengths(path)
@@ -96,7 +96,8 @@ def read_library_file(path):
 def read_picture_file(path):
     """Read it as a picture and as a mask, and look for flocs."""
     from flocsim.io.images.masks import read_masks, segment_mask
-    from flocsim.io.images.pictures import read_grey, segment
+    from flocsim.io.images.pictures import segment
+    from flocsim.io.images.reading import read_grey
 
     try:
         grey = read_grey(path)
@@ -150,7 +151,7 @@ class SwarmJournalReader:
     def __init__(self, folder):
         from flocsim.ensembles.chunks import chunk_record, kept_record
         from flocsim.ensembles.swarms.study import SwarmStudy
-        from flocsim.io.journal.records import CHUNK, SNAPSHOT, record_at
+        from flocsim.io.records import CHUNK, SNAPSHOT, record_at
         from tests.helpers.swarm_study import swarm_config
 
         self.study, self.identity, self.parts = SwarmStudy(swarm_config(folder)), {"seed": 1}, []
@@ -176,7 +177,7 @@ class SwarmJournalReader:
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.ensembles.swarms.kind import results
-        from flocsim.io.journal.journal import Journal
+        from flocsim.io.journal import Journal
         from flocsim.io.results.swarm_file import table_of
 
         journal = Journal(path)
@@ -237,7 +238,7 @@ class JournalReader:
         from flocsim.ensembles.collision.draw import FAILURES
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.io.journal.journal import Journal
+        from flocsim.io.journal import Journal
         from flocsim.io.results.checks import check_rows
 
         journal = Journal(path)

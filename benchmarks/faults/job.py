@@ -14,8 +14,8 @@ import attrs
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
-from flocsim.io.journal.journal import journal_path
-from flocsim.io.journal.records import CHUNK, Record, scan
+from flocsim.io.journal import journal_path
+from flocsim.io.records import CHUNK, Record, scan
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 

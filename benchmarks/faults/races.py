@@ -29,7 +29,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.errors import FlocsimError
-from flocsim.io.journal.records import CHUNK, SESSION, Record, scan
+from flocsim.io.records import CHUNK, SESSION, Record, scan
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 

@@ -27,9 +27,8 @@ from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.io.journal.journal import MemoryJournal
-from flocsim.io.results.layout import frame_of
-from flocsim.io.results.row_file import ROWS, RowFile, new_row_file, plan_of
+from flocsim.io.journal import MemoryJournal
+from flocsim.io.results.layout import ROWS, RowFile, frame_of, new_row_file, plan_of
 
 BANDWIDTHS = (5.0, 20.0, 100.0)
 """GB/s at which a file system serves all ranks that read or write parts of one file."""

@@ -13,7 +13,7 @@ from flocsim.ensembles.parallel.communicator import SLEEP, ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState, chunk_seconds
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.io.journal.journal import Journal
+from flocsim.io.journal import Journal
 
 LATENCY = SLEEP + 1e-4
 """Seconds between a rank's request and its arrival, half a look for messages each way included."""

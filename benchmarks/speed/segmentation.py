@@ -22,7 +22,8 @@ from scipy.ndimage import gaussian_filter
 
 from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.io.images.pictures import read_grey, segment
+from flocsim.io.images.pictures import segment
+from flocsim.io.images.reading import read_grey
 
 SEGMENTED = (
     "flocpy/023.png", "flocpy/024.png", "flocpy/025.png", "safas/brightfield_flocs.png",

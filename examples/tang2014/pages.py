@@ -12,7 +12,8 @@ from summary import write_summary
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
-from flocsim.io.results.file import CLASSES, read_results
+from flocsim.io.results.file import read_results
+from flocsim.io.results.schema import CLASSES
 from flocsim.io.shapes.library import read_library
 
 MOST_VERTICES = 64

@@ -11,7 +11,7 @@ from claims.verdicts import interval_of
 from output import marked, write_page
 
 from flocsim.io.confidence import proportion
-from flocsim.io.results.file import CLASSES
+from flocsim.io.results.schema import CLASSES
 from flocsim.io.terminal import markdown_table
 
 FLIP_KINDS = ("outcome", "aggregation", "zone")

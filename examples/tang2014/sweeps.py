@@ -13,7 +13,7 @@ from scipy.optimize import isotonic_regression
 from flocsim.ensembles import load_config, run
 from flocsim.ensembles.config.loader import lay_over
 from flocsim.io.confidence import proportion
-from flocsim.io.results.file import CLASSES
+from flocsim.io.results.schema import CLASSES
 
 STUDY = Path(__file__).resolve().parent / "study.toml"
 TYPES = ("I", "II", "III")

@@ -1,8 +1,7 @@
-"""The subcommands of ``flocsim``, one file each; ``fitting`` is the work behind ``fit``,
-``reporting`` that behind ``report``.
+"""The subcommands of ``flocsim``; ``fitting`` is the work behind ``fit``.
 
-A subcommand is a file with ``add_parser(subparsers)`` and ``run(arguments)``, the exit code, and
-has a line in SUMMARIES.
+A file has ``add_parser(subparsers)``, by which its subcommands set ``run(arguments)``, the exit
+code; each has a line in SUMMARIES, and one in FILES where its file has another name.
 """
 
 SUMMARIES = {
@@ -34,10 +33,12 @@ FOLDER_HELP = (
 )
 
 ENSEMBLES = "ensemble", "kernel", "swarm"
-"""Commands of one file: a study by the name of its kind of scene."""
+"""A study by the name of its kind of scene."""
+
+FILES = {"compare": "plot"} | dict.fromkeys(ENSEMBLES, "sweep")
+"""{command: the file that it shares}."""
 
 
 def file_of(command: str) -> str:
     """The module of a command."""
-    name = ENSEMBLES[0] if command in ENSEMBLES else command
-    return f"flocsim.commands.{name.replace('-', '_')}"
+    return f"flocsim.commands.{FILES.get(command, command).replace('-', '_')}"

@@ -14,7 +14,7 @@ from typing import Any
 import attrs
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.precision.judged import (
+from flocsim.commands.judged import (
     HEADER,
     RIGHT,
     STATED,
@@ -32,7 +32,7 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
 from flocsim.ensembles.preflight import check_study, measured_flocs
 from flocsim.errors import ConfigError, UsageError
-from flocsim.fields.quantities import read_number
+from flocsim.fields import read_number
 from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.terminal import tell

@@ -10,17 +10,19 @@ import numpy as np
 from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
-from flocsim.io.files import held, write_file
+from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.results.curvilinear import CORRECTIONS, SPHERES
 from flocsim.io.results.kernel_tables import (
+    CORRECTIONS,
     MODELS,
     OF_MODELS,
     QUANTITIES,
     REFERENCES,
+    SPHERES,
     kernel_csv,
     kernel_matrix,
 )
+from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
 SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS} | {"csv": ".csv", "matrix": ".csv"}
@@ -64,7 +66,10 @@ def run(args: argparse.Namespace) -> int:
         raise UsageError(
             f"--curvilinear is for matrices, not {args.format}: export matrix, or leave it out"
         )
-    path = named(args)
+    suffix = SUFFIXES[args.format]
+    path = Path(args.output or f"{Path(args.source).stem}{suffix}")
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"--output {path}: the name must end in {suffix}")
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.source])
     if args.format == "csv":
@@ -75,15 +80,6 @@ def run(args: argparse.Namespace) -> int:
         WRITERS[path.suffix.lower()](path, t, position, velocity, shapes, rule)
     print(path)
     return 0
-
-
-def named(args):
-    """The file to write; UsageError where its name has another ending."""
-    suffix = SUFFIXES[args.format]
-    path = Path(args.output or f"{Path(args.source).stem}{suffix}")
-    if path.suffix.lower() != suffix:
-        raise UsageError(f"--output {path}: the name must end in {suffix}")
-    return path
 
 
 def kernel_in(path):
@@ -127,7 +123,7 @@ def run_matrices(args):
         if args.what in OF_MODELS and args.model not in REFERENCES.get(mechanism, {}):
             continue
         formulas = CORRECTIONS.get(args.curvilinear)
-        if formulas is not None and mechanism not in formulas.mechanisms:
+        if formulas is not None and mechanism not in formulas:
             without.append(mechanism)
             continue
         for count in kernel.vertices.tolist():

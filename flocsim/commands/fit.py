@@ -6,27 +6,39 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.fitting.overlays import draw, draw_fits, expected_overlays, pictures_beneath
+from flocsim.commands.fitting.overlays import (
+    draw,
+    draw_fits,
+    expected_overlays,
+    pictures_beneath,
+    stem_of,
+)
 from flocsim.commands.fitting.pictures import (
     LOST,
-    Options,
+    distinct,
     fit_pictures,
     list_pictures,
     report,
     titles_of,
 )
 from flocsim.errors import UsageError
-from flocsim.fields.quantities import read_number
+from flocsim.fields import read_number
 from flocsim.io.files import make_folder, write_file
-from flocsim.io.images.correction import Correction, label_image, read_names
 from flocsim.io.images.masks import MASK_SUFFIXES
+from flocsim.io.images.selection import label_image, read_names
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
-from flocsim.io.shapes.fit_report import coarse_line, errors_of, format_errors, plural, summary_text
+from flocsim.io.shapes.fit_report import (
+    coarse_line,
+    errors_of,
+    format_errors,
+    plural,
+    population_lines,
+    summary_text,
+)
 from flocsim.io.shapes.library import make_entry, write_library
-from flocsim.io.shapes.population import population_lines
-from flocsim.plausibility.ranges import PIXEL_SIZE
+from flocsim.plausibility.doubts import PIXEL_SIZE
 
 DESCRIPTION = """\
 Find the flocs in pictures, fit a spheropolygon to each at every requested number of vertices, and
@@ -134,12 +146,12 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit, print what was found and write the library; returns the exit code."""
-    options = read_options(args)
+    read_numbers(args)
     summary = args.summary or Path(args.output).with_suffix(".csv")
     if args.overlay is not None:
         checked_format(args.overlay, "--overlay ")
-    paths = list_pictures(args.images, options.masks)
-    if options.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):
+    paths = list_pictures(args.images, args.masks)
+    if args.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):
         raise UsageError(
             "--pixel-size is missing, and only OME-TIFF and ImageJ files give the size of a "
             "pixel; give the length of its side, for example --pixel-size '0.95 um'"
@@ -156,63 +168,53 @@ def run(args: argparse.Namespace) -> int:
         made = label_paths(args.masks_out, titles_of(paths)).values()
         outputs += [Output(path, rule) for path in made]
     check_outputs(outputs, [*paths, *beneath.values()])
-    doubt = options.pixel_size and PIXEL_SIZE.doubt("--pixel-size", options.pixel_size)
+    doubt = args.pixel_size and PIXEL_SIZE.doubt("--pixel-size", args.pixel_size)
     if doubt:
         report(f"warning: {doubt}")
     try:
-        pictures, fits, bands, lost = fit_pictures(paths, options)
+        pictures, lost = fit_pictures(paths, args)
     except KeyboardInterrupt:
         print("flocsim: interrupted; no shape library was written", file=sys.stderr)
         return 130
-    if options.pixel_size is None:
+    if args.pixel_size is None:
         doubt = say_sizes(pictures)
     if args.masks_out is not None:
         write_labels(args.masks_out, pictures, titles_of(paths), rule)
-    flocs = [(picture, region) for picture in pictures for region in picture.regions]
-    several = len(options.radii) > 1
     entries = [
-        make_entry(
-            picture.name,
-            region,
-            fit[radius],
-            picture.pixel_size,
-            radius,
-            several,
-            picture.measures[region.label],
-            tuple(each[radius] for each in band),
-        )
-        for radius in options.radii
-        for (picture, region), fit, band in zip(flocs, fits, bands, strict=True)
-    ]
-    table = summary_text(pictures, fits).encode()
+        make_entry(picture, region, picture.fits[region.label], radius, len(args.radii) > 1)
+        for radius in args.radii for picture in pictures for region in picture.regions
+    ]  # fmt: skip
+    table = summary_text(pictures).encode()
     if not entries:
         if args.summary:
             write_file(summary, table, rule)
         print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
         return LOST if lost else 2
-    settings = {"method": options.method, "preserve_area": options.preserve_area,
-                "inscribed": options.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
-    if options.holes:
+    settings = {"method": args.method, "preserve_area": args.preserve_area,
+                "inscribed": args.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
+    if args.holes:
         settings["holes"] = True
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:
-        lost += draw(Path(args.overlay), pictures, fits, options, drawn, len(paths) > 1, beneath)
+        lost += draw(Path(args.overlay), pictures, args, drawn, len(paths) > 1, beneath)
     if args.fits is not None:
-        draw_fits(args.fits, pictures, fits, options, drawn)
+        draw_fits(args.fits, pictures, args, drawn)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     if coarse := coarse_line(errors_of(entries)):
         print(f"warning: {coarse} (--vertices)")
-    counts = ", ".join(map(str, options.vertices))
-    print(f"{args.output}: {plural(len(fits), 'floc')} at N = {counts}; {summary}: all regions")
+    counts, flocs = ", ".join(map(str, args.vertices)), sum(len(each.regions) for each in pictures)
+    print(f"{args.output}: {plural(flocs, 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:
         return 0
     report(f"lost: {', '.join(lost)}; all else was written")
     return LOST
 
 
-def read_options(args):
-    """Options from argparse's; UsageError for a number that does not make sense."""
+def read_numbers(args: argparse.Namespace) -> None:
+    """Put values in the place of the texts in argparse's arguments: lengths [m or px], counts; with
+    1 among the ``vertices``, ``radii`` rising, ``segmentation`` {option of `segment`: value} and a
+    ``correction``. UsageError for what does not make sense."""
     if args.masks and (args.page or args.channel or args.crop):
         raise UsageError("--page, --channel and --crop apply to pictures, not to --masks")
     if args.page not in (None, "all"):
@@ -228,14 +230,14 @@ def read_options(args):
         )
     limit = float("inf") if args.max_radius is None else positive("--max-radius", args.max_radius)
     endless = args.max_blur.strip() == "inf"
-    threshold = args.threshold
+    threshold, neck = args.threshold, args.neck
     if threshold is not None:
         threshold = number("--threshold", threshold, "a contrast above 0, to 1", 5e-324, 1.0)
-    correction = {
+    args.correction = {
         key: () if text is None else read_names(f"--{key}", text)
         for key, text in (("drop", args.drop), ("keep", args.keep), ("add", args.add))
     }
-    segmentation = {
+    args.segmentation = {
         "flocs": args.flocs,
         "threshold": threshold,
         "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
@@ -243,29 +245,14 @@ def read_options(args):
         "min_radius": positive("--min-radius", args.min_radius),
         "max_radius": limit,
         "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
-        "neck": None
-        if args.neck is None
-        else number("--neck", args.neck, "a share from 0 to 1", 0.0, 1.0),
+        "neck": None if neck is None else number("--neck", neck, "a share from 0 to 1", 0.0, 1.0),
     }
-    return Options(
-        pixel_size=args.pixel_size and length("--pixel-size", args.pixel_size),
-        pages=args.page,
-        channel=args.channel,
-        crop=args.crop and rectangle(args.crop),
-        vertices=tuple(sorted({1, *(whole("--vertices", p) for p in args.vertices.split(","))})),
-        radii=tuple(sorted({positive("--radius", p, "pixels") for p in args.radius.split(",")})),
-        method=args.method,
-        preserve_area=args.preserve_area,
-        inscribed=args.inscribed,
-        holes=args.holes,
-        band=args.band,
-        max_flocs=None if args.max_flocs is None else whole("--max-flocs", args.max_flocs),
-        masks=args.masks,
-        background=args.background,
-        jobs=whole("--jobs", args.jobs),
-        segmentation=segmentation,
-        correction=Correction(**correction),
-    )
+    args.pixel_size = args.pixel_size and length("--pixel-size", args.pixel_size)
+    args.crop = args.crop and rectangle(args.crop)
+    args.vertices = sorted({1, *(whole("--vertices", each) for each in args.vertices.split(","))})
+    args.radii = sorted({positive("--radius", each, "pixels") for each in args.radius.split(",")})
+    args.max_flocs = None if args.max_flocs is None else whole("--max-flocs", args.max_flocs)
+    args.jobs = whole("--jobs", args.jobs)
 
 
 def number(option, text, meaning, least, most):
@@ -328,15 +315,8 @@ def whole(option, text):
 
 def label_paths(folder, names):
     """{name of a picture: path of its label image}, all different."""
-    paths: dict[str, Path] = {}
-    for name in names:
-        plain = name.replace(":", "-").replace("/", "-")
-        stem = Path(plain).stem if Path(plain).suffix.lower() in MASK_SUFFIXES else plain
-        path = Path(folder, f"{stem}.png")
-        while path in paths.values():  # a.png and a.tif
-            path = path.with_name(f"{path.stem}'.png")
-        paths[name] = path
-    return paths
+    made = distinct((stem_of(name, MASK_SUFFIXES) for name in names), ".png")
+    return {name: Path(folder, file) for name, file in zip(names, made, strict=True)}
 
 
 def write_labels(folder, pictures, titles, rule):

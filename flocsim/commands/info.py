@@ -8,8 +8,8 @@ from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
 from flocsim.errors import FileError, visible
-from flocsim.io.files import held
-from flocsim.io.journal.journal import journal_of
+from flocsim.io.journal import journal_of
+from flocsim.io.seals import held
 
 
 def add_parser(subparsers: Any) -> None:

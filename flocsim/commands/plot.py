@@ -1,4 +1,5 @@
-"""`flocsim plot`: the paper's figures from a results file or a shape library."""
+"""`flocsim plot`: the paper's figures from a results file or a shape library; `flocsim compare`:
+what one study has more of than another."""
 
 import argparse
 import math
@@ -9,11 +10,12 @@ from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.kinds import FILES, contents_of
 from flocsim.ensembles.contents import file_kind, studies
 from flocsim.errors import UsageError
-from flocsim.io.files import held, make_folder
-from flocsim.io.journal.journal import journal_of
+from flocsim.io.files import make_folder
+from flocsim.io.journal import journal_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.results import MOST_ROWS
 from flocsim.io.plots.style import FORMATS, mark_figure, save
+from flocsim.io.seals import held
 
 
 def listed(figures):
@@ -52,6 +54,7 @@ def add_parser(subparsers: Any) -> None:
         help="for a swarm study: also write its first swarm as an animation")  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run)
+    add_compare(subparsers)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -122,3 +125,37 @@ def figure_names(text):
         found = ", ".join(map(repr, unknown)) or "none"
         raise UsageError(f"--figures: found {found}; choose from {', '.join(known)}")
     return names
+
+
+def add_compare(subparsers: Any) -> None:
+    parser = subparsers.add_parser(
+        "compare",
+        help=SUMMARIES["compare"],
+        description="Print the differences between two results files, at every condition, or time, "
+        "that both have, with 95 % intervals: of paired replicates where both have drawn the same "
+        "ones (the same seed), otherwise of independent samples. What the studies differ in is "
+        "printed first.",
+    )
+    parser.add_argument("first", help="results file written by flocsim ensemble")
+    parser.add_argument("second", help="results file to compare with it")
+    known = "; ".join(
+        f"of {kind.title} "
+        + ", ".join(f"{name} ({words})" for name, words in kind.compared.items())
+        for kind in studies() if kind.compared
+    ).replace("%", "%%")  # fmt: skip
+    parser.add_argument(
+        "--quantity", "--probability", metavar="NAME",
+        help=f"what to compare: {known} (default: the first)",
+    )  # fmt: skip
+    parser.set_defaults(run=run_compare)
+
+
+def run_compare(args: argparse.Namespace) -> int:
+    """Print the comparison; the exit code."""
+    from flocsim.ensembles.comparison import compare
+
+    both = [file_kind(source := held(path), "compare").opened(source)
+            for path in (args.first, args.second)]  # fmt: skip
+    comparison = compare(*both)
+    print(comparison.table(*filter(None, [args.quantity])))
+    return 0

@@ -11,9 +11,15 @@ from flocsim.commands import SUMMARIES
 from flocsim.commands.fit import number
 from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.shapes.fit_report import coarse_line, errors_of, plural
+from flocsim.io.shapes.fit_report import (
+    coarse_line,
+    errors_of,
+    measures_in,
+    plural,
+    population_lines,
+)
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
-from flocsim.io.shapes.population import measures_in, population_lines
+from flocsim.io.terminal import aligned
 
 DESCRIPTION = """\
   flocsim shapes list shapes.h5
@@ -64,17 +70,20 @@ def run_list(args: argparse.Namespace) -> int:
     for library in args.libraries:
         entries = selected(read_library(library), args, library)
         counts = [count for count in entries[0].fits if count > 1] if entries else []
-        heads = ["r_eq um", "pixel um", "r px", *MEASURES, *(f"RE% N={count}" for count in counts)]
-        wide = max([len(visible(each.floc_id, keep="")) for each in entries] + [4])
-        print(f"{library}: {plural(len(entries), 'floc')}")
-        print("  ".join([f"{'name':<{wide}}", *(f"{head:>8}" for head in heads)]))
+        rows = [["name", "r_eq um", "pixel um", "r px", *MEASURES,
+                 *(f"RE% N={count}" for count in counts)]]  # fmt: skip
         for each in entries:
-            cells = [
-                f"{MICRO * each.measured_radius:8.4g}", f"{MICRO * each.pixel_size:8.4g}",
-                f"{each.spheroradius:8g}", *measure_cells(each),
-                *(f"{each.fits[count].relative_error:8.2f}" for count in counts),
-            ]  # fmt: skip
-            print("  ".join([f"{visible(each.floc_id, keep=''):<{wide}}", *cells]))
+            found = measures_in(each)
+            lengths = (each.measured_radius, each.pixel_size)
+            sizes = (found.perimeter, found.feret_max, found.feret_min)
+            shares = (found.aspect_ratio, found.circularity, found.solidity)
+            rows.append([
+                visible(each.floc_id, keep=""), *(f"{MICRO * length:.4g}" for length in lengths),
+                f"{each.spheroradius:g}", *(f"{MICRO * length:.4g}" for length in sizes),
+                *(f"{share:.3f}" for share in shares),
+                *(f"{each.fits[count].relative_error:.2f}" for count in counts),
+            ])  # fmt: skip
+        print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
         if entries:
             print("\n".join(population_lines(entries)))
         if coarse := coarse_line(errors_of(entries)):
@@ -82,14 +91,6 @@ def run_list(args: argparse.Namespace) -> int:
         if any(each.measures is None for each in entries):
             print("shape measures of the finest fit where the library has none of the picture")
     return 0
-
-
-def measure_cells(entry):
-    """What stands under the heads of MEASURES."""
-    found = measures_in(entry)
-    lengths = (found.perimeter, found.feret_max, found.feret_min)
-    shares = (found.aspect_ratio, found.circularity, found.solidity)
-    return [*(f"{MICRO * each:8.4g}" for each in lengths), *(f"{each:8.3f}" for each in shares)]
 
 
 def run_write(args: argparse.Namespace) -> int:
@@ -112,29 +113,24 @@ def run_write(args: argparse.Namespace) -> int:
 
 
 def read_all(paths):
-    """[(path, entries)] of libraries, and the settings on which all of them agree."""
+    """[(path, entries)] of libraries, and their settings, all values where they do not agree."""
     libraries = [(path, read_library(path)) for path in paths]
     first = tuple(libraries[0][1][0].fits)
     for path, entries in libraries:
         if tuple(entries[0].fits) != first:
+            here, there = (", ".join(map(str, counts)) for counts in (entries[0].fits, first))
             raise UsageError(
-                f"{path} has fits at N = {numbers(entries[0].fits)}, {paths[0]} at N = "
-                f"{numbers(first)}: fit both at the same --vertices"
+                f"{path} has fits at N = {here}, {paths[0]} at N = {there}: fit both at the same "
+                "--vertices"
             )
     settings = [read_settings(path) for path in paths]
     keys = dict.fromkeys(key for each in settings for key in each)
-    return libraries, {
-        key: agreed(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
+    found = {
+        key: list(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
     }
-
-
-def agreed(values):
-    """The one value of a setting, or all of them in words."""
-    return next(iter(values)) if len(values) == 1 else ", ".join(map(str, values))
-
-
-def numbers(counts):
-    return ", ".join(map(str, counts))
+    return libraries, {
+        key: each[0] if len(each) == 1 else ", ".join(map(str, each)) for key, each in found.items()
+    }
 
 
 def merged_entries(libraries):

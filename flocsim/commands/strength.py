@@ -59,7 +59,7 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
     from flocsim.ensembles.pairs.opened import open_results
     from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.strength.kind import Bonds, config_of
-    from flocsim.io.journal.journal import SUFFIX
+    from flocsim.io.journal import SUFFIX
     from flocsim.io.plots.style import checked_format
 
     output, figure = places(args)
@@ -80,7 +80,7 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
 
 def run(args: Namespace) -> int:
     """Survey, write, print, and draw; the exit code."""
-    from flocsim.io.plots.strength import over_rate
+    from flocsim.io.plots.rates import over_rate
     from flocsim.io.plots.style import save
     from flocsim.io.results.strength_file import read_strengths
 

@@ -1,4 +1,6 @@
-"""`flocsim sweep s.toml --over KEY=1,2,3`: one study at several values of its keys, in one file."""
+"""`flocsim ensemble s.toml`: a study, the same as `python -m flocsim.ensemble s.toml`, by another
+name, `flocsim swarm` and `flocsim kernel`, of that kind of scene; `flocsim sweep s.toml --over
+KEY=1,2,3`: one study at several values of its keys, in one file."""
 
 import os
 import re
@@ -9,7 +11,8 @@ from shlex import quote
 from types import FrameType
 from typing import Any
 
-from flocsim.commands import SUMMARIES
+from flocsim.commands import ENSEMBLES, SUMMARIES
+from flocsim.ensembles.cli import add_arguments, run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
@@ -48,6 +51,10 @@ def add_parser(subparsers: Any) -> None:
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--dry-run", action="store_true", help="print a command for each value, and stop")
     parser.set_defaults(run=run)
+    for name in ENSEMBLES:
+        words = SUMMARIES[name]
+        parser = subparsers.add_parser(name, help=words, description=words)
+        add_arguments(parser).set_defaults(run=run_command)
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:
@@ -60,18 +67,32 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 
 def run(args: Namespace) -> int:
-    """Run what is missing and join it; the exit code."""
+    """Run what is missing and join it, or find elasticities; the exit code."""
     from flocsim.ensembles.storage.resume import WAYS
-    from flocsim.ensembles.studies.study import Study, settings_of
-    from flocsim.ensembles.studies.sweep import planned, sweep
+    from flocsim.ensembles.studies.study import Study
 
     if bool(args.elasticities) == bool(args.over):
         raise UsageError("sweep needs one of --over KEY=VALUE,VALUE and --elasticities KEY,KEY")
     study = Study(args.config)
     if args.settings:
         study = study.with_(nested(map(parse_setting, args.settings)))
-    if args.elasticities:
-        return run_elasticities(args, study)
+    how = {
+        "jobs": args.jobs, "mode": "resume" if args.resume else "new",
+        "overwrite": args.overwrite, "tell": tell, "ways": WAYS,
+    }  # fmt: skip
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        return (run_elasticities if args.elasticities else run_sweep)(args, study, how)
+    except KeyboardInterrupt:
+        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
+        return STOPPED
+
+
+def run_sweep(args, study, how):
+    """Run what is missing and join it, or say what there is to run."""
+    from flocsim.ensembles.studies.study import settings_of
+    from flocsim.ensembles.studies.sweep import planned, sweep
+
     if args.ratio is not None:
         raise UsageError("--ratio is for --elasticities: leave it out")
     pairs = [values_of(text) for text in args.over]
@@ -84,22 +105,13 @@ def run(args: Namespace) -> int:
             words = " ".join(f"--set {quote(f'{k}={v}')}" for k, v in settings_of(part.overrides))
             tell(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        sweep(
-            study, over, output, jobs=args.jobs, mode="resume" if args.resume else "new",
-            overwrite=args.overwrite, tell=tell, ways=WAYS,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
-        return STOPPED
+    sweep(study, over, output, **how)
     tell(os.fspath(output))
     return 0
 
 
-def run_elasticities(args: Namespace, study: Any) -> int:
-    """Run both values of each key, print the table and write the figure; the exit code."""
-    from flocsim.ensembles.storage.resume import WAYS
+def run_elasticities(args, study, how):
+    """Run both values of each key, print the table and write the figure."""
     from flocsim.ensembles.studies.elasticity import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
     from flocsim.io.plots.style import checked_format, save
@@ -112,16 +124,8 @@ def run_elasticities(args: Namespace, study: Any) -> int:
     rule = figure_rule(args.overwrite)
     check_outputs([Output(picture, rule)], [args.config])
     keys = [key.strip() for key in args.elasticities.split(",") if key.strip()]
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        found = elasticities(
-            study, keys, picture, ratio=RATIO if args.ratio is None else args.ratio,
-            jobs=args.jobs, mode="resume" if args.resume else "new", overwrite=args.overwrite,
-            tell=tell, ways=WAYS,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
-        return STOPPED
+    ratio = RATIO if args.ratio is None else args.ratio
+    found = elasticities(study, keys, picture, ratio=ratio, **how)
     tell(found.table())
     save(figure_of(found), picture, rule)
     tell(os.fspath(picture))

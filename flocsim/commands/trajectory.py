@@ -99,26 +99,14 @@ def draw(args, trajectory, title):
     rule, written = figure_rule(args.overwrite), []
     asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
     for figure, names in asked.items():
-        if names:
-            written += save_all(drawn(trajectory, figure, args.frames, title), names, rule)
+        made = drawn(trajectory, figure, args.frames, title) if names else None
+        for path in map(Path, names):
+            save(made, path, rule)
+            written.append(path)
     if args.animation:
         animated(trajectory, Path(args.animation), ANIMATION_FRAMES, title, rule)
         written.append(Path(args.animation))
     return written
-
-
-def save_all(figure, names, rule):
-    paths = [Path(name) for name in names]
-    for path in paths:
-        save(figure, path, rule)
-    return paths
-
-
-def default_name(args, config, place):
-    """A figure's name that says what it shows: "study-I-64-0.5-17.png"."""
-    condition, vertices, share = place
-    name = config.scene.names[condition]
-    return f"{Path(args.config).stem}-{name}-{vertices}-{share:g}-{args.replicate}.png"
 
 
 def run(args: Namespace) -> int:
@@ -128,7 +116,9 @@ def run(args: Namespace) -> int:
     take_scene(args)
     place = select(config, args)
     check_study(config)
-    args.output = args.output or [default_name(args, config, place)]
+    name, vertices, share = config.scene.names[place[0]], *place[1:]
+    shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
+    args.output = args.output or [f"{Path(args.config).stem}-{shows}.png"]
     figures = [*args.output, *args.distance, *args.forces]
     # What could not be written is said now, not after the run.
     for path in figures:

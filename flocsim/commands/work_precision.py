@@ -1,25 +1,40 @@
 """`flocsim work-precision cfg.toml`: flips against CPU time of a study, for every tolerance.
 
-With `--replicate 17`, error against run time of one collision (the other is
-`flocsim.commands.precision.ladder`).
+It is the whole ladder of `accuracy = "auto"`, in seconds: where the pilot of a study stops as soon
+as it knows enough and counts evaluations, this runs every rung of both methods and takes the time.
+With `--replicate 17`, error against run time of one collision.
 """
 
 import math
 from argparse import Namespace
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
+import numpy as np
 
 from flocsim.commands import SUMMARIES
-from flocsim.commands.precision import ladder
-from flocsim.commands.precision.judged import HEADER, Case, Checker, line_of
+from flocsim.commands.judged import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
+from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pairs.replicates import one_count_study, with_one_count
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.pilot.choice import ALLOWED, first_methods, sampling_error, settled
+from flocsim.ensembles.pilot.ladder import DECADES, REFERENCE, Ladder, at_rung, scene_length
+from flocsim.ensembles.pilot.trials import Job, Trial, sample_of, try_out
+from flocsim.ensembles.preflight import check_study, inputs_of
+from flocsim.ensembles.study import Study
+from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
-from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.confidence import wilson
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
+from flocsim.io.plots.style import checked_format, save
+from flocsim.io.plots.work_precision import Rung, draw_ladders
+from flocsim.io.results.schema import OUTCOMES, UNKNOWN
+from flocsim.io.terminal import tell
 
 TIGHTEST = 1e-13
 """Tolerance [m] of the reference."""
@@ -31,6 +46,17 @@ STEP_COUNTS = (1_000, 10_000, 100_000)
 
 MOST_STEPS = 1_000_000
 """Steps after which a method counts as having failed."""
+
+COUNT = 60
+"""Replicates of each type, where nothing else is asked for."""
+
+PATIENCE = 20
+"""Times the mean steps of the implicit method's reference that an explicit run may take."""
+
+LADDER_HEADER = (
+    f"{'method':<18}{'tolerance':>11}{'flips':>7}{'[%]':>7}{'95 %':>14}"
+    f"{'d_c error [m]':>17}{'of 90 %':>10}{'CPU [ms]':>10}{'undecided':>11}"
+)
 
 
 def add_parser(subparsers: Any) -> None:
@@ -44,7 +70,12 @@ def add_parser(subparsers: Any) -> None:
         "print its error against the reference at the time when the first of the two is decided.",
     )
     add_replicate(parser)
-    ladder.add_arguments(parser)
+    add = parser.add_argument
+    add("--count", type=int, metavar="K",
+        help=f"without --replicate: replicates of each type (default: {COUNT})")  # fmt: skip
+    add("-o", "--output", nargs="+", default=[], metavar="FILE",
+        help="without --replicate: also draw it, as .png, .pdf or .svg")  # fmt: skip
+    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     parser.set_defaults(run=run, frames=2, replicate=None)
     return parser
 
@@ -60,8 +91,10 @@ def methods(duration: float) -> list[Integrator]:
 def run(args: Namespace) -> int:
     """Run the methods, print the table; the exit code."""
     if args.replicate is None:
-        return ladder.run(args)
-    ladder.refuse_arguments(args)
+        return run_ladder(args)
+    for name, given in (("--count", args.count is not None), ("--output", args.output)):
+        if given:
+            raise UsageError(f"{name} is for the whole study: leave out either it or --replicate")
     config = load_config(args.config)
     place = select(config, args)
     check_study(config)
@@ -78,4 +111,145 @@ def run(args: Namespace) -> int:
     for method in methods(found["t_end"]):
         case = Case(place[0], place[1], math.nan, method, place[2], args.replicate)
         print(line_of(config, case, checker.judge(case, TIGHTEST)), flush=True)
+    return 0
+
+
+def part_of(config: Config, args: Namespace) -> Config:
+    """The config with the type, N and δ alone that were named."""
+    place, vertices, delta = select(config, args)
+    scene: Any = config.scene
+    if args.type is not None:
+        scene = scene.only([place])
+    if len(scene.delta) > 1 and args.delta is not None:
+        scene = attrs.evolve(scene, delta=(delta,))
+    if args.vertices is not None:
+        config = with_one_count(config, vertices)
+    return attrs.evolve(config, scene=scene)
+
+
+def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
+    """(Trial whose cost is CPU time [µs], times, d_c and its rate) of a replicate; None for no
+    motion."""
+    trial, run = try_out(study, job, record=True)
+    trial = trial._replace(cost=1e6 * trial.cpu)
+    if run is None:
+        return trial, None
+    times, position, velocity = run.motion()
+    apart, speed = (each[:, 1, :2] - each[:, 0, :2] for each in (position, velocity))
+    distance = np.hypot(*apart.T)
+    rate = np.sum(apart * speed, axis=1) / np.maximum(distance, 1e-300)
+    return trial, (times, distance, rate)
+
+
+def distance_at(motion: tuple, instant: float) -> float:
+    """d_c [m] at a time of a motion (times, d_c, rates), by Hermite's cubic between two steps."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    times, values, rates = (each[np.diff(motion[0], prepend=-1.0) > 0.0] for each in motion)
+    if len(times) < 2:
+        return float(values[-1])
+    return float(CubicHermiteSpline(times, values, rates)(instant))
+
+
+def climb(
+    study: Study, condition: int, tasks: Sequence
+) -> Iterator[tuple[Ladder, dict[float, np.ndarray]]]:
+    """(ladder, {rung: by how much d_c is off the reference's [m]}) of both methods of a type, from
+    the loosest rung to the tightest."""
+    length, budget = (
+        scene_length(study.config, condition, study.flocs),
+        study.config.integrator.max_steps,
+    )
+    reference = REFERENCE * DECADES[-1]
+    exact = at_rung(Implicit(), reference * length)
+    found = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
+    trials, motions = [each for each, _ in found], [motion for _, motion in found]
+    steps = np.mean([len(motion[0]) for motion in motions if motion is not None] or [1])
+    for method in (Implicit(), DormandPrince54()):
+        ladder = Ladder(condition, method, length, list(tasks), reference, trials)
+        ladder.max_steps = budget if isinstance(method, Implicit) else int(PATIENCE * steps)
+        # Compiled, or loaded, before the first is timed.
+        measured(study, ladder.jobs(1.0)[0])
+        distances = {}
+        for rung in DECADES:
+            found = [measured(study, job) for job in ladder.jobs(rung)]
+            ladder.tried[rung] = [each for each, _ in found]
+            pairs = zip([motion for _, motion in found], motions, strict=True)
+            distances[rung] = np.array([apart(*pair) for pair in pairs])
+        yield ladder, distances
+
+
+def apart(motion, exact):
+    """By how much d_c of two runs differs [m] at the last time that both have; NaN for none."""
+    if motion is None or exact is None:
+        return math.nan
+    instant = min(motion[0][-1], exact[0][-1])
+    return abs(distance_at(motion, instant) - distance_at(exact, instant))
+
+
+def rung_of(ladder: Ladder, distances: np.ndarray, rung: float) -> Rung:
+    """What is printed and drawn of a rung."""
+    trials, flips = ladder.tried[rung], ladder.flips(rung)
+    low, high = (float(end) for end in wilson(flips, len(trials)))
+    known = distances[np.isfinite(distances)]
+    median, most = np.quantile(known, [0.5, 0.9]) if len(known) else (math.nan, math.nan)
+    undecided = sum(OUTCOMES[each.outcome] in UNKNOWN for each in trials)
+    return Rung(
+        type(ladder.method).__name__, at_rung(ladder.method, rung * ladder.length).tolerance,
+        len(trials), flips, low, high, float(median), float(most), 1e-3 * ladder.cost(rung),
+        undecided,
+    )  # fmt: skip
+
+
+def rung_line(rung: Rung) -> str:
+    interval = f"[{100.0 * rung.low:.2g}, {100.0 * rung.high:.2g}]"
+    return (
+        f"{rung.method:<18}{f'{rung.tolerance:.0e} m':>11}{rung.flips:>7}"
+        f"{100.0 * rung.flips / rung.runs:>7.2f}{interval:>14}{rung.median:>17.1e}"
+        f"{rung.most:>10.1e}{rung.cpu:>10.2f}{rung.undecided:>11}"
+    )
+
+
+def run_ladder(args: Namespace) -> int:
+    """Climb the ladders of all types, print them, say what is best, draw; the exit code."""
+    config = load_config(args.config)
+    if args.count is not None and not args.count >= 1:
+        raise UsageError(f"--count must be at least 1, found {args.count}")
+    config = part_of(config, args)
+    check_study(config)
+    for path in args.output:
+        checked_format(path)
+    rule = figure_rule(args.overwrite)
+    check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
+    study = study_of(config, methods=first_methods(config))
+    target = ALLOWED * sampling_error(config)
+    ladders: list[Ladder] = []
+    panels: dict[str, list[Rung]] = {}
+    for condition, tasks in enumerate(sample_of(config, args.count or COUNT)):
+        name = config.scene.names[condition]
+        tell(f"\ntype {name}, {len(tasks)} replicates over all N and delta\n{LADDER_HEADER}")
+        panels[name] = []
+        for ladder, distances in climb(study, condition, tasks):
+            ladders.append(ladder)
+            panels[name] += [rung_of(ladder, distances[rung], rung) for rung in DECADES]
+            for rung in panels[name][-len(DECADES) :]:
+                tell(rung_line(rung))
+    methods, types = settled(config, ladders[::2], ladders[1::2], target)
+    tell(
+        f"\nwith {config.replicates} replicates the sampling error is "
+        f"{100.0 * sampling_error(config):.2g} %; the cheapest with flips below a fifth of it:"
+    )
+    for each in types:
+        end = "" if each["bound"] <= target else ", the tightest tested: not enough"
+        tell(
+            f"  {each['name']}: {each['method']}, tolerance = {each['tolerance']:g}, "
+            f"{100.0 * each['expected']:.2g} % expected{end}"
+        )
+    tell('  [integrator] accuracy = "auto" finds these by itself, for each type')
+    chosen = {name: (type(each).__name__, each.tolerance) for name, each in methods.items()}
+    if args.output:
+        figure = draw_ladders(panels, chosen, target)
+        for path in args.output:
+            save(figure, path, rule)
+            tell(path)
     return 0

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flocsim.errors import visible
-from flocsim.io.journal.records import CHUNK, SNAPSHOT, encode
 from flocsim.io.json_text import matches
+from flocsim.io.records import CHUNK, SNAPSHOT, encode
 from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384

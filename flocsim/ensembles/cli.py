@@ -116,7 +116,7 @@ def read_config(arguments, sources, first):
 def results_of(config, arguments):
     """The results file as an Output; what is to be extended is looked at when the run begins."""
     from flocsim.ensembles.storage.resume import RESUME, WAYS
-    from flocsim.io.journal.journal import SUFFIX
+    from flocsim.io.journal import SUFFIX
 
     rule = data_rule(arguments.overwrite or arguments.mode == RESUME)
     return Output(config.output.file, rule, SUFFIX, WAYS)

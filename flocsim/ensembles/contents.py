@@ -16,10 +16,9 @@ import attrs
 from flocsim.ensembles.config.kinds import FILES, STUDIES, contents_of
 from flocsim.ensembles.storage.stored_json import describe_kind, stored
 from flocsim.errors import FileError, visible
-from flocsim.io.files import held
-from flocsim.io.groups import Group
-from flocsim.io.opening import kind_of
+from flocsim.io.groups import Group, kind_of
 from flocsim.io.plots.style import Figure
+from flocsim.io.seals import held
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""

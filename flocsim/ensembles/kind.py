@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.chunks import COLUMNS, MOST_ROWS, ORDER, ROW, Condition, Interval
 from flocsim.ensembles.config.kinds import STUDIES
 from flocsim.ensembles.config.schema import Config
-from flocsim.io.journal.records import Record
+from flocsim.io.records import Record
 
 Code = tuple[int, int]
 """Place of a collision type, and N: they stand for all that runs the same compiled code."""

@@ -11,10 +11,9 @@ from flocsim.errors import visible
 from flocsim.io.confidence import wilson
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.events import HOOK, MOST_UNKNOWN
-from flocsim.io.results.file import CLASSES
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.run_group import describe_note
-from flocsim.io.results.schema import Results
+from flocsim.io.results.schema import CLASSES, Results
 
 ENDS = {
     "n_missed": ("mis-", "sed"),

@@ -48,7 +48,7 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.stored_json import distinct, mixture_warnings
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
-from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.journal import MemoryJournal
 from flocsim.io.results.run_group import choice_lines, provenance, storable
 from flocsim.io.terminal import Progress, tell
 

@@ -63,12 +63,6 @@ def placed(points: np.ndarray, places: np.ndarray) -> np.ndarray:
     return turned + places[:, None, :2]
 
 
-def spread(shapes: Sequence[Shape], position: np.ndarray) -> float:
-    """Half the width [m] of a box about the origin that all bodies stay inside of."""
-    reach = np.array([shape.bounding_radius for shape in shapes])
-    return float((np.abs(position[:, :, :2]) + reach[None, :, None]).max())
-
-
 MICRO = 1e6
 ROOM = 1.05
 
@@ -88,7 +82,9 @@ def write_gsd(
     except ImportError:
         raise UsageError("gsd is not installed: pip install 'flocsim[formats]'") from None
 
-    width = 2.0 * ROOM * MICRO * spread(shapes, position)
+    # A box about the origin that all bodies stay inside of.
+    reach = np.array([shape.bounding_radius for shape in shapes])[:, np.newaxis]
+    width = 2.0 * ROOM * MICRO * float((np.abs(position[:, :, :2]) + reach).max())
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "motion.gsd"
         with gsd.hoomd.open(made, "w") as file:
@@ -101,8 +97,9 @@ def write_gsd(
                 bodies.types = [f"body {n}" for n in range(len(shapes))]
                 bodies.typeid = list(range(len(shapes)))
                 bodies.type_shapes = [shape_of(shape) for shape in shapes]
-                bodies.position = in_space(MICRO * position[step, :, :2])
-                bodies.velocity = in_space(MICRO * velocity[step, :, :2])
+                flat = (each[step, :, :2] for each in (position, velocity))
+                in_space = (np.pad(MICRO * each, ((0, 0), (0, 1))) for each in flat)
+                bodies.position, bodies.velocity = in_space
                 half = 0.5 * position[step, :, 2]
                 turn = np.zeros((len(shapes), 4))
                 turn[:, 0], turn[:, 3] = np.cos(half), np.sin(half)
@@ -113,11 +110,6 @@ def write_gsd(
                 file.append(frame)
         data = made.read_bytes()
     write_file(path, data, rule)
-
-
-def in_space(flat: np.ndarray) -> np.ndarray:
-    """Vectors (n, 2) with z = 0."""
-    return np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)
 
 
 def outer_ring(shape: Shape) -> np.ndarray:

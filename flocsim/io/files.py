@@ -1,8 +1,4 @@
-"""Files written whole or not at all, and sealed so that damage is found before HDF5 parses them.
-
-The seal is a checksum appended behind the end of the HDF5 data, where every HDF5 library ignores
-it: a damaged HDF5 file can crash its reader or keep it busy for ever, a wrong checksum cannot.
-"""
+"""Files written whole or not at all."""
 
 import contextlib
 import ctypes
@@ -16,15 +12,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-import attrs
-
 from flocsim.errors import FileError
-from flocsim.io.pieces import PIECES_LINE, digest_at, digest_of, is_in_pieces, size_of_pieces
-
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-SEAL_MARK = b"\nflocsim blake2b-256 "
-SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
-DAMAGED = "is damaged, its checksum is wrong: use a copy or run it again"
+from flocsim.io.seals import digest_of
 
 NO_SPACE_TAKEN = {errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
 """What file systems answer that cannot take the space of a file beforehand."""
@@ -40,6 +29,9 @@ TRIES = 9
 
 NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
 """What file systems without hard links answer."""
+
+NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
+"""What a file system says that has no locks, or whose lock server is away."""
 
 NO_SYNC = {errno.EACCES, errno.EINVAL, errno.ENOTSUP, errno.EPERM, errno.EBADF}
 """What the system answers where a folder cannot be synced, or only be written to."""
@@ -62,17 +54,10 @@ def keep(_: Path) -> Old:
     return Old.KEPT
 
 
-@attrs.frozen
-class Unfinished:
-    """A file that is being written: where it lies until it is whole, and open for writing."""
-
-    path: Path
-    file: BinaryIO
-
-
 @contextlib.contextmanager
-def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinished]:
-    """A fresh file beside ``path`` that takes its place, whole and synced, at the end of the block.
+def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[tuple[Path, BinaryIO]]:
+    """(path, open file) of a fresh file beside ``path`` that takes its place, whole and synced, at
+    the end of the block.
 
     A reader meets the old file or the new one, never a part. ``rule`` says what becomes of a file
     that lies at the place; one that is kept ends the block before it begins, with a FileError. If
@@ -89,7 +74,7 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinishe
         temporary, descriptor = fresh_beside(target)
         try:
             with os.fdopen(descriptor, "w+b") as file:
-                yield Unfinished(temporary, file)
+                yield temporary, file
                 file.flush()
                 os.fsync(file.fileno())
                 if os.name == "nt":
@@ -108,8 +93,8 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[Unfinishe
 
 def write_file(path: str | os.PathLike, data: bytes, rule: Rule = keep) -> None:
     """Put ``data`` at ``path``, whole or not at all; FileError and ``rule`` as in `unfinished`."""
-    with unfinished(path, rule) as new:
-        new.file.write(data)
+    with unfinished(path, rule) as (_, file):
+        file.write(data)
 
 
 def make_folder(path: str | os.PathLike, option: str = "") -> None:
@@ -134,9 +119,11 @@ def fresh_beside(target: Path, length: int = 0) -> tuple[Path, int]:
         name = left_over_prefix(target) + secrets.token_hex(8)
         path = target.with_name(name.ljust(length - len(UNFINISHED), "-") + UNFINISHED)
         descriptor = os.open(path, flags, 0o666)
-        if lock(descriptor) is not False and names(path, descriptor):
-            return path, descriptor
-        os.close(descriptor)  # another process took it for one that was left over
+        with contextlib.suppress(OSError):  # as where no file can be locked
+            if lock(descriptor) is False or not names(path, descriptor):
+                os.close(descriptor)  # another process took it for one that was left over
+                continue
+        return path, descriptor
 
 
 def left_over_prefix(target):
@@ -162,21 +149,25 @@ def remove_left_over(target):
                 os.close(descriptor)
 
 
-def lock(descriptor):
+def lock(descriptor: int) -> bool | None:
     """Lock an open file without waiting: True, False if another process has it, None if no file
-    can be locked there."""
+    can be locked there; OSError if that fails otherwise."""
     try:
         import fcntl
 
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    except (BlockingIOError, PermissionError):
         return False
-    except (ImportError, OSError):
+    except ImportError:
         return None
+    except OSError as error:
+        if error.errno in NO_LOCKS:
+            return None
+        raise
     return True
 
 
-def names(path, descriptor):
+def names(path: Path, descriptor: int) -> bool:
     """Whether the path is that of the open file."""
     try:
         return os.path.samestat(os.lstat(path), os.fstat(descriptor))
@@ -206,7 +197,7 @@ def place(path, temporary, target, rule):
         raise FileError(f"{path} {reason}: what was computed is in {free}")
 
 
-def give_name(temporary, name):
+def give_name(temporary: Path, name: Path) -> None:
     """Rename a file of our own; FileExistsError, whatever it is that has the name already."""
     try:
         if os.name == "nt":
@@ -277,10 +268,6 @@ def reserve(descriptor, size):
             raise OSError(number, os.strerror(number))
 
 
-def seal_of(digest):
-    return SEAL_MARK + digest.hex().encode() + b"\n"
-
-
 def ordinary_target(path: str | os.PathLike) -> Path:
     """The file behind ``path``, links followed, there or not.
 
@@ -348,91 +335,3 @@ def check_writable(path: str | os.PathLike, suffix: str = "") -> None:
             probe.unlink()
     except OSError as error:
         raise unwritable(path, error) from error
-
-
-@attrs.frozen
-class Held(os.PathLike):
-    """A path, and the end of the file that lay there, which has the digest of all of it: whoever
-    reads it later, wherever a path is taken, reads that file or is told that it has changed."""
-
-    path: Path
-    end: bytes
-
-    def __fspath__(self) -> str:
-        return os.fspath(self.path)
-
-    def __str__(self) -> str:
-        return str(self.path)
-
-
-def held(path: str | os.PathLike) -> str | os.PathLike:
-    """A path to be read more than once, as Held; as it is, where no ordinary file lies there."""
-    if isinstance(path, Held) or not os.path.isfile(path):
-        return path
-    try:
-        with open(path, "rb") as file:
-            return Held(Path(path), end_of(file))
-    except OSError:
-        return path  # who reads it says so
-
-
-def end_of(file):
-    """The end of an open file, whichever seal it has."""
-    file.seek(max(file.seek(0, os.SEEK_END) - max(SEAL_LENGTH, PIECES_LINE), 0))
-    return file.read()
-
-
-def seal(data: bytes) -> bytes:
-    """The bytes of an HDF5 file with their checksum appended."""
-    return data + seal_of(digest_of(data))
-
-
-def read_sealed(path: str | os.PathLike) -> bytes:
-    """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
-    with checked_sealed(path) as (file, size):
-        return file.read(size)
-
-
-@contextlib.contextmanager
-def checked_sealed(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, int]]:
-    """(open file, size of its HDF5 data), once its checksum has been found right.
-
-    Read a block at a time, so that files larger than the memory can be checked.
-    """
-    try:
-        if Path(path).exists() and not Path(path).is_file():
-            raise FileError(f"{path} is not an ordinary file: name a results file")
-        file = open(path, "rb")  # noqa: SIM115 (closed below)
-    except (OSError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"{path} could not be read: {reason}; check the name") from error
-    with file:
-        if isinstance(path, Held) and path.end != end_of(file):
-            raise FileError(f"{path} has changed since it was opened: open it again")
-        file.seek(0)
-        size = check_seal(path, file)
-        file.seek(0)
-        yield file, size
-
-
-def check_seal(path, file):
-    """The size of the data before the seal; FileError where either is wrong."""
-    if not file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
-        raise FileError(f"{path} is not an HDF5 file: name a file written by flocsim")
-    if is_in_pieces(file):
-        if (size := size_of_pieces(file)) is None:
-            raise FileError(f"{path} {DAMAGED}")
-        return size
-    size = max(file.seek(0, os.SEEK_END) - SEAL_LENGTH, 0)
-    file.seek(size)
-    tail = file.read()
-    if not tail.startswith(SEAL_MARK):
-        raise FileError(
-            f"{path} does not end in flocsim's checksum: it is not from flocsim, was truncated or "
-            "was changed by another program; use the original file"
-        )
-    if seal_of(digest_at(file, 0, size)[0]) != tail:
-        raise FileError(f"{path} {DAMAGED}")
-    return size

@@ -2,25 +2,119 @@
 
 A Group says what arrays a group has, along which axes, of what type, in what unit, and what they
 mean: how it is written and read, what a file is held against and what a user sees follow from it.
+A file is opened in three steps: its checksum, then its structure, then h5py.
 """
 
+import contextlib
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, BinaryIO
 
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.hdf5.expected import Declared, check_root
-from flocsim.io.hdf5.structure import Node
+from flocsim.errors import FileError, UsageError
+from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.hdf5 import Node, Unfit, structure_of
 from flocsim.io.labelled import Column, Labelled
+from flocsim.io.seals import checked_sealed, seal
+
+SCALE_ATTRIBUTES = {
+    "units": "text",
+    "long_name": "text",
+    "flag_values": "u1",
+    "flag_meanings": "text",
+    "CLASS": "fixed",
+    "NAME": "fixed",
+    "DIMENSION_LIST": "references",
+    "REFERENCE_LIST": "scales",
+}
+"""Attributes that a dataset may have, and their types."""
 
 Schema = Mapping[str, tuple[str, str, str]]
 """{name: (type, unit, meaning)}."""
 
-SCALAR_TYPES = ("text", "i8", "f8")
+UNREADABLE = (
+    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
+    OverflowError, IndexError, EOFError,
+)  # fmt: skip
+"""What h5py raises for what it cannot read."""
+
+LONGEST_WORDS = 80
+"""Letters of what a file says that it is."""
+
+
+@attrs.frozen
+class Declared:
+    """A dataset: its type and its axes, each a length or the name of one that is found, its unit,
+    its meaning, and where it holds codes these and their words.
+
+    Axes of one name are of one length.
+    """
+
+    type: str
+    axes: tuple[int | str, ...] = ()
+    unit: str = "1"
+    text: str = ""
+    codes: tuple[Sequence[int], Sequence[str]] | None = None
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Its attributes."""
+        said: dict[str, Any] = {"units": self.unit, "long_name": self.text}
+        if self.codes is not None:
+            said["flag_values"] = np.array(self.codes[0], "u1")
+            said["flag_meanings"] = " ".join(self.codes[1])
+        return said
+
+
+def hold_against(
+    nodes: Mapping[str, Node], groups: Mapping[str, Mapping[str, Declared]],
+    needed: Iterable[str], known: Mapping[str, int] | None = None,
+) -> dict[str, int]:  # fmt: skip
+    """{axis: length} where every group and dataset of a file is as its kind should have it.
+
+    ``groups``: {path: {name: Declared}}, ``needed`` the paths of those that it must have, ``known``
+    the lengths of axes that are always the same. Raises Unfit for a group or dataset that is
+    missing, unknown, or of another type or shape.
+    """
+    lengths = dict(known or {})
+    for path in needed:
+        if path not in nodes or nodes[path].type is not None:
+            raise Unfit(f"there is no group {path}")
+    for path, node in nodes.items():
+        group, _, name = path.rpartition("/")
+        if node.type is None:
+            if path and path not in groups:
+                raise Unfit(f"there is an unknown group {path}")
+            # Coordinates that are no axis, as xarray looks for them.
+            if path and node.attributes.items() - {("coordinates", ("text", ()))}:
+                raise Unfit(f"the group {path} has attributes")
+        elif name not in groups.get(group, {}):
+            raise Unfit(f"there is an unknown dataset {path}")
+        else:
+            check_column(path, node, groups[group][name], lengths)
+    for group, columns in groups.items():
+        for name in columns:
+            if group in nodes and f"{group}/{name}" not in nodes:
+                raise Unfit(f"{group}/{name} is missing")
+    return lengths
+
+
+def check_column(path, node, column, lengths):
+    if node.type != column.type:
+        raise Unfit(f"{path} holds {node.type}, expected {column.type}")
+    if len(node.shape) != len(column.axes):
+        raise Unfit(f"{path} has {len(node.shape)} dimensions, expected {len(column.axes)}")
+    for axis, length in zip(column.axes, node.shape, strict=True):
+        wanted = axis if isinstance(axis, int) else lengths.setdefault(axis, length)
+        if length != wanted:
+            raise Unfit(f"{path} has {length} values along {axis}, expected {wanted}")
+    for name, (kind, shape) in node.attributes.items():
+        known = SCALE_ATTRIBUTES.get(name)
+        if known is None or kind.split()[0] != known or len(shape) > 1:
+            raise Unfit(f"{path} has an attribute {name} that flocsim does not write")
 
 
 def declared(
@@ -101,12 +195,17 @@ def scalar_of(dataset: Any) -> str | int | float:
     return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
 
 
+def run_of(file: Any) -> dict[str, str | int | float]:
+    """The scalars of the group ``run`` of an open file."""
+    return {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+
+
 def scalars_in(nodes: Mapping[str, Node], group: str) -> dict[str, Declared]:
     """What a group of any scalars holds, to hold it against."""
     return {
         path.removeprefix(f"{group}/"): Declared(node.type)
         for path, node in nodes.items()
-        if path.startswith(f"{group}/") and node.type in SCALAR_TYPES
+        if path.startswith(f"{group}/") and node.type in ("text", "i8", "f8")
     }
 
 
@@ -173,6 +272,95 @@ def check_format(
 ) -> None:  # fmt: skip
     """ValueError unless an open file says that it is of this format and version, and has the
     ``further`` attributes {name: type}."""
-    check_root(nodes, {"format": "text", "schema_version": "i8", **(further or {})})
+    needed = {"format": "text", "schema_version": "i8", **(further or {})}
+    for attribute, kind in needed.items():
+        if nodes[""].attributes.get(attribute) != (kind, ()):
+            raise Unfit(f"its attribute {attribute} is missing, or is of another type")
     if (str(file.attrs["format"]), int(file.attrs["schema_version"])) != (name, version):
         raise ValueError(f"its format is not {name} of version {version}")
+
+
+@contextlib.contextmanager
+def parsed(data: BinaryIO, size: int) -> Iterator[tuple[Any, dict[str, Node]]]:
+    """(open h5py file, its structure) of HDF5 data, h5py being let at it once the structure is one
+    that flocsim writes."""
+    import h5py
+
+    nodes = structure_of(data, size)
+    data.seek(0)
+    with h5py.File(data, "r") as file:
+        yield file, nodes
+
+
+@contextlib.contextmanager
+def opened_file(
+    path: str | os.PathLike, complaint: Callable[[str], str]
+) -> Iterator[tuple[Any, dict[str, Node]]]:
+    """(open h5py file, its structure), once checksum and structure were found right.
+
+    FileError with ``complaint(reason)`` where it, or what is done with it, fails on what it holds.
+    """
+    with checked_sealed(path) as (data, size):
+        try:
+            with parsed(data, size) as found:
+                yield found
+        except FileError:
+            raise
+        except UNREADABLE as error:
+            raise FileError(complaint(" ".join(str(error).split()))) from error
+
+
+def text_of(file: Any, nodes: dict[str, Node], name: str) -> str:
+    """An attribute of an open file that is a text; "" where there is none, or none that flocsim
+    writes there, which messages show."""
+    known = nodes[""].attributes.get(name)
+    found = str(file.attrs[name]) if known == ("text", ()) else ""
+    return found if found.isprintable() and len(found) <= LONGEST_WORDS else ""
+
+
+def kind_of(path: str | os.PathLike) -> str:
+    """What a file says that it is, its `kind` or `format`; "" where that cannot be read: who then
+    reads it as one of these says what is wrong.
+
+    One look for all kinds, since each look goes through the whole file for its checksum. FileError
+    where that is wrong, or where there is no such file.
+    """
+    with checked_sealed(path) as (data, size):
+        try:
+            with parsed(data, size) as (file, nodes):
+                return text_of(file, nodes, "kind") or text_of(file, nodes, "format")
+        except UNREADABLE:
+            return ""
+
+
+def checked_arrays(
+    group: str, arrays: Mapping[str, Any], declared: Mapping[str, Declared],
+    lengths: Mapping[str, int],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """A group's arrays in the order and of the types declared; UsageError for an array that is
+    missing, unknown, misshapen or would lose its values."""
+    if set(arrays) != set(declared):
+        strange = ", ".join(sorted(set(arrays) ^ set(declared)))
+        raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
+    found = {
+        name: exact(arrays[name], each.type, f"{group}/{name}") for name, each in declared.items()
+    }
+    for name, array in found.items():
+        shape = tuple(lengths[str(axis)] for axis in declared[name].axes)
+        if array.shape != shape:
+            raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shape}")
+    return found
+
+
+def exact(values, dtype, name):
+    """``values`` as an array of ``dtype``; UsageError if a value would change."""
+    try:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):
+            converted = given.astype(dtype)
+        same = np.array_equal(given, converted, equal_nan=converted.dtype.kind == "f")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise UsageError(f"{name} must hold numbers of type {dtype}: {error}") from error
+    if not same:
+        raise UsageError(f"{name} holds values that do not fit the type {dtype}")
+    return converted

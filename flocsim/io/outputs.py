@@ -13,14 +13,14 @@ import stat
 import struct
 import sys
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import attrs
 
 from flocsim.errors import UsageError
 from flocsim.io.files import Old, Rule, check_writable, keep, ordinary_target
-from flocsim.io.pieces import digest_of
+from flocsim.io.seals import digest_of
 
 NAME = b"flocsim blake2b-256"
 
@@ -38,23 +38,14 @@ def gif_remark(text):
     return b"\x21\xfe" + bytes([len(words)]) + words + b"\0"
 
 
-def markup_remark(text):
-    return b"<!-- " + NAME + b" " + text + b" -->\n"
-
-
-def pdf_remark(text):
-    return b"% " + NAME + b" " + text + b"\n"
-
-
-PLACES = {
-    # ending: (remark in the format, bytes of the file that come after it)
+# ending: (remark in the format, bytes of the file that come after it)
+PLACES: dict[str, tuple[Callable[[bytes], bytes], int]] = {
     ".png": (png_remark, 12),
     ".gif": (gif_remark, 1),
-    ".svg": (markup_remark, 0),
-    ".md": (markup_remark, 0),
-    ".html": (markup_remark, 0),
-    ".pdf": (pdf_remark, 0),
-}
+    ".pdf": (lambda text: b"% " + NAME + b" " + text + b"\n", 0),
+} | dict.fromkeys(
+    (".svg", ".md", ".html"), (lambda text: b"<!-- " + NAME + b" " + text + b" -->\n", 0)
+)
 
 
 def marked(data: bytes, suffix: str) -> bytes:

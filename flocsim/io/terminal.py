@@ -38,10 +38,13 @@ def duration(seconds: float) -> str:
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table, each column as wide as its widest word and set to the right."""
+def aligned(rows: Sequence[Sequence[str]], left: int = 0) -> list[str]:
+    """Lines of a table, each column as wide as its widest word and set to the right, but for the
+    first ``left`` columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(w.rjust(k) for w, k in zip(row, widths, strict=True)) for row in rows]
+    sides = "<" * left + ">" * (len(widths) - left)
+    forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
+    return ["  ".join(map(format, row, forms)) for row in rows]
 
 
 @contextlib.contextmanager
@@ -174,14 +177,14 @@ def output_problem() -> str:
     return f"standard output could not be written: {problem.strerror or problem}"
 
 
-def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
+def tell(text: str, stream: TextIO | None = None) -> None:
     """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
 
     What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
     """
     stream = sys.stdout if stream is None else stream
     try:
-        print(text, end=end, file=stream, flush=True)
+        print(text, file=stream, flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 

@@ -13,10 +13,10 @@ from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.exchange import add_vtkhdf, write_gsd
-from flocsim.io.files import Rule, keep, seal, write_file
-from flocsim.io.groups import write_labelled
+from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.groups import opened_file, write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of
-from flocsim.io.opening import opened_file
+from flocsim.io.seals import seal
 
 KIND = "flocsim trajectory"
 SCHEMA_VERSION = 2
@@ -82,10 +82,10 @@ def write_trajectory(
                 ("point_radius", table.radius, "m"),
             ):  # fmt: skip
                 columns[f"{name}_{body}"] = Column(of_points[:1], values, {"units": unit})
-    coordinates = {}
-    for name, values in scales.items():
-        said = DATASETS.get(name, ("1", name.replace("_", " of body ")))
-        coordinates[name] = Column((name,), values, about_of(said))
+    said = {name: DATASETS.get(name, ("1", name.replace("_", " of body "))) for name in scales}
+    coordinates = {
+        name: Column((name,), each, about_of(said[name])) for name, each in scales.items()
+    }
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
         file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})

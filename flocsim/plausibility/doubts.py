@@ -1,21 +1,37 @@
-"""What is possible in a scene but implausible: a line each, with the way out."""
+"""What is possible in a scene but implausible: a line each, with the way out.
 
+The usual ranges of quantities are declared once, with their source and what to do outside. A value
+outside is computed with, and doubted in one line. A force of a user's own that subclasses one of
+these is held to the same. Reynolds and Stokes numbers are those of bodies at their terminal speeds.
+"""
+
+import math
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 
-from flocsim.body import Body
-from flocsim.errors import PlausibilityWarning
+from flocsim.body import Body, Fluid
+from flocsim.errors import PlausibilityWarning, UsageError
 from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
-from flocsim.forces.drag import StokesDrag
+from flocsim.forces.double_layer import DoubleLayer
+from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, reynolds_number
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.pair_resistance import Lubrication
+from flocsim.forces.shape_drag import follows_shape
 from flocsim.forces.thermal import Thermal, thermal_in
-from flocsim.plausibility.ranges import RADIUS, ROUNDING, unusual
-from flocsim.plausibility.reynolds import all_settled, beyond_the_law
+from flocsim.forces.van_der_waals import VanDerWaals
+from flocsim.plausibility.settling import largest_mobility, terminal_motion
+
+CHECK = "check the number and its unit"
+
+HOLDS = {
+    "stokes": "Stokes's drag is accurate to 15 %",
+    "shape": "slow flow around a shape is accurate to 15 %",
+    "schiller_naumann": "the drag of Schiller and Naumann is accurate to 5 %",
+}
 
 
 @attrs.frozen
@@ -31,12 +47,6 @@ class Names:
     buoyancy: str = "Fluid(buoyancy=True)"
     drop: str = "leave {} out"
 
-    def thermal_in(self, forces: Sequence[Any]) -> dict[str, Any]:
-        """{name: force} of those forces that act, two of one name told apart."""
-        names = told_apart(self.forces or [type(force).__name__ for force in forces])
-        named = zip(names, forces, strict=True)
-        return {name: force for name, force in named if not force.absent}
-
 
 def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     """Lines on what is implausible of Systems that have forces and fluid in common.
@@ -44,7 +54,9 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     Values outside their usual ranges, sizes, weight, drag, contacts.
     """
     names, first = names or Names(), systems[0]
-    forces = names.thermal_in(first.forces)
+    told = told_apart(names.forces or [type(force).__name__ for force in first.forces])
+    named = zip(told, first.forces, strict=True)
+    forces = {name: force for name, force in named if not force.absent}
     bodies = [body for system in systems for body in system.bodies]
     lines = [line for name, force in forces.items() for line in unusual(force, name)]
     lines += unusual(first.fluid, names.fluid)
@@ -52,11 +64,13 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     for body in bodies:
         lines += [*unusual(body, names.body), *about_shape(body, warm)]
     settled = [each for system in systems for each in all_settled(system)]
+    # Fixed bodies alone do not act on each other.
+    meeting = [len(each.bodies) for each in systems if not all(body.fixed for body in each.bodies)]
     lines += [
         about_weight(first.fluid, bodies, forces, names.buoyancy),
         beyond_the_law(settled, forces),
         about_kicks(forces),
-        about_contacts(max(map(meeting, systems)), forces, names.drop),
+        about_contacts(max(meeting, default=0), forces, names.drop),
     ]
     return [line for line in dict.fromkeys(lines) if line]
 
@@ -92,10 +106,10 @@ def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cur
 
 def about_kicks(forces: dict[str, Any]) -> str:
     """A line where random forces are not balanced by the resistance that belongs to them."""
+    drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
     for name, thermal in forces.items():
         if not isinstance(thermal, Thermal):
             continue
-        drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
         if not drags:
             return (
                 f"{name} kicks the bodies continually, but no StokesDrag takes up the energy, so "
@@ -114,11 +128,6 @@ def about_kicks(forces: dict[str, Any]) -> str:
                     "read meeting rates as lower bounds"
                 )
     return ""
-
-
-def meeting(system: Any) -> int:
-    """How many bodies can meet others: fixed ones alone do not act on each other."""
-    return 0 if all(body.fixed for body in system.bodies) else len(system.bodies)
 
 
 def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:
@@ -142,3 +151,189 @@ def warn_of(system: Any, stacklevel: int) -> None:
     """A PlausibilityWarning for each of a System's doubts, told as of the caller's caller."""
     for line in doubts_of([system]):
         warnings.warn(line, PlausibilityWarning, stacklevel=stacklevel + 1)
+
+
+@attrs.frozen
+class Usual:
+    """The usual range, ends included, of ``what`` in a unit; where that is known from; and what to
+    do about a value outside."""
+
+    what: str
+    low: float
+    high: float
+    unit: str
+    source: str
+    advice: str = CHECK
+
+    def doubt(self, place: str, value: object) -> str:
+        """A line on a value that stands at a place, e.g. "fluid.viscosity"; "" where it is usual.
+
+        A value that is not a number has no range. The sign does not count.
+        """
+        if isinstance(value, tuple):
+            return next(filter(None, (self.doubt(place, each) for each in value)), "")
+        if isinstance(value, str | bool) or not isinstance(value, int | float):
+            return ""
+        if self.low <= abs(value) <= self.high:
+            return ""
+        unit = f" {self.unit}" if self.unit else ""
+        low = f"{self.low:g} to " if self.low > 0.0 else "at most "
+        return (
+            f"{place} = {value:g}{unit} is implausible: {self.what} is usually {low}"
+            f"{self.high:g}{unit} ({self.source}): {self.advice}"
+        )
+
+
+VISCOSITY = Usual(
+    "the viscosity of water, from 100 C to brines and suspensions as thick as oil,",
+    2e-4, 1e-1, "Pa s",
+    "pure water has 2.8e-4 to 1.8e-3: Huber et al. 2009, J. Phys. Chem. Ref. Data 38, 101",
+)  # fmt: skip
+
+USUAL: dict[type, dict[str, Usual]] = {
+    VanDerWaals: {
+        "hamaker": Usual(
+            "a Hamaker constant", 1e-22, 1e-18, "J",
+            "Israelachvili 2011, Intermolecular and Surface Forces, ch. 13",
+            'check the number and its unit, as in "5 zJ"',
+        ),
+    },
+    DoubleLayer: {
+        "potential": Usual(
+            "a surface potential", 0.0, 0.2, "V",
+            "Hunter 1981, Zeta Potential in Colloid Science, ch. 2",
+            'check the number and its unit, as in "15 mV"',
+        ),
+        "debye_length": Usual(
+            "a Debye length", 2e-10, 1e-6, "m",
+            "0.304 nm/sqrt(c in mol/L), 960 nm in pure water: Israelachvili 2011, ch. 14",
+            'check the number and its unit, as in "0.98 nm"',
+        ),
+        "permittivity": Usual(
+            "the relative permittivity of a liquid", 1.5, 200.0, "",
+            "water has 78.5 at 25 C: CRC Handbook of Chemistry and Physics, sec. 6",
+        ),
+    },
+    Fluid: {
+        "viscosity": VISCOSITY,
+        "density": Usual(
+            "the density of water and brines", 600.0, 1500.0, "kg/m^3",
+            "Wagner and Pruss 2002, J. Phys. Chem. Ref. Data 31, 387",
+        ),
+    },
+    Body: {
+        "density": Usual(
+            "the density of a solid, or of a floc,", 500.0, 2.3e4, "kg/m^3",
+            "quartz has 2650, osmium 22590: CRC Handbook of Chemistry and Physics, sec. 4",
+            'check the number and its unit, as in "2.65 g/cm^3"',
+        ),
+    },
+}  # fmt: skip
+"""Class → field → its usual range."""
+
+RADIUS = Usual(
+    "the equivalent radius of a settling body", 5e-7, 1e-2, "m",
+    "below, Brownian motion, which is left out here, moves bodies as fast as they settle: Russel, "
+    "Saville and Schowalter 1989, Colloidal Dispersions, ch. 3",
+    "use larger bodies, or read the results as those of bodies that do not diffuse",
+)  # fmt: skip
+
+ROUNDING = Usual(
+    "the spheroradius over the equivalent radius", 0.0, 0.5, "",
+    "0.04 to 0.22 in Tang et al. 2014; near 1 every floc is a disc",
+    "choose a smaller spheroradius",
+)  # fmt: skip
+
+PIXEL_SIZE = Usual(
+    "the side of a pixel", 1e-11, 1e-4, "m",
+    "electron micrographs have about 1e-9, floc cameras 1e-5: Smith and Friedrichs 2011, Cont. "
+    "Shelf Res. 31, S50",
+    'check the number and its unit, as in "0.95 um"',
+)  # fmt: skip
+
+
+def unusual(owner: object, place: str) -> list[str]:
+    """Lines on the values of an object that are outside their usual ranges; ``place``: its name."""
+    found: dict[str, Usual] = {}
+    for each in type(owner).__mro__:
+        found = USUAL.get(each, {}) | found
+    lines = [usual.doubt(f"{place}.{name}", getattr(owner, name)) for name, usual in found.items()]
+    return [line for line in lines if line]
+
+
+class Settled(NamedTuple):
+    """A body of equivalent radius r [m] at its terminal speed v [m/s] against the flow.
+
+    ``reynolds`` = 2 r ρ_f v/γ; ``stokes`` = τ v/r, with τ the time in which a slow motion dies
+    away, m/(6πγ r) in Stokes's drag.
+    """
+
+    radius: float
+    speed: float
+    reynolds: float
+    stokes: float
+
+    @property
+    def words(self) -> str:
+        """The numbers for people."""
+        return (
+            f"r_eq = {1e6 * self.radius:.4g} um settles at {1e3 * self.speed:.4g} mm/s: "
+            f"Re = {self.reynolds:.2g}, St = {self.stokes:.2g}"
+        )
+
+
+def settled(system: Any, body: Body) -> Settled | None:
+    """A free body alone in the system's fluid; None where it is held or does not settle."""
+    if body.fixed:
+        return None
+    try:
+        velocity, mobility = terminal_motion(system, body)
+    except UsageError:
+        return None
+    u, v = system.fluid.velocity
+    speed, radius = math.hypot(velocity[0] - u, velocity[1] - v), body.shape.equivalent_radius
+    relaxation = body.mass * largest_mobility(system, body, speed, mobility)
+    return Settled(
+        radius,
+        speed,
+        reynolds_number(speed, radius, system.fluid.viscosity, system.fluid.density),
+        relaxation * speed / radius,
+    )
+
+
+def all_settled(system: Any) -> list[Settled]:
+    """Every free body that settles, those alike once, in the order of the bodies."""
+    by_shape = follows_shape(system.forces)
+    alike = {
+        (
+            body.shape.equivalent_radius, body.mass, body.buoyant_mass(system.fluid),
+            (id(body.shape), body.angle) if by_shape else None,
+        ): body
+        for body in reversed(system.bodies)
+        if not body.fixed
+    }  # fmt: skip
+    found = (settled(system, body) for body in reversed(alike.values()))
+    return [each for each in found if each is not None]
+
+
+def beyond_the_law(bodies: Sequence[Settled], forces: dict[str, Any]) -> str:
+    """A line on the body whose Reynolds number is furthest beyond its drag law; "" for none.
+
+    ``forces``: {name: force}. A drag of the user's own says itself what it is good for.
+    """
+    drags = {name: each for name, each in forces.items() if isinstance(each, StokesDrag)}
+    if not drags or not bodies:
+        return ""
+    name, drag = min(drags.items(), key=lambda item: item[1].serves_up_to)
+    worst = max(bodies, key=lambda each: each.reynolds)
+    if worst.reynolds <= drag.serves_up_to:
+        return ""
+    advice = (
+        f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
+        if drag.law == "stokes"
+        else "use smaller or lighter bodies, or a drag of your own"
+    )
+    return (
+        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.serves_up_to:g} "
+        f"(Clift, Grace and Weber 1978, Bubbles, Drops and Particles, ch. 5): {advice}"
+    )

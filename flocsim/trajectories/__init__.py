@@ -1,4 +1,4 @@
 """Trajectories: what a run was, at any time of it, and how it goes on.
 
-`trajectory` is what System.run returns; `replay` goes through its run again, `energies` adds up.
+`trajectory` is what System.run returns; `replay` goes through its run again.
 """

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
@@ -15,6 +14,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.collision import (
+    Frames,
     draw_distance,
     draw_energies,
     draw_forces,
@@ -24,22 +24,6 @@ from flocsim.io.plots.collision import (
 from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.replay import motion_at
-
-
-@attrs.frozen(eq=False)
-class Frames:
-    """Instants of a motion, seen from the first body's centroid; of a lone body, from where it is.
-
-    ``times`` (f,) [s]; ``outlines`` per frame and body a list of rings (k, 2) [m]; ``contacts``
-    per frame (c, 2) [m]; ``paths`` per body (m, 2) [m]; ``centre_distance`` (f,) [m] of the first
-    two, 0 of one.
-    """
-
-    times: np.ndarray
-    outlines: list[list[list[np.ndarray]]]
-    contacts: list[np.ndarray]
-    paths: list[np.ndarray]
-    centre_distance: np.ndarray
 
 
 def seen_from_first(position: np.ndarray) -> np.ndarray:
@@ -139,13 +123,7 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
     title = plain(title_of(trajectory) if title is None else title, MOST_OF_TITLE)
     touch, zone = touch_and_zone(trajectory)
     if figure == "strip":
-        seen = frames_of(trajectory, frames)
-        pair = len(trajectory.shapes) == 2
-        return draw_strip(
-            seen.outlines, seen.times.tolist(), seen.paths, title, contacts=seen.contacts,
-            seen_from=0 if len(trajectory.shapes) > 1 else None,
-            centre_distance=seen.centre_distance.tolist() if pair else None, zone_distance=zone,
-        )  # fmt: skip
+        return draw_strip(frames_of(trajectory, frames), title, zone)
     if figure == "energies":
         found = trajectory.energies()
         kinetic = found.kinetic.sum(axis=1)

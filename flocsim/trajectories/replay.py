@@ -1,4 +1,4 @@
-"""A run gone through again: the state within steps, contacts and forces, from the engine's arrays.
+"""A run gone through again: the state within steps, contacts, forces and their work.
 
 A run is the same each time, so nothing of this has to be kept: it is found when it is asked for.
 Forces are summed by the engine's own functions, uncompiled, for one force at a time.
@@ -14,7 +14,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.arrays import Scene, Work, copy_of, with_room
 from flocsim.body import NO_WATER, Body, Fluid
-from flocsim.forces.base import Force, names_of
+from flocsim.forces.base import ContactForce, Force, names_of
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.pair_resistance import PairResistance
 from flocsim.geometry.contact.body_pairs import watches_all
@@ -24,6 +24,7 @@ from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.modes import set_closed
 from flocsim.integrators.implicit import Implicit
+from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.radau.collocation import cubic, stage_weights
 from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import sum_forces
@@ -97,26 +98,19 @@ class Instant:
     def contacts(self) -> list[Contact]:
         """All contact points."""
         work, found = self.work, []
-        for row in range(work.tally[at.CANDIDATES]):
-            if work.candidates[row, at.CLOSED] == 1:
-                a, b = (
-                    int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY)
-                )
-                geometry = work.geometry[at.NOW, row]
-                dx, dy = contact_point(work, row, a)
-                force = (0.0, 0.0)
-                if has(self.scene, CONTACT_FORCE):
-                    force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
-                motion = work.motion[at.NOW, a]
-                found.append(
-                    Contact(
-                        (a, b),
-                        (float(motion[0] + dx), float(motion[1] + dy)),
-                        (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
-                        float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
-                        (float(force[0]), float(force[1])),
-                    )
-                )  # fmt: skip
+        for row in np.flatnonzero(work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] == 1):
+            a, b = (int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY))
+            geometry, motion = work.geometry[at.NOW, row], work.motion[at.NOW, a]
+            dx, dy = contact_point(work, row, a)
+            force = (0.0, 0.0)
+            if has(self.scene, CONTACT_FORCE):
+                force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
+            found.append(Contact(
+                (a, b), (float(motion[0] + dx), float(motion[1] + dy)),
+                (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
+                float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
+                (float(force[0]), float(force[1])),
+            ))  # fmt: skip
         return found
 
 
@@ -218,13 +212,8 @@ class Replay:
 
 
 def key_of(work, row):
-    pair = work.candidates[row]
-    return (
-        int(pair[at.VERTEX_BODY]),
-        int(pair[at.VERTEX]),
-        int(pair[at.EDGE_BODY]),
-        int(pair[at.EDGE_START]),
-    )
+    columns = [at.VERTEX_BODY, at.VERTEX, at.EDGE_BODY, at.EDGE_START]
+    return tuple(work.candidates[row, columns].tolist())
 
 
 def step_motion(
@@ -269,3 +258,55 @@ def hermite(
     rate = 6.0 * s * (1.0 - s) * (y - x) / h
     rate = rate + (1.0 - s) * (1.0 - 3.0 * s) * v + s * (3.0 * s - 2.0) * w
     return np.concatenate([place, rate], axis=1)
+
+
+@attrs.frozen(eq=False)
+class Energies:
+    """Kinetic energies and work over a run.
+
+    ``t`` (k,) [s]; ``kinetic`` (k, n) ½ m v² + ½ I ω² of every body [J]; ``work`` {force: (k,)}
+    done on all free bodies since the start [J], by Simpson's rule over each step on the
+    integrator's interpolation. Contacts are stiff within steps: theirs, "contact", is what the
+    balance Δ(kinetic) = Σ work leaves. ``error`` (k,) [J]: what it leaves where there are no
+    contact forces, None else.
+    """
+
+    t: np.ndarray
+    kinetic: np.ndarray
+    work: dict[str, np.ndarray]
+    error: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        return f"Energies({len(self.t)} times, work of {', '.join(self.work)})"
+
+
+def energies_of(origin: Origin, times: np.ndarray, velocity: np.ndarray) -> Energies:
+    """The Energies of a run with steps at these times (k,), its velocities being (k, n, 3)."""
+    replay = Replay(origin)
+    smooth = {
+        name: scene
+        for (name, scene), force in zip(replay.single_scenes.items(), origin.forces, strict=True)
+        if not isinstance(force, ContactForce)
+    }
+    free = np.array([0.0 if body.fixed else 1.0 for body in origin.bodies])[:, None]
+
+    def powers(instant: Instant) -> np.ndarray:
+        rates = instant.motion[:, 3:].copy() * free
+        return np.array([np.sum(instant.forces(scene) * rates) for scene in smooth.values()])
+
+    order = np.sort(np.concatenate([times, times[:-1] + 0.5 * np.diff(times)]))
+    found = np.array([powers(each) for each in replay.instants(order, times)])
+    found = found.reshape(len(order), len(smooth))
+    steps = np.diff(times)[:, None] / 6.0
+    parts = steps * (found[:-2:2] + 4.0 * found[1:-1:2] + found[2::2])
+    total = np.concatenate([np.zeros((1, len(smooth))), np.cumsum(parts, axis=0)])
+    work = {name: total[:, place] for place, name in enumerate(smooth)}
+    inertias = np.array([(body.mass, body.mass, body.inertia) for body in origin.bodies])
+    kinetic = 0.5 * np.einsum("nc,knc->kn", inertias, velocity**2)
+    change = (kinetic - kinetic[0]) @ free[:, 0]
+    if isinstance(origin.integrator, Overdamped):
+        change = np.zeros(len(times))  # without inertia forces balance, and so does their work
+    left = change - total.sum(axis=1)
+    if len(smooth) == len(origin.forces):
+        return Energies(times, kinetic, work, left)
+    return Energies(times, kinetic, work | {"contact": left})

@@ -17,8 +17,7 @@ from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Status
 from flocsim.run import Run
-from flocsim.trajectories.energies import Energies, energies_of
-from flocsim.trajectories.replay import Contact, Origin, Replay, motion_at
+from flocsim.trajectories.replay import Contact, Energies, Origin, Replay, energies_of, motion_at
 
 ENDED_FOR_GOOD = (Status.STALLED, Status.TOO_DEEP, Status.NOT_FINITE)
 """Ends from which a run would not get any further."""

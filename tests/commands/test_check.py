@@ -7,8 +7,7 @@ import attrs
 import pytest
 
 from flocsim.__main__ import main, make_parser
-from flocsim.commands import check
-from flocsim.commands.precision import judged
+from flocsim.commands import check, judged
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.forces import Contact

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.commands.precision import ladder
+from flocsim.commands import work_precision
 from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.pilot.trials import Job, Task, sample_of
 from flocsim.ensembles.study import Study
@@ -17,8 +17,8 @@ def implicit_alone(monkeypatch, tmp_path):
     """The small config; only the method that is compiled already, at two rungs."""
     write_small(tmp_path)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ladder, "DormandPrince54", Implicit)
-    monkeypatch.setattr(ladder, "DECADES", (1.0, 1e-2))
+    monkeypatch.setattr(work_precision, "DormandPrince54", Implicit)
+    monkeypatch.setattr(work_precision, "DECADES", (1.0, 1e-2))
     return tmp_path
 
 
@@ -58,7 +58,7 @@ def test_the_distance_between_two_steps_is_a_cubics():
     times = np.array([0.0, 1.0, 3.0])
     values, rates = times**3 - times, 3.0 * times**2 - 1.0
     for instant in (0.0, 0.4, 1.0, 2.2, 3.0):
-        found = ladder.distance_at((times, values, rates), instant)
+        found = work_precision.distance_at((times, values, rates), instant)
         assert found == pytest.approx(instant**3 - instant, abs=1e-12)
 
 
@@ -67,7 +67,7 @@ def test_what_is_measured_ends_as_in_the_study(tmp_path):
     row = study.run(1, 4, 0.0, 1)
     task = Task(1, 4, 0.0, 1)
     job = Job(task, study.config.integrator.method, study.config.integrator.max_steps)
-    trial, motion = ladder.measured(study, job)
+    trial, motion = work_precision.measured(study, job)
     assert (trial.outcome, trial.inside, trial.time) == (
         row["outcome"], row["inside"], row["t_end"],
     )  # fmt: skip

@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands import trajectory
-from flocsim.io.files import read_sealed, seal
+from flocsim.io.seals import read_sealed, seal
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import write_small
 from tests.helpers.tiers import rest_slow

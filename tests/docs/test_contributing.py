@@ -20,7 +20,7 @@ PAGE = "docs/schema_tables.py"
 CONCERNED = {
     "Add a config key": ["tests/ensembles/config", "tests/docs/test_schema_tables.py"],
     "Add a result column": [
-        "tests/io/results", "tests/io/hdf5", "tests/io/plots/test_results.py",
+        "tests/io/results", "tests/io/test_hdf5.py", "tests/io/plots/test_results.py",
         "tests/io/test_held.py", "tests/commands/test_info.py", "tests/commands/test_outputs.py",
         "tests/commands/test_plot.py", "tests/docs/test_schema_tables.py",
         "tests/ensembles/test_study.py", "tests/ensembles/storage/test_unfinished.py",

@@ -11,7 +11,7 @@ from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.journal import MemoryJournal
 from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results

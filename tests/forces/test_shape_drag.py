@@ -20,7 +20,7 @@ from flocsim.forces.shape_drag import (
 )
 from flocsim.hydrodynamics import prism_drag
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.plausibility.reynolds import all_settled
+from flocsim.plausibility.doubts import all_settled
 from flocsim.plausibility.settling import free_mobilities, held_mobility, terminal_motion
 from tests.forces.test_strain import SHEAR, ellipse
 from tests.helpers.tiers import rest_slow

@@ -19,10 +19,10 @@ from PIL import Image
 
 from flocsim.ensembles.chunks import Condition, chunk_record, layout
 from flocsim.geometry.shapes.parts import table_of
-from flocsim.io.files import read_sealed, seal
-from flocsim.io.journal.records import CHUNK, SESSION, encode
+from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
+from flocsim.io.seals import read_sealed, seal
 from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
@@ -318,8 +318,8 @@ def change_json(rng, value):
 def encode_words(kind, words, data):
     """A record of any words, with right checksums."""
     template = encode(kind, {}, data)
-    from flocsim.io.journal.records import CHECKED, HEAD
-    from flocsim.io.pieces import digest_of
+    from flocsim.io.records import CHECKED, HEAD
+    from flocsim.io.seals import digest_of
 
     mark, kind, _, length, data_digest, _ = HEAD.unpack_from(template)
     head = HEAD.pack(mark, kind, len(words), length, data_digest, b"")[:CHECKED]

@@ -22,8 +22,8 @@ import h5py
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.io.files import read_sealed, seal
-from flocsim.io.journal.records import Record, scan
+from flocsim.io.records import Record, scan
+from flocsim.io.seals import read_sealed, seal
 from tests.helpers.config_mutations import tables_of, toml
 from tests.helpers.hostile_files import (
     ODD_TEXTS,
@@ -303,7 +303,7 @@ class Hostile:
 @contextlib.contextmanager
 def kept_journal(path, parts, name):
     """Keep the records of the journal that a command writes, which it removes at its end."""
-    from flocsim.io.journal.journal import Journal
+    from flocsim.io.journal import Journal
 
     original = Journal.remove
 

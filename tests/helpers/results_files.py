@@ -5,15 +5,16 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.results.file import Results, opened, parts_of
-from flocsim.io.results.row_file import ROWS, new_row_file
+from flocsim.io.results.file import opened, parts_of
+from flocsim.io.results.layout import ROWS, new_row_file
+from flocsim.io.results.schema import Results
 
 
 def write_results(path: str | Path, results: Results, rule: Rule = keep) -> None:
     """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
 
     ``rule`` says what becomes of a file that is there. A table of replicates that is larger than
-    the memory: `flocsim.io.results.row_file`.
+    the memory: `flocsim.io.results.layout`.
     """
     flat = {
         name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(-1)

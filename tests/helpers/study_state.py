@@ -6,7 +6,7 @@ from flocsim.ensembles.chunks import ROW, Condition, chunk_record
 from flocsim.ensembles.parallel.communicator import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.journal.journal import MemoryJournal
+from flocsim.io.journal import MemoryJournal
 
 CONDITION = Condition("I", 1, 0.0)
 NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}

@@ -4,8 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from flocsim.io.results.file import NOT_APPLICABLE, Results
-from flocsim.io.results.schema import BLANKS, REPLICATES
+from flocsim.io.results.schema import BLANKS, NOT_APPLICABLE, REPLICATES, Results
 from tests.helpers.tabulate import tabulate
 
 FAILURES = ("none", "overlap_too_deep", "step_budget")

@@ -59,8 +59,8 @@ def test_a_file_that_exists_is_kept_unless_a_rule_says_otherwise(tmp_path):
 
 def test_what_appears_while_a_file_is_written_is_kept_and_so_is_the_work(tmp_path):
     said = r"a\.h5 has meanwhile been written.* computed is in .*a\.2\.h5"
-    with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as new:
-        new.file.write(b"work")
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as (_, file):
+        file.write(b"work")
         (tmp_path / "a.h5").write_bytes(b"other")
         (tmp_path / "a.1.h5").write_bytes(b"older")
     assert content(tmp_path) == {"a.h5": b"other", "a.1.h5": b"older", "a.2.h5": b"work"}
@@ -86,8 +86,8 @@ def test_without_hard_links_nothing_is_replaced_either(tmp_path, monkeypatch):
     write_file(tmp_path / "a.h5", b"new")
     assert content(tmp_path) == {"a.h5": b"new"}
     said = r"computed is in .*b\.1\.h5"
-    with pytest.raises(FileError, match=said), unfinished(tmp_path / "b.h5") as new:
-        new.file.write(b"work")
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "b.h5") as (_, file):
+        file.write(b"work")
         (tmp_path / "b.h5").write_bytes(b"other")
     assert content(tmp_path) == {"a.h5": b"new", "b.h5": b"other", "b.1.h5": b"work"}
 
@@ -135,9 +135,9 @@ def test_what_a_killed_job_left_is_removed_and_what_is_being_written_is_not(tmp_
     code = (
         "import os, sys\n"
         "from flocsim.io.files import unfinished\n"
-        "with unfinished(sys.argv[1]) as new:\n"
-        "    new.file.write(b'x' * 100)\n"
-        "    print(new.path, flush=True)\n"
+        "with unfinished(sys.argv[1]) as (beside, file):\n"
+        "    file.write(b'x' * 100)\n"
+        "    print(beside, flush=True)\n"
         "    sys.stdin.readline()\n"
     )
     job = subprocess.Popen(
@@ -209,9 +209,9 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_else(tmp_path):
     (tmp_path / "a.h5").write_bytes(b"old")
     with (
         pytest.raises(FileError, match=r"a\.h5 could not be written: No space left"),
-        unfinished(tmp_path / "a.h5", aside) as new,
+        unfinished(tmp_path / "a.h5", aside) as (_, file),
     ):
-        new.file.write(b"half")
+        file.write(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")
     assert content(tmp_path) == {"a.h5": b"old"}
 

@@ -11,7 +11,7 @@ from flocsim.__main__ import main
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.ensembles.pairs import contents
 from flocsim.errors import FileError
-from flocsim.io import files
+from flocsim.io import seals
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import SMALL, load_text, write_star_library
@@ -95,7 +95,7 @@ def test_a_command_reads_one_file(two, name, monkeypatch, capsys):
     one = outcome()
     shutil.copyfile(other, path)
     another = outcome()
-    looks, check = [], files.check_seal
+    looks, check = [], seals.check_seal
 
     def replaced(place, file):
         looks.append(place)
@@ -104,7 +104,7 @@ def test_a_command_reads_one_file(two, name, monkeypatch, capsys):
             os.replace("new.h5", path)
         return check(place, file)
 
-    monkeypatch.setattr(files, "check_seal", replaced)
+    monkeypatch.setattr(seals, "check_seal", replaced)
     for look in (1, 2, 3):
         shutil.copyfile("kept.h5", path)
         looks.clear()
@@ -133,6 +133,6 @@ def test_a_library_is_that_of_the_config(tmp_path):
 def test_what_is_no_file_is_not_held(tmp_path):
     os.mkfifo(tmp_path / "pipe")  # would wait for ever
     for name in ("pipe", "nothing", "."):
-        assert files.held(tmp_path / name) == tmp_path / name
+        assert seals.held(tmp_path / name) == tmp_path / name
     with pytest.raises(FileError, match="could not be read"):
-        read_results(files.held(tmp_path / "nothing"))
+        read_results(seals.held(tmp_path / "nothing"))

@@ -9,8 +9,8 @@ import pytest
 from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
-from flocsim.io.files import read_sealed, seal
-from flocsim.io.opening import kind_of
+from flocsim.io.groups import kind_of
+from flocsim.io.seals import read_sealed, seal
 from flocsim.io.trajectory import DATASETS, KIND, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
 

@@ -17,9 +17,7 @@ from flocsim.forces import (
     Thermal,
     VanDerWaals,
 )
-from flocsim.plausibility.doubts import doubts_of
-from flocsim.plausibility.ranges import PIXEL_SIZE, USUAL
-from flocsim.plausibility.reynolds import all_settled, settled
+from flocsim.plausibility.doubts import PIXEL_SIZE, USUAL, all_settled, doubts_of, settled
 from tests.helpers.trial_scenes import hook
 
 WATER = Fluid(buoyancy=True)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from flocsim.commands.fitting.pictures import MOST_NAMES, report, titles_of
+from flocsim.commands.fitting.pictures import distinct, report, some_of, titles_of
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.reading import SUFFIXES, read_grey
 from flocsim.io.plots.overlay import draw_overlay, single_fit
@@ -35,10 +35,8 @@ def pictures_beneath(name, paths, drawn):
             )
     missing = [path.name for path in paths if path not in found]
     if missing:
-        shown, more = ", ".join(missing[:MOST_NAMES]), len(missing) - MOST_NAMES
         report(
-            f"warning: --pictures {name} has no picture of {shown}"
-            f"{f' and {more} more' if more > 0 else ''}; drawn over the mask"
+            f"warning: --pictures {name} has no picture of {some_of(missing)}; drawn over the mask"
         )
     return {mask: several[0] for mask, several in found.items()}
 
@@ -65,15 +63,15 @@ def overlay_paths(overlay, names, several):
     """A path for the overlay of each of the pictures that have these (name, path of the file)."""
     if not several:
         return [overlay] * len(names)
-    paths: list[Path] = []
-    for name, file in names:
-        plain = Path(name.replace(":", "-").replace("/", "-"))
-        stem = plain.stem if plain.suffix.lower() == file.suffix.lower() else plain.name
-        path = overlay.with_name(f"{overlay.stem}-{stem}{overlay.suffix}")
-        while path in paths:  # pictures a/b.png and a-b.png
-            path = path.with_name(f"{path.stem}'{path.suffix}")
-        paths.append(path)
-    return paths
+    stems = [stem_of(name, [file.suffix.lower()]) for name, file in names]
+    made = distinct((f"{overlay.stem}-{stem}" for stem in stems), overlay.suffix)
+    return [overlay.with_name(name) for name in made]
+
+
+def stem_of(name, suffixes):
+    """The name of a picture in names of files, without one of these endings."""
+    plain = Path(name.replace(":", "-").replace("/", "-"))
+    return plain.stem if plain.suffix.lower() in suffixes else plain.name
 
 
 def expected_overlays(overlay, paths):
@@ -82,27 +80,30 @@ def expected_overlays(overlay, paths):
     return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
 
 
-def draw_fits(folder, pictures, fits, options, rule):
+def draw_fits(folder, pictures, options, rule):
     """Write a picture of every fit at the largest N and the smallest spheroradius."""
-    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
     for picture in pictures:
-        stem = picture.name.replace(":", "-").replace("/", "-")
         for region in picture.regions:
-            figure = single_fit(region.mask, next(results)[radius][most],
-                                f"{picture.name}#{region.label}")  # fmt: skip
-            save(figure, Path(folder, f"{stem}-{region.label}.png"), rule)
+            fit = finest(picture, region, options)
+            figure = single_fit(region.mask, fit, f"{picture.name}#{region.label}")
+            save(figure, Path(folder, f"{stem_of(picture.name, ())}-{region.label}.png"), rule)
 
 
-def draw(overlay, pictures, fits, options, rule, several, beneath):
+def finest(picture, region, options):
+    """The fit of a region at the largest N and the smallest spheroradius."""
+    return picture.fits[region.label][0][options.radii[0]][options.vertices[-1]]
+
+
+def draw(overlay, pictures, options, rule, several, beneath):
     """Write each picture with the outlines at the largest N and the smallest spheroradius.
 
     Returns what could not be drawn because its picture cannot be read any more.
     """
-    most, radius, results = options.vertices[-1], options.radii[0], iter(fits)
+    most, radius = options.vertices[-1], options.radii[0]
     names = [(each.name, each.path) for each in pictures]
     paths, lost = overlay_paths(overlay, names, several or len(pictures) > 1), []
     for picture, path in zip(pictures, paths, strict=True):
-        flocs = [(region, next(results)[radius][most]) for region in picture.regions]
+        flocs = [(region, finest(picture, region, options)) for region in picture.regions]
         title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
         try:
             grey = grey_beneath(picture, beneath, options)

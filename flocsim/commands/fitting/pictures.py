@@ -3,27 +3,30 @@
 import contextlib
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from argparse import Namespace
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from flocsim.commands.fitting.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
-from flocsim.io.images.correction import Correction, check_names, corrected
+from flocsim.geometry.fit.fit import Fit, fit_mask
+from flocsim.geometry.shapes.outline import ShapeMeasures
+from flocsim.io.images.background import FEWEST_FRAMES
+from flocsim.io.images.masks import MASK_SUFFIXES, is_mask, read_masks, segment_mask
+from flocsim.io.images.pictures import Segmentation, segment
+from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_pixels
+from flocsim.io.images.regions import Region, mask_measures, with_holes
+from flocsim.io.images.selection import check_names, corrected, weighed
+from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
 
-if TYPE_CHECKING:
-    from flocsim.geometry.fit.fit import Fit
-    from flocsim.geometry.shapes.outline import ShapeMeasures
-    from flocsim.io.images.pictures import Region, Segmentation
-    from flocsim.io.images.stacks import Plane
-
-    Fits = dict[float, dict[int, Fit]]
-    """The Fit of one mask at every spheroradius [px] and N."""
+Fits = dict[float, dict[int, Fit]]
+"""The Fit of one mask at every spheroradius [px] and N."""
 
 LOST = FlocsimError.exit_code
 """Exit code where pictures were lost; the library has the others."""
@@ -35,61 +38,25 @@ MOST_NAMES = 5
 """Files that one line names."""
 
 
-@attrs.frozen
-class Options:
-    """What to look for and what to fit, ready to be handed to other processes.
-
-    Radii, blur and saturation as in flocsim.io.images.pictures.segment; vertices with 1 among them;
-    radii: spheroradii [px], rising; pixel_size [m], None: that of each file; pages, channel, crop:
-    which part of a file; band: fit the ends of every outline's band as well.
-    """
-
-    pixel_size: float | None
-    vertices: tuple[int, ...]
-    radii: tuple[float, ...]
-    method: str
-    preserve_area: bool
-    inscribed: bool
-    holes: bool
-    max_flocs: int | None
-    masks: bool
-    background: str
-    jobs: int
-    segmentation: dict[str, Any]
-    correction: Correction
-    pages: str | None = None
-    channel: str | None = None
-    crop: tuple[int, int, int, int] | None = None
-    band: bool = False
-
-
 @attrs.frozen(eq=False)
 class Picture:
     """One picture or mask, what was found in it, the regions of that to be fitted, and the measures
-    {label: ShapeMeasures} [px] of all its flocs; pixel_size [m]; plane: where it is in the file."""
+    {label: ShapeMeasures} [px] of all its flocs; pixel_size [m]; plane: where it is in the file;
+    fits {label: [Fits]} of the regions, of the mask and, if asked for, of both ends of its band."""
 
     path: Path
     name: str
-    found: "Segmentation"
-    regions: "tuple[Region, ...]"
-    measures: "dict[int, ShapeMeasures]"
+    found: Segmentation
+    regions: tuple[Region, ...]
+    measures: dict[int, ShapeMeasures]
     pixel_size: float
-    plane: "Plane | None" = None
+    plane: Plane | None = None
+    fits: dict[int, list[Fits]] = attrs.Factory(dict)
 
 
-@attrs.frozen
-class MaskFile:
-    """What stands for a file among the pictures that is a mask or a label image."""
-
-    name: str
-
-
-def fit_pictures(
-    paths: Sequence[Path], options: Options
-) -> "tuple[list[Picture], list[Fits], list[tuple[Fits, ...]], list[str]]":
-    """Pictures, the Fits of each of their regions, those of the two masks of its band (none unless
-    ``options.band``), and the names of pictures lost.
-
+def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Picture], list[str]]:
+    """Pictures with their fits, and the names of pictures lost; ``options`` as `fit.read_numbers`
+    leaves them.
 
     A file that cannot be read as a picture is told and passed over. One that the machine has
     failed on, for want of memory or because a process was killed, is lost, with all its flocs.
@@ -113,21 +80,31 @@ def fit_pictures(
             if isinstance(result, FlocsimError):
                 report(result)
                 continue
-            if isinstance(result, MaskFile):
-                masks_found.append(result.name)
+            if result is None:
+                masks_found.append(task[1])
                 continue
             for picture in result:
                 print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
                 warn_of_coarse(picture.name, picture.regions, options.radii)
                 pictures.append(picture)
-        report_masks(masks_found)
-        pictures = pictures if options.masks else weighted(pictures, options)
+        if masks_found:
+            report(
+                f"{plural(len(masks_found), 'file')} of masks or labels among the pictures: "
+                f"{some_of(masks_found)}; left out, fit them with --masks"
+            )
+        if not options.masks:
+            found = weighed([e.found for e in pictures], options.segmentation["max_blur"])
+            pictures = [
+                attrs.evolve(each, found=one, regions=largest(one.regions, options.max_flocs))
+                for each, one in zip(pictures, found, strict=True)
+            ]
         check_names(options.correction, [(each.name, each.found) for each in pictures])
         regions = [(each.name, region) for each in pictures for region in each.regions]
         masks = [
-            (f"{name}#{region.label}", (region.mask, *(bands_of(region) if options.band else ())),
-             options)
-            for name, region in regions
+            # At the ends of a band that is not known lies the mask itself.
+            (f"{name}#{each.label}",
+             (each.mask, *((each.band or (each.mask, each.mask)) if options.band else ())), options)
+            for name, each in regions
         ]  # fmt: skip
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
         fits = []
@@ -138,26 +115,18 @@ def fit_pictures(
     for (name, _), fit in zip(regions, fits, strict=True):
         if isinstance(fit, Lost):
             lose(name, fit)
-    fits = [fit for (name, _), fit in zip(regions, fits, strict=True) if name not in lost]
-    firsts, bands = [fit[0] for fit in fits], [fit[1:] for fit in fits]
-    return [each for each in pictures if each.name not in lost], firsts, bands, list(lost)
-
-
-def bands_of(region):
-    """The two masks at the ends of a region's band; its own where nothing is known."""
-    return region.band or (region.mask, region.mask)
-
-
-def weighted(pictures, options):
-    """The Pictures with the weights of their flocs among all of them."""
-    from flocsim.io.images.selection import weighed
-
-    max_blur = options.segmentation["max_blur"]
-    found = weighed([each.found for each in pictures], max_blur)
-    return [
-        attrs.evolve(each, found=one, regions=largest(one.regions, options.max_flocs))
-        for each, one in zip(pictures, found, strict=True)
+    results = iter(fits)
+    fitted = [
+        attrs.evolve(each, fits={region.label: next(results) for region in each.regions})
+        for each in pictures
     ]
+    return [each for each in fitted if each.name not in lost], list(lost)
+
+
+def some_of(names: Sequence[str]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def titles_of(paths: Sequence[Path]) -> list[str]:
@@ -167,13 +136,20 @@ def titles_of(paths: Sequence[Path]) -> list[str]:
     is written as \\xe9.
     """
     names = [printable(path.name) for path in paths]
-    titles: list[str] = []
-    for name, path in zip(names, paths, strict=True):
-        title = name if names.count(name) == 1 else printable(path.as_posix())
-        while title in titles:
-            title += "'"
-        titles.append(title)
-    return titles
+    pairs = zip(names, paths, strict=True)
+    return distinct(
+        (name if names.count(name) == 1 else printable(path.as_posix())) for name, path in pairs
+    )
+
+
+def distinct(names: Iterable[str], suffix: str = "") -> list[str]:
+    """The names, of which those that have come before get as many primes as they need."""
+    found: list[str] = []
+    for name in names:
+        while name + suffix in found:
+            name += "'"
+        found.append(name + suffix)
+    return found
 
 
 def printable(text):
@@ -182,8 +158,6 @@ def printable(text):
 
 def compile_fit():
     """Compile before there are several processes that would all do it."""
-    from flocsim.geometry.fit.fit import fit_mask
-
     fit_mask(np.ones((9, 9), bool), vertices=5)
 
 
@@ -191,32 +165,17 @@ def report(error):
     print(f"flocsim: {printable(error)}", file=sys.stderr, flush=True)
 
 
-def report_masks(names):
-    """One line on all masks that lay among the pictures."""
-    if names:
-        shown = ", ".join(names[:MOST_NAMES])
-        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-        report(
-            f"{plural(len(names), 'file')} of masks or labels among the pictures: {shown}{more}; "
-            "left out, fit them with --masks"
-        )
-
-
 def find_flocs(task):
-    """[Picture] of (path, name, background, Options), or MaskFile, or the error of its file."""
+    """[Picture] of (path, name, background, options); the error of its file, None of a mask."""
     path, name, background, options = task
     try:
         if options.masks:
             return masked(path, name, options)
-        from flocsim.io.images.pictures import segment
-        from flocsim.io.images.reading import grey_of, read_pixels
-        from flocsim.io.images.recognition import is_mask
-
         size, pictures = None, []
         for page, plane in planes_in(path, options):
             pixels = read_pixels(path, plane)
             if is_mask(pixels):
-                return MaskFile(name)
+                return None
             size = size or known_size(path, options)
             found = segment(grey_of(pixels, path), background=background, **options.segmentation)
             pictures.append(chosen(path, name + page, found, options, size, plane))
@@ -227,17 +186,12 @@ def find_flocs(task):
 
 def planes_in(path, options):
     """[(what is put behind its name, Plane)] of the pictures of a file that are asked for."""
-    from flocsim.io.images.limits import check_file
-    from flocsim.io.images.stacks import planes_of, stack_of
-
     check_file(path, "picture file")
-    return planes_of(path, stack_of(path), options.pages, options.channel, options.crop)
+    return planes_of(path, stack_of(path), options.page, options.channel, options.crop)
 
 
 def known_size(path, options):
     """The size of a file's pixels [m]: the one that was given, or its own; ImageError for none."""
-    from flocsim.io.images.stacks import pixel_size_in, stack_of
-
     if options.pixel_size is not None:
         return options.pixel_size
     if (found := pixel_size_in(path, stack_of(path))) is None:
@@ -249,8 +203,6 @@ def known_size(path, options):
 
 
 def masked(path, name, options):
-    from flocsim.io.images.masks import read_masks, segment_mask
-
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
     pictures = []
     for inner, mask in read_masks(path):
@@ -262,9 +214,6 @@ def masked(path, name, options):
 
 def chosen(path, name, found, options, pixel_size, plane=None):
     """A Picture of a Segmentation, corrected as the user wants it."""
-    from flocsim.io.images.measures import mask_measures
-    from flocsim.io.images.regions import with_holes
-
     found = corrected(name, found, options.correction)
     if options.holes:
         opened = tuple(with_holes(each, found.holes) for each in found.regions)
@@ -283,10 +232,6 @@ def largest(regions, count):
 
 def fit_region(task):
     """The Fits of each mask in (name, masks, Options); ShapeError, with the name, for none."""
-    import warnings
-
-    from flocsim.geometry.fit.fit import fit_mask
-
     name, masks, options = task
     with warnings.catch_warnings():
         # Said once a picture, by warn_of_coarse, not once a floc and N.
@@ -315,9 +260,6 @@ def fit_region(task):
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:
     """The files' paths, folders replaced by the pictures in them; each path once."""
-    from flocsim.io.images.masks import MASK_SUFFIXES
-    from flocsim.io.images.reading import SUFFIXES
-
     suffixes = MASK_SUFFIXES if masks else SUFFIXES
     paths = []
     for path in map(Path, names):
@@ -333,10 +275,6 @@ def find_background(paths, options):
     """The median of the frames, or None where a surface is fitted to each."""
     if options.background == "surface" or options.masks:
         return None
-    from flocsim.io.images.background import FEWEST_FRAMES
-    from flocsim.io.images.reading import grey_of, read_pixels
-    from flocsim.io.images.recognition import is_mask
-
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
         # A file that cannot be read, or is a mask, is reported when its own turn comes.

@@ -30,10 +30,10 @@ STUDIES = {
 
 FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
     "flocsim sweep": "ensembles.studies.sweep_contents",
-    "flocsim trajectory": "commands.contents.trajectory",
-    "flocsim shape library": "commands.contents.library",
+    "flocsim trajectory": "commands.contents:TRAJECTORY",
+    "flocsim shape library": "commands.contents:LIBRARY",
 }
-"""What any file says that it is → the module of its CONTENTS in flocsim."""
+"""What any file says that it is → the module of its CONTENTS, or of what a colon precedes."""
 
 SCENE_WORDS = tuple(each.scene for each in STUDIES.values() if each.scene)
 
@@ -45,4 +45,5 @@ def scenes() -> dict[str, type]:
 
 def contents_of(file_format: str) -> Any:
     """The Contents of a kind of file, by what such a file says that it is."""
-    return importlib.import_module(f"flocsim.{FILES[file_format]}").CONTENTS
+    module, _, name = FILES[file_format].partition(":")
+    return getattr(importlib.import_module(f"flocsim.{module}"), name or "CONTENTS")

@@ -26,8 +26,8 @@ import attrs
 
 from flocsim.ensembles.config.toml_text import read_text_file
 from flocsim.errors import ConfigError
-from flocsim.io.files import held
 from flocsim.io.json_text import matches, read_json
+from flocsim.io.seals import held
 
 LONGEST_SOURCE = 2**20
 """Bytes of a module that are kept as text; of longer ones the digest is."""

@@ -18,8 +18,15 @@ import attrs
 
 from flocsim.ensembles.config.toml_text import BARE_KEY, key_lines
 from flocsim.errors import ConfigError, visible
-from flocsim.fields import is_number, is_whole, list_words, may_be_none, number_range
-from flocsim.fields.quantities import kind_of, read_quantity
+from flocsim.fields import (
+    is_number,
+    is_whole,
+    kind_of,
+    list_words,
+    may_be_none,
+    number_range,
+    read_quantity,
+)
 
 LONGEST_SHOWN = 60
 MOST_SHOWN = 50

@@ -36,8 +36,14 @@ from flocsim.io.results.events import (
     events,
     events_of,
 )
-from flocsim.io.results.file import CLASSES, NOT_APPLICABLE
-from flocsim.io.results.schema import BONDS, FAILED, POOLED_PROBABILITIES, last_axis
+from flocsim.io.results.schema import (
+    BONDS,
+    CLASSES,
+    FAILED,
+    NOT_APPLICABLE,
+    POOLED_PROBABILITIES,
+    last_axis,
+)
 
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""

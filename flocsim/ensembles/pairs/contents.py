@@ -36,11 +36,11 @@ from flocsim.ensembles.report import (
 )
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, visible
-from flocsim.io.plots.kernel import KERNEL_FIGURES
+from flocsim.io.plots.rates import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.sweep import SWEEP_FIGURES
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
-from flocsim.io.results.file import OUTCOMES, Overview, read_overview, read_results, with_rows
+from flocsim.io.results.file import Overview, read_overview, read_results, with_rows
 from flocsim.io.results.run_group import (
     choice_lines,
     class_words,
@@ -54,6 +54,7 @@ from flocsim.io.results.schema import (
     COMPARED,
     GROUPS,
     LAST_AXES,
+    OUTCOMES,
     POOLED_PROBABILITIES,
     PROBABILITIES,
     RADII,

@@ -59,14 +59,14 @@ from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.interruption import WITHHELD
-from flocsim.io.journal.records import CHUNK, Record
+from flocsim.io.groups import run_of
 from flocsim.io.json_text import matches
+from flocsim.io.records import CHUNK, Record
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened, scalar_of
+from flocsim.io.results.file import opened
 from flocsim.io.results.kernel_group import Kernel
-from flocsim.io.results.layout import FORMAT
+from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.older import why_apart
-from flocsim.io.results.row_file import new_row_file
 from flocsim.io.results.schema import OUTLINES, Results, as_words, blank
 
 
@@ -79,7 +79,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
     places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    run = run_of(file)
     return OldTable(rows, places, len(rows["replicate"]), run)
 
 

@@ -32,7 +32,6 @@ from flocsim.ensembles.study import Study, methods_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
-from flocsim.io.files import held
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
@@ -40,6 +39,7 @@ from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import first_of_each, read_results, read_row
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import CLASSES, GROUPS, Results
+from flocsim.io.seals import held
 from flocsim.trajectories.trajectory import Trajectory
 
 STEPS_MORE = 1000

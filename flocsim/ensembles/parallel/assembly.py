@@ -31,7 +31,7 @@ from flocsim.ensembles.storage.row_store import (
 )
 from flocsim.errors import FileError, FlocsimError
 from flocsim.interruption import INTERRUPTION, stop_requested
-from flocsim.io.results.row_file import ROWS, Plan, RowFile, shared_row_file
+from flocsim.io.results.layout import ROWS, Plan, RowFile, shared_row_file
 
 COUNTED_ROWS = 524_288
 """Rows that a rank counts, at least: an answer has as many numbers as many ranks'."""

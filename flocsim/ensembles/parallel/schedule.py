@@ -19,7 +19,7 @@ from flocsim.ensembles.chunks import MOST_ROWS, Chunk, Interval, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
-from flocsim.io.journal.records import data_digest, record_at
+from flocsim.io.records import data_digest, record_at
 from flocsim.io.results.run_group import describe_note
 
 SHORTEST_SECONDS = 0.25

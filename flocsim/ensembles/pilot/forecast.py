@@ -29,10 +29,8 @@ from flocsim.ensembles.pilot.trials import (
     try_out,
 )
 from flocsim.ensembles.study import Study
-from flocsim.io.pieces import seal_size
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.layout import frame_of
-from flocsim.io.results.row_file import plan_of
+from flocsim.io.results.layout import frame_of, plan_of
 from flocsim.io.results.schema import (
     BAND_ENDS,
     DIFFERENCES,
@@ -44,6 +42,7 @@ from flocsim.io.results.schema import (
     Results,
     blank,
 )
+from flocsim.io.seals import seal_size
 
 SECONDS = 5.0
 """CPU time of the replicates that are timed, their second runs included."""

@@ -28,8 +28,8 @@ from flocsim.ensembles.chunks import (
     total,
 )
 from flocsim.errors import FileError
-from flocsim.io.journal.records import Record
-from flocsim.io.pieces import digest_of
+from flocsim.io.records import Record
+from flocsim.io.seals import digest_of
 
 ENTRY = np.dtype([("first", "<i8"), ("stop", "<i8"), ("offset", "<i8"), ("digest", "V16")])
 """A run of rows: its replicates, where its data begin in the journal (−1: it is in the old file),

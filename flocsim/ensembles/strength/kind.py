@@ -24,7 +24,7 @@ from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import is_number, is_whole
 from flocsim.forces.outline import refuse_outlines
-from flocsim.io.journal.records import Record
+from flocsim.io.records import Record
 from flocsim.io.results.run_group import now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.strength_file import (

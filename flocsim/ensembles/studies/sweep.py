@@ -38,7 +38,7 @@ from flocsim.ensembles.studies.sweep_contents import joined_of, kinds_joined, re
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import make_folder
-from flocsim.io.journal.journal import journal_path
+from flocsim.io.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
 from flocsim.io.results.schema import GROUPS

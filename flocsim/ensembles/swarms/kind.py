@@ -39,7 +39,7 @@ from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.explain import force_lines, scale_lines
 from flocsim.fields import is_whole
 from flocsim.forces import ContactForce
-from flocsim.io.journal.records import CHUNK, SNAPSHOT, Record
+from flocsim.io.records import CHUNK, SNAPSHOT, Record
 from flocsim.io.results.swarm_file import (
     ENDS,
     FORMAT,
@@ -49,8 +49,7 @@ from flocsim.io.results.swarm_file import (
     write_swarm,
 )
 from flocsim.io.terminal import duration
-from flocsim.plausibility.doubts import doubts_of
-from flocsim.plausibility.reynolds import settled
+from flocsim.plausibility.doubts import doubts_of, settled
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import Swarm, check_box
 from flocsim.system import System

@@ -11,8 +11,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.journal.records import Record
 from flocsim.io.json_text import matches
+from flocsim.io.records import Record
 
 BODIES, MOMENT, STATE = "bodies", "moment", "state"
 """What a replicate's records are of."""

@@ -20,7 +20,7 @@ from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.journal.records import Record
+from flocsim.io.records import Record
 from flocsim.io.results.swarm_file import ENDS
 from flocsim.plausibility.settling import terminal_motion
 from flocsim.swarms.leaving import KEEP, Leaving

@@ -1,6 +1,6 @@
 """Pictures to flocs, by scikit-image: `segment` in ``pictures`` finds them, step by step.
 
 ``reading``: files → grey; ``background``: noise and light; ``outlines``: contrast → where flocs
-end, by ``focus`` and ``slopes``; ``regions``: outlines → flocs, those that touch parted; ``masks``:
-flocs that are given without a picture; ``recognition``: which of the two a file is.
+end, by ``focus``; ``regions``: outlines → flocs, those that touch parted; ``masks``: flocs that are
+given without a picture; ``selection``: which of them count, and for how many.
 """

@@ -12,8 +12,7 @@ import attrs
 import numpy as np
 
 from flocsim.io.images.background import robust_deviation, sampled, stride_of, strips
-from flocsim.io.images.focus import Focus, rim
-from flocsim.io.images.slopes import around
+from flocsim.io.images.focus import Focus, around, rim
 
 EIGHT = np.ones((3, 3), int)
 """Diagonal pixels belong together."""

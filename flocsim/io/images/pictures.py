@@ -3,21 +3,18 @@
 import attrs
 import numpy as np
 
-from flocsim.errors import ImageError, UsageError
-from flocsim.io.images.annotations import without_annotations
+from flocsim.errors import ImageError
 from flocsim.io.images.background import (
     light_surface,
     low_pass,
     robust_deviation,
     sampled,
     smooth_surface,
+    without_annotations,
 )
 from flocsim.io.images.focus import Focus
 from flocsim.io.images.outlines import Search, background_noise, filled, outlines_at, quietened
-from flocsim.io.images.reading import read_grey
-from flocsim.io.images.regions import Filters, Region, Rejection, find_regions
-
-__all__ = ["Filters", "Region", "Rejection", "Segmentation", "read_grey", "segment"]
+from flocsim.io.images.regions import Filters, Region, find_regions
 
 UNLIT = 0.04
 """Where the light is below this share of its maximum, a camera's black level drowns the flocs."""
@@ -29,6 +26,9 @@ picture counts as broken up."""
 UNDECIDED = 0.5
 """Share of the area of flocs between their bands' inner and outer outlines, from which levels
 disagree: twice what a lens of a tenth of r_eq makes of it."""
+
+DEGREE = 6
+"""Of the polynomial surface that is the light."""
 
 COARSE = 4
 """Every fourth pixel tells whether flocs are dark or bright."""
@@ -49,7 +49,7 @@ class Segmentation:
 
     foreground: np.ndarray
     regions: tuple[Region, ...]
-    rejected: tuple[Rejection, ...]
+    rejected: tuple[Region, ...]
     flocs: str
     threshold: float
     left_whole: int = 0
@@ -63,13 +63,16 @@ class Segmentation:
     @property
     def alarms(self) -> list[str]:
         """What speaks against the outlines, each in a few words; empty where nothing does."""
+        from scipy.ndimage import binary_dilation, label
+
         found = []
         kept, left = (sum(each.area for each in some) for some in (self.regions, self.rejected))
         if left > kept:
             found.append(f"{100 * left / (kept + left):.0f} % of the area is left out")
         pieces = len(self.regions) + len(self.rejected)
         if pieces >= MANY_PIECES:
-            bodies = self._bodies()
+            # Gaps of up to 2 APART pixels are none.
+            bodies = int(label(binary_dilation(self.foreground, iterations=APART))[1])
             if pieces >= MANY_PIECES * bodies:
                 found.append(f"{pieces} pieces lie as if broken from {bodies}")
         bands = [each.band for each in self.regions if each.band is not None]
@@ -79,12 +82,6 @@ class Segmentation:
                 f"outlines are undecided over {100 * undecided / kept:.0f} % of their area"
             )
         return found
-
-    def _bodies(self):
-        """The number of bodies if gaps of up to 2 APART pixels are none."""
-        from scipy.ndimage import binary_dilation, label
-
-        return int(label(binary_dilation(self.foreground, iterations=APART))[1])
 
     def rejected_by_reason(self) -> dict[str, int]:
         """{reason: number of regions}, reasons in alphabetical order."""
@@ -98,7 +95,6 @@ def segment(
     flocs: str = "auto",
     threshold: float | None = None,
     noise_scale: float = 1.0,
-    background_degree: int = 6,
     background: np.ndarray | None = None,
     saturated: float = 0.001,
     min_radius: float = 4.0,
@@ -123,16 +119,14 @@ def segment(
 
     grey: (h, w) in [0, 1]; flocs: "bright", "dark" or "auto" (the longer tail of the contrast);
     background: (h, w), for example the median of many frames, or None for a polynomial surface of
-    `background_degree`.  Returns a Segmentation; no floc is no error.  Raises ImageError for an
-    array that is no picture, UsageError for a wrong option.
+    degree 6.  Returns a Segmentation; no floc is no error.  Raises ImageError where the background
+    has another shape.  Options are not looked at: `flocsim fit` has done that.
     """
-    grey, burnt_in = without_annotations(_checked(grey))
+    grey, burnt_in = without_annotations(grey)
     filters = Filters(min_radius, max_radius, max_blur, neck)
-    _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters)
     smooth = low_pass(grey, noise_scale)
     light = None
     if background is not None:
-        background = _checked(background)
         if background.shape != grey.shape:
             raise ImageError(
                 f"the background's shape {background.shape} is not the picture's {grey.shape}; "
@@ -141,7 +135,7 @@ def segment(
         light = low_pass(background, noise_scale)
     if flocs == "auto":
         flocs = _guess_polarity(smooth, light)
-    contrast, fine = _contrast(grey, smooth, light, flocs, noise_scale, background_degree)
+    contrast, fine = _contrast(grey, smooth, light, flocs, noise_scale)
     noise, slope = background_noise(contrast, fine, noise_scale)
     if threshold is None:
         quiet, scale = quietened(contrast, noise, noise_scale)
@@ -165,37 +159,6 @@ def segment(
     )  # fmt: skip
 
 
-def _checked(grey):
-    grey = np.asarray(grey, dtype=float)
-    if grey.ndim != 2 or grey.size == 0 or not np.all(np.isfinite(grey)):
-        raise ImageError(
-            f"a picture is a filled (h, w) array of finite numbers, found shape {grey.shape}"
-        )
-    return grey
-
-
-def _check_options(flocs, threshold, noise_scale, background_degree, saturated, filters):
-    allowed = [
-        (threshold is None or 0 < threshold <= 1, "threshold", threshold, "above 0, to 1"),
-        (flocs in ("auto", "bright", "dark"), "flocs", flocs, "'auto', 'bright' or 'dark'"),
-        (0 <= noise_scale < np.inf, "noise_scale", noise_scale, "at least 0 px"),
-        (background_degree in range(13), "background_degree", background_degree, "0 to 12"),
-        (0 <= saturated < 1, "saturated", saturated, "a share from 0 to below 1"),
-        (0 <= filters.min_radius < np.inf, "min_radius", filters.min_radius, "at least 0 px"),
-        (filters.max_radius > 0, "max_radius", filters.max_radius, "above 0 px"),
-        (filters.max_blur > 0, "max_blur", filters.max_blur, "a share of r_eq above 0"),
-        (
-            filters.neck is None or 0 <= filters.neck <= 1,
-            "neck",
-            filters.neck,
-            "a share from 0 to 1",
-        ),
-    ]
-    for right, name, found, wanted in allowed:
-        if not right:
-            raise UsageError(f"{name} must be {wanted}, found {found!r}")
-
-
 def _guess_polarity(smooth, light):
     """The side of the contrast's longer tail."""
     coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
@@ -206,7 +169,7 @@ def _guess_polarity(smooth, light):
     return "dark" if np.mean(beside * beside * beside) < 0 else "bright"
 
 
-def _contrast(grey, smooth, light, flocs, noise_scale, degree):
+def _contrast(grey, smooth, light, flocs, noise_scale):
     """Contrast against the background, in the place of `smooth`, and the standard deviation of its
     noise."""
     # White noise of deviation s is left with s/(2√π·scale) by the low pass, and the part that is
@@ -214,9 +177,9 @@ def _contrast(grey, smooth, light, flocs, noise_scale, degree):
     left_over = 1.0 / max(2.0 * np.sqrt(np.pi) * noise_scale, 1.0)
     fine = sampled(grey) - sampled(smooth)
     if flocs == "bright":
-        smooth -= smooth_surface(smooth, degree) if light is None else light
+        smooth -= smooth_surface(smooth, DEGREE) if light is None else light
         return smooth, left_over * robust_deviation(fine)
-    light = light_surface(smooth, degree) if light is None else light
+    light = light_surface(smooth, DEGREE) if light is None else light
     floor = max(UNLIT * light.max(), np.finfo(float).tiny)
     np.maximum(light, floor, out=light)
     smooth /= light

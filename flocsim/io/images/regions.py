@@ -1,8 +1,10 @@
-"""From outlines to flocs: necks, filters, bands; a region that is left out has a reason."""
+"""From outlines to flocs: necks, filters, bands, measures; what is left out has a reason."""
 
 import attrs
 import numpy as np
 
+from flocsim.geometry.shapes.outline import ShapeMeasures, feret_diameters
+from flocsim.io.images.focus import along
 from flocsim.io.images.outlines import (
     BAND,
     EIGHT,
@@ -14,7 +16,6 @@ from flocsim.io.images.outlines import (
     placed,
     widened,
 )
-from flocsim.io.images.slopes import along
 
 NECK = 0.5
 SURE = 0.65
@@ -27,6 +28,9 @@ STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """From a pixel to half of its eight neighbours: every pair of neighbours once."""
 
 NAN = float("nan")
+
+PIXEL_MOMENT = 1.0 / 12.0
+"""Second moment of a pixel about its own centre, over its area [px²]."""
 
 
 @attrs.frozen(eq=False)
@@ -42,7 +46,8 @@ class Region:
     mask that came without a picture; parted: the confidence that it is a floc apart from one that
     it touched, NaN for all others; band: masks as it would have been cut at a higher and at a lower
     level, in the bbox widened by the same on every side, None where it is not known; weight: for
-    how many flocs it stands, of which the filters kept it alone (selection.weighed).
+    how many flocs it stands, of which the filters kept it alone (selection.weighed); reason: why it
+    is left out, "" for a floc. The labels of what is left out count on from those of the flocs.
     """
 
     label: int
@@ -57,6 +62,7 @@ class Region:
     parted: float = NAN
     band: tuple[np.ndarray, np.ndarray] | None = None
     weight: float = 1.0
+    reason: str = ""
 
     @property
     def radius_band(self) -> tuple[float, float]:
@@ -65,13 +71,6 @@ class Region:
             return self.equivalent_radius, self.equivalent_radius
         inner, outer = (float(np.sqrt(mask.sum() / np.pi)) for mask in self.band)
         return inner, outer
-
-
-@attrs.frozen(eq=False)
-class Rejection(Region):
-    """A region left out, and why; its label counts on from those of the picture's flocs."""
-
-    reason: str = ""
 
 
 @attrs.frozen
@@ -90,7 +89,7 @@ class Filters:
 
 
 def find_regions(outlines, contrast, filters):
-    """(Regions, Rejections, number of regions with necks that were left whole) of Outlines.
+    """(flocs, regions left out, number of regions with necks that were left whole) of Outlines.
 
     contrast: (h, w), of which they are.
     """
@@ -104,45 +103,41 @@ def find_regions(outlines, contrast, filters):
 
 
 def sorted_out(outlines, shape, filters, numbers=None):
-    """(Regions, Rejections) of Outlines in a picture of a shape.
+    """(flocs, what is left out) of Outlines in a picture of a shape, as Regions.
 
     numbers: of each the label; otherwise the flocs are counted, and then what is left out.
     """
-    accepted, rejected = [], []
+    found = []
     for place, each in enumerate(outlines):
         mask, box = each.mask, each.box
-        size = int(mask.sum()), float(np.sqrt(mask.sum() / np.pi))
-        reason = reason_to_reject(box, shape, size[1], each.softness, filters)
-        bbox = (box[0].start, box[1].start, box[0].stop, box[1].stop)
-        number = len(accepted) + 1 if numbers is None else numbers[place]
-        about = (number, centroid_of(mask, box), bbox, *size, placed(mask, box, beyond(box, 1)),
-                 each.softness, each.level, each.base, each.parted)  # fmt: skip
-        if reason:
-            rejected.append(Rejection(*about, reason=reason))
-        else:
-            accepted.append(Region(*about))
+        radius = float(np.sqrt(mask.sum() / np.pi))
+        found.append(Region(
+            0 if numbers is None else numbers[place], centroid_of(mask, box),
+            (box[0].start, box[1].start, box[0].stop, box[1].stop), int(mask.sum()), radius,
+            placed(mask, box, beyond(box, 1)), each.softness, each.level, each.base, each.parted,
+            reason=reason_to_reject(box, shape, radius, each.softness, filters),
+        ))  # fmt: skip
+    kept, left = ([each for each in found if bool(each.reason) == out] for out in (False, True))
     if numbers is None:
-        first = len(accepted) + 1
-        rejected = [attrs.evolve(each, label=first + k) for k, each in enumerate(rejected)]
-    return tuple(accepted), tuple(rejected)
+        counted = [attrs.evolve(each, label=n) for n, each in enumerate([*kept, *left], start=1)]
+        kept, left = counted[: len(kept)], counted[len(kept) :]
+    return tuple(kept), tuple(left)
 
 
 def reason_to_reject(box, shape, radius, blur, filters):
+    """Why a region is left out; "" where it meets the filters."""
+    sides = zip(box, shape, strict=True)
     if radius < filters.min_radius:
         return "too small"
     if radius > filters.max_radius:
         return "too large"
-    if filters.clear_of_border:
-        sides = zip(box, shape, strict=True)
-        if any(side.start == 0 or side.stop == size for side, size in sides):
-            return "at the border"
-    if blur > max(SHARP, filters.max_blur * radius):
-        return "out of focus"
-    return None
+    if filters.clear_of_border and any(s.start == 0 or s.stop == size for s, size in sides):
+        return "at the border"
+    return "out of focus" if blur > max(SHARP, filters.max_blur * radius) else ""
 
 
 def with_bands(regions, rejected, contrast):
-    """Regions and Rejections, which may yet be added, with bands that reach into no other.
+    """Flocs and regions left out, which may yet be added, with bands that reach into no other.
 
     A level is uncertain by BAND of the step at the edge, and by what it changes over PIXEL.
     """
@@ -338,3 +333,26 @@ def joined(basins, depth, neck, min_radius):
     left = np.unique(owner[1:])
     share = deepest[np.ix_(left, left)] / np.minimum.outer(peak[left], peak[left])
     return np.concatenate([[0], numbers])[basins], float(share.max())
+
+
+def mask_measures(mask: np.ndarray) -> ShapeMeasures:
+    """The ShapeMeasures [px] of a mask (h, w) bool, as scikit-image's regionprops has them.
+
+    The perimeter is Crofton's, by lines in four directions (``perimeter_crofton``): of a disc of
+    8 px it is .2 % too short, where the length along pixels (``perimeter``) is up to 4 % too long.
+    A row of single pixels has the aspect ratio of the rectangle that it is.
+    """
+    from scipy.spatial import ConvexHull
+    from skimage.measure import find_contours, regionprops
+
+    found = regionprops(np.asarray(mask, np.uint8))[0]
+    perimeter = float(found.perimeter_crofton)
+    # As feret_diameter_max has it: on the sides of the pixels.
+    outline = np.concatenate(find_contours(np.pad(found.image_convex, 1).astype(float), 0.5))
+    long, short = found.axis_major_length / 4.0, found.axis_minor_length / 4.0
+    if short == 0.0:
+        long, short = np.sqrt(long**2 + PIXEL_MOMENT), np.sqrt(PIXEL_MOMENT)
+    return ShapeMeasures(
+        perimeter, float(long / short), 4.0 * np.pi * float(found.area) / perimeter**2,
+        float(found.solidity), *feret_diameters(outline[ConvexHull(outline).vertices]),
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What the filters select, and the weights that undo it.
+"""Which flocs count: what a user corrects in a segmentation, and the weights that undo the filters.
 
 A floc of h × w pixels is kept clear of the border at (H − h)(W − w) of the places where its picture
 of H × W could have shown it: each stands for HW/((H − h)(W − w)) (Miles and Lantuéjoul).
@@ -10,13 +10,29 @@ Lynden-Bell): a floc stands for the share of flocs, of those within the largest 
 within its own.
 """
 
-from collections.abc import Sequence
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
 import numpy as np
 
+from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.outlines import SHARP
 from flocsim.io.images.pictures import Segmentation
+from flocsim.io.images.regions import Region
+
+DROPPED = "dropped"
+NOT_CHOSEN = "not among those kept"
+MOST_LABEL = 65535
+"""The largest number that a label image of 16 bits has."""
+
+Names = tuple[tuple[str | None, int], ...]
+"""(picture, number) of regions; None where only the number was given."""
+
+Correction = Mapping[str, Names]
+"""Regions by name: "drop" leaves flocs out, "keep", if any, all others, "add" takes regions in.
+Named as in the overlay and the table, "023.png#7", also if they were left out."""
 
 
 def weighed(found: Sequence[Segmentation], max_blur: float) -> list[Segmentation]:
@@ -65,3 +81,90 @@ def focus_weights(blur: np.ndarray, limit: np.ndarray) -> np.ndarray:
     softer = np.searchsorted(-blur[order], -limit, side="left")
     weights[known] = 1.0 / shares[softer]
     return weights
+
+
+def read_names(option: str, text: str) -> Names:
+    """The regions in a list such as "3,5", "023.png#7" or "023.png#7,9,024.png#2".
+
+    A bare number belongs to the picture named before it.  UsageError, which names the option.
+    """
+    names: list[tuple[str | None, int]] = []
+    picture, begun = None, ""
+    for piece in text.split(","):
+        before, mark, number = (begun + piece).strip().rpartition("#")
+        if not re.fullmatch("[0-9]{1,9}", number):
+            begun += piece + ","  # a picture's name with a comma in it
+            continue
+        picture, begun = before if mark else picture, ""
+        names.append((picture, int(number)))
+    if begun:
+        raise UsageError(
+            f"{option} takes numbers or names of flocs, such as 3,5 or 023.png#7, found {text!r}"
+        )
+    return tuple(names)
+
+
+def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]]) -> None:
+    """UsageError for a name that none of the (picture's name, Segmentation) has, or several."""
+    known = dict(found)
+    for option, names in correction.items():
+        for picture, number in names:
+            if picture is None and len(known) != 1:
+                raise UsageError(
+                    f"--{option} {number}: there are {len(known)} pictures; name the picture too, "
+                    f"for example {next(iter(known), 'a.png')}#{number}"
+                )
+            name = next(iter(known)) if picture is None else picture
+            if name not in known:
+                raise UsageError(
+                    f"--{option} {name}#{number}: no picture is called {name!r}; the first is "
+                    f"{next(iter(known), 'missing')!r}"
+                )
+            numbers = {each.label for each in (*known[name].regions, *known[name].rejected)}
+            if number not in numbers:
+                raise UsageError(
+                    f"--{option} {name}#{number}: the picture has no such region; its last is "
+                    f"{max(numbers, default=0)}; the table of all regions and the overlay name them"
+                )
+
+
+def corrected(picture: str, found: Segmentation, correction: Correction) -> Segmentation:
+    """The Segmentation with regions moved between flocs and those left out; numbers stay."""
+
+    def named(names):
+        return {number for name, number in names if name in (None, picture)}
+
+    drop, keep, add = (named(correction[key]) for key in ("drop", "keep", "add"))
+    regions: list[Region] = []
+    rejected: list[Region] = []
+    for each in (*found.regions, *found.rejected):
+        reason = each.reason
+        if each.label in drop:
+            reason = reason or DROPPED
+        elif each.label in (keep | add):
+            reason = ""
+        elif correction["keep"]:
+            reason = reason or NOT_CHOSEN
+        (rejected if reason else regions).append(attrs.evolve(each, reason=reason))
+    return attrs.evolve(found, regions=tuple(regions), rejected=tuple(rejected))
+
+
+def label_image(shape: tuple[int, int], regions: Iterable[Region], name: str = "") -> bytes:
+    """A PNG of 16 bits: 0 outside, in every region its number; `flocsim fit --masks` reads it.
+
+    ImageError for a number above 65535.
+    """
+    from PIL import Image
+
+    labels = np.zeros(shape, np.uint16)
+    for region in regions:
+        if region.label > MOST_LABEL:
+            raise ImageError(
+                f"{name}: a label image has numbers up to {MOST_LABEL}, found {region.label}; "
+                "leave out small regions with --min-radius"
+            )
+        top, left, bottom, right = region.bbox
+        labels[top:bottom, left:right][region.mask[1:-1, 1:-1]] = region.label
+    picture = io.BytesIO()
+    Image.fromarray(labels).save(picture, format="PNG")
+    return picture.getvalue()

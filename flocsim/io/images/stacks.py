@@ -11,23 +11,16 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ImageError, UsageError
-from flocsim.fields.quantities import read_number
+from flocsim.fields import read_number
 
 LONGEST_TEXT = 2**22
 """Letters of a description beyond which it is not read."""
 
 MOST_PLANES = 100_000
-UNITS = {
-    "micron": "um",
-    "microns": "um",
-    "µm": "um",
-    "μm": "um",
-    "\\u00b5m": "um",
-    "\\u00B5m": "um",
-}
 UNEQUAL = 1e-3
 """By this share the sides of a pixel may differ, and it counts as square."""
 
+PLANES = r'\{"shape": \[([34]), (\d+), (\d+)\]'
 TIFF_SUFFIXES = (".tif", ".tiff")
 
 
@@ -60,10 +53,6 @@ class Stack:
     @property
     def channel_count(self) -> int:
         return dict(zip(self.axes, self.sizes, strict=True)).get("C", 1)
-
-    @property
-    def page_count(self) -> int:
-        return self.frame_count // self.channel_count
 
     def frame(self, page: int, channel: int) -> int:
         """Place in the file of a page and channel, all from 0."""
@@ -104,18 +93,12 @@ def stack_in(tiff):
         found = ome_stack(text)
     elif tiff.is_imagej:
         found = imagej_stack(first, text)
-    elif count == 1 and is_planar_stack(first, text):
+    # 3 or 4 planes that are stored as colours were an array (3, h, w): Python's tifffile says so.
+    elif count == 1 and first.axes == "SYX" and re.match(PLANES, text):
         return Stack(sizes=(first.shape[0],), planar=True)
     # What it says of its axes has to fit what it has.
     fits = found.frame_count == count
     return found if fits else Stack(sizes=(count,), sides=found.sides)
-
-
-def is_planar_stack(page, text):
-    """Whether 3 or 4 planes that are stored as colours were an array (3, h, w): Python's tifffile
-    writes such, and says so."""
-    shape = re.match(r'\{"shape": \[([34]), (\d+), (\d+)\]', text)
-    return page.axes == "SYX" and shape is not None
 
 
 def ome_stack(text):
@@ -154,10 +137,12 @@ def imagej_stack(page, text):
 def side_of(value, unit):
     """A length [m]; None where it is none above 0, or its unit none of length."""
     try:
-        found = read_number(f"{float(value)!r} {UNITS.get(unit.strip(), unit.strip())}", "m")
+        # Some programs write the letter as its code.
+        unit = re.sub(r"\\u00b5", "µ", unit.strip(), flags=re.IGNORECASE)
+        found = read_number(f"{float(value)!r} {unit}", "m")
     except (TypeError, ValueError):
         return None
-    return found if unit.strip() and 0.0 < found < float("inf") else None
+    return found if unit and 0.0 < found < float("inf") else None
 
 
 def pair_of(sides):
@@ -174,7 +159,8 @@ def planes_of(
     ``pages``: "all", or numbers with commas; ``channel``: a number, or a name that the file gives.
     ImageError where the file has several and none is asked for, or has not that one.
     """
-    count, channels = stack.page_count, stack.channel_count
+    channels = stack.channel_count
+    count = stack.frame_count // channels
     if pages is None and count > 1:
         raise ImageError(
             f"{path}: holds {count} pages; choose with --page 1, --page 1,3 or --page all"

@@ -1,23 +1,23 @@
 """One collision: a strip of frames (the paper's Fig. 7), distance, forces, and an animation."""
 
+import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
 from flocsim.io.files import Rule
 from flocsim.io.outputs import redrawn
 from flocsim.io.plots.style import (
     BODY_COLOURS,
     CONTACT_COLOUR,
     Figure,
+    drawing,
     frame_of,
-    house_style,
     keep_titles_whole,
-    new_figure,
     plain,
     save_gif,
 )
@@ -48,54 +48,53 @@ MILLISECONDS = 80
 """Of every frame of an animation."""
 
 
-def draw_strip(
-    outlines_per_frame: Sequence[Sequence[Sequence[np.ndarray]]],
-    times: Sequence[float],
-    paths: Sequence[np.ndarray],
-    title: str = "",
-    *,
-    centre_distance: Sequence[float] | None = None,
-    zone_distance: float | None = None,
-    contacts: Sequence[np.ndarray] | None = None,
-    seen_from: int | None = None,
-) -> Figure:
-    """A row of frames of a trajectory; returns the matplotlib Figure.
+@attrs.frozen(eq=False)
+class Frames:
+    """Instants of a motion, seen from the first body's centroid; of a lone body, from where it is.
 
-    ``outlines_per_frame``: per frame, per body, a list of (k, 2) outline polygons [m];
-    ``times`` (frames,) [s]; ``paths``: per body the (m, 2) path of its centre [m];
-    ``centre_distance`` (frames,) d_c [m], written beneath each frame; ``zone_distance`` D_0 [m],
-    to say on which side of it d_c lies; ``contacts``: per frame the (c, 2) contact points [m],
-    ringed in red. A legend names the bodies (i and j where there are two) and says what the lines
-    are; ``seen_from``: the body that the others are seen from, None for the laboratory. All frames
-    have one scale and are centred on their bodies, in whatever frame of
-    reference the outlines and paths are given. Raises UsageError if the lengths disagree.
+    ``times`` (f,) [s]; ``outlines`` per frame and body a list of rings (k, 2) [m]; ``contacts``
+    per frame (c, 2) [m]; ``paths`` per body (m, 2) [m]; ``centre_distance`` (f,) of the first two
+    [m], 0 of one.
     """
-    contacts = [np.empty((0, 2))] * len(times) if contacts is None else contacts
-    labels = frame_labels(len(times), centre_distance, zone_distance)
-    check_lengths(len(times), outlines_per_frame, contacts, labels)
-    centres, half = windows(outlines_per_frame)
-    unit, factor = time_unit(times)
-    with house_style():
-        figure = new_figure(1.65 * len(times) + 0.1, (2.4 if title else 2.15) + 0.3)
-        row = figure.subplots(1, len(times), squeeze=False)[0]
+
+    times: np.ndarray
+    outlines: list[list[list[np.ndarray]]]
+    contacts: list[np.ndarray]
+    paths: list[np.ndarray]
+    centre_distance: np.ndarray
+
+
+def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan) -> Figure:
+    """A row of Frames; returns the matplotlib Figure.
+
+    d_c of a pair is written beneath each frame, and on which side of ``zone_distance``, D_0 [m], it
+    lies; contacts are ringed in red. A legend names the bodies (i and j where there are two) and
+    says what the lines are. All frames have one scale and are centred on their bodies.
+    """
+    count, bodies = len(frames.times), len(frames.outlines[0])
+    # The numbers of bodies are places in the list that System was given.
+    names = ["i", "j"] if bodies == 2 else [str(number) for number in range(bodies)]
+    centres, half = windows(frames.outlines)
+    unit, factor = time_unit(frames.times)
+    with drawing(1.65 * count + 0.1, (2.4 if title else 2.15) + 0.3) as figure:
+        row = figure.subplots(1, count, squeeze=False)[0]
         for number, axes in enumerate(row):
-            draw_frame(axes, paths, outlines_per_frame[number], contacts[number])
+            draw_frame(axes, frames.paths, frames.outlines[number], frames.contacts[number])
             frame_axes(axes, centres[number], half)
-            axes.set_title(f"{times[number] * factor:.4g} {unit}", loc="center", fontsize=8)
-            axes.set_xlabel(labels[number])
+            time = f"{frames.times[number] * factor:.4g} {unit}"
+            axes.set_title(time, loc="center", fontsize=8)
+            if bodies == 2:
+                distance = frames.centre_distance[number]
+                side = r" $<D_0$" if distance < zone_distance else r" $\geq D_0$"
+                side = side if math.isfinite(zone_distance) else ""
+                axes.set_xlabel(f"$d_c$ = {distance * MICRO:.1f} µm{side}")
         draw_scale_bar(row[0], centres[0], half)
-        names = body_names(len(outlines_per_frame[0]))
-        name_bodies(row[0], outlines_per_frame[0], names)
+        name_bodies(row[0], frames.outlines[0], names)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-        figure.legend(handles=strip_keys(names, seen_from), loc="outside lower left",
-                      ncols=len(names) + 2 if len(times) > 3 else 2)  # fmt: skip
+        figure.legend(handles=strip_keys(names), loc="outside lower left",
+                      ncols=len(names) + 2 if count > 3 else 2)  # fmt: skip
         keep_titles_whole(figure)
         return figure
-
-
-def body_names(count):
-    """ "i" and "j" of two bodies; the numbers of more, as in the list that System was given."""
-    return ["i", "j"] if count == 2 else [str(number) for number in range(count)]
 
 
 def name_bodies(axes, frame, names):
@@ -127,7 +126,7 @@ def deepest_inside(polygon):
     return inside[np.argmax(distance)]
 
 
-def strip_keys(names, seen_from):
+def strip_keys(names):
     """The keys of a strip's legend: bodies, the paths of their centres, contacts."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -138,81 +137,66 @@ def strip_keys(names, seen_from):
               label=f"body {name}")
         for number, name in shown
     ]  # fmt: skip
-    seen = "" if seen_from is None else f", seen from {names[seen_from]}"
+    seen = f", seen from {names[0]}" if len(names) > 1 else ""
     keys.append(Line2D([], [], color="0.4", linewidth=0.8, linestyle=(0, (3, 1.5)),
                        label=f"path of a body's centre, whole run{seen}"))  # fmt: skip
     keys.append(Line2D([], [], **RING, label="contact"))
     return keys
 
 
+@contextlib.contextmanager
+def over_time(
+    times: Sequence[float], label: str, title: str, width: float, height: float
+) -> Iterator[tuple[Any, np.ndarray, float]]:
+    """(axes of a new figure, times (k,) in a unit that suits them, that unit per second)."""
+    unit, factor = time_unit(times)
+    with drawing(width, height) as figure:
+        axes = figure.subplots()
+        axes.set(xlabel=f"time [{unit}]", ylabel=label, title=title)
+        yield axes, np.asarray(times) * factor, factor
+        keep_titles_whole(figure)
+
+
 def draw_distance(
-    times: Sequence[float],
-    centre_distance: Sequence[float],
-    zone_distance: float | None = None,
+    times: Sequence[float], centre_distance: Sequence[float], zone_distance: float = math.nan,
     title: str = "",
-) -> Figure:
+) -> Figure:  # fmt: skip
     """The centre distance d_c against time, with D_0 where there is a zone; returns the Figure.
 
-    ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], None or NaN for none.
+    ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], NaN for none.
     """
-    check_lengths(len(times), centre_distance)
-    unit, factor = time_unit(times)
-    with house_style():
-        figure = new_figure(3.6, 2.3)
-        axes = figure.subplots()
-        time = np.asarray(times) * factor
+    with over_time(times, "centre distance $d_c$ [µm]", title, 3.6, 2.3) as (axes, time, _):
         axes.plot(time, np.asarray(centre_distance) * MICRO, color=BODY_COLOURS[0])
-        axes.set_xlabel(f"time [{unit}]")
-        axes.set_ylabel("centre distance $d_c$ [µm]")
-        axes.set_title(title)
         axes.margins(x=0.02, y=0.12)
         draw_zone(axes, zone_distance)
-        keep_titles_whole(figure)
-        return figure
+    return axes.figure
 
 
 def draw_forces(
-    times: Sequence[float],
-    forces: Mapping[str, Sequence[float]],
-    collision: float | None = None,
+    times: Sequence[float], forces: Mapping[str, Sequence[float]], collision: float = math.nan,
     title: str = "",
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Magnitudes of forces [N] against time [s], solid where they push apart; returns the Figure.
 
     ``forces``: {name: (k,)}, above 0 where a force pushes the bodies apart; ``collision``: the
-    time of the first touch. Raises UsageError if the lengths disagree.
+    time of the first touch, NaN for none.
     """
-    if any(len(force) != len(times) for force in forces.values()):
-        raise UsageError("a figure of forces needs one force per time")
-    unit, factor = time_unit(times)
-    time = np.asarray(times) * factor
-    curves = {name: np.asarray(force) * NANO for name, force in forces.items()}
-    sizes = np.abs(np.concatenate([np.asarray(force) for force in forces.values()])) * NANO
-    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
-    with house_style():
-        figure = new_figure(5.4, 2.6)
-        axes = figure.subplots()
-        for place, (name, force) in enumerate(curves.items()):
-            colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
-            push = np.where(force > 0.0, force, np.nan)
+    curves = {plain(name): np.asarray(force) * NANO for name, force in forces.items()}
+    label = "force on the line of centres [nN]"
+    with over_time(times, label, title, 5.4, 2.6) as (axes, time, factor):
+        for name, force, style in styled(curves):
+            axes.plot(time, np.where(force > 0.0, force, np.nan), label=name, **style)
             pull = np.where(force < 0.0, -force, np.nan)
-            # Drag balances weight: what lies under another curve is seen on both sides of it.
-            width = max(2.6 - 0.5 * place, 0.8)
-            axes.plot(time, push, color=colour, linewidth=width, label=plain(name))
-            axes.plot(time, pull, color=colour, linewidth=width, linestyle=(0, (3, 1.5)))
-        if collision is not None and np.isfinite(collision):
+            axes.plot(time, pull, linestyle=(0, (3, 1.5)), **style)
+        if np.isfinite(collision):
             axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":",
                          label="first touch")  # fmt: skip
-        if largest > 0.0:
+        if (largest := largest_of(curves)) > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(largest * 10.0**-DECADES, 3.0 * largest)
-        axes.set_ylabel("force on the line of centres [nN]")
-        axes.set_xlabel(f"time [{unit}]")
-        axes.set_title(title)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="pushes —   pulls - -",
                     alignment="left")  # fmt: skip
-        keep_titles_whole(figure)
-        return figure
+    return axes.figure
 
 
 def draw_energies(
@@ -223,48 +207,44 @@ def draw_energies(
 
     ``work``: {name: (k,)}; ``kinetic`` (k,), of all bodies together. Returns the Figure. Energies
     of settling flocs differ by many orders of magnitude: the axis is linear around 0 and
-    logarithmic beyond. Raises UsageError if the lengths disagree.
+    logarithmic beyond.
     """
-    if any(len(each) != len(times) for each in (*work.values(), kinetic)):
-        raise UsageError("a figure of energies needs one energy per time")
-    unit, factor = time_unit(times)
-    time = np.asarray(times) * factor
     curves = {f"work of {plain(name)}": np.asarray(each) * FEMTO for name, each in work.items()}
     curves["kinetic energy"] = np.asarray(kinetic) * FEMTO
-    sizes = np.abs(np.concatenate(list(curves.values())))
-    largest = np.nanmax(sizes[np.isfinite(sizes)], initial=0.0)
-    with house_style():
-        figure = new_figure(5.4, 2.6)
-        axes = figure.subplots()
-        for place, (name, each) in enumerate(curves.items()):
-            colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
-            axes.plot(time, each, color=colour, linewidth=max(2.6 - 0.5 * place, 0.8), label=name)
+    with over_time(times, "energy [fJ]", title, 5.4, 2.6) as (axes, time, _):
+        for name, each, style in styled(curves):
+            axes.plot(time, each, label=name, **style)
         axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
-        if largest > 0.0:
+        if (largest := largest_of(curves)) > 0.0:
             least = math.ceil(math.log10(largest)) - ENERGY_DECADES
             axes.set_yscale("symlog", linthresh=10.0**least)
-        axes.set_ylabel("energy [fJ]")
-        axes.set_xlabel(f"time [{unit}]")
-        axes.set_title(title)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-        keep_titles_whole(figure)
-        return figure
+    return axes.figure
+
+
+def styled(curves):
+    """(name, values, style) of curves: what lies under another is seen on both sides of it, as drag
+    does, which balances weight."""
+    for place, (name, values) in enumerate(curves.items()):
+        colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
+        yield name, values, {"color": colour, "linewidth": max(2.6 - 0.5 * place, 0.8)}
+
+
+def largest_of(curves):
+    """The largest size of all values that are numbers; 0 for none."""
+    sizes = np.abs(np.concatenate([*curves.values()]))
+    return np.max(sizes[np.isfinite(sizes)], initial=0.0)
 
 
 def write_animation(
-    path: str | Path,
-    frames: Any,
-    motion: tuple[Sequence[float], Sequence[float]],
-    zone_distance: float | None = None,
-    title: str = "",
-    rule: Rule = redrawn,
-) -> None:
-    """Write Frames (times, outlines, paths, contacts, centre_distance) as a GIF that loops.
+    path: str | Path, frames: Frames, motion: tuple[Sequence[float], Sequence[float]],
+    zone_distance: float = math.nan, title: str = "", rule: Rule = redrawn,
+) -> None:  # fmt: skip
+    """Write Frames as a GIF that loops.
 
     ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
     D_0 [m]; ``rule`` as in `save`. FileError if it cannot be written.
     """
-    check_lengths(len(frames.times), frames.outlines, frames.contacts, frames.centre_distance)
     pictures = [picture_of(frames, place, motion, zone_distance, title)
                 for place in range(len(frames.times))]  # fmt: skip
     save_gif(path, pictures, MILLISECONDS, rule)
@@ -274,8 +254,7 @@ def picture_of(frames, place, motion, zone_distance, title):
     """One frame, beside the centre distance, as a Pillow image of 64 colours."""
     unit, factor = time_unit(motion[0])
     centres, half = windows(frames.outlines)
-    with house_style():
-        figure = new_figure(6.4, 3.0)
+    with drawing(6.4, 3.0) as figure:
         bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
         draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
         frame_axes(bodies, centres[place], half)
@@ -284,8 +263,7 @@ def picture_of(frames, place, motion, zone_distance, title):
         graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
         now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
         graph.plot(*now, "o", color=BODY_COLOURS[0])
-        graph.set_xlabel(f"time [{unit}]")
-        graph.set_ylabel("centre distance $d_c$ [µm]")
+        graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
         draw_zone(graph, zone_distance)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
         keep_titles_whole(figure)  # which draws it
@@ -294,7 +272,7 @@ def picture_of(frames, place, motion, zone_distance, title):
 
 def draw_zone(axes, zone_distance):
     """The line d_c = D_0 with its name, the inside of the zone shaded beneath it."""
-    if zone_distance is None or not math.isfinite(zone_distance):
+    if not math.isfinite(zone_distance):
         return
     level = zone_distance * MICRO
     low, high = axes.get_ylim()
@@ -321,27 +299,6 @@ def free_side(axes, low, high):
     x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
     crowded = x[(y >= low) & (y <= high)]
     return "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
-
-
-def check_lengths(count, *sequences):
-    """UsageError unless there is at least one time, and one entry of each sequence per time."""
-    lengths = [len(sequence) for sequence in sequences]
-    if count == 0 or any(length != count for length in lengths):
-        raise UsageError(
-            f"a figure of {count} times needs as many of everything else, found {lengths}"
-        )
-
-
-def frame_labels(count, centre_distance, zone_distance):
-    """What stands beneath the frames: d_c and, if a zone is known, its side of D_0."""
-    if centre_distance is None:
-        return [""] * count
-    known = zone_distance is not None and math.isfinite(zone_distance)
-    labels = []
-    for distance in centre_distance:
-        side = "" if not known else r" $<D_0$" if distance < zone_distance else r" $\geq D_0$"
-        labels.append(f"$d_c$ = {distance * MICRO:.1f} µm{side}")
-    return labels
 
 
 def windows(outlines_per_frame):
@@ -397,11 +354,8 @@ def closed(rings):
 
 def frame_axes(axes, centre, half):
     """A square window without numbers; the scale bar gives the size."""
-    axes.set_xlim(centre[0] - half, centre[0] + half)
-    axes.set_ylim(centre[1] - half, centre[1] + half)
-    axes.set_aspect("equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
+    (left, right), (low, high) = ((each - half, each + half) for each in centre)
+    axes.set(xlim=(left, right), ylim=(low, high), aspect="equal", xticks=[], yticks=[])
     for spine in axes.spines.values():
         spine.set(visible=True, color="0.8")
 

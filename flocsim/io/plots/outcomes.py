@@ -1,4 +1,5 @@
-"""What becomes of replicates, as bars stacked to 1, and why a probability has no value.
+"""How what becomes of replicates is drawn: probabilities as points with bars, ends as bars stacked
+to 1, and why a probability has no value.
 
 Counts are those of the group `probabilities` {name: (…)}, in whatever order of axes.
 """
@@ -8,13 +9,46 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.results.events import NOT_COLLIDED, ends_of, events_of
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
+from flocsim.io.plots.style import (
+    BOND_COLOURS,
+    CLASS_COLOURS,
+    CROWDED,
+    MARKERS,
+    dodge,
+    graded_colours,
+    note,
+    set_probability_axis,
+    set_vertex_axis,
+    vertex_positions,
+)
+from flocsim.io.results.events import NOT_COLLIDED, ends_of, events, events_of
 
 COLOURS = {
     "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.85", "held": "#009E73",
     "undecided": "#E69F00", "failed": "#D7191C",
 }  # fmt: skip
 """Of the ends of replicates, in the order of the stack."""
+
+ENDS = ("", "_low", "_high", "_numerical")
+
+FEW = 10
+"""Trials below which a point is hollow: its probability says little."""
+
+NO_EVENTS = {
+    "pr_inside": "no collision",
+    "pr_a_given_inside": "no decided collision\ninside the zone",
+    "pr_a_given_outside": "no decided collision\noutside the zone",
+    "pr_a": "no decided collision",
+    "classes": "no decided collision",
+    "bonds": "no aggregation",
+}
+
+SHARES = {
+    "classes": ("n_class", CLASS_COLOURS),
+    "bonds": ("n_bond", BOND_COLOURS),
+}
+"""What is drawn as shares of a whole: its counts, its colours."""
 
 INSIDE, OUTSIDE = "all inside", "all outside"
 LETTERS = {
@@ -89,3 +123,143 @@ def end_handles() -> list[Any]:
     from matplotlib.patches import Patch
 
     return [Patch(facecolor=colour, label=word) for word, colour in reversed(COLOURS.items())]
+
+
+def draw_probability(axes, results, number, name):
+    """The lines of a type, for each delta; the causes of what has no value."""
+    causes, marked = causes_of(results.probabilities, name)[number], set()
+    bands = [band[number] for band in bands_of(results, name)]
+    set_vertex_axis(axes, results.vertices)
+    set_probability_axis(axes)
+    count, few = results.delta.size, trials_of(results, name)[number] < FEW
+    for index, colour in enumerate(graded_colours(count)[:count]):
+        line = [band[:, index] for band in bands]
+        marked |= draw_line(axes, results.vertices, line, index, count, colour, few[:, index],
+                            causes[:, index])  # fmt: skip
+    note_if_empty(axes, bands[0], NO_EVENTS[name])
+    return marked
+
+
+def trials_of(results, name):
+    """How many replicates a probability is of (type, vertices, delta)."""
+    return events_of(results.probabilities)[name].trials
+
+
+def draw_shares(axes, results, number, name):
+    """The classes or kinds of bond of one type, counts pooled over delta."""
+    bands = share_bands(results, number, name)
+    set_vertex_axis(axes, results.vertices)
+    set_probability_axis(axes)
+    colours = SHARES[name][-1].values()
+    for index, colour in enumerate(colours):
+        line = [band[:, index] for band in bands]
+        draw_line(axes, results.vertices, line, index, len(colours), colour)
+    note_if_empty(axes, bands[0], NO_EVENTS[name])
+
+
+def share_bands(results, number, name):
+    """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
+    type."""
+    table, share = results.probabilities, f"pr_{SHARES[name][0].removeprefix('n_')}"
+    errors = over_delta(table, share, table[f"{share}_numerical"])[number]
+    changes = [-errors, errors]
+    for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
+        shape = over_delta(table, share, results.outlines[f"{share}_shape{end}"])
+        changes[side] = changes[side] + shape[number]
+    return (*shares_of(results, number, name), *changes)
+
+
+def bands_in(table, name):
+    """[value, low, high, least and most change by numerics] of a probability in a table."""
+    value, low, high, numerical = (table[name + end] for end in ENDS)
+    return [value, low, high, -numerical, numerical]
+
+
+def bands_of(results, name):
+    """The same of the conditions of results, which may know the sign of what numerics change; with
+    what outlines cut otherwise change."""
+    bands = bands_in(results.probabilities, name)
+    for side, end in enumerate(ENDS[1:3], start=3):
+        if results.numerics:
+            bands[side] = results.numerics[f"{name}_change{end}"]
+        if results.outlines:
+            bands[side] = bands[side] + np.nan_to_num(results.outlines[f"{name}_shape{end}"])
+    return bands
+
+
+def over_delta(table, share, errors):
+    """Errors (type, vertices, class or bond) of shares, pooled over delta: the mean of those at
+    each, by their trials."""
+    trials = events_of(table)[share].trials
+    errors = np.where(trials > 0, errors, 0.0)
+    with np.errstate(invalid="ignore"):
+        return (trials * errors).sum(axis=2) / trials.sum(axis=2)
+
+
+def shares_of(results, number, name):
+    """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
+    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+    if results.replicates is None:
+        counts = {
+            name: values[number].sum(axis=1)
+            for name, values in results.probabilities.items()
+            if name.startswith("n_")
+        }
+        trials, successes, unknown = events_of(counts)[share]
+        return proportion(successes, trials, unknown=unknown)
+    codes = (results.replicates[column][number] for column in ("outcome", "inside", "bond"))
+    # A replicate is a cluster: (class or bond, vertices, delta, replicate) → over delta.
+    trials, successes, unknown = (
+        np.sum(each, axis=2, dtype=np.int64) for each in events(*codes)[share]
+    )
+    found = clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
+    return tuple(np.moveaxis(each, 0, -1) for each in found)
+
+
+def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None):
+    """Line ``index`` of ``count``: points with bars, joined in the order of N; the causes marked.
+
+    Inner bars are intervals, outer ones, thin, these and the numerical error on either side;
+    points are hollow where there are ``few`` trials, ``causes`` say why there are none.
+    """
+    order = np.argsort(vertices)
+    places = vertex_positions(vertices)[order] + dodge(index, count)
+    few = None if few is None else few[order]
+    draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
+    return set() if causes is None else mark_causes(axes, places, causes[order], colour)
+
+
+def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
+    """A line of points with bars at these places: value, low, high, and by how much numerics may
+    lower and raise it.
+
+    ``shift``: to the right, in points, whatever the axis. Where there is an interval, but no value,
+    it is dotted.
+    """
+    value, low, high, lowers, raises = bands
+    reach = np.clip([value - low, high - value], 0.0, None)
+    size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
+    where = shifted(axes, shift)
+    axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
+                  marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
+                  elinewidth=0.6 * width, transform=where)  # fmt: skip
+    if few is not None and few.any():
+        axes.plot(places[few], value[few], linestyle="", marker=MARKERS[index % len(MARKERS)],
+                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3,
+                  transform=where)  # fmt: skip
+    alone = ~np.isfinite(value) & np.isfinite(high)
+    if alone.any():
+        axes.vlines(places[alone], low[alone], high[alone], color=colour, linestyle=":",
+                    linewidth=0.6 * width, transform=where)  # fmt: skip
+    if np.any((lowers < 0.0) | (raises > 0.0)):
+        down, up = np.minimum(np.nan_to_num(lowers), 0.0), np.maximum(np.nan_to_num(raises), 0.0)
+        outer = [value - np.maximum(low + down, 0.0), np.minimum(high + up, 1.0) - value]
+        thin = 0.2 * width
+        axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
+                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin,
+                      transform=where)  # fmt: skip
+
+
+def note_if_empty(axes, values, text):
+    if not np.any(np.isfinite(values)):
+        note(axes, text)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
-from flocsim.io.images.regions import Region, Rejection
-from flocsim.io.plots.style import MOST_OF_TITLE, Figure, house_style, new_figure, plain
+from flocsim.io.images.regions import Region
+from flocsim.io.plots.style import MOST_OF_TITLE, Figure, drawing, house_style, plain
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
@@ -42,7 +42,7 @@ def draw_overlay(
     grey: np.ndarray,
     flocs: "Iterable[tuple[Region, Fit]]",
     title: str,
-    rejected: Iterable[Rejection] = (),
+    rejected: Iterable[Region] = (),
 ) -> Figure:
     """A figure of the picture with the outline of every floc, and dashed those of the others.
 
@@ -82,7 +82,8 @@ def draw_overlay(
             text = f"{reasons.count(reason)} {reason}"
             key.append(Line2D([], [], color=colour, linestyle=DASHES, label=text))
             for each in (each for each in rejected if each.reason == reason):
-                draw_outline(axes, each, colour)
+                dashed = {"linewidths": 0.7, "linestyles": [DASHES]}
+                draw_mask(axes, each.mask, each.bbox, colour, **dashed)
                 wordless = reasons.count(reason) > MOST_WORDS
                 text = str(each.label) if wordless else f"{each.label} {reason}"
                 labels.put(text, each.bbox, colour, 5.5 if wordless else 6.5)
@@ -108,11 +109,6 @@ def stretched(grey: np.ndarray) -> np.ndarray:
     spread = np.clip((values - low) / (high - low), 0.0, 1.0)
     dark = np.clip(np.percentile(spread, DARK_SHARE), 1e-6, 1.0 - 1e-6)
     return spread ** np.clip(np.log(DARK_GREY) / np.log(dark), LEAST_GAMMA, 1.0)
-
-
-def draw_outline(axes, region, colour):
-    """The outline of a region's pixels, dashed."""
-    draw_mask(axes, region.mask, region.bbox, colour, linewidths=0.7, linestyles=[DASHES])
 
 
 def draw_mask(axes, mask, bbox, colour, **style):
@@ -141,7 +137,8 @@ class Labels:
         corners = [(right, top - height), (right, bottom), (left - width, top - height),
                    (left - width, bottom), (left, top - height), (left, bottom)]  # fmt: skip
         boxes = [self.inside(x, y, width, height) for x, y in corners]
-        box = next((box for box in boxes if not any(map(box_meets(box), self.taken))), boxes[0])
+        free = (box for box in boxes if not any(meets(box, other) for other in self.taken))
+        box = next(free, boxes[0])
         self.taken.append(box)
         self.axes.text(box[0], box[1], text, color=colour, fontsize=size, va="top", ha="left",
                        path_effects=[withStroke(linewidth=0.9, foreground="black")])  # fmt: skip
@@ -152,11 +149,9 @@ class Labels:
         return x, y, x + width, y + height
 
 
-def box_meets(box):
-    """Whether another box overlaps this one."""
-    return lambda other: (
-        box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
-    )
+def meets(box, other):
+    """Whether two boxes overlap."""
+    return box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
 
 
 MASK, CORE, DISK = "#c7c7c7", "#0072B2", "#D55E00"
@@ -170,7 +165,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     """The fit of a mask (h, w) bool in four panels, as in the paper's Fig. 1: the mask; the core
     polygon; the disk along it and the outline that it sweeps; the pixels that differ."""
     from matplotlib.colors import to_rgb
-    from matplotlib.patches import Polygon
+    from matplotlib.patches import Circle, Polygon
 
     mask = np.asarray(mask, bool)
     # The fit's y counts upwards.
@@ -178,9 +173,8 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     outlines = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, ROUND_POINTS)]
     inside = covered_by(outlines, mask.shape)
     count = len(fit.vertices)
-    with house_style():
-        height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
-        figure = new_figure(9.2, height + 0.6)
+    height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
+    with drawing(9.2, height + 0.6) as figure:
         panels = figure.subplots(1, 4, sharex=True, sharey=True)
         for axes in panels:
             axes.imshow(np.where(mask, 0.78, 1.0), cmap="gray", vmin=0.0, vmax=1.0,
@@ -190,7 +184,9 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
             for axes in panels[1:3]:
                 axes.add_patch(Polygon(core, closed=True, fill=False, edgecolor=CORE))
                 axes.plot(*core.T, "o", color=CORE, ms=2.5)
-            draw_disks(panels[2], core, fit.radius)
+            for vertex in core:
+                disk = Circle(vertex, fit.radius, fill=False, edgecolor=DISK, linewidth=0.4)
+                panels[2].add_patch(disk)
         for ring in outlines:
             panels[2].plot(*ring.T, color=DISK, linewidth=1.0)
         colours = np.ones((*mask.shape, 3))
@@ -213,14 +209,6 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         if name:
             figure.suptitle(plain(name, MOST_OF_TITLE), x=0.01, ha="left", fontsize=9)
         return figure
-
-
-def draw_disks(axes, core, radius):
-    """The disk at every vertex."""
-    from matplotlib.patches import Circle
-
-    for x, y in core:
-        axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=DISK, linewidth=0.4))
 
 
 def covered_by(rings, shape):

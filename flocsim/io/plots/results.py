@@ -5,33 +5,39 @@ FIGURES at the end, under the name that `flocsim plot` gives it; the first line 
 the command's help.
 """
 
+import contextlib
 import textwrap
 from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
 from flocsim.io.plots.outcomes import (
+    FEW,
+    NO_EVENTS,
+    SHARES,
+    bands_in,
+    bands_of,
     causes_of,
+    draw_bars,
     draw_ends,
+    draw_line,
+    draw_probability,
+    draw_shares,
     end_handles,
     mark_causes,
-    shifted,
+    note_if_empty,
+    trials_of,
     words_of,
 )
 from flocsim.io.plots.shape_effects import shape_effects
 from flocsim.io.plots.style import (
-    BOND_COLOURS,
     CLASS_COLOURS,
     CLASS_WORDS,
-    CROWDED,
-    MARKERS,
     Figure,
     add_line_legend,
     dodge,
+    drawing,
     graded_colours,
-    house_style,
-    new_figure,
     note,
     place_legend,
     plain,
@@ -42,8 +48,8 @@ from flocsim.io.plots.style import (
     vertex_positions,
 )
 from flocsim.io.results.efficiency import efficiency
-from flocsim.io.results.events import ENDS_COUNTED, events, events_of
-from flocsim.io.results.file import Results
+from flocsim.io.results.events import ENDS_COUNTED
+from flocsim.io.results.schema import Results
 
 PANELS_PER_ROW = 3
 PANEL_SIZE = (2.35, 2.15)
@@ -52,7 +58,6 @@ BARS = "\n(bars: 95 %;\nthin: plus numerical error)"
 BARS_OF_BANDS = BARS.replace(" error)", "\nand shape error)")
 """What bars mean, where outlines were cut closer and wider as well."""
 HOLLOW = "\nhollow: n < 10"
-ENDS = ("", "_low", "_high", "_numerical")
 BOND_WORDS = {
     "certificate": "certificate: no load opens it",
     "hook": "hook: hangs by its shape",
@@ -73,26 +78,10 @@ LETTERS_WIDE, MOST_LINES = 18, 6
 """Of what a legend tells of displacements."""
 ROOM = 0.8
 """Share of a panel's width that its axis takes, about."""
-FEW = 10
-"""Trials below which a point is hollow: its probability says little."""
 
-NO_EVENTS = {
-    "pr_inside": "no collision",
-    "pr_a_given_inside": "no decided collision\ninside the zone",
-    "pr_a_given_outside": "no decided collision\noutside the zone",
-    "pr_a": "no decided collision",
-    "classes": "no decided collision",
-    "bonds": "no aggregation",
-}
 SIZE_COLOURS = "viridis"
 MOST_SIZES_NAMED = 6
 """Up to so many receiving sizes are all named beside their colours."""
-
-SHARES = {
-    "classes": ("n_class", CLASS_COLOURS),
-    "bonds": ("n_bond", BOND_COLOURS),
-}
-"""What is drawn as shares of a whole: its counts, its colours."""
 
 
 def figure_4(results: Results) -> Figure:
@@ -112,8 +101,7 @@ def figure_6(results: Results) -> Figure:
 
 def probability_figure(results, name):
     """One panel per type, one line per delta, against N, with bars for both errors."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], 1.35)
+    with panel_grid(type_titles(results.types), LABELS[name], 1.35) as (figure, panels, last):
         marked = set()
         for number, axes in enumerate(panels):
             marked |= draw_probability(axes, results, number, name)
@@ -136,8 +124,8 @@ def bonds(results: Results) -> Figure:
 
 def shares_figure(results, name, legend_width):
     """One panel per type, one line for each class or kind of bond, against N."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), LABELS[name], legend_width)
+    titles = type_titles(results.types)
+    with panel_grid(titles, LABELS[name], legend_width) as (figure, panels, last):
         for number, axes in enumerate(panels):
             draw_shares(axes, results, number, name)
         add_shares_legend(last, name, results)
@@ -147,9 +135,8 @@ def shares_figure(results, name, legend_width):
 def overview(results: Results) -> Figure:
     """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
     rows = ("pr_inside", "pr_a", *SHARES)
-    with house_style():
-        count, marked = len(results.types), set()
-        figure = new_figure(2.1 * count + 2.2, 7.1)
+    count, marked = len(results.types), set()
+    with drawing(2.1 * count + 2.2, 7.1) as figure:
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
@@ -168,9 +155,8 @@ def overview(results: Results) -> Figure:
 
 def against_delta(results: Results) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
-    with house_style():
-        titles = type_titles(results.types)
-        figure, panels, last = panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL)
+    titles = type_titles(results.types)
+    with panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL) as (figure, panels, last):
         colours = graded_colours(len(results.vertices))
         order, marked = np.argsort(results.delta), set()
         places = results.delta[order]
@@ -196,8 +182,8 @@ def against_delta(results: Results) -> Figure:
 
 def outcomes(results: Results) -> Figure:
     """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), "share of replicates", 1.35)
+    titles = type_titles(results.types)
+    with panel_grid(titles, "share of replicates", 1.35) as (figure, panels, last):
         count = results.delta.size
         order = np.argsort(results.vertices)
         places = vertex_positions(results.vertices)[order]
@@ -224,8 +210,7 @@ def efficiencies(results: Results) -> Figure:
 
     docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
     """
-    with house_style():
-        figure, panels, last = panel_grid(type_titles(results.types), "efficiency $E$", 1.9)
+    with panel_grid(type_titles(results.types), "efficiency $E$", 1.9) as (figure, panels, last):
         words = [
             r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
         ]  # fmt: skip
@@ -236,7 +221,7 @@ def efficiencies(results: Results) -> Figure:
             for index, axial in enumerate((False, True)):
                 found = efficiency(results.probabilities, results.delta, axial)
                 if found is None:
-                    note_if_empty(axes, np.array([np.nan]), "delta does not\nspan 0 to 1")
+                    note(axes, "delta does not\nspan 0 to 1")
                     break
                 bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
                 draw_line(axes, results.vertices, bands, index, 2, colours[index])
@@ -257,21 +242,20 @@ def against_size(results: Results) -> Figure:
     r_i, r_j = (1e6 * np.asarray(results.radii[name]) for name in ("r_i", "r_j"))
     known = (r_i > 0.0) & (r_j > 0.0)
     receivers = np.unique(r_i[known].round(9))
-    with house_style():
-        titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
-        figure, panels, _ = panel_grid(titles, LABELS["pr_a"], x_label="approaching $r_j$ [µm]")
+    titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
+    x_label = "approaching $r_j$ [µm]"
+    with panel_grid(titles, LABELS["pr_a"], x_label=x_label) as (figure, panels, _):
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
         missing = "sizes unknown" if results.pooled else "not yet pooled"
         for number, axes in enumerate(panels):
             set_probability_axis(axes)
-            axes.set_xscale("log")
+            axes.set(xscale="log", xlim=room_for(r_j[known]))
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.minorticks_off()
-            axes.set_xlim(*room_for(r_j[known]))
             if not (known.any() and results.pooled):
-                note_if_empty(axes, np.array([np.nan]), missing)
+                note(axes, missing)
                 continue
             for index, receiver in enumerate(receivers):
                 rows = np.flatnonzero(known & (r_i.round(9) == receiver))
@@ -295,164 +279,26 @@ def room_for(sizes):
     return low / margin, high * margin
 
 
+@contextlib.contextmanager
 def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$"):
     """(a figure with equal panels of these titles, at most three a row, and room for a legend, the
     panels, the last one of the first row, beside which the legend stands)."""
     count = len(titles)
     columns = min(count, PANELS_PER_ROW)
     rows = -(-count // PANELS_PER_ROW)
-    figure = new_figure(PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes in grid[count:]:
-        axes.set_visible(False)
-    for axes in grid[max(count - columns, 0) : count]:
-        axes.xaxis.set_tick_params(labelbottom=True)
-        axes.set_xlabel(x_label)
-    for axes, title in zip(grid, titles, strict=False):
-        axes.set_title(title)
-    for axes in grid[:count:PANELS_PER_ROW]:
-        axes.set_ylabel(y_label)
-    return figure, list(grid[:count]), grid[columns - 1]
-
-
-def draw_probability(axes, results, number, name):
-    """The lines of a type, for each delta; the causes of what has no value."""
-    causes, marked = causes_of(results.probabilities, name)[number], set()
-    bands = [band[number] for band in bands_of(results, name)]
-    set_vertex_axis(axes, results.vertices)
-    set_probability_axis(axes)
-    count, few = results.delta.size, trials_of(results, name)[number] < FEW
-    for index, colour in enumerate(graded_colours(count)[:count]):
-        line = [band[:, index] for band in bands]
-        marked |= draw_line(axes, results.vertices, line, index, count, colour, few[:, index],
-                            causes[:, index])  # fmt: skip
-    note_if_empty(axes, bands[0], NO_EVENTS[name])
-    return marked
-
-
-def trials_of(results, name):
-    """How many replicates a probability is of (type, vertices, delta)."""
-    return events_of(results.probabilities)[name].trials
-
-
-def draw_shares(axes, results, number, name):
-    """The classes or kinds of bond of one type, counts pooled over delta."""
-    bands = share_bands(results, number, name)
-    set_vertex_axis(axes, results.vertices)
-    set_probability_axis(axes)
-    colours = SHARES[name][-1].values()
-    for index, colour in enumerate(colours):
-        line = [band[:, index] for band in bands]
-        draw_line(axes, results.vertices, line, index, len(colours), colour)
-    note_if_empty(axes, bands[0], NO_EVENTS[name])
-
-
-def share_bands(results, number, name):
-    """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
-    type."""
-    table, share = results.probabilities, f"pr_{SHARES[name][0].removeprefix('n_')}"
-    errors = over_delta(table, share, table[f"{share}_numerical"])[number]
-    changes = [-errors, errors]
-    for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
-        shape = over_delta(table, share, results.outlines[f"{share}_shape{end}"])
-        changes[side] = changes[side] + shape[number]
-    return (*shares_of(results, number, name), *changes)
-
-
-def bands_in(table, name):
-    """[value, low, high, least and most change by numerics] of a probability in a table."""
-    value, low, high, numerical = (table[name + end] for end in ENDS)
-    return [value, low, high, -numerical, numerical]
-
-
-def bands_of(results, name):
-    """The same of the conditions of results, which may know the sign of what numerics change; with
-    what outlines cut otherwise change."""
-    bands = bands_in(results.probabilities, name)
-    for side, end in enumerate(ENDS[1:3], start=3):
-        if results.numerics:
-            bands[side] = results.numerics[f"{name}_change{end}"]
-        if results.outlines:
-            bands[side] = bands[side] + np.nan_to_num(results.outlines[f"{name}_shape{end}"])
-    return bands
-
-
-def over_delta(table, share, errors):
-    """Errors (type, vertices, class or bond) of shares, pooled over delta: the mean of those at
-    each, by their trials."""
-    trials = events_of(table)[share].trials
-    errors = np.where(trials > 0, errors, 0.0)
-    with np.errstate(invalid="ignore"):
-        return (trials * errors).sum(axis=2) / trials.sum(axis=2)
-
-
-def shares_of(results, number, name):
-    """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
-    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
-    if results.replicates is None:
-        counts = {
-            name: values[number].sum(axis=1)
-            for name, values in results.probabilities.items()
-            if name.startswith("n_")
-        }
-        trials, successes, unknown = events_of(counts)[share]
-        return proportion(successes, trials, unknown=unknown)
-    codes = (results.replicates[column][number] for column in ("outcome", "inside", "bond"))
-    # A replicate is a cluster: (class or bond, vertices, delta, replicate) → over delta.
-    trials, successes, unknown = (
-        np.sum(each, axis=2, dtype=np.int64) for each in events(*codes)[share]
-    )
-    found = clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
-    return tuple(np.moveaxis(each, 0, -1) for each in found)
-
-
-def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None):
-    """Line ``index`` of ``count``: points with bars, joined in the order of N; the causes marked.
-
-    Inner bars are intervals, outer ones, thin, these and the numerical error on either side;
-    points are hollow where there are ``few`` trials, ``causes`` say why there are none.
-    """
-    order = np.argsort(vertices)
-    places = vertex_positions(vertices)[order] + dodge(index, count)
-    few = None if few is None else few[order]
-    draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
-    return set() if causes is None else mark_causes(axes, places, causes[order], colour)
-
-
-def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
-    """A line of points with bars at these places: value, low, high, and by how much numerics may
-    lower and raise it.
-
-    ``shift``: to the right, in points, whatever the axis. Where there is an interval, but no value,
-    it is dotted.
-    """
-    value, low, high, lowers, raises = bands
-    reach = np.clip([value - low, high - value], 0.0, None)
-    size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
-    where = shifted(axes, shift)
-    axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
-                  marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
-                  elinewidth=0.6 * width, transform=where)  # fmt: skip
-    if few is not None and few.any():
-        axes.plot(places[few], value[few], linestyle="", marker=MARKERS[index % len(MARKERS)],
-                  ms=size, color=colour, mfc="white", clip_on=False, zorder=3,
-                  transform=where)  # fmt: skip
-    alone = ~np.isfinite(value) & np.isfinite(high)
-    if alone.any():
-        axes.vlines(places[alone], low[alone], high[alone], color=colour, linestyle=":",
-                    linewidth=0.6 * width, transform=where)  # fmt: skip
-    if np.any((lowers < 0.0) | (raises > 0.0)):
-        down, up = np.minimum(np.nan_to_num(lowers), 0.0), np.maximum(np.nan_to_num(raises), 0.0)
-        outer = [value - np.maximum(low + down, 0.0), np.minimum(high + up, 1.0) - value]
-        thin = 0.2 * width
-        axes.errorbar(places, value, np.clip(outer, 0.0, None), capsize=1.5, clip_on=False,
-                      fmt="none", ecolor=colour, elinewidth=thin, capthick=thin,
-                      transform=where)  # fmt: skip
-
-
-def note_if_empty(axes, values, text):
-    if not np.any(np.isfinite(values)):
-        note(axes, text)
+    width, height = PANEL_SIZE[0] * columns + legend_width, PANEL_SIZE[1] * rows + 0.25
+    with drawing(width, height) as figure:
+        grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes in grid[count:]:
+            axes.set_visible(False)
+        for axes in grid[max(count - columns, 0) : count]:
+            axes.xaxis.set_tick_params(labelbottom=True)
+            axes.set_xlabel(x_label)
+        for axes, title in zip(grid, titles, strict=False):
+            axes.set_title(title)
+        for axes in grid[:count:PANELS_PER_ROW]:
+            axes.set_ylabel(y_label)
+        yield figure, list(grid[:count]), grid[columns - 1]
 
 
 def add_delta_legend(axes, results, marked=frozenset()):

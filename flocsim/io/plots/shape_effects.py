@@ -13,8 +13,7 @@ from flocsim.io.plots.style import (
     MARKERS,
     Figure,
     add_line_legend,
-    house_style,
-    new_figure,
+    drawing,
     note,
     plain,
     set_probability_axis,
@@ -54,13 +53,6 @@ class ShapeEffect:
     by_pair: tuple[float, float, float]
 
 
-def measure_of_pairs(rows: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    """A measure of PAIR_MEASURES of the two flocs of every replicate."""
-    if name == "size_ratio":
-        return np.minimum(rows["r_i"], rows["r_j"]) / np.maximum(rows["r_i"], rows["r_j"])
-    return 0.5 * (rows[f"{name}_i"] + rows[f"{name}_j"])
-
-
 def shape_effect(rows: Mapping[str, np.ndarray], name: str) -> ShapeEffect:
     """The ShapeEffect of a measure of PAIR_MEASURES.
 
@@ -70,7 +62,10 @@ def shape_effect(rows: Mapping[str, np.ndarray], name: str) -> ShapeEffect:
     counts = [np.asarray(np.sum(each, axis=0, dtype=np.int64)) for each in found["pr_a"]]
     trials, successes = counts[:2]
     # A replicate has the same flocs at all displacements; one that failed does not say which.
-    values = measure_of_pairs(rows, name)
+    if name == "size_ratio":
+        values = np.minimum(rows["r_i"], rows["r_j"]) / np.maximum(rows["r_i"], rows["r_j"])
+    else:
+        values = 0.5 * (rows[f"{name}_i"] + rows[f"{name}_j"])
     known = np.isfinite(values).any(axis=0)
     value = np.where(known, np.nanmax(np.where(known, values, -np.inf), axis=0), np.nan)
     places = bins_of(value)
@@ -123,9 +118,8 @@ def shape_effects(results: Results) -> Figure:
     at the end of a row that which is explained by which two flocs met.
     """
     number = int(np.argmax(results.vertices))
-    with house_style():
-        count = len(results.types)
-        figure = new_figure(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5)
+    count = len(results.types)
+    with drawing(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5) as figure:
         grid = figure.subplots(count, len(PAIR_MEASURES), sharey=True, sharex="col", squeeze=False)
         for t, (row, title) in enumerate(zip(grid, type_titles(results.types), strict=True)):
             row[0].set_ylabel(f"{title}\nprobability")
@@ -143,7 +137,9 @@ def shape_effects(results: Results) -> Figure:
             row[-1].text(1.04, 0.0, of_pairs, fontsize=7.5, transform=row[-1].transAxes)
         for axes, label in zip(grid[-1], PAIR_MEASURES.values(), strict=True):
             axes.set_xlabel(label)
-        add_legend(grid[0, -1], int(results.vertices[number]))
+        words = [r"$\Pr[A]$", *(plain(CLASS_WORDS[name]) for name in CLASS_COLOURS)]
+        title = f"$N$ = {results.vertices[number]}\n(bars: 95 %)"
+        add_line_legend(grid[0, -1], words, [ALL_COLOUR, *CLASS_COLOURS.values()], title)
         return figure
 
 
@@ -167,9 +163,3 @@ def share_words(subject, share):
     if np.isnan(value):
         return ""
     return f"{subject} {value:.2g} % ({low:.2g} to {high:.2g})"
-
-
-def add_legend(axes, vertices):
-    words = [r"$\Pr[A]$", *(plain(CLASS_WORDS[name]) for name in CLASS_COLOURS)]
-    title = f"$N$ = {vertices}\n(bars: 95 %)"
-    add_line_legend(axes, words, [ALL_COLOUR, *CLASS_COLOURS.values()], title)

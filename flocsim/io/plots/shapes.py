@@ -10,21 +10,20 @@ import numpy as np
 
 from flocsim.io.plots.style import (
     Figure,
-    house_style,
-    new_figure,
+    drawing,
     set_log_axis,
     set_vertex_axis,
     vertex_positions,
 )
-from flocsim.io.shapes.fit_report import CLASS_LIMIT
-from flocsim.io.shapes.library import ShapeEntry
-from flocsim.io.shapes.population import (
+from flocsim.io.shapes.fit_report import (
+    CLASS_LIMIT,
     SHARES,
     diameters_at,
     measures_in,
     one_each,
     perimeter_dimension,
 )
+from flocsim.io.shapes.library import ShapeEntry
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))
@@ -53,17 +52,15 @@ def figure_2(entries: Sequence[ShapeEntry]) -> Figure:
     """
     sizes = np.array([1e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(sizes, 0.0)
-    with house_style():
-        figure = new_figure(4.2, 2.8)
+    with drawing(4.2, 2.8) as figure:
         axes = figure.subplots()
         axes.hist(sizes, bins=bins, color=BAR_COLOUR, edgecolor="white", linewidth=0.5)
         marks = ((np.median(sizes), "median", "--"), (sizes.mean(), "mean", ":"))
         for value, name, dashes in marks:
             axes.axvline(value, color="0.25", linestyle=dashes, label=f"{name} {value:.3g} µm")
-        axes.set_xlabel(r"equivalent radius $r_\mathrm{eq}$ [µm]")
-        axes.set_ylabel("number of flocs")
-        axes.set_xlim(left=0.0)
-        axes.set_title(f"{len(sizes)} flocs, {sizes.min():.3g} to {sizes.max():.3g} µm")
+        title = f"{len(sizes)} flocs, {sizes.min():.3g} to {sizes.max():.3g} µm"
+        axes.set(xlabel=r"equivalent radius $r_\mathrm{eq}$ [µm]", ylabel="number of flocs",
+                 title=title, xlim=(0.0, None))  # fmt: skip
         axes.legend()
         return figure
 
@@ -80,8 +77,8 @@ def sizes(entries: Sequence[ShapeEntry]) -> Figure:
     """Diameters 2 r_eq: shares of the flocs and of their volume, with D10, D50 and D90."""
     found = np.array([2e6 * entry.measured_radius for entry in one_each(entries)])
     bins = bins_of(found, 0.0)
-    with house_style():
-        figure, top = new_figure(6.4, 2.8), 0.0
+    top = 0.0
+    with drawing(6.4, 2.8) as figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for axes, word, by_volume in zip(panels, ("number", "volume"), (False, True), strict=True):
             weights = found**3 if by_volume else np.ones(found.size)
@@ -106,8 +103,7 @@ def shape(entries: Sequence[ShapeEntry]) -> Figure:
     found = [measures_in(entry) for entry in flocs]
     areas = np.array([np.pi * (1e6 * entry.measured_radius) ** 2 for entry in flocs])
     perimeters = np.array([1e6 * each.perimeter for each in found])
-    with house_style():
-        figure = new_figure(6.4, 4.8)
+    with drawing(6.4, 4.8) as figure:
         panels = figure.subplots(2, 2).ravel()
         for axes, (name, label) in zip(panels, MEASURES.items(), strict=False):
             values = np.array([getattr(each, name) for each in found])
@@ -145,13 +141,11 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
     (N = 1).  The classes part at r_eq = 5 px, the paper's 5 µm.
     """
     radii = sorted({entry.spheroradius for entry in entries})
-    with house_style():
-        figure = new_figure(PANEL_SIZE[0] * len(radii) + MARGIN, PANEL_SIZE[1] + MARGIN)
+    with drawing(PANEL_SIZE[0] * len(radii) + MARGIN, PANEL_SIZE[1] + MARGIN) as figure:
         panels = figure.subplots(1, len(radii), sharey=True, squeeze=False)[0]
         for radius, axes in zip(radii, panels, strict=True):
             draw_errors(axes, [e for e in entries if e.spheroradius == radius])
-            axes.set_title(f"spheroradius r = {radius:g} px")
-            axes.set_xlabel("vertices $N$")
+            axes.set(title=f"spheroradius r = {radius:g} px", xlabel="vertices $N$")
         panels[0].set_ylabel("relative error RE [%]")
         room = panels[0].dataLim.ymax / BELOW_LEGEND
         panels[0].set_ylim(0.0, max(panels[0].get_ylim()[1], room))

@@ -107,6 +107,13 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+@contextlib.contextmanager
+def drawing(width: float, height: float) -> Iterator[Figure]:
+    """An empty figure [inches], to be drawn in the house's style inside the block."""
+    with house_style():
+        yield new_figure(width, height)
+
+
 def keep_titles_whole(figure: Figure) -> None:
     """Draw a figure, the lines of titles broken that are wider than the room they have.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flocsim.geometry.shapes.parts import PointTable, parts_in
+from flocsim.geometry.shapes.parts import parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
@@ -17,14 +17,13 @@ from flocsim.io.outputs import redrawn
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
     Figure,
+    drawing,
     frame_of,
     graded_colours,
-    house_style,
-    new_figure,
     save_gif,
     set_log_axis,
 )
-from flocsim.io.results.swarm_file import GONE, SwarmResults, mean
+from flocsim.io.results.swarm_file import GONE, SwarmResults, mean, points_of
 
 MICRO = 1e6
 MOST_POINTS = 160
@@ -49,11 +48,10 @@ MILLISECONDS = 120
 def snapshots(results: SwarmResults) -> Figure:
     """Snapshots of the first swarm, each cluster in a colour; single bodies are grey."""
     times = results.scales["time"]
-    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS).round().astype(int))
+    chosen = places_shown(results, SNAPSHOTS)
     width, height = results.groups["bodies"]["box"][0]
-    with house_style():
-        tall = min(max(2.3 * height / width, 1.2), 5.0)
-        figure = new_figure(2.3 * len(chosen), tall + 0.3)
+    tall = min(max(2.3 * height / width, 1.2), 5.0)
+    with drawing(2.3 * len(chosen), tall + 0.3) as figure:
         panels = figure.subplots(1, len(chosen), squeeze=False)[0]
         for axes, place in zip(panels, chosen, strict=True):
             draw_bodies(axes, results, 0, int(place))
@@ -73,23 +71,26 @@ def clusters(results: SwarmResults) -> Figure:
         ("gyration", MICRO, f"radius of gyration [µm]{finite}"),
         ("settling", 1e3, "settling [mm/s]"),
     ]
-    with house_style():
-        figure = new_figure(9.2, 2.3)
+    with drawing(9.2, 2.3) as figure:
         *panels, last = figure.subplots(1, len(shown) + 1)
         for axes, (name, factor, label) in zip(panels, shown, strict=True):
             values = factor * counts[name]
             for each in values if len(values) > 1 else ():
                 axes.plot(times, each, color="0.8", linewidth=0.7)
             axes.plot(times, mean(values), color="#0072B2")
-            axes.set_xlabel("time [s]")
-            axes.set_title(label, fontsize=8.0)
-            axes.set_ylim(bottom=0.0)
+            set_time_panel(axes, label)
         if len(values) > 1:
             panels[0].plot([], [], color="0.8", linewidth=0.7, label="a swarm")
             panels[0].plot([], [], color="#0072B2", label="mean")
             panels[0].legend()
         draw_bonds(last, results)
         return figure
+
+
+def set_time_panel(axes, title):
+    axes.set(xlabel="time [s]")
+    axes.set_title(title, fontsize=8.0)
+    axes.set_ylim(bottom=0.0)
 
 
 def draw_bonds(axes, results):
@@ -102,9 +103,7 @@ def draw_bonds(axes, results):
         level = below + number
         axes.fill_between(times, below, level, color=colour, label=word, linewidth=0.0)
         below = level
-    axes.set_xlabel("time [s]")
-    axes.set_title("bonds", fontsize=8.0)
-    axes.set_ylim(bottom=0.0)
+    set_time_panel(axes, "bonds")
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
@@ -112,9 +111,8 @@ def draw_bonds(axes, results):
 def sizes(results: SwarmResults) -> Figure:
     """Share of bodies in clusters of each size or less, at several times, all swarms together."""
     labels, times = results.groups["snapshots"]["cluster"], results.scales["time"]
-    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS + 1).round().astype(int))
-    with house_style():
-        figure = new_figure(4.4, 2.6)
+    chosen = places_shown(results, SNAPSHOTS + 1)
+    with drawing(4.4, 2.6) as figure:
         axes = figure.subplots()
         for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
             found = np.concatenate([sizes_of(each) for each in labels[:, place]])
@@ -122,11 +120,9 @@ def sizes(results: SwarmResults) -> Figure:
             share = np.cumsum(number) / number.sum()
             axes.step(np.append(values, values[-1] * 1.3), np.append(share, 1.0), where="post",
                       color=colour, label=f"{times[place]:.4g} s")  # fmt: skip
-        axes.set_xscale("log")
+        axes.set(xscale="log", ylim=(0.0, 1.03), xlabel="bodies in the cluster",
+                 ylabel="share of bodies in clusters\nup to that size")  # fmt: skip
         set_log_axis(axes.xaxis)
-        axes.set_xlabel("bodies in the cluster")
-        axes.set_ylabel("share of bodies in clusters\nup to that size")
-        axes.set_ylim(0.0, 1.03)
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
         return figure
 
@@ -134,20 +130,17 @@ def sizes(results: SwarmResults) -> Figure:
 def speed(results: SwarmResults) -> Figure:
     """Speed of clusters against their radius of gyration, at several times, all swarms together."""
     found, times = results.groups["clusters"], results.scales["time"]
-    chosen = np.unique(np.linspace(0, last_known(results), SNAPSHOTS).round().astype(int))
+    chosen = places_shown(results, SNAPSHOTS)
     shown = (found["cluster_gyration"] > 0.0) & (found["cluster_speed"] > 0.0)
-    with house_style():
-        figure = new_figure(4.4, 2.8)
+    with drawing(4.4, 2.8) as figure:
         axes = figure.subplots()
         for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
             rows = shown & (found["cluster_time"] == place)
             axes.plot(MICRO * found["cluster_gyration"][rows], 1e3 * found["cluster_speed"][rows],
                       "o", color=colour, markersize=3.0, label=f"{times[place]:.4g} s")  # fmt: skip
-        axes.set_xlabel("radius of gyration [µm]")
-        axes.set_ylabel("settling [mm/s]")
+        axes.set(xlabel="radius of gyration [µm]", ylabel="settling [mm/s]")
         if shown.any():
-            axes.set_xscale("log")
-            axes.set_yscale("log")
+            axes.set(xscale="log", yscale="log")
             set_log_axis(axes.xaxis)
             set_log_axis(axes.yaxis)
         endless = np.isnan(found["cluster_gyration"]).any()
@@ -164,17 +157,20 @@ def classes(results: SwarmResults) -> Figure:
         f"from {a:.4g} µm" if b is None else (f"{a:.4g} to {b:.4g} µm" if a else f"to {b:.4g} µm")
         for a, b in zip(low, [*low[1:], None], strict=True)
     ]
-    with house_style():
-        figure = new_figure(4.8, 2.6)
+    with drawing(4.8, 2.6) as figure:
         axes = figure.subplots()
         for colour, word, each in zip(graded_colours(len(low)), words, numbers.T, strict=True):
             axes.plot(times, each, color=colour, label=word if len(low) > 1 else "all")
-        axes.set_xlabel("time [s]")
-        axes.set_ylabel("clusters in the box")
+        axes.set(xlabel="time [s]", ylabel="clusters in the box")
         axes.set_ylim(bottom=0.0)
         title = r"$r_\mathrm{eq} = \sqrt{A/\pi}$"
         axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title=title, alignment="left")
         return figure
+
+
+def places_shown(results: SwarmResults, count: int) -> np.ndarray:
+    """The places of so many times, evenly up to the last known."""
+    return np.unique(np.linspace(0, last_known(results), count).round().astype(int))
 
 
 def last_known(results: SwarmResults) -> int:
@@ -192,14 +188,7 @@ def sizes_of(labels: np.ndarray) -> np.ndarray:
 
 def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
     """The shape of a body, made of what the file has of it."""
-    bodies = results.groups["bodies"]
-    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
-    rows = slice(first, first + count)
-    columns = (
-        bodies[name][replicate, rows]
-        for name in ("points", "point_part", "point_ring", "point_radius")
-    )
-    return shape_of_parts(parts_in(PointTable(*columns)))
+    return shape_of_parts(parts_in(points_of(results.groups["bodies"], replicate, body)))
 
 
 def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]:
@@ -217,15 +206,10 @@ def cluster_colours(labels: np.ndarray) -> list:
     import matplotlib
 
     palette = matplotlib.colormaps["tab20"]
-    size = sizes_of(labels)
-    own = np.full(len(labels), 0)
-    own[labels >= 0] = size
-    firsts: dict[int, int] = {}
-    for body, label in enumerate(labels.tolist()):
-        firsts.setdefault(label, body)
+    _, first, place, size = np.unique(labels, True, True, True)
     return [
-        FIXED if label < 0 else (palette(firsts[label] % 20) if own[body] > 1 else ALONE)
-        for body, label in enumerate(labels.tolist())
+        FIXED if label < 0 else (palette(first[own] % 20) if size[own] > 1 else ALONE)
+        for label, own in zip(labels, place, strict=True)
     ]
 
 
@@ -254,21 +238,18 @@ def draw_bodies(axes, results, replicate, place, outlines=None):
                 lowest.append(min(ring[:, 1].min() for ring in rings))
                 shades.append(colour)
     axes.add_collection(PathCollection(paths, facecolors=shades, edgecolors="0.25", lw=0.2))
-    axes.set_xlim(0.0, MICRO * width)
-    low = 0.0 if "y" in repeats else float(min(lowest, default=0.0))
     high = MICRO * height
-    axes.set_ylim(max(min(low, 0.0), -0.1 * high) if "y" not in repeats else 0.0, high)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [µm]")
+    low = 0.0 if "y" in repeats else max(min([0.0, *lowest]), -0.1 * high)
+    axes.set(xlim=(0.0, MICRO * width), ylim=(low, high), aspect="equal", xlabel="x [µm]")
     for spine in axes.spines.values():
         spine.set_visible(True)
 
 
 def shifts(place, reach, side, repeats):
     """By how much a body is shifted to be seen at both sides of a seam that it lies across."""
-    if not repeats:
+    if not repeats or reach <= place <= side - reach:
         return (0.0,)
-    return (0.0, side) if place < reach else ((0.0, -side) if place > side - reach else (0.0,))
+    return (0.0, side if place < reach else -side)
 
 
 def write_swarm_animation(
@@ -278,12 +259,10 @@ def write_swarm_animation(
     outlines, pictures = outlines_of(results, replicate), []
     width, height = results.groups["bodies"]["box"][replicate]
     for place in range(last_known(results) + 1):
-        with house_style():
-            figure = new_figure(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3)
+        with drawing(4.0, min(max(4.0 * height / width, 2.0), 8.0) + 0.3) as figure:
             axes = figure.subplots()
             draw_bodies(axes, results, replicate, place, outlines)
-            axes.set_ylabel("y [µm]")
-            axes.set_title(f"{results.scales['time'][place]:.4g} s")
+            axes.set(ylabel="y [µm]", title=f"{results.scales['time'][place]:.4g} s")
             figure.canvas.draw()
             pictures.append(frame_of(figure))
     save_gif(path, pictures, MILLISECONDS, rule)

@@ -6,30 +6,24 @@ from typing import Any
 import numpy as np
 
 from flocsim.io.plots.outcomes import (
+    ENDS,
+    bands_in,
     causes_of,
+    draw_bars,
     draw_ends,
     end_handles,
     mark_causes,
+    note_if_empty,
     words_of,
 )
-from flocsim.io.plots.results import (
-    BARS,
-    ENDS,
-    LABELS,
-    PANEL_SIZE,
-    ROOM,
-    bands_in,
-    draw_bars,
-    note_if_empty,
-)
+from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM
 from flocsim.io.plots.style import (
     MARKERS,
     Figure,
     add_line_legend,
     dodge,
+    drawing,
     graded_colours,
-    house_style,
-    new_figure,
     place_legend,
     plain,
     set_probability_axis,
@@ -73,9 +67,8 @@ def against_key(results: SweepResults) -> Figure:
         name: lines_of(table.columns[name].values, names.index("type"))[:, :, order]
         for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in ENDS)]
     }
-    with house_style():
-        count = len(types)
-        figure = new_figure(2.35 * count + 2.0, 4.4)
+    count = len(types)
+    with drawing(2.35 * count + 2.0, 4.4) as figure:
         grid = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
         step = set_key_axis(grid[0, 0], first, where[order].astype(float))
         step = min(WIDEST, step / len(words))
@@ -173,8 +166,7 @@ def over_time(results: SweepResults) -> Figure:
     times = table.axes["time"].values
     words = line_words([(name, table.axes[name].values.tolist()) for name in names])
     colours = graded_colours(len(words))
-    with house_style():
-        figure = new_figure(9.2, 2.6)
+    with drawing(9.2, 2.6) as figure:
         panels = figure.subplots(1, len(SHOWN))
         for axes, (name, factor, label) in zip(panels, SHOWN, strict=True):
             values = table.columns[name].values
@@ -205,9 +197,8 @@ def elasticities(found: Any) -> Figure:
     each N and delta; hollow where 0 is in the interval."""
     count = len(found.types)
     conditions = list(np.ndindex(len(found.vertices), len(found.delta)))
-    with house_style():
-        height = 0.9 + 0.12 * len(found.keys) * max(len(conditions), 3)
-        figure = new_figure(2.2 * count + 3.4, height)
+    height = 0.9 + 0.12 * len(found.keys) * max(len(conditions), 3)
+    with drawing(2.2 * count + 3.4, height) as figure:
         panels = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
         rows = np.arange(len(found.keys), dtype=float)[::-1]
         colours = graded_colours(len(conditions))
@@ -217,9 +208,7 @@ def elasticities(found: Any) -> Figure:
                 colour, marker = colours[index], MARKERS[index % len(MARKERS)]
                 for k, row in enumerate(rows):
                     place = (k, t, v, d)
-                    value, low, high = (
-                        each[place] for each in (found.value, found.low, found.high)
-                    )
+                    value, low, high = found.value[place], found.low[place], found.high[place]
                     if np.isnan(value):
                         continue
                     at = row - dodge(index, len(conditions))
@@ -228,8 +217,7 @@ def elasticities(found: Any) -> Figure:
                     axes.plot([low + down, high + up], [at, at], color=colour, linewidth=0.4)
                     axes.plot(value, at, marker=marker, color=colour, ms=4.0,
                               mfc=colour if found.matters(place) else "white")  # fmt: skip
-            axes.set_title(title)
-            axes.set_xlabel(r"$d\Pr[A]\,/\,d\ln p$")
+            axes.set(title=title, xlabel=r"$d\Pr[A]\,/\,d\ln p$")
             axes.grid(axis="x", color="0.92", linewidth=0.6)
         panels[0].set_yticks(rows, labels=[plain(key) for key in found.keys])
         panels[0].set_ylim(-0.6, len(rows) - 0.4)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.io.plots.style import Figure, house_style, new_figure, set_log_axis, type_titles
+from flocsim.io.plots.style import Figure, drawing, set_log_axis, type_titles
 
 COLOURS = {"Implicit": "#0072B2", "DormandPrince54": "#D55E00"}
 MARKERS = {"Implicit": "o", "DormandPrince54": "^"}
@@ -37,8 +37,7 @@ def draw_ladders(
     ``chosen`` has (method, tolerance) of what is recommended for a type, which gets a ring if it
     was run; ``target`` is the share of flips that is asked for.
     """
-    with house_style():
-        figure = new_figure(2.5 * len(panels) + 0.8, 4.8)
+    with drawing(2.5 * len(panels) + 0.8, 4.8) as figure:
         rows = figure.subplots(2, len(panels), squeeze=False, sharex="col", sharey="row")
         titles = type_titles(list(panels))
         for place, (name, rungs) in enumerate(panels.items()):

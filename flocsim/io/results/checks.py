@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.groups import Group, scalars_in
-from flocsim.io.hdf5.expected import hold_against
-from flocsim.io.hdf5.structure import Node
+from flocsim.io.groups import Group, hold_against, scalars_in
+from flocsim.io.hdf5 import Node
 from flocsim.io.results import schema
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.schema import Results

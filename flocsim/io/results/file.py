@@ -1,21 +1,12 @@
 """The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
 
-Layout (`SCHEMA_VERSION`). Every group holds its own coordinates as dimension scales, and every
-dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and ``flag_meanings``:
-
-- ``probabilities``  (type, vertices, delta[, class or bond]): counts, probabilities, bounds
-- ``pooled``         (type, vertices): probabilities over all displacements
-- ``differences``    (against, event, type, vertices, delta): between conditions, replicates paired
-- ``kernel``         (mechanism, vertices, i, j): rates of a kernel study (`kernel_group`)
-- ``replicates``     (type, vertices, delta, replicate): what became of every single collision
-- ``flocs``          (floc): names of the flocs that ``replicates/floc_i`` and ``floc_j`` number
-- ``numerics``       (type, vertices, delta): by how much numerics change each probability
-- ``outlines``       (type, vertices, delta): by how much outlines cut otherwise change it
-- ``run``            scalars: config text, versions, machine, wall times
-
-All that may differ between two runs of one config is in ``run``, so the rest can be compared byte
-for byte. The file ends in checksums behind the HDF5 data (see `flocsim.io.pieces`), is checked
-before HDF5 parses it, and is written a block at a time (see `flocsim.io.results.row_file`).
+Every group of `schema.GROUPS`, and ``kernel`` (`kernel_group`), holds its own coordinates as
+dimension scales, and every dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and
+``flag_meanings``. ``flocs`` has the names of the flocs that ``replicates/floc_i`` and ``floc_j``
+number, ``run`` scalars: config text, versions, machine, wall times. All that may differ between two
+runs of one config is in ``run``, so the rest can be compared byte for byte. The file ends in
+checksums behind the HDF5 data (see `flocsim.io.seals`), is checked before HDF5 parses it, and is
+written a block at a time (see `flocsim.io.results.layout`).
 """
 
 import contextlib
@@ -27,8 +18,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError
-from flocsim.io.groups import scalar_of, values_of
-from flocsim.io.opening import opened_file, text_of
+from flocsim.io.groups import opened_file, text_of
 from flocsim.io.results import older
 from flocsim.io.results.checks import (
     CODED,
@@ -38,36 +28,9 @@ from flocsim.io.results.checks import (
     check_structure,
     check_tables,
 )
-from flocsim.io.results.kernel_group import read_kernel
+from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
-from flocsim.io.results.schema import (
-    CLASSES,
-    DIFFERENCES,
-    GROUPS,
-    NOT_APPLICABLE,
-    NUMERICS,
-    OUTCOMES,
-    OUTLINES,
-    POOLED,
-    RADII,
-    REPLICATES,
-    TABLE,
-    Results,
-)
-
-__all__ = [
-    "CLASSES",
-    "NOT_APPLICABLE",
-    "OUTCOMES",
-    "REPLICATES",
-    "TABLE",
-    "Results",
-    "first_of_each",
-    "read_overview",
-    "read_results",
-    "read_row",
-    "with_rows",
-]
+from flocsim.io.results.schema import GROUPS, OUTCOMES, REPLICATES, Results
 
 BLOCK = 262_144
 """Replicates of a condition that are read together."""
@@ -106,25 +69,7 @@ def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -
 
 def results_in(file, replicates):
     """The Results in an open file."""
-    table, rows = GROUPS["probabilities"].read(file["probabilities"]), file["replicates"]
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
-    results = Results(
-        types=table["type"],
-        vertices=table["vertices"],
-        delta=table["delta"],
-        replicates={name: rows[name][()] for name in REPLICATES} if replicates else None,
-        probabilities={name: table[name] for name in TABLE},
-        run=run,
-        failures=rows["failure"].attrs["flag_meanings"].split(),
-        flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
-        pooled=read_group(file, "pooled", POOLED),
-        differences=read_group(file, "differences", DIFFERENCES),
-        numerics=read_group(file, "numerics", NUMERICS),
-        outlines=read_group(file, "outlines", OUTLINES),
-        count=len(rows["replicate"]),
-        radii={name: table[name] for name in RADII},
-        kernel=read_kernel(file, str(run.get("identity", ""))),
-    )
+    results = older.results_of(file, {**GROUPS, "kernel": KERNEL_GROUP}, replicates)
     check_tables(results)
     if results.replicates is not None:
         check_rows(
@@ -137,11 +82,6 @@ def results_in(file, replicates):
 def lacking_in(file):
     """The columns that the replicates of an open file do not have, as it is of an older version."""
     return older.lacking(older.version_of(file), "replicates")
-
-
-def read_group(file, name, schema):
-    """The arrays of a group that a file may lack."""
-    return {each: file[name][each][()] for each in schema} if name in file else {}
 
 
 def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:
@@ -171,23 +111,6 @@ class Totals:
     rejected: int = 0
     spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
 
-    def span(self, name: str, values: np.ndarray) -> None:
-        """Take the values of a column into its span."""
-        known = values[np.isfinite(values)]
-        if known.size:
-            low, high = self.spans.get(name, (np.inf, -np.inf))
-            self.spans[name] = min(low, float(known.min())), max(high, float(known.max()))
-
-    def add(
-        self, outcome: np.ndarray, failure: np.ndarray, steps: np.ndarray, rejected: np.ndarray
-    ) -> None:
-        self.outcomes += np.bincount(outcome, minlength=len(self.outcomes))
-        self.failures += np.bincount(failure, minlength=len(self.failures))
-        self.count += outcome.size
-        self.steps += int(steps.sum())
-        self.most_steps = max(self.most_steps, int(steps.max(initial=0)))
-        self.rejected += int(rejected.sum())
-
 
 @attrs.frozen(eq=False)
 class Overview(Results):
@@ -198,14 +121,23 @@ class Overview(Results):
 
 def totals_in(rows, reasons):
     """The Totals of an open table of replicates with so many reasons of failure."""
-    totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
+    found = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
     for part in parts_of(rows["outcome"].shape):
         columns = {name: rows[name][part] for name in CODED}
         check_codes(columns, reasons)
-        totals.add(*columns.values())
+        outcome, failure, steps, rejected = columns.values()
+        found.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
+        found.failures += np.bincount(failure, minlength=reasons)
+        found.count += outcome.size
+        found.steps += int(steps.sum())
+        found.most_steps = max(found.most_steps, int(steps.max(initial=0)))
+        found.rejected += int(rejected.sum())
         for name in SPANNED:
-            totals.span(name, rows[name][part])
-    return totals
+            values = rows[name][part]
+            known = np.append(values[np.isfinite(values)], found.spans.get(name, ()))
+            if known.size:
+                found.spans[name] = float(known.min()), float(known.max())
+    return found
 
 
 def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
@@ -278,8 +210,5 @@ def read_version(file, known):
     """The schema version of an open file; "unknown" where it is not a number or word."""
     if known.get("schema_version") not in (("i8", ()), ("text", ())):
         return "unknown"
-    return (
-        str(file.attrs["schema_version"])[:20]
-        if known["schema_version"][0] == "text"
-        else (int(file.attrs["schema_version"]))
-    )
+    version = file.attrs["schema_version"]
+    return str(version)[:20] if isinstance(version, str) else int(version)

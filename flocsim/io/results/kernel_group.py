@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.groups import Group, declared
+from flocsim.io.groups import Group, checked_arrays, declared
 from flocsim.io.labelled import Labelled
 
 AXES = ("mechanism", "vertices", "i", "j")
@@ -99,13 +99,10 @@ class Kernel:
     fractal: tuple[float, float, float] | None = None
 
     def __attrs_post_init__(self):
-        shape = (len(self.mechanisms), len(self.vertices), len(self.labels), len(self.labels))
-        if set(self.arrays) != set(KERNEL):
-            strange = ", ".join(sorted(set(self.arrays) ^ set(KERNEL)))
-            raise UsageError(f"kernel must hold the schema's arrays; differing: {strange}")
-        for name, array in self.arrays.items():
-            if array.shape != shape:
-                raise UsageError(f"kernel/{name} has shape {array.shape}, expected {shape}")
+        values = self.mechanisms, self.vertices, self.labels, self.labels
+        lengths = dict(zip(AXES, map(len, values), strict=True))
+        arrays = checked_arrays("kernel", self.arrays, KERNEL_GROUP.columns, lengths)
+        object.__setattr__(self, "arrays", arrays)
 
     def labelled(self) -> Labelled:
         """The arrays with their axes."""

@@ -16,14 +16,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.groups import Group, scalar_of, values_of
-from flocsim.io.hdf5.structure import Node
-from flocsim.io.opening import parsed
+from flocsim.io.groups import Declared, Group, parsed, run_of, values_of
+from flocsim.io.hdf5 import Node
 from flocsim.io.results import schema
 from flocsim.io.results.checks import check_coordinates, check_structure
 from flocsim.io.results.kernel_group import CHANGE, ESTIMATES, KERNEL_GROUP, read_kernel
 from flocsim.io.results.layout import SCHEMA_VERSION, image_of
-from flocsim.io.results.schema import Results, tail_of
+from flocsim.io.results.schema import Results
 
 MOST_ROWS = 2**23
 """Of a file that is taken into memory, 1.5 GB."""
@@ -141,47 +140,38 @@ def as_now(file: Any, nodes: Mapping[str, Node], version: int) -> Iterator[Any]:
         yield now
 
 
-def results_of(file: Any, groups: Mapping[str, Group]) -> Results:
-    """The Results in an open file of an older version."""
-    run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
-    kernel = read_kernel(file, str(run.get("identity", "")), groups["kernel"])
-    found = {name: group.read(file[name]) for name, group in groups.items()
-             if name in file and name != "kernel"}  # fmt: skip
-    table, rows = found["probabilities"], found["replicates"]
-    shape = len(table["type"]), len(table["vertices"]), len(table["delta"])
-    blank = {
-        name: np.full((*shape, *tail_of(name)), blank_of(schema.TABLE[name]))
-        for name in schema.TABLE
+def results_of(file: Any, groups: Mapping[str, Group], replicates: bool = True) -> Results:
+    """The Results in an open file that has these groups; what they lack is blank.
+
+    ``replicates``: whether the table of these is read as well.
+    """
+    wanted = [name for name in schema.GROUPS if name in file and name != "replicates"]
+    found = {name: groups[name].read(file[name]) for name in wanted}
+    table, rows = found["probabilities"], file["replicates"]
+    lengths = {axis: len(words) for axis, words in schema.WORDS.items()}
+    lengths |= {axis: len(table[axis]) for axis in schema.AXES} | {
+        "replicate": len(rows["replicate"])
     }
-    blank["n_bond"] = np.stack(
-        [np.sum(rows["bond"] == 1 + code, axis=-1) for code in range(len(schema.BONDS))], axis=-1
-    )
-    pooled = {name: np.full(shape[:2], blank_of(schema.POOLED[name])) for name in schema.POOLED}
-    columns = {
-        name: np.full(rows["outcome"].shape, schema.BLANKS[kind])
-        for name, (kind, _, _) in schema.REPLICATES.items()
-    }
-    radii = {name: np.full(shape[0], np.nan) for name in schema.RADII}
+    if replicates:
+        found["replicates"] = groups["replicates"].read(rows)
+    if "n_bond" not in table:
+        kinds = range(1, 1 + len(schema.BONDS))
+        table["n_bond"] = np.stack([np.sum(rows["bond"][()] == k, axis=-1) for k in kinds], axis=-1)
+
+    def filled(known: Mapping[str, np.ndarray], declared: Mapping[str, Declared]) -> dict:
+        blanks = {
+            name: np.full([lengths[str(axis)] for axis in each.axes], schema.BLANKS[each.type])
+            for name, each in declared.items() if name not in known
+        }  # fmt: skip
+        return {name: known.get(name, blanks.get(name)) for name in declared}
+
+    made: Any = {name: filled(each, schema.GROUPS[name].columns) for name, each in found.items()}
+    run = run_of(file)
     return Results(
-        types=table["type"], vertices=table["vertices"], delta=table["delta"],
-        replicates=filled(columns, rows), probabilities=filled(blank, table),
-        run=run,
-        failures=file["replicates/failure"].attrs["flag_meanings"].split(),
+        types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
+        failures=rows["failure"].attrs["flag_meanings"].split(),
         flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
-        pooled=filled(pooled, found["pooled"]) if "pooled" in found else {},
-        differences={name: found["differences"][name] for name in schema.DIFFERENCES}
-        if "differences" in found else {},
-        numerics={name: found["numerics"][name] for name in schema.NUMERICS}
-        if "numerics" in found else {},
-        radii=filled(radii, table), kernel=kernel,
+        count=lengths["replicate"], radii=filled(table, schema.SIZES),
+        kernel=read_kernel(file, str(run.get("identity", "")), groups["kernel"]),
+        **{"replicates": None, **made},
     )  # fmt: skip
-
-
-def blank_of(about):
-    """What stands in a table for what was not looked at."""
-    return 0 if about[0] == "i8" else np.nan
-
-
-def filled(blank, known):
-    """The blank arrays, and in the place of those that are known these."""
-    return {name: known.get(name, values) for name, values in blank.items()}

@@ -1,16 +1,16 @@
 """What a results file holds: outcome codes, the table of its arrays, and the checked container.
 
-The file itself is written and read by `flocsim.io.results.file`, which offers these names too.
+The file itself is read by `flocsim.io.results.file` and written by `flocsim.io.results.layout`.
 """
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.groups import Group, declared
-from flocsim.io.hdf5.expected import Declared
+from flocsim.io.groups import Declared, Group, checked_arrays, declared, exact
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import Kernel
 
@@ -227,11 +227,6 @@ def last_axis(name: str) -> tuple[str, ...]:
     return tuple(axis for axis in LAST_AXES if axis in name)
 
 
-def tail_of(name: str) -> tuple[int, ...]:
-    """The length of `last_axis`, or nothing."""
-    return tuple(len(LAST_AXES[axis]) for axis in last_axis(name))
-
-
 def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Declared]:
     """Arrays with a value, or one for each word of a last axis, for every condition."""
     return {
@@ -260,7 +255,8 @@ def blank(
     schema: Mapping[str, tuple[str, str, str]], shape: tuple[int, ...]
 ) -> dict[str, np.ndarray]:
     """Tables of a results file without any number in them."""
-    return {name: np.zeros((*shape, *tail_of(name)), about[0]) for name, about in schema.items()}
+    tails = {name: [len(LAST_AXES[axis]) for axis in last_axis(name)] for name in schema}
+    return {name: np.zeros((*shape, *tails[name]), about[0]) for name, about in schema.items()}
 
 
 def as_names(names: Iterable) -> tuple[str, ...]:
@@ -319,36 +315,17 @@ class Results:
     kernel: Kernel | None = None
 
     def __attrs_post_init__(self):
-        shape = self.shape
-        shapes = {name: (*shape, *tail_of(name)) for name in TABLE}
-        self.check("probabilities", TABLE, shapes)
-        self.check("radii", RADII, dict.fromkeys(RADII, shape[:1]))
-        if self.pooled:
-            self.check("pooled", POOLED, dict.fromkeys(POOLED, shape[:2]))
-        if self.differences:
-            wanted = (len(AXES), len(EVENTS), *shape)
-            self.check("differences", DIFFERENCES, dict.fromkeys(DIFFERENCES, wanted))
-        for group, schema in (("numerics", NUMERICS), ("outlines", OUTLINES)):
-            if getattr(self, group):
-                self.check(group, schema, {name: (*shape, *tail_of(name)) for name in schema})
         if self.replicates is not None:
-            count = np.shape(self.replicates.get("outcome", ()))[3:4]
-            self.check("replicates", REPLICATES, dict.fromkeys(REPLICATES, shape + count))
-            object.__setattr__(self, "count", count[0])
-            if np.any(self.replicates["failure"] >= len(self.failures)):
-                raise UsageError("replicates/failure holds a code without a word in failures")
-
-    def check(self, group, schema, shapes):
-        """Replace a group's arrays by themselves in the schema's order and types."""
-        arrays = getattr(self, group)
-        if set(arrays) != set(schema):
-            strange = ", ".join(sorted(set(arrays) ^ set(schema)))
-            raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
-        checked = {name: exact(arrays[name], schema[name][0], f"{group}/{name}") for name in schema}
-        for name, array in checked.items():
-            if array.shape != shapes[name]:
-                raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shapes[name]}")
-        object.__setattr__(self, group, checked)
+            [*_, count] = np.shape(self.replicates.get("outcome", ())) or [0]
+            object.__setattr__(self, "count", count)
+        lengths = {axis: len(values) for axis, values in self.axes.items()}
+        columns = {"radii": SIZES} | {name: group.columns for name, group in GROUPS.items()}
+        for name, each in columns.items():
+            arrays = getattr(self, name)
+            if arrays or (arrays is not None and name in ("probabilities", "radii", "replicates")):
+                object.__setattr__(self, name, checked_arrays(name, arrays, each, lengths))
+        if self.replicates and np.any(self.replicates["failure"] >= len(self.failures)):
+            raise UsageError("replicates/failure holds a code without a word in failures")
 
     def labelled(self, group: str, arrays: Mapping[str, np.ndarray] | None = None) -> Labelled:
         """A group with its axes; ``arrays``: those of the group, where they are not at hand.
@@ -367,26 +344,15 @@ class Results:
                 name: np.broadcast_to(np.zeros((), each.type), shape)
                 for name, each in columns.items()
             }
-        axes = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
-        return declared.labelled(
-            {**axes, "replicate": np.arange(self.count), **WORDS, **self.radii, **found}
-        )
+        return declared.labelled({**self.axes, **self.radii, **found})
+
+    @property
+    def axes(self) -> dict[str, Any]:
+        """{axis: its values} of all groups."""
+        own = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
+        return {**own, "replicate": np.arange(self.count), **WORDS}
 
     @property
     def shape(self) -> tuple[int, int, int]:
         """Numbers of types, vertex counts and displacements."""
         return len(self.types), self.vertices.size, self.delta.size
-
-
-def exact(values, dtype, name):
-    """``values`` as an array of ``dtype``; UsageError if a value would change."""
-    try:
-        given = np.asarray(values)
-        with np.errstate(invalid="ignore"):
-            converted = given.astype(dtype)
-        same = np.array_equal(given, converted, equal_nan=converted.dtype.kind == "f")
-    except (TypeError, ValueError, OverflowError) as error:
-        raise UsageError(f"{name} must hold numbers of type {dtype}: {error}") from error
-    if not same:
-        raise UsageError(f"{name} holds values that do not fit the type {dtype}")
-    return converted

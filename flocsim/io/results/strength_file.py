@@ -20,11 +20,9 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, declared, write_groups
-from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.groups import Group, check_format, declared, hold_against, opened_file, write_groups
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import opened_file
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
 FORMAT = "flocsim strength"
@@ -149,19 +147,14 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
         wanted = {name: group.arrays for name, group in GROUPS.items()}
         hold_against(nodes, wanted, wanted, {"quantile": len(QUANTILES)})
         doublets, conditions = (group.read(file[name]) for name, group in GROUPS.items())
-        check_places(doublets, tuple(len(conditions[axis]) for axis in AXES))
+        for axis in AXES:
+            if np.any((doublets[axis] < 0) | (doublets[axis] >= len(conditions[axis]))):
+                raise ValueError(f"a doublet has a {axis} that the file does not have")
+        check_opened(doublets.__getitem__)
         return Strengths(
             known, GROUPS["doublets"].labelled(doublets),
             GROUPS["conditions"].labelled(conditions | {"quantile": QUANTILES}),
         )  # fmt: skip
-
-
-def check_places(columns, shape):
-    """ValueError for doublets of conditions that the file does not have, or of unknown codes."""
-    for name, length in zip(AXES, shape, strict=True):
-        if np.any((columns[name] < 0) | (columns[name] >= length)):
-            raise ValueError(f"a doublet has a {name} that the file does not have")
-    check_opened(columns.__getitem__)
 
 
 def check_opened(column: Callable[[str], np.ndarray]) -> None:

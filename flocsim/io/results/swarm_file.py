@@ -20,10 +20,17 @@ import numpy as np
 
 from flocsim.geometry.shapes.parts import PointTable, parts_in
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
-from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.groups import (
+    Group,
+    check_format,
+    declared,
+    hold_against,
+    opened_file,
+    run_of,
+    scalars_in,
+    write_groups,
+)
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import opened_file
 from flocsim.io.terminal import aligned
 
 FORMAT = "flocsim swarm"
@@ -57,7 +64,6 @@ COUNTS = {
 }  # fmt: skip
 """Columns (replicate, time) of `counts`: {name: (type, units, long name)}."""
 
-BY_CLASS = {"n_class": ("f8", "1", "clusters of each size class")}
 SNAPSHOTS = {
     "position": ("f8", "m, m, rad", "x, y and angle; positions continue through a periodic box"),
     "velocity": ("f8", "m s-1, m s-1, rad s-1", "velocity and spin"),
@@ -160,7 +166,9 @@ COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
 GROUPS = {
     "counts": Group.of(
-        declared(COUNTS, MOMENTS) | declared(BY_CLASS, (*MOMENTS, "class")), SCALES
+        declared(COUNTS, MOMENTS)
+        | declared({"n_class": ("f8", "1", "clusters of each size class")}, (*MOMENTS, "class")),
+        SCALES,
     ),
     "snapshots": Group.of(
         declared(SNAPSHOTS, (*MOMENTS, "body", "component"))
@@ -241,7 +249,7 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
             groups["events"] = events_of(groups["snapshots"]["cluster"])
             scales["event"] = np.arange(len(groups["events"]["event_time"]))
         scales.setdefault("row", np.zeros(0, dtype=np.int64))
-        run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+        run = run_of(file)
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)
 
@@ -291,6 +299,13 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
     return events
 
 
+def points_of(bodies: Mapping[str, np.ndarray], replicate: int, body: int) -> PointTable:
+    """The core points of a body."""
+    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
+    rows = slice(first, first + count)
+    return PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
+
+
 def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:
     """ValueError for what no swarm can have been."""
     bodies = groups["bodies"]
@@ -302,11 +317,7 @@ def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> 
         if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
             raise ValueError(f"bodies/{name} has values that are not radii")
     for replicate, body in np.ndindex(*first.shape):
-        begin, many = int(first[replicate, body]), int(count[replicate, body])
-        columns = (
-            bodies[name][replicate, begin : begin + many] for name in (*POINTS, *RINGS)
-        )  # fmt: skip
-        table = PointTable(*columns)
+        table = points_of(bodies, replicate, body)
         if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
             raise ValueError("bodies/point_radius has values that are not radii")
         parts_in(table)

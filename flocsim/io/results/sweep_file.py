@@ -14,12 +14,18 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, scalar_of, write_groups
-from flocsim.io.hdf5.expected import Declared, hold_against
-from flocsim.io.hdf5.structure import Node
+from flocsim.io.groups import (
+    Declared,
+    Group,
+    check_format,
+    hold_against,
+    opened_file,
+    scalar_of,
+    write_groups,
+)
+from flocsim.io.hdf5 import Node
 from flocsim.io.json_text import matches, read_json
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.opening import opened_file
 
 FORMAT = "flocsim sweep"
 SCHEMA_VERSION = 1

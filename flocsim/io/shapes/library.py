@@ -1,54 +1,26 @@
 """The shape library: flocs fitted at several numbers of vertices, in one HDF5 file.
 
-Layout, schema versions 1 and 2; n flocs, in the order in which they were written:
+- ``flocs``              each floc in its picture (FLOC_COLUMNS), in the order of writing; of
+                         several spheroradii each has a row, e.g. "023.png#7 r=2"
+- ``fits/N``             for every N, so that between conditions nothing changes but N
+                         (FIT_COLUMNS); in version 2, of holes or several parts, POINT_COLUMNS too
+- ``measures``           of flocs that have been measured (MEASURE_COLUMNS); NaN for one without
+- ``population``         of flocs from pictures (POPULATION_COLUMNS)
+- ``closer/N, wider/N``  as ``fits/N``, of the outlines cut closer and wider, about the centroid of
+                         the floc as it was cut, where these were fitted as well
 
-    /                       attributes: kind = "flocsim shape library", schema_version = 1,
-                            and what the fits were made with, as far as given: method, …
-    /flocs/id               (n) text, picture and region, e.g. "023.png#7"; of several
-                            spheroradii each has a row, e.g. "023.png#7 r=2"
-    /flocs/image            (n) text, the picture's file name
-    /flocs/pixel_size       (n) [m]
-    /flocs/centroid         (n, 2) [px] x right, y down, in the picture
-    /flocs/area             (n) [px], pixels of the mask
-    /flocs/equivalent_radius(n) [px], √(area/π)
-    /flocs/spheroradius     (n) [px], asked for
-    /fits/N/vertices        (n, N, 2) [m] x right, y up, origin at the floc's centroid
-    /fits/N/radius          (n) [m], spheroradius; for N = 1 the circle's radius
-    /fits/N/relative_error  (n) [%], paper eq. 2
-
-and, in version 2, where flocs have holes or several parts:
-
-    /fits/N/part            (n, N) part that a vertex belongs to, from 0
-    /fits/N/ring            (n, N) its ring in there: 0 the outline, from 1 holes
-    /fits/N/point_radius    (n, N) [m] spheroradius of its part
-
-for every N, so that between conditions nothing changes but N; where the flocs have been measured
-
-    /measures/perimeter     (n) [px] of the mask, as are feret_max and feret_min; aspect_ratio,
-                            circularity and solidity [-]; NaN for a floc without
-
-and of flocs from pictures
-
-    /population/weight      (n) how many flocs each stands for, of which the filters kept it alone
-    /population/radius_low  (n) [px], r_eq as it would have been cut closer
-    /population/radius_high (n) [px], and wider
-
-and where the ends of the bands were fitted as well
-
-    /closer/N, /wider/N     as /fits/N, of the outlines cut closer and wider; the origin is the
-                            centroid of the floc as it was cut
-
-Every dataset has the attributes
-`units` and `long_name`.  The file ends in flocsim's checksum and is the same from run to run.
+Attributes of the file say its kind, its schema version and what the fits were made with, as far as
+given; those of every dataset `units` and `long_name`.  The file ends in flocsim's checksum and is
+the same from run to run.
 """
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -59,11 +31,18 @@ from flocsim.geometry.shapes.parts import Part, PointTable, is_compound, parts_i
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import column_of, declared, values_of, write_groups
-from flocsim.io.hdf5.expected import Declared, hold_against
-from flocsim.io.hdf5.structure import Node
+from flocsim.io.groups import (
+    Declared,
+    column_of,
+    declared,
+    hold_against,
+    opened_file,
+    text_of,
+    values_of,
+    write_groups,
+)
+from flocsim.io.hdf5 import Node
 from flocsim.io.labelled import Labelled
-from flocsim.io.opening import opened_file, text_of
 from flocsim.io.results.schema import BAND_ENDS
 
 if TYPE_CHECKING:
@@ -73,7 +52,7 @@ NAME_OF_SHIPPED = "synthetic"
 """What a config calls the library that ships with flocsim."""
 
 SHIPPED = Path(__file__).with_name("synthetic.h5")
-"""Its place; flocsim.io.shapes.shipped made it."""
+"""Its place; tests/helpers/shipped_library.py made it."""
 
 KIND = "flocsim shape library"
 SCHEMA_VERSION, COMPOUND_VERSION = 1, 2
@@ -241,61 +220,45 @@ def population_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
     return {name: values.tolist() for name, values in columns.items()}
 
 
-class OptionalGroup(NamedTuple):
-    """A group that a library may lack: its columns, whether it says anything of an entry, what of
-    an entry has its values, and these, once they were checked, as attributes of entries."""
-
-    columns: Mapping[str, Declared]
-    is_known: Callable[[ShapeEntry], bool]
-    owner: Callable[[ShapeEntry], Any]
-    read: Callable[[dict[str, np.ndarray]], dict[str, list]]
-
-
 OPTIONAL = {
-    "measures": OptionalGroup(
-        MEASURE_COLUMNS, lambda entry: entry.measures is not None,
-        lambda entry: entry.measures or UNMEASURED, measures_in,
-    ),
-    "population": OptionalGroup(
-        POPULATION_COLUMNS,
-        lambda entry: entry.radius_low < entry.radius_high or entry.weight != 1.0,
-        lambda entry: entry, population_in,
-    ),
+    "measures": (MEASURE_COLUMNS, measures_in), "population": (POPULATION_COLUMNS, population_in)
 }  # fmt: skip
+"""Groups that a library may lack: their columns, and the attributes of entries that these give,
+once they were checked."""
 
 
 def make_entry(
-    image: str,
-    region: Any,
-    fits: "Mapping[int, Fit]",
-    pixel_size: float,
-    spheroradius: float,
-    name_radius: bool = False,
-    measures: ShapeMeasures | None = None,
-    band: "tuple[Mapping[int, Fit], ...]" = (),
-) -> ShapeEntry:
-    """The ShapeEntry of a picture's Region (flocsim.io.images) and its fits {N: Fit} [px].
+    picture: Any, region: Any, fits: "Sequence[Mapping[float, Mapping[int, Fit]]]",
+    spheroradius: float, name_radius: bool = False,
+) -> ShapeEntry:  # fmt: skip
+    """The ShapeEntry of a Region (flocsim.io.images) of a picture, which has a name, pixel_size [m]
+    and measures {label: ShapeMeasures}.
 
-    name_radius: its id names the spheroradius, for libraries with several of one floc; band: the
-    fits of the two masks of the region's band, where they were made.
+    fits: {r: {N: Fit}} [px] of its mask, and of the two masks of its band, where they were made;
+    name_radius: its id names the spheroradius, for libraries with several of one floc.
     """
     top, left = region.bbox[:2]
-    # The mask has a margin of one pixel, and y counts downwards there.
-    centroid = np.array([region.centroid[0] - left + 1, -(region.centroid[1] - top + 1)])
 
-    def stored(fits, centroid):
-        return {count: stored_fit(fit, centroid, pixel_size) for count, fit in fits.items()}
+    def stored(found, margin):
+        # y counts downwards in the picture, from the margin of its mask.
+        x, y = region.centroid[0] - left + margin, -(region.centroid[1] - top + margin)
+        return {
+            count: stored_fit(fit, np.array([x, y]), picture.pixel_size)
+            for count, fit in found[spheroradius].items()
+        }
 
+    own, *band = fits
+    # The masks of a band have a wider margin, the same on every side.
     ends = {
-        # The masks of a band have a wider margin, the same on every side.
-        name: stored(each, centroid + np.array([1, -1]) * (len(mask) - len(region.mask)) // 2)
+        name: stored(each, 1 + (len(mask) - len(region.mask)) // 2)
         for name, each, mask in zip(BAND_ENDS, band, region.band or (), strict=bool(band))
     }
-    floc_id = f"{image}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
+    floc_id = f"{picture.name}#{region.label}" + (f" r={spheroradius:g}" if name_radius else "")
     low, high = region.radius_band
     return ShapeEntry(
-        floc_id, image, float(pixel_size), region.centroid, region.area,
-        region.equivalent_radius, float(spheroradius), stored(fits, centroid), measures,
+        floc_id, picture.name, float(picture.pixel_size), region.centroid, region.area,
+        region.equivalent_radius, float(spheroradius), stored(own, 1),
+        picture.measures.get(region.label),
         weight=region.weight, radius_low=low, radius_high=high, **ends,
     )  # fmt: skip
 
@@ -346,9 +309,11 @@ def write_library(
     for kind, count in product(kinds, sorted(entries[0].fits)):
         fits = [getattr(entry, kind)[count] for entry in entries]
         groups[f"{kind}/{count}"] = labelled(fits_at(count, compound), fits)
-    for name, group in OPTIONAL.items():
-        if any(map(group.is_known, entries)):
-            groups[name] = labelled(group.columns, [group.owner(entry) for entry in entries])
+    if any(entry.measures is not None for entry in entries):
+        measures = [entry.measures or UNMEASURED for entry in entries]
+        groups["measures"] = labelled(MEASURE_COLUMNS, measures)
+    if any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
+        groups["population"] = labelled(POPULATION_COLUMNS, entries)
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
     attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
     write_groups(path, attributes, groups, rule=rule)
@@ -425,7 +390,7 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
                 raise ValueError(f"{path} is not a number of vertices up to {MOST_VERTICES}")
             groups[path] = fits_at(int(count), compound)
             counts[group].add(count)
-    optional = {name: group.columns for name, group in OPTIONAL.items()}
+    optional = {name: columns for name, (columns, _) in OPTIONAL.items()}
     lengths = hold_against(nodes, groups | optional, groups)
     if lengths["floc"] < 1 or not counts["fits"]:
         raise ValueError("there are no flocs")
@@ -451,33 +416,23 @@ def _entries(file):
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
         raise ValueError("two flocs have the same id")
-    for name, group in OPTIONAL.items():
+    for name, (columns, read) in OPTIONAL.items():
         if name in file:
-            flocs |= group.read({each: file[name][each][()] for each in group.columns})
-    rows = range(len(flocs["floc_id"]))
+            flocs |= read({each: file[name][each][()] for each in columns})
     for kind in ("fits", *BAND_ENDS):
         if kind in file:
-            flocs[kind] = _stored_fits(file[kind], rows)
+            fits = {n: _fits(n, file[f"{kind}/{n}"]) for n in sorted(map(int, file[kind]))}
+            flocs[kind] = [
+                dict(zip(fits, each, strict=True)) for each in zip(*fits.values(), strict=True)
+            ]
     return [
-        ShapeEntry(**{attribute: column[row] for attribute, column in flocs.items()})
-        for row in rows
-    ]
-
-
-def _stored_fits(group, rows):
-    """[{N: StoredFit}] of all flocs in an open group of fits."""
-    fits = {int(count): _fits(int(count), each) for count, each in group.items()}
-    return [
-        {
-            count: StoredFit(vertices[row], float(radius[row]), float(error[row]), tables[row])
-            for count, (vertices, radius, error, tables) in sorted(fits.items())
-        }
-        for row in rows
+        ShapeEntry(**dict(zip(flocs, row, strict=True)))
+        for row in zip(*flocs.values(), strict=True)
     ]
 
 
 def _fits(count, group):
-    """(vertices, radius, relative error, tables of points) of all flocs at N = ``count``."""
+    """The StoredFits of all flocs at N = ``count``."""
     vertices, radius, error = (group[name][()] for name in FIT_COLUMNS)
     for name, values, most in (
         ("vertices", np.abs(vertices), LARGEST),
@@ -488,7 +443,9 @@ def _fits(count, group):
             raise ValueError(f"{group.name[1:]}/{name} has values that a floc cannot have")
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
-    return vertices, radius, error, _tables(count, group, vertices, radius)
+    tables = _tables(count, group, vertices, radius)
+    columns = vertices, radius.tolist(), error.tolist(), tables
+    return [StoredFit(*each) for each in zip(*columns, strict=True)]
 
 
 def _tables(count, group, vertices, radius):

@@ -21,8 +21,8 @@ from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.errors import UsageError
 from flocsim.io.confidence import bounds_quantile, proportion, wilson
 from flocsim.io.results.events import events, events_of
-from flocsim.io.results.file import NOT_APPLICABLE, read_results
-from flocsim.io.results.schema import PROBABILITIES
+from flocsim.io.results.file import read_results
+from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 from tests.helpers.results_files import same_data
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config

@@ -22,9 +22,9 @@ from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, Stop
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import journal_path
-from flocsim.io.results import row_file
-from flocsim.io.results.row_file import RowFile, new_row_file, shared_row_file
+from flocsim.io.journal import journal_path
+from flocsim.io.results import layout
+from flocsim.io.results.layout import RowFile, new_row_file, shared_row_file
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import mpirun, problems, run_command
 from tests.helpers.tiers import rest_slow
@@ -168,7 +168,7 @@ def test_the_command_writes_the_same_bytes(folders, reference, tmp_path, words):
 def test_without_a_common_file_system_rank_0_does_it_alone(
     folders, reference, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(row_file, "TOKEN_SIZE", 16)
+    monkeypatch.setattr(layout, "TOKEN_SIZE", 16)
 
     def elsewhere(path, token, plan):
         return shared_row_file(path, bytes(16), plan)
@@ -184,7 +184,7 @@ def test_without_a_common_file_system_rank_0_does_it_alone(
 def test_a_file_of_another_job_is_not_written_to(tmp_path):
     path = tmp_path / "x"
     path.write_bytes(b"of another job" * 10)
-    plan = row_file.Plan(0, 0, {})
+    plan = layout.Plan(0, 0, {})
     (tmp_path / "link").symlink_to(path)
     cases = [("x", bytes(32), "share no file system"), ("absent", bytes(32), "cannot be seen here"),
              ("link", path.read_bytes()[:32], "cannot be seen here")]  # fmt: skip

@@ -18,7 +18,7 @@ from flocsim.ensembles.parallel.heartbeat import (
     WITHOUT_THREADS,
     Heartbeat,
 )
-from flocsim.io.journal.records import CHUNK, Record, scan
+from flocsim.io.records import CHUNK, Record, scan
 from tests.helpers.small_study import command, mpirun, problems, run_command, write_small
 from tests.helpers.tiers import rest_slow
 

@@ -15,9 +15,9 @@ from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME, Beginning, take_journal
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, FlocsimError
-from flocsim.io.files import read_sealed, seal
-from flocsim.io.journal.journal import Journal
-from flocsim.io.journal.records import CHUNK, SESSION
+from flocsim.io.journal import Journal
+from flocsim.io.records import CHUNK, SESSION
+from flocsim.io.seals import read_sealed, seal
 from tests.helpers.hostile_files import encode_words
 from tests.helpers.small_study import small_config
 

@@ -17,7 +17,7 @@ from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.interruption import STOPPED
-from flocsim.io.journal.records import encode
+from flocsim.io.records import encode
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config

@@ -18,9 +18,9 @@ from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, KernelError, UsageError
 from flocsim.interruption import STOPPED
-from flocsim.io.journal import locked_file
-from flocsim.io.journal.journal import Journal
-from flocsim.io.journal.records import CHUNK
+from flocsim.io import journal as locked_file
+from flocsim.io.journal import Journal
+from flocsim.io.records import CHUNK
 from tests.ensembles.storage.test_resume import stop_after
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, small_config

@@ -18,8 +18,8 @@ from flocsim.ensembles.storage.stored_json import (
     distinct,
     mixture_warnings,
 )
-from flocsim.io.journal.journal import journal_path
-from flocsim.io.journal.records import SESSION, scan
+from flocsim.io.journal import journal_path
+from flocsim.io.records import SESSION, scan
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import problems, small_config
 from tests.helpers.tiers import rest_slow

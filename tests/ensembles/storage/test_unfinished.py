@@ -9,8 +9,8 @@ from flocsim.ensembles.estimates.statistics import EXACT_RUNS
 from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import Journal, journal_of
-from flocsim.io.journal.records import SESSION, encode
+from flocsim.io.journal import Journal, journal_of
+from flocsim.io.records import SESSION, encode
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tabulate import tabulate
 

@@ -7,10 +7,17 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule
-from flocsim.io.groups import Group, check_format, declared, scalar_of, scalars_in, write_groups
-from flocsim.io.hdf5.expected import hold_against
+from flocsim.io.groups import (
+    Group,
+    check_format,
+    declared,
+    hold_against,
+    opened_file,
+    run_of,
+    scalars_in,
+    write_groups,
+)
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.opening import opened_file
 
 FORMAT, SCHEMA_VERSION = "flocsim lone", 1
 COLUMNS = {
@@ -64,5 +71,5 @@ def read_lone(path: str | os.PathLike) -> LoneResults:
         wanted = {"flocs": GROUP.arrays, "run": scalars_in(nodes, "run")}
         hold_against(nodes, wanted, wanted)
         found = GROUP.read(file["flocs"])
-        run = {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+        run = run_of(file)
         return LoneResults(found["vertices"], {name: found[name] for name in COLUMNS}, run)

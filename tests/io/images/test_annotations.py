@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFont
 
-from flocsim.io.images.annotations import without_annotations
+from flocsim.io.images.background import without_annotations
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.reading import read_grey
 from tests.helpers.real_images import real_image

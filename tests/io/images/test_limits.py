@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from flocsim.errors import ImageError
-from flocsim.io.images import limits, masks
+from flocsim.io.images import masks, reading
 from flocsim.io.images.masks import read_masks, segment_mask
 from flocsim.io.images.reading import read_grey
 
@@ -209,6 +209,6 @@ def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, name):
 
 
 def test_a_very_large_file_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(limits, "LARGEST_FILE", 100)
+    monkeypatch.setattr(reading, "LARGEST_FILE", 100)
     Image.fromarray(SQUARE).resize((200, 200)).save(tmp_path / "p.bmp")
     refused(tmp_path / "p.bmp", "larger than", read_grey)

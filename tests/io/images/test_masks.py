@@ -6,8 +6,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 from flocsim.errors import ImageError
-from flocsim.io.images.masks import read_masks, segment_mask
-from flocsim.io.images.recognition import AGREEING, agreement, is_mask
+from flocsim.io.images.masks import AGREEING, agreement, is_mask, read_masks, segment_mask
 from tests.helpers.real_images import real_image
 
 MASK = np.zeros((30, 40), np.uint8)

@@ -5,7 +5,7 @@ import pytest
 from skimage.measure import regionprops
 
 from flocsim.geometry.shapes.synthetic import synthetic_floc
-from flocsim.io.images.measures import mask_measures
+from flocsim.io.images.regions import mask_measures
 
 
 def disc(radius, margin=4):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.errors import ImageError, UsageError
-from flocsim.io.images.pictures import read_grey, segment
+from flocsim.errors import ImageError
+from flocsim.io.images.pictures import segment
+from flocsim.io.images.reading import read_grey
 from tests.helpers.real_images import real_image
 from tests.helpers.tiers import rest_slow
 
@@ -311,31 +312,6 @@ def test_pictures_without_flocs_give_none(grey):
 def test_pure_noise_gives_no_flocs():
     noise = 0.5 + 0.1 * np.random.default_rng(3).standard_normal((300, 300))
     assert segment(noise).regions == ()
-
-
-@pytest.mark.parametrize("grey", [np.zeros((0, 5)), np.zeros(7), np.full((5, 5), np.nan)])
-def test_arrays_that_are_no_pictures_are_refused(grey):
-    with pytest.raises(ImageError):
-        segment(grey)
-
-
-@pytest.mark.parametrize(
-    "option",
-    [
-        {"flocs": "grey"},
-        {"noise_scale": -1},
-        {"noise_scale": float("nan")},
-        {"background_degree": 2.5},
-        {"saturated": 1},
-        {"min_radius": float("inf")},
-        {"max_radius": 0},
-        {"max_blur": 0},
-        {"neck": 2},
-    ],
-)
-def test_wrong_options_are_named(option):
-    with pytest.raises(UsageError, match=next(iter(option))):
-        segment(np.zeros((9, 9)), **option)
 
 
 GREY = np.linspace(0, 255, 12 * 17).reshape(12, 17).astype(np.uint8)

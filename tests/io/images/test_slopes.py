@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, maximum_filter
 
-from flocsim.io.images.focus import rim
-from flocsim.io.images.slopes import NEAR, along, around
+from flocsim.io.images.focus import NEAR, along, around, rim
 
 SHAPES = [(30, 40), (1, 9), (9, 1), (2, 2), (40, 3)]
 

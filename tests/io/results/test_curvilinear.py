@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from flocsim.errors import UsageError
-from flocsim.io.results import curvilinear
-from flocsim.io.results.curvilinear import CORRECTIONS, about_factor, curvilinear_factor
+from flocsim.io.results import kernel_tables
+from flocsim.io.results.kernel_tables import CORRECTIONS, SOURCES, about_factor, curvilinear_factor
 
-PAIRS = [(name, each) for name in CORRECTIONS for each in CORRECTIONS[name].mechanisms]
+PAIRS = [(name, each) for name in CORRECTIONS for each in CORRECTIONS[name]]
 RATIOS = np.geomspace(1e-6, 1.0, 200)
 
 
@@ -122,9 +122,9 @@ def test_what_has_no_factor_is_refused():
 def test_lines_about_it_say_what_it_is(name, mechanism):
     told = about_factor(name, mechanism)
     assert f"'{name}'" in told[0] and "p = r_small/r_large" in told[0]
-    assert CORRECTIONS[name].source in told[0] and "solid spheres" in told[1]
+    assert SOURCES[name] in told[0] and "solid spheres" in told[1]
     assert all("\n" not in line and line.isascii() for line in told)
 
 
 def test_the_example_of_its_docstring():
-    assert doctest.testmod(curvilinear).failed == 0
+    assert doctest.testmod(kernel_tables).failed == 0

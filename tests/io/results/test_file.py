@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io import files
-from flocsim.io.results.file import OUTCOMES, REPLICATES, TABLE, read_results
+from flocsim.io import files, seals
+from flocsim.io.results.file import read_results
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.run_group import provenance
+from flocsim.io.results.schema import OUTCOMES, REPLICATES, TABLE
 from tests.helpers.results_files import same_data, write_results
 from tests.helpers.synthetic_results import FAILURES, make_results
 
@@ -43,10 +44,10 @@ def written(once, tmp_path):
 
 def reseal(path, change):
     """Change a file by h5py and seal it again, as another version of the program might write."""
-    image = io.BytesIO(files.read_sealed(path))
+    image = io.BytesIO(seals.read_sealed(path))
     with h5py.File(image, "r+") as file:
         change(file)
-    files.write_file(path, files.seal(image.getvalue()), replace)
+    files.write_file(path, seals.seal(image.getvalue()), replace)
 
 
 def test_what_is_written_is_read(written):
@@ -194,8 +195,8 @@ def test_a_failed_write_leaves_the_old_file_and_no_rest(written, monkeypatch, fa
     [
         (b"", "not an HDF5 file"),
         (b"type,vertices\nI,4\n", "not an HDF5 file"),
-        (files.HDF5_SIGNATURE, "checksum"),
-        (files.seal(files.HDF5_SIGNATURE + b"junk"), "no readable results"),
+        (seals.HDF5_SIGNATURE, "checksum"),
+        (seals.seal(seals.HDF5_SIGNATURE + b"junk"), "no readable results"),
     ],
 )
 def test_files_of_another_kind_are_refused(tmp_path, content, finding):
@@ -220,7 +221,7 @@ def test_foreign_hdf5_is_refused(tmp_path):
         file["x"] = 1.0
     with pytest.raises(FileError, match="not from flocsim"):
         read_results(path)
-    path.write_bytes(files.seal(path.read_bytes()))
+    path.write_bytes(seals.seal(path.read_bytes()))
     with pytest.raises(FileError, match="not a results file"):
         read_results(path)
 

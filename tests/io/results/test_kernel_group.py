@@ -8,9 +8,13 @@ import pytest
 
 from flocsim.body import FractalDensity
 from flocsim.errors import UsageError
-from flocsim.io.results.curvilinear import curvilinear_factor
 from flocsim.io.results.kernel_group import Kernel, check_kernel, fractal_in
-from flocsim.io.results.kernel_tables import efficiency_for, kernel_csv, kernel_matrix
+from flocsim.io.results.kernel_tables import (
+    curvilinear_factor,
+    efficiency_for,
+    kernel_csv,
+    kernel_matrix,
+)
 from tests.helpers.small_rates import some_kernel
 
 

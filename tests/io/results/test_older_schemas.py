@@ -15,11 +15,11 @@ import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.pairs import contents
 from flocsim.errors import FileError, UsageError
-from flocsim.io.files import read_sealed, seal
 from flocsim.io.results import older
 from flocsim.io.results.file import read_overview, read_results, read_row
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES, TABLE
+from flocsim.io.seals import read_sealed, seal
 from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow

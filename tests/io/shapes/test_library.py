@@ -1,5 +1,7 @@
 """The shape library: what is written is read, and nothing else is."""
 
+from types import SimpleNamespace
+
 import attrs
 import h5py
 import numpy as np
@@ -9,9 +11,9 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.geometry.shapes.shape import Sphere
-from flocsim.io.files import read_sealed, seal
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import with_holes
+from flocsim.io.seals import read_sealed, seal
 from flocsim.io.shapes.library import (
     FIT_COLUMNS,
     StoredFit,
@@ -37,15 +39,19 @@ def picture():
 def entries():
     regions = segment(picture(), noise_scale=0).regions
     return [
-        make_entry(
-            "é 1.png", region, {n: fit_mask(region.mask, vertices=n) for n in (1, 2, 6)}, PIXEL, 1.0
-        )
+        entry_of(region, {n: fit_mask(region.mask, vertices=n) for n in (1, 2, 6)}, name="é 1.png")
         for region in regions
     ]
 
 
+def entry_of(region, *fits, name="a.png"):
+    """The entry of a region of a picture, whose measures nobody took."""
+    taken = SimpleNamespace(name=name, pixel_size=PIXEL, measures={})
+    return make_entry(taken, region, [{1.0: each} for each in fits], 1.0)
+
+
 def test_measures_survive_the_file_and_have_to_be_numbers_of_a_floc(tmp_path, entries):
-    from flocsim.io.images.measures import mask_measures
+    from flocsim.io.images.regions import mask_measures
 
     region = segment(picture(), noise_scale=0).regions[0]
     measured = attrs.evolve(entries[0], measures=mask_measures(region.mask))
@@ -184,12 +190,9 @@ def holed_entries():
     found = segment(grey, noise_scale=0)
     regions = [with_holes(region, found.holes) for region in found.regions]
     return [
-        make_entry(
-            "a.png", region,
-            {n: fit_mask(region.mask, vertices=n, holes=True) for n in (1, 8, 16)}, PIXEL, 1.0,
-        )
+        entry_of(region, {n: fit_mask(region.mask, vertices=n, holes=True) for n in (1, 8, 16)})
         for region in regions
-    ]  # fmt: skip
+    ]
 
 
 def test_holes_survive_the_file(tmp_path):
@@ -276,10 +279,8 @@ def test_ends_of_bands_survive_the_file_and_have_the_vertices_of_the_fits(tmp_pa
     a wider margin, has its very vertices."""
     region = segment(picture(), noise_scale=0).regions[0]
     region = attrs.evolve(region, band=tuple(np.pad(region.mask, by) for by in (1, 3)))
-    fits, *band = (
-        {n: fit_mask(mask, vertices=n) for n in (1, 6)} for mask in (region.mask, *region.band)
-    )
-    entry = make_entry("a.png", region, fits, PIXEL, 1.0, band=tuple(band))
+    masks = region.mask, *region.band
+    entry = entry_of(region, *({n: fit_mask(mask, vertices=n) for n in (1, 6)} for mask in masks))
     for end in (entry.closer, entry.wider):
         np.testing.assert_allclose(end[6].vertices, entry.fits[6].vertices, atol=1e-12)
     write_library(tmp_path / "s.h5", [entry])

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import attrs
 
 from flocsim.io.json_text import read_json
-from flocsim.io.pieces import digest_at, digest_of
+from flocsim.io.seals import digest_at, digest_of
 
 MARK = b"\x93FLOCREC"
 HEAD = struct.Struct("<8sIIQ16s8s")

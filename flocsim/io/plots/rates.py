@@ -1,21 +1,35 @@
-"""Figures of a kernel study: what shapes do to kernels and efficiencies, by size and mechanism.
+"""Figures of rates: what shapes do to kernels and efficiencies; at what rate a flow opens bonds.
 
-A figure is a function of Results that have a kernel, and stands in KERNEL_FIGURES under the name
-that `flocsim plot` gives it.
+A figure stands in KERNEL_FIGURES or STRENGTH_FIGURES under the name that `flocsim plot` gives it.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from flocsim.io.plots.style import MARKERS, Figure, graded_colours, house_style, new_figure, plain
+from flocsim.io.plots.results import panel_grid
+from flocsim.io.plots.style import (
+    MARKERS,
+    Figure,
+    add_line_legend,
+    drawing,
+    graded_colours,
+    note,
+    plain,
+    set_log_axis,
+    type_titles,
+)
 from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.schema import Results
+from flocsim.io.results.strength_file import STATUS, Strengths
 
 MICRO = 1e6
 MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
 WATER_WORDS = "with hydrodynamic interaction"
+
+FAILED = STATUS.index("failed")
 
 
 def kernel_of(results: Results) -> Kernel:
@@ -38,8 +52,7 @@ def efficiency(results: Results) -> Figure:
 
 def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
     """An estimate of all pairs against r_i/r_j, the larger one's size in colours, N by markers."""
-    with house_style():
-        figure = new_figure(2.6 * len(kernel.mechanisms) + 1.6, 2.9)
+    with drawing(2.6 * len(kernel.mechanisms) + 1.6, 2.9) as figure:
         panels = figure.subplots(1, len(kernel.mechanisms), squeeze=False, sharey=True)[0]
         chosen = chosen_sizes(len(kernel.labels))
         colours = dict(zip(chosen, graded_colours(len(chosen)), strict=True))
@@ -47,10 +60,8 @@ def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
             for v in range(len(kernel.vertices)):
                 for larger in chosen:
                     draw_line(axes, kernel, name, (m, v, larger), colours[larger])
-            axes.set_title(plain(mechanism))
-            axes.set_xlabel("r of the smaller over r of the larger")
-            axes.set_ylim(bottom=0.0)
-            axes.set_xlim(0.0, 1.05)
+            axes.set(title=plain(mechanism), xlabel="r of the smaller over r of the larger")
+            axes.set(xlim=(0.0, 1.05), ylim=(0.0, None))
             axes.grid(axis="y", color="0.9", linewidth=0.6)
         panels[0].set_ylabel(label)
         legend(panels[-1], kernel, colours)
@@ -62,11 +73,9 @@ def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
 def chosen_sizes(count: int) -> list[int]:
     """Places of the larger classes whose lines are drawn: no more than can be told apart."""
     first = min(1, count - 1)
-    return (
-        np.unique(np.linspace(first, count - 1, min(MOST_LINES, count)).round())
-        .astype(int)
-        .tolist()
-    )
+    return np.unique(
+        np.linspace(first, count - 1, min(MOST_LINES, count)).round().astype(int)
+    ).tolist()
 
 
 def draw_line(axes, kernel, name, place, colour):
@@ -106,3 +115,41 @@ KERNEL_FIGURES: dict[str, Callable[[Results], Figure]] = {
     "efficiency": efficiency,
 }
 """Name → figure."""
+
+
+OPENED = [STATUS.index(name) for name in ("opened", "opens_at_least_rate")]
+
+
+def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tuple:
+    """(rates (k,), shares (k,) opened by then) of all doublets of a type and an N."""
+    rows = (found.column("type") == type_place) & (found.column("vertices") == vertices_place)
+    status = found.column("status")[rows]
+    opens = np.sort(found.column("opens")[rows][np.isin(status, OPENED)])
+    tested = int(np.sum(status != FAILED))
+    return opens, np.arange(1, len(opens) + 1) / max(tested, 1)
+
+
+def over_rate(found: Strengths) -> Figure:
+    """A panel per type, a line per N, all displacements together."""
+    types, vertices = (found.conditions.axes[name].values for name in ("type", "vertices"))
+    x_label = f"rate G of the {plain(found.about.get('flow'))} [1/s]"
+    titles = type_titles(types)
+    with panel_grid(titles, "share of bonds opened", 2.0, x_label) as (figure, panels, last):
+        colours = graded_colours(len(vertices))
+        for number, axes in enumerate(panels):
+            any_opened = 0
+            for place in range(len(vertices)):
+                rates, shares = shares_opened(found, number, place)
+                any_opened += len(rates)
+                if len(rates):
+                    axes.plot(rates, shares, drawstyle="steps-post", color=colours[place],
+                              marker=MARKERS[place % len(MARKERS)], markersize=3)  # fmt: skip
+            axes.set(ylim=(0.0, 1.04), xscale="log")
+            if not any_opened:
+                note(axes, "no bond opened")
+        set_log_axis(panels[0].xaxis)
+        add_line_legend(last, [f"{n}" for n in vertices], colours, "N")
+        return figure
+
+
+STRENGTH_FIGURES: dict[str, Callable[[Any], Figure]] = {"strength": over_rate}

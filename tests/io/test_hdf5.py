@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.io.files import read_sealed, seal
-from flocsim.io.hdf5.structure import Unfit, structure_of
+from flocsim.io.hdf5 import Unfit, structure_of
 from flocsim.io.results.file import read_overview, read_results
+from flocsim.io.seals import read_sealed, seal
 from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import write_star_library

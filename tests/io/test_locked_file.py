@@ -7,8 +7,8 @@ import time
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.io.journal import locked_file as module
-from flocsim.io.journal.locked_file import LockedFile
+from flocsim.io import journal as module
+from flocsim.io.journal import LockedFile
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_who_waited_gets_the_file_of_that_name_and_not_the_deleted_one(path, mon
     first = LockedFile(path)
     others = []
 
-    def turns(descriptor, path, original=module.lock):
+    def turns(descriptor, original=module.lock):
         """Whoever waits has opened the file when its name is taken away and given to another."""
         if not others:
             first.unlink()
@@ -74,11 +74,11 @@ def test_who_waited_gets_the_file_of_that_name_and_not_the_deleted_one(path, mon
             others[0] = LockedFile(path)  # a third job is faster
             first.close()
         elif others[0] is not None and others[0].descriptor >= 0:
-            locked = original(descriptor, path)
+            locked = original(descriptor)
             assert locked is False  # the lock on what was deleted was worth nothing
             others[0].close()
             return locked
-        return original(descriptor, path)
+        return original(descriptor)
 
     monkeypatch.setattr(module, "lock", turns)
     got = LockedFile(path)
@@ -89,11 +89,11 @@ def test_who_waited_gets_the_file_of_that_name_and_not_the_deleted_one(path, mon
 def test_the_lock_of_a_file_that_was_replaced_before_it_was_got_is_not_believed(path, monkeypatch):
     path.write_text("old")
 
-    def lock(descriptor, path, original=module.lock):
+    def lock(descriptor, original=module.lock):
         if path.read_text() == "old":  # between opening and locking another job ends
             path.unlink()
             path.write_text("new")
-        return original(descriptor, path)
+        return original(descriptor)
 
     monkeypatch.setattr(module, "lock", lock)
     file = LockedFile(path)

@@ -7,6 +7,7 @@ For `flocsim check` and `flocsim work-precision --replicate`.
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import attrs
@@ -113,13 +114,12 @@ class Checker:
                 scene.run(case.method)
                 self.warm.add(kind)
             return judged(scene, Implicit(reference))
-        except FlocsimError as error:
-            return Verdict(0, math.nan, math.nan, math.nan, WRONG, str(error))
         except MemoryError:
             raise
-        except Exception as error:  # of a class of the user's own
+        except Exception as error:  # also of a class of the user's own
             words = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            return Verdict(0, math.nan, math.nan, math.nan, WRONG, words)
+            why = str(error) if isinstance(error, FlocsimError) else words
+            return Verdict(0, math.nan, math.nan, math.nan, WRONG, why)
 
 
 @attrs.frozen
@@ -146,45 +146,47 @@ class Scene:
 
 def judged(scene: Scene, exact: Integrator) -> Verdict:
     """The Verdict on a Scene's Case, against a run by the method ``exact``."""
-    case = scene.case
+    method = scene.case.method
     _ = scene.draw.encounter.scene
     began = time.process_time()
-    found, row = scene.run(case.method)
+    found, row = scene.run(method)
     spent = time.process_time() - began
-    stated = found.error if math.isfinite(case.method.tolerance) else math.nan
-    about = found.steps + found.rejected, spent
+    verdict = partial(Verdict, found.steps + found.rejected, spent)
+
+    def stated_of(run):
+        return run.error if math.isfinite(method.tolerance) else math.nan
+
     if row["failure"]:
-        return Verdict(*about, math.nan, stated, WRONG, ending(row))
+        return verdict(math.nan, stated_of(found), WRONG, ending(row))
     reference, other = scene.run(exact, MORE_STEPS)
     if other["failure"]:
-        return Verdict(*about, math.nan, stated, WRONG, f"no reference: it ends {ending(other)}")
+        return verdict(math.nan, stated_of(found), WRONG, f"no reference: it ends {ending(other)}")
     until = min(found.time, reference.time)
     # Both are stopped where the first of them was decided.
     if found.time > until:
-        found, _ = scene.run(case.method, until=until)
+        found, _ = scene.run(method, until=until)
     elif reference.time > until:
         reference, _ = scene.run(exact, MORE_STEPS, until=until)
     error = end_distance(scene.draw.encounter.system.bodies, place_of(found), place_of(reference))
-    stated = found.error if math.isfinite(case.method.tolerance) else math.nan
+    stated, right = stated_of(found), allowed(scene)
     if (row["outcome"], row["inside"]) != (other["outcome"], other["inside"]):
-        most = max(allowed(scene), stated) + reference.error
+        most = max(right, stated) + reference.error
+        why = f"{ending(row)}, and the reference {ending(other)}"
         if error <= most and is_close_call(row, other, most):
-            both = f"{ending(row)}, and the reference {ending(other)}"
-            why = f"{both}: the difference lies within the error"
-            return Verdict(*about, error, stated, STATED, why)
-        why = f"{ending(row)}, and the reference {ending(other)}{remark(scene, reference, exact)}"
-        return Verdict(*about, error, stated, WRONG, why)
-    if error <= allowed(scene):
-        return Verdict(*about, error, stated, RIGHT)
-    if error <= stated:
-        return Verdict(*about, error, stated, STATED)
-    if error <= stated + reference.error:
+            return verdict(error, stated, STATED, f"{why}: the difference lies within the error")
+    elif error <= right:
+        return verdict(error, stated, RIGHT)
+    elif error <= stated:
+        return verdict(error, stated, STATED)
+    elif error <= stated + reference.error:
         own = f"of which {reference.error:.2g} m may be the reference's own"
         why = f"no good reference: off by {error:.3g} m, {own}"
-        return Verdict(*about, error, stated, WRONG, f"{why}{remark(scene, reference, exact)}")
-    times = f"{error / stated:.3g} times its stated error" if stated > 0.0 else "and states none"
-    why = f"off by {error:.2g} m, {times}{remark(scene, reference, exact)}"
-    return Verdict(*about, error, stated, WRONG, why)
+    else:
+        times = (
+            f"{error / stated:.3g} times its stated error" if stated > 0.0 else "and states none"
+        )
+        why = f"off by {error:.2g} m, {times}"
+    return verdict(error, stated, WRONG, why + remark(scene, reference, exact))
 
 
 def is_close_call(row: dict, other: dict, most: float) -> bool:

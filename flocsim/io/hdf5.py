@@ -9,13 +9,26 @@ are two things that lie on the same bytes. The format is HDF5's oldest, which h5
 """
 
 import math
+import re
 import struct
 from collections.abc import Callable
 from typing import BinaryIO
 
 import attrs
 
-from flocsim.io.hdf5.types import size_of, type_name
+from flocsim.io.seals import HDF5_SIGNATURE
+
+REFERENCE = struct.pack("<BBBBI", 0x17, 0, 0, 0, 8)
+MEMBER = bytes(28)
+"""Of a compound's member: what it says of dimensions, of which it has none."""
+
+SIZES = {
+    "u1": 1, "i4": 4, "i8": 8, "f8": 8, "text": 16, "flag": 1, "references": 16, "scales": 16
+}  # fmt: skip
+"""Bytes of one value, by the name of its type."""
+
+FIXED_TEXT = re.compile(rb"\x13[\x00-\x02\x10-\x12]\0\0(.{4})", re.DOTALL)
+LONGEST_FIXED = 256
 
 LARGEST = 2**28
 """Bytes of a heap: far more than flocsim writes into one."""
@@ -23,75 +36,6 @@ LARGEST = 2**28
 END_OF_FREE = 1
 """In a heap of names, instead of the place of the next free piece."""
 
-
-def name_table(take: Callable[[int, int], bytes], address: int) -> Callable[[int], bytes]:
-    """place → name, of the heap of names at an address; ValueError where that is none.
-
-    ``take(start, length)`` gives bytes of the file.
-    """
-    mark, version, length, free, start = struct.unpack("<4sB3xQQQ", take(address, 32))
-    if mark != b"HEAP" or version != 0 or length > LARGEST:
-        raise ValueError("a group has no heap of names")
-    names = take(start, length)
-    check_free(names, free)
-
-    def name(place):
-        stop = names.find(b"\0", place) if place < length else -1
-        if stop < 0:
-            raise ValueError("a name in it has no end")
-        return names[place:stop]
-
-    return name
-
-
-def check_free(names, free):
-    """ValueError unless the list of the heap's free pieces goes up and ends."""
-    least = 0
-    while free not in (END_OF_FREE, 2**64 - 1):
-        if not least <= free <= len(names) - 16:
-            raise ValueError("a group's heap of names is damaged")
-        following, size = struct.unpack_from("<QQ", names, free)
-        if size < 16 or free + size > len(names):
-            raise ValueError("a group's heap of names is damaged")
-        free, least = following, free + size
-
-
-@attrs.define
-class TextHeap:
-    """The collections of text and references of a file, each text being of one value."""
-
-    take: Callable[[int, int], bytes]
-    known: dict[int, dict[int, bytes]] = attrs.Factory(dict)
-
-    def content(self, address: int, number: int) -> bytes:
-        """What lies at a number of the collection at an address; ValueError where nothing does.
-
-        Each is given out once: many values that share a long one would fill the memory.
-        """
-        if address not in self.known:
-            self.known[address] = self.collection(address)
-        found = self.known[address].pop(number, None)
-        if found is None:
-            raise ValueError("a text in it is missing, or is that of several values")
-        return found
-
-    def collection(self, address):
-        mark, version, size = struct.unpack("<4sB3xQ", self.take(address, 16))
-        if mark != b"GCOL" or version != 1 or not 16 <= size <= LARGEST:
-            raise ValueError("a text in it is missing")
-        data, place, found = self.take(address + 16, size - 16), 0, {}
-        while place + 16 <= len(data):
-            number, _, length = struct.unpack_from("<HH4xQ", data, place)
-            step = length if number == 0 else 16 + -(-length // 8) * 8
-            if step < 16 or place + step > len(data) or number in found:
-                raise ValueError("its texts are damaged")
-            if number:
-                found[number] = data[place + 16 : place + 16 + length]
-            place += step
-        return found
-
-
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NOWHERE = 2**64 - 1
 SUPERBLOCK = struct.Struct("<8s8BHHI4Q2QII16s")
 LINK = struct.Struct("<QQII16s")
@@ -116,8 +60,88 @@ FOREIGN = {
 }
 
 
+def integer(size: int, signed: bool) -> bytes:
+    """The message of an integer type, little-endian."""
+    return struct.pack("<BBBBIHH", 0x10, 0x08 if signed else 0, 0, 0, size, 0, 8 * size)
+
+
+def text(charset: int) -> bytes:
+    """The message of text of variable length, ASCII (0) or UTF-8 (1)."""
+    return struct.pack("<BBBBI", 0x19, 1, charset, 0, 16) + integer(1, False)
+
+
+KNOWN = {
+    integer(1, False): "u1",
+    integer(4, True): "i4",
+    integer(8, True): "i8",
+    bytes.fromhex("11203f000800000000004000340b0034ff030000"): "f8",
+    text(0): "text",
+    text(1): "text",
+    # How h5py writes a bool.
+    bytes.fromhex("1802000001000000") + integer(1, True) + b"FALSE\0\0\0TRUE\0\0\0\0\0\1": "flag",
+    # Of a dataset, its dimension scales.
+    struct.pack("<BBBBI", 0x19, 0, 0, 0, 16) + REFERENCE: "references",
+    # Of a dimension scale, the datasets that have it, and as which dimension.
+    struct.pack("<BBBBI", 0x16, 2, 0, 0, 16)
+    + b"dataset\0" + bytes(4) + MEMBER + REFERENCE
+    + b"dimension\0\0\0\0\0\0\0" + struct.pack("<I", 8) + MEMBER + integer(4, False): "scales",
+}  # fmt: skip
+
+
 class Unfit(ValueError):
     """What a file holds that flocsim does not write, in a line without the file's name."""
+
+
+def checked_type(where: str, message: bytes) -> str:
+    """What a datatype message names: a key of SIZES or "fixed N"; Unfit for all else.
+
+    Messages may be padded with zeros.
+    """
+    for known, name in KNOWN.items():
+        if message.startswith(known) and not any(message[len(known) :]):
+            return name
+    match = FIXED_TEXT.match(message)
+    size = int.from_bytes(match[1], "little") if match and not any(message[8:]) else 0
+    if not 0 < size <= LONGEST_FIXED:
+        raise Unfit(f"{where} holds values of a type that flocsim does not write")
+    return f"fixed {size}"
+
+
+def size_of(name: str) -> int:
+    """Bytes of one value of a type."""
+    return SIZES[name] if name in SIZES else int(name.removeprefix("fixed "))
+
+
+def name_table(take: Callable[[int, int], bytes], address: int) -> Callable[[int], bytes]:
+    """place → name, of the heap of names at an address; Unfit where that is none.
+
+    ``take(start, length)`` gives bytes of the file.
+    """
+    mark, version, length, free, start = struct.unpack("<4sB3xQQQ", take(address, 32))
+    if mark != b"HEAP" or version != 0 or length > LARGEST:
+        raise Unfit("a group has no heap of names")
+    names = take(start, length)
+    check_free(names, free)
+
+    def name(place):
+        stop = names.find(b"\0", place) if place < length else -1
+        if stop < 0:
+            raise Unfit("a name in it has no end")
+        return names[place:stop]
+
+    return name
+
+
+def check_free(names, free):
+    """Unfit unless the list of the heap's free pieces goes up and ends."""
+    least = 0
+    while free not in (END_OF_FREE, 2**64 - 1):
+        if not least <= free <= len(names) - 16:
+            raise Unfit("a group's heap of names is damaged")
+        following, size = struct.unpack_from("<QQ", names, free)
+        if size < 16 or free + size > len(names):
+            raise Unfit("a group's heap of names is damaged")
+        free, least = following, free + size
 
 
 @attrs.frozen
@@ -154,11 +178,11 @@ class Walk:
     size: int
     nodes: dict[str, Node] = attrs.Factory(dict)
     claims: list[tuple[int, int]] = attrs.Factory(list)
+    texts: dict[int, dict[int, bytes]] = attrs.Factory(dict)
+    """The collections of text and references, each text being of one value."""
     left: int = attrs.field(init=False)
-    texts: TextHeap = attrs.field(init=False)
 
     def __attrs_post_init__(self):
-        self.texts = TextHeap(self.take)
         self.left = self.size
 
     def claim(self, start, length):
@@ -191,7 +215,7 @@ class Walk:
         signature, *rest = SUPERBLOCK.unpack(block)
         versions, sizes, plan = rest[:5], rest[5:8], rest[8:11]
         base, free, end, driver, name, root, kind, _, scratch = rest[11:]
-        if signature != SIGNATURE:
+        if signature != HDF5_SIGNATURE:
             raise Unfit("it is not HDF5")
         if versions != [0] * 5 or sizes != [8, 8, 0] or plan != [LEAF_SIZE // 2, NODE_SIZE // 2, 0]:
             raise Unfit("its HDF5 format is not the one that h5py writes")
@@ -349,15 +373,42 @@ class Walk:
             self.text_values(inside, values)
         elif kind == "references":
             for count, heap, number in struct.iter_unpack("<IQI", values):
-                if count != 1 or len(self.texts.content(heap, number)) != 8:
+                if count != 1 or len(self.content(heap, number)) != 8:
                     raise Unfit(f"{inside} does not lead to a dataset")
         return decoded(name), (kind, shape)
+
+    def content(self, address, number):
+        """What lies at a number of the collection at an address; Unfit where nothing does.
+
+        Each is given out once: many values that share a long one would fill the memory.
+        """
+        if address not in self.texts:
+            self.texts[address] = self.collection(address)
+        found = self.texts[address].pop(number, None)
+        if found is None:
+            raise Unfit("a text in it is missing, or is that of several values")
+        return found
+
+    def collection(self, address):
+        mark, version, size = struct.unpack("<4sB3xQ", self.take(address, 16))
+        if mark != b"GCOL" or version != 1 or not 16 <= size <= LARGEST:
+            raise Unfit("a text in it is missing")
+        data, place, found = self.take(address + 16, size - 16), 0, {}
+        while place + 16 <= len(data):
+            number, _, length = struct.unpack_from("<HH4xQ", data, place)
+            step = length if number == 0 else 16 + -(-length // 8) * 8
+            if step < 16 or place + step > len(data) or number in found:
+                raise Unfit("its texts are damaged")
+            if number:
+                found[number] = data[place + 16 : place + 16 + length]
+            place += step
+        return found
 
     def text_values(self, where, values):
         if len(values) > 16 * MOST_TEXTS:
             raise Unfit(f"{where} has more than {MOST_TEXTS} texts")
         for length, heap, number in struct.iter_unpack("<IQI", values):
-            if length and len(self.texts.content(heap, number)) != length:
+            if length and len(self.content(heap, number)) != length:
                 raise Unfit(f"a text of {where} is not as long as stated")
 
 
@@ -374,13 +425,6 @@ def decoded(name):
     if not text.isprintable() or "/" in text or text in ("", ".", ".."):
         raise Unfit(f"a name in it is not one that flocsim writes: {text!r}")
     return text
-
-
-def checked_type(where, message):
-    name = type_name(message)
-    if name is None:
-        raise Unfit(f"{where} holds values of a type that flocsim does not write")
-    return name
 
 
 def shape_of(where, message):

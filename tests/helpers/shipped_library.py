@@ -1,10 +1,10 @@
 """The shape library that ships with flocsim: synthetic flocs, to be used without growing any.
 
-Named by ``[shapes] source = "library", file = "synthetic"``. `python -m flocsim.io.shapes.shipped`
-makes it anew: the first FLOCS clusters of `flocsim.geometry.shapes.synthetic` with 60 primary
-particles and a fractal dimension of 1.8 in the plane, the defaults of ``[shapes]``, fitted at
-VERTICES. Their pixel size, and so their measured sizes, are nominal: equivalent radii from 5 to
-25 µm, in equal steps of the logarithm.
+Named by ``[shapes] source = "library", file = "synthetic"``. It is made anew by
+`python -m tests.helpers.shipped_library`: the first FLOCS clusters of
+`flocsim.geometry.shapes.synthetic` with 60 primary particles and a fractal dimension of 1.8 in the
+plane, the defaults of ``[shapes]``, fitted at VERTICES. Their pixel size, and so their measured
+sizes, are nominal: equivalent radii from 5 to 25 µm, in equal steps of the logarithm.
 """
 
 import sys

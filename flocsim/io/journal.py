@@ -3,23 +3,40 @@
 One process writes it, rank 0's, by the one descriptor that it has locked. What a killed process
 left half written is cut off when the file is opened again; a chunk that was damaged later is named,
 passed over and computed again.
+
+A lock holds for an inode, not for a name: a job that waited for one may find that the file has
+been deleted or put aside since, and would write where nobody looks. So whoever gets the lock
+compares what is locked with what bears the name, and opens anew where they differ; and nobody
+deletes or renames anything but the very file that it has locked.
 """
 
 import contextlib
 import io
 import os
+import stat
 import time
 from pathlib import Path
 
 from flocsim.errors import FileError
-from flocsim.io.files import ordinary_target, unwritable
-from flocsim.io.journal.locked_file import LockedFile
-from flocsim.io.journal.records import MARK, SESSION, Damage, Record, kind_of, scan
+from flocsim.io.files import give_name, lock, names, ordinary_target, sync_folder, unwritable
+from flocsim.io.records import MARK, SESSION, Damage, Record, kind_of, scan
+from flocsim.io.seals import BLOCK
 
 SUFFIX = ".journal"
 
 SYNC_SECONDS = 5.0
 """Seconds between two syncs to the disk: what a power cut may cost. A kill costs nothing."""
+
+LOCK_SECONDS = 10.0
+"""Seconds to wait for a job that is just dying, or just finishing, to let go of the file."""
+
+LOOK_SECONDS = 0.05
+"""Seconds between two tries to get the lock."""
+
+MOST_COPIES = 1000
+"""Names NAME.1, NAME.2, … that are tried for a file that is put aside."""
+
+OPEN = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 def journal_path(results: str | Path) -> Path:
@@ -197,3 +214,128 @@ def journal_of(path: str | Path) -> Path | None:
     except FileError:
         return None
     return beside if not os.path.lexists(path) and beside.is_file() else None
+
+
+def open_regular(path: Path) -> int:
+    """A descriptor of the ordinary file at ``path``, which a link, a pipe or a device is not.
+
+    FileError where it is none; nothing here waits for the other end of a pipe.
+    """
+    try:
+        if is_regular(path):
+            descriptor = os.open(path, OPEN | os.O_CREAT, 0o666)
+            if stat.S_ISREG(os.fstat(descriptor).st_mode):
+                return descriptor
+            os.close(descriptor)
+    except (OSError, ValueError) as error:
+        raise unwritable(path, error) from error
+    raise FileError(f"{path} is not an ordinary file: move it away, or name another output")
+
+
+def is_regular(path):
+    """Whether there is an ordinary file, or nothing."""
+    try:
+        return stat.S_ISREG(os.lstat(path).st_mode)
+    except FileNotFoundError:
+        return True
+
+
+class LockedFile:
+    """The file at ``path``, locked: ``descriptor`` reads and writes it.
+
+    ``has_lock`` is False on a file system without locks.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open or make the file and lock it; FileError where another job keeps it."""
+        self.path = path
+        until = time.monotonic() + LOCK_SECONDS
+        while True:
+            self.descriptor = open_regular(path)
+            try:
+                locked = lock(self.descriptor)
+            except OSError as error:
+                self.close()
+                raise unwritable(path, error) from error
+            if locked is not False and self.is_in_place():
+                break
+            os.close(self.descriptor)
+            if time.monotonic() > until:
+                raise FileError(
+                    f"{path} is being written by another job: wait for it, or name another output"
+                )
+            if locked is False:
+                time.sleep(LOOK_SECONDS)
+        self.has_lock = bool(locked)
+        try:
+            sync_folder(path.parent)
+        except OSError as error:
+            self.close()
+            raise unwritable(path, error) from error
+
+    def is_in_place(self) -> bool:
+        """Whether the name still leads to this very file."""
+        return names(self.path, self.descriptor)
+
+    def unlink(self) -> None:
+        """Take the file's name away, if the name is still this file's."""
+        with contextlib.suppress(OSError):
+            if self.is_in_place():
+                os.unlink(self.path)
+
+    def put_aside(self) -> Path:
+        """Rename the file to the first of NAME.1, NAME.2, … that is free; its new path."""
+        if not self.is_in_place():
+            raise FileError(f"{self.path} was replaced just now: check what is there")
+        descriptor, target = self.free_file()
+        os.close(descriptor)
+        try:
+            os.replace(self.path, target)
+            sync_folder(self.path.parent)
+        except OSError as error:
+            raise unwritable(self.path, error) from error
+        return target
+
+    def put_back(self) -> None:
+        """Where the name has gone, write the file anew and give it the name; FileError where
+        the name is another file's by now: then the copy is left beside it."""
+        descriptor, copy = self.free_file()
+        try:
+            lock(descriptor)
+            place = 0
+            while block := os.pread(self.descriptor, BLOCK, place):
+                place += os.write(descriptor, block)
+            os.fsync(descriptor)
+            give_name(copy, self.path)
+            copy.unlink(missing_ok=True)
+        except FileExistsError as error:
+            os.close(descriptor)
+            raise FileError(
+                f"{self.path} was replaced by another file while this run wrote to it: what is "
+                f"finished is in {copy}; move the other file away, rename {copy} to it, and "
+                "continue with --resume"
+            ) from error
+        except OSError as error:
+            os.close(descriptor)
+            raise unwritable(copy, error) from error
+        os.close(self.descriptor)
+        self.descriptor = descriptor
+
+    def free_file(self) -> tuple[int, Path]:
+        """(descriptor, path) of a new empty file, the first of NAME.1, NAME.2, … to be had."""
+        for number in range(1, MOST_COPIES):
+            path = self.path.with_name(f"{self.path.name}.{number}")
+            try:
+                return os.open(path, OPEN | os.O_CREAT | os.O_EXCL, 0o666), path
+            except FileExistsError:
+                continue
+            except OSError as error:
+                raise unwritable(path, error) from error
+        raise FileError(f"{self.path}.1 to .{MOST_COPIES - 1} exist: move some of them away")
+
+    def close(self) -> None:
+        """Let go of the lock; nothing can be done with the file any more."""
+        if self.descriptor >= 0:
+            with contextlib.suppress(OSError):
+                os.close(self.descriptor)
+        self.descriptor = -1

@@ -6,12 +6,13 @@ Lengths in it are µm, y points up, and everything is seen from the receiving bo
 import json
 import math
 from collections.abc import Sequence
+from html import escape
 from pathlib import Path
 
 import numpy as np
 
-from flocsim.commands.reporting.markup import text
 from flocsim.ensembles.contents import Example
+from flocsim.errors import visible
 from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
@@ -26,7 +27,12 @@ FRAMES = 150
 GRAPH = (46.0, 8.0, 310.0, 262.0)
 """Left, top, right and bottom of the graph's panel in its drawing of 320 × 320."""
 
-SCRIPT = Path(__file__).with_name("motion.js").read_text("utf-8")
+SCRIPT = Path(__file__).with_name("templates").joinpath("motion.js").read_text("utf-8")
+
+
+def text(value: object) -> str:
+    """Any text as HTML shows it: escaped, letters that steer a display written out."""
+    return escape(visible(str(value), ""))
 
 
 def motion_of(example: Example) -> str:
@@ -46,7 +52,10 @@ def motion_of(example: Example) -> str:
     instants = instants_along(times, trajectory.position, reaches, FRAMES, touch)
     rows = np.unique([np.abs(times - each).argmin() for each in instants])
     shown = int(np.abs(times[rows] - touch).argmin()) if math.isfinite(touch) else 0
-    eyes, half = windows_of(relative[rows], MICRO * np.array(reaches))
+    # The middle of both bodies in every frame, and one half width that fits them all.
+    seen, reach = relative[rows, :, :2], MICRO * np.array(reaches)[:, None]
+    low, high = (seen - reach).min(axis=1), (seen + reach).max(axis=1)
+    eyes, half = 0.5 * (low + high), 0.52 * float(np.max(high - low))
     distance = np.hypot(*(relative[:, 1, :2] - relative[:, 0, :2]).T)
     unit, factor = time_unit(times)
     zone = MICRO * example.zone_distance
@@ -75,13 +84,6 @@ def rounded(values):
     return [
         [*rounded(each)] if np.ndim(each) else float(f"{each:.6g}") for each in np.asarray(values)
     ]
-
-
-def windows_of(places, reaches):
-    """The middle (f, 2) of both bodies in every frame, and one half width that fits them all."""
-    reach = np.array(reaches)[None, :, None]
-    low, high = (places[:, :, :2] - reach).min(axis=1), (places[:, :, :2] + reach).max(axis=1)
-    return 0.5 * (low + high), 0.52 * float(np.max(high - low))
 
 
 def drawing_of(shapes: Sequence, data: dict, half: float, shown: int) -> str:

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.io.files import HDF5_SIGNATURE, checked_sealed, read_sealed, seal
-from flocsim.io.pieces import (
+from flocsim.io.seals import (
+    HDF5_SIGNATURE,
     PIECE,
     PIECES_LINE,
     PIECES_MARK,
+    checked_sealed,
     digest_of,
     is_in_pieces,
+    read_sealed,
+    seal,
     seal_of_pieces,
     seal_size,
     size_of_pieces,

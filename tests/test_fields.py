@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.fields.quantities import KINDS, kind_of, read_quantity
+from flocsim.fields import KINDS, kind_of, read_quantity
 
 EXACT = [
     ("16.41 um", "m", 16.41e-6),

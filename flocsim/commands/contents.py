@@ -1,4 +1,4 @@
-"""What a shape library holds, for the commands."""
+"""What files hold that are of no study, for the commands: shape libraries and trajectories."""
 
 import os
 from collections.abc import Callable
@@ -6,8 +6,9 @@ from functools import wraps
 from typing import Any
 
 import attrs
+import numpy as np
 
-from flocsim.ensembles.contents import Contents, Summary
+from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.errors import visible
 from flocsim.hydrodynamics import prism_drag
 from flocsim.io.plots.shapes import POPULATION_FIGURES
@@ -15,6 +16,9 @@ from flocsim.io.plots.style import Figure
 from flocsim.io.shapes.fit_report import format_errors
 from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings
 from flocsim.io.terminal import aligned
+from flocsim.io.trajectory import StoredTrajectory, centre_distance, read_trajectory
+
+STRIP_FRAMES = 7
 
 
 @attrs.frozen(eq=False)
@@ -73,7 +77,7 @@ def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
 
 FIGURES = {name: of_entries(draw) for name, draw in POPULATION_FIGURES.items()}
 
-CONTENTS = Contents(
+LIBRARY = Contents(
     title="a shape library",
     read=read,
     summary=summary,
@@ -81,4 +85,51 @@ CONTENTS = Contents(
     figures=lambda found: FIGURES,
     drawn={"a shape library written by flocsim fit": FIGURES},
     water=water,
+)
+
+
+def summary_of_motion(found: StoredTrajectory) -> Summary:
+    """What a trajectory file holds."""
+    moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+    facts = [
+        ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
+        *((f"body {number}", f"N = {len(shape.vertices)}, r_eq {1e6 * shape.equivalent_radius:.4g} "
+           f"µm, moved {1e6 * way:.4g} µm")
+          for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
+    ]  # fmt: skip
+    if len(found.shapes) == 2:
+        apart = 1e6 * centre_distance(found.position)
+        facts.append(
+            ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
+             f"{apart[-1]:.4g} at last")
+        )  # fmt: skip
+    for name, value in found.facts.items():
+        if name != "config":
+            told = f"{value:.6g}" if isinstance(value, float) else str(value)
+            facts.append((name.replace("_", " "), told))
+    return Summary(facts)
+
+
+def strip(trajectory: Any, figure: str = "strip") -> Any:
+    """Frames of the motion, evenly along the way of the bodies against each other."""
+    from flocsim.trajectories.figures import drawn
+
+    return drawn(trajectory, figure, STRIP_FRAMES)
+
+
+def distance(trajectory: Any) -> Any:
+    """Distance of the two centres against time."""
+    return strip(trajectory, "distance")
+
+
+MOTION_FIGURES: Figures = {"strip": strip, "distance": distance}
+
+TRAJECTORY = Contents(
+    title="a trajectory",
+    read=read_trajectory,
+    summary=summary_of_motion,
+    table=lambda found: "",
+    figures=lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
+    drawn={"a trajectory file (flocsim trajectory --save, Trajectory.save)": MOTION_FIGURES},
+    motion=lambda found: (found.t, found.position, found.velocity, found.shapes),
 )

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.errors import FileError
-from flocsim.io.journal.journal import Journal, MemoryJournal, journal_path
-from flocsim.io.journal.records import (
+from flocsim.io.journal import Journal, MemoryJournal, journal_path
+from flocsim.io.records import (
     CHUNK,
     HEAD,
     MARK,

@@ -1,1 +1,0 @@
-"""What files hold that are of no study: shape libraries and trajectories."""

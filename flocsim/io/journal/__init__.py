@@ -1,1 +1,0 @@
-"""The journal beside an unfinished results file: records with checksums, appended as they come."""
