@@ -21,6 +21,7 @@ Measured: benchmarks/speed/compile_times.py --without NAME leaves one of 3 to 5 
 
 import builtins
 import contextlib
+import ctypes
 import functools
 import gc
 import inspect
@@ -28,7 +29,7 @@ import operator
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from flocsim.compiler.by_pointer import address_of_data, is_array
@@ -49,6 +50,9 @@ with numbers in it. Functions that are only linked into others have nothing to d
 
 COLOURED = ("code", "errmsg", "filename", "highlight", "indicate", "reset")
 """What numba colours in its messages, where colorama is installed."""
+
+MANY = 50
+"""Functions that take more than a second and leave some ten MB behind: less garbage waits."""
 
 _one_at_a_time = threading.RLock()
 
@@ -392,12 +396,17 @@ def typed_once(dispatcher: Any) -> Any:
     return dispatcher
 
 
-def forget(dispatchers: Iterable[Any]) -> None:
-    """Give back what numba keeps of functions that have been linked into another one."""
+def forget(dispatchers: Sequence[Any]) -> None:
+    """Give back what numba keeps of functions that have been linked into another one, and, of many,
+    what C's library keeps of the memory that they took."""
     for each in dispatchers:
         for result in each.overloads.values():
             each.targetctx.remove_user_function(result.entry_point)
         each.overloads.clear()
+    if len(dispatchers) > MANY:
+        gc.collect()
+        with contextlib.suppress(OSError, AttributeError):  # glibc's alone has that
+            ctypes.CDLL(None).malloc_trim(0)
 
 
 @contextlib.contextmanager
