@@ -142,7 +142,8 @@ class Build:
         code = self.code
         try:
             missing = to_compile(code.entry, self.whole)
-            with compiling(code.what, missing), internals.quick_typing():
+            what = f"the rest of {code.what}" if self.whole else code.what
+            with compiling(what, missing), internals.quick_typing():
                 self.known |= known
                 found = self.completed(code.entry, begun.split(b"\n", 1)[1]) if begun else None
                 return found or self.compiled(code.entry, code.name, signature, readers)
