@@ -20,7 +20,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from flocsim.compiler.processor import compiled_for
+from flocsim.compiler.processor import shared_kind
 
 MARK = b"flocsim compiled code 1\n"
 DIGEST_SIZE = 32
@@ -133,10 +133,9 @@ def folders() -> Iterator[Path]:
 def shipped() -> Path | None:
     """The folder of compiled code that came with the package for processors such as this one; None
     without."""
-    kind = compiled_for()
-    if len(kind) != 2:  # for this very processor alone
+    if not (kind := shared_kind()):
         return None
-    folder = resolved(SHIPPED / "-".join(kind))
+    folder = resolved(SHIPPED / kind)
     return folder if folder.is_dir() and not why_unsafe(folder) else None
 
 

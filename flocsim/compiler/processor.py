@@ -103,6 +103,15 @@ def baseline() -> str:
     return BASELINE if all(known.get(name) for name in OF_BASELINE) else ""
 
 
+def shared_kind() -> str:
+    """The kind of machine, system and processor, that others can share engines with, as the name of
+    a folder; "" where engines are for this very processor."""
+    import llvmlite.binding as llvm
+
+    target = baseline()
+    return f"{llvm.get_process_triple()}-{target}" if target else ""
+
+
 def compiled_for(loops: bool = False) -> tuple[str, ...]:
     """What of the machine the machine code of an engine depends on; ``loops``: that of functions
     that are mostly loops, which are compiled for this very processor."""

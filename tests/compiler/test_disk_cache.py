@@ -152,7 +152,7 @@ def shipped(folder, tmp_path, monkeypatch):
     path = only_file(folder)
     path.rename(place / path.name)
     monkeypatch.setattr(disk_cache, "SHIPPED", place.parent)
-    monkeypatch.setattr(disk_cache, "compiled_for", lambda: ("system", "kind"))
+    monkeypatch.setattr(disk_cache, "shared_kind", lambda: "system-kind")
     return place
 
 
@@ -166,8 +166,8 @@ def test_what_came_with_the_package_is_used_and_never_copied(folder, shipped, mo
 def test_what_came_for_another_kind_of_processor_is_left_alone(folder, shipped, monkeypatch):
     name = only_file(shipped).name.partition("-")[0]
     assert disk_cache.has(name)
-    for kind in (("system", "other kind"), ("system", "kind", "and features")):
-        monkeypatch.setattr(disk_cache, "compiled_for", lambda found=kind: found)
+    for kind in ("system-other kind", ""):
+        monkeypatch.setattr(disk_cache, "shared_kind", lambda found=kind: found)
         assert not disk_cache.has(name)
     assert answer() == 7.0
     assert len(list(folder.iterdir())) == 1
