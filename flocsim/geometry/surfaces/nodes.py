@@ -47,3 +47,19 @@ def foot_of(piece, other):
     if piece.bend == 0.0:
         return (x - piece.x) * piece.way_x + (y - piece.y) * piece.way_y
     return parameter_beside(piece, x_2, y_2)
+
+
+def parameter_before(piece, x, y, way, most):
+    """The parameter at which a ray from a point along a unit vector ``way`` meets a piece, or the
+    line or circle that it is part of, no further than ``most`` [m] away; inf where it does not."""
+    dx, dy = piece.x - x, piece.y - y
+    if piece.bend == 0.0:
+        crossing = way[0] * piece.way_y - way[1] * piece.way_x
+        along = (dx * piece.way_y - dy * piece.way_x) / crossing if crossing != 0.0 else math.inf
+    else:
+        ahead, aside = dx * way[0] + dy * way[1], dx * way[1] - dy * way[0]
+        squared = piece.bend * piece.bend - aside * aside
+        along = ahead - math.sqrt(squared) if squared > 0.0 else math.inf
+    if not 0.0 < along < most:
+        return math.inf
+    return parameter_beside(piece, x + along * way[0], y + along * way[1])

@@ -38,8 +38,7 @@ from flocsim.integrators.loop.step_size import (
     shortest_needed,
     step_behind_touch,
 )
-from flocsim.integrators.rhs.friction import slip_in
-from flocsim.integrators.rhs.rolling import rolled, rolled_besides
+from flocsim.integrators.rhs.friction import rolled, rolled_besides, slip_in
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
 from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has

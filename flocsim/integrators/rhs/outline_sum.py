@@ -8,7 +8,7 @@ one is gone along. All is in the frame of the other.
 import math
 
 import flocsim.arrays as at
-from flocsim.arrays import MOST_FEET, MOST_NODES, MOST_ORDER, OutlineView
+from flocsim.arrays import MOST_NODES, MOST_ORDER, OutlineView
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.surfaces.attraction import add_arc, add_segment, find_plates
@@ -16,30 +16,22 @@ from flocsim.geometry.surfaces.distances import (
     Pose,
     are_within,
     between_cores,
-    distance_to,
-    from_core,
     may_be_within,
     piece_at,
     placed,
 )
-from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of
+from flocsim.geometry.surfaces.nodes import ends_of
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import between_oriented
+from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, growth_at, put_side
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.laws import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, outline_pressure
 
-LENS = 200.0
+LENS = 300.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
-to less than 3e-6 of the attraction of touching outlines. A narrower lens takes less time a sum, and
-more steps."""
-
-SAME = 1e-3
-"""Of the gap: pieces of the other outline that are as near as that are both the nearest, and feet
-that are as near to each other are one."""
-
-MOST_HALVES = 40
-"""How often a way along a piece is halved: far below any length that counts."""
+to less than 1e-6 of the attraction of touching outlines, as it fades and is made up for
+(attraction.py). A narrower lens takes less time a sum, and more steps."""
 
 SKIN, MOST_SKIN = 1.0, 4.0
 """Pieces are listed to so much further than they count, so that lists last, and anew where it is
@@ -47,9 +39,6 @@ more than the latter."""
 
 UNMOVED = Pose(0.0, 0.0, 1.0, 0.0)
 """Of the body in whose frame all is."""
-
-LEAST_GROWTH = 1e-6
-"""Of the gap: what grows by less is flat."""
 
 AT_ONCE = 8
 """Nodes that a processor takes at once at most."""
@@ -140,125 +129,6 @@ def add_row(rows, row):
             return
     rows[0] += 1
     rows[rows[0]] = row
-
-
-def gap_from(scene, work, x, y):
-    """How far the other outline, as far as it is around, is from a point [m]."""
-    near, gap = work.near, math.inf
-    for j in range(near[at.AROUND, 0]):
-        gap = min(gap, distance_to(x, y, piece_at(scene.pieces, near[at.AROUND, 1 + j])))
-    return gap
-
-
-def find_feet(scene, work, piece, inset, lens):
-    """Write the feet of a piece to ``work.feet``, in their order; how many there are. They are the
-    places, ends among them, from where the gap within the lens grows either way."""
-    near, count = work.near, 0
-    first, last = ends_of(piece)
-    for j in range(near[at.AROUND, 0]):
-        other = piece_at(scene.pieces, near[at.AROUND, 1 + j])
-        parameter = min(max(foot_of(piece, other), first), last)
-        x, y, _, _, metres = at_parameter(piece, parameter)
-        gap = distance_to(x, y, other)
-        # Only where the other is what lies nearest there.
-        same = SAME * (gap + inset)
-        if gap < lens and gap <= gap_from(scene, work, x, y) + same:
-            count = add_foot(work.feet, count, parameter, same / metres)
-    return count
-
-
-def add_foot(feet, count, parameter, same):
-    """Put a foot among those found so far, in their order, unless one is as near as ``same``; how
-    many there are then."""
-    place = count
-    while place > 0 and feet[place - 1] > parameter:
-        place -= 1
-    if place > 0 and parameter - feet[place - 1] <= same:
-        return count
-    if (place < count and feet[place] - parameter <= same) or count == MOST_FEET:
-        return count
-    for k in range(count, place, -1):
-        feet[k] = feet[k - 1]
-    feet[place] = parameter
-    return count + 1
-
-
-def way_to_gap(scene, work, piece, foot, way, wanted):
-    """How far along a piece from a foot, in its parameter and ``way`` at most, the gap has grown to
-    the one that is wanted [m]: continuous in where the bodies are, as the quadrature is then."""
-    x, y, _, _, _ = at_parameter(piece, foot + way)
-    beyond = gap_from(scene, work, x, y)
-    if beyond <= wanted:
-        return way
-    for _ in range(MOST_HALVES):
-        x, y, _, _, _ = at_parameter(piece, foot + 0.5 * way)
-        gap = gap_from(scene, work, x, y)
-        if gap <= wanted:
-            return 0.5 * way * (1.0 + (wanted - gap) / (beyond - gap))
-        beyond = gap
-        way *= 0.5
-    return way
-
-
-def put_panel(work, count, piece, foot, scale, low, high):
-    """Put the nodes of a panel after so many others: t from ``low`` to ``high``, where a piece goes
-    on from a foot by 2 t/(1 − t²) times a scale in its parameter; how many nodes there are then."""
-    nodes, rules, order = work.nodes, work.rules, order_of(high - low)
-    middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    for k in range(order):
-        t = middle + half * rules[order, 0, k]
-        shrunk = 1.0 / (1.0 - t * t)
-        part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * shrunk * shrunk
-        x, y, nx, ny, metres = at_parameter(piece, foot + 2.0 * scale * t * shrunk)
-        nodes[at.NODE_X, count + k], nodes[at.NODE_Y, count + k] = x, y
-        nodes[at.NODE_NORMAL_X, count + k], nodes[at.NODE_NORMAL_Y, count + k] = nx, ny
-        nodes[at.NODE_WEIGHT, count + k] = part * metres
-        nodes[at.NODE_GAP, count + k], nodes[at.NODE_SUM, count + k] = math.inf, 0.0
-    return count + order
-
-
-def order_of(width):
-    """How many nodes of Gauss's rule a panel of so much t takes: what it is taken of has its poles
-    near ±i, from where the error is below 1e-7."""
-    if width < 0.3:
-        return 4 if width > 0.1 else 3
-    return 16 if width > 0.7 else 12
-
-
-def growth_at(scene, work, piece, foot):
-    """(gap, its slope along a piece [-], that of the slope [1/m], metres for a unit of the
-    parameter) at a foot."""
-    x, y, nx, ny, metres = at_parameter(piece, foot)
-    near, gap, slope, rise = work.near, math.inf, 0.0, 0.0
-    for j in range(near[at.AROUND, 0]):
-        other = piece_at(scene.pieces, near[at.AROUND, 1 + j])
-        dx, dy, end = from_core(x, y, other)
-        distance = math.sqrt(dx * dx + dy * dy)
-        if distance - other.inward < gap:
-            gap = distance - other.inward
-            away = (nx * dx + ny * dy) / distance
-            slope = (nx * dy - ny * dx) / distance
-            rise = -away / piece.bend if piece.bend > 0.0 else 0.0
-            rise += away * away / distance if end else 0.0
-    return gap, slope, rise, metres
-
-
-def put_side(scene, work, count, piece, foot, growth, end, inset, lens):
-    """Put the nodes of a piece from a foot, with its growth_at, to an end after so many others; how
-    many there are then."""
-    reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
-    gap, slope, rise, metres = growth
-    parted, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
-    # Where the gap, as it grows there, has become twice as large; and as it has grown by then.
-    whole = abs(reach) * metres
-    root = slope + math.sqrt(slope * slope + 2.0 * max(rise, 0.0) * parted)
-    way = min(2.0 * parted / max(root, parted / whole), whole)
-    x, y, _, _, _ = at_parameter(piece, foot + math.copysign(way / metres, reach))
-    grown = (gap_from(scene, work, x, y) - gap) / parted
-    scale = way / math.sqrt(max(grown, LEAST_GROWTH))
-    share = whole / scale
-    last = share / (1.0 + math.sqrt(1.0 + share * share))
-    return put_panel(work, count, piece, foot, math.copysign(scale / metres, reach), 0.0, last)
 
 
 def look_from(scene, work, count, inset, lens):
@@ -373,7 +243,7 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     inset, lens, view = numbers
     if lens == 0.0:
         return total
-    count, work.near[at.SEEN, 0] = 0, 0
+    count, least, work.near[at.SEEN, 0] = 0, view.gap + inset, 0
     for i in range(work.near[at.NEAR_A, 0]):
         piece = placed(scene.pieces, work.near[at.NEAR_A, 1 + i], pose)
         if look_around_piece(scene, work, piece, lens) == 0:
@@ -386,10 +256,10 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
             if low < foot:
-                count = put_side(scene, work, count, piece, foot, growth, low, inset, lens)
+                count = put_side(scene, work, count, piece, foot, growth, low, inset, lens, least)
             if foot < high:
-                count = put_side(scene, work, count, piece, foot, growth, high, inset, lens)
-            if count > MOST_NODES - 2 * MOST_ORDER:
+                count = put_side(scene, work, count, piece, foot, growth, high, inset, lens, least)
+            if count > MOST_NODES - 2 * MOST_PANELS * MOST_ORDER:
                 total = add_nodes(scene, work, total, count, numbers)
                 count = 0
     fx, fy, torque = add_nodes(scene, work, total, count, numbers)

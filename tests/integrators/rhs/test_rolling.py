@@ -11,7 +11,7 @@ from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.rhs.rolling import rolled, rolled_besides
+from flocsim.integrators.rhs.friction import rolled, rolled_besides
 from flocsim.integrators.rhs.views import tangential_rate
 
 LATER = at.FIRST_STAGE
