@@ -9,7 +9,6 @@ bodies as before is not run again (`Finished`).
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -18,12 +17,9 @@ import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import Swarm, with_links
-from flocsim.swarms.leaving import REMOVE, Leaving
+from flocsim.swarms.placement import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
-from flocsim.swarms.together.shielding import WAY, Shielding
-
-if TYPE_CHECKING:
-    from flocsim.swarms.runner import Islands
+from flocsim.swarms.shielding import WAY, Shielding
 
 NONE = -1
 """Label of a body whose island has not been run."""
@@ -48,7 +44,7 @@ class Finished:
         later = links[:, sw.LATER_BODY]
         return np.where(self.free[later], later, links[:, sw.EARLIER_BODY])
 
-    def missing(self, islands: "Islands") -> np.ndarray:
+    def missing(self, islands: Islands) -> np.ndarray:
         """Which islands are not among them. One of the same free bodies, and as many fixed ones,
         has the same of these: it can reach no fewer than before."""
         if not len(self.sizes):
@@ -59,7 +55,7 @@ class Finished:
         first = np.minimum.reduceat(np.where(free, labels, len(self.sizes)), starts)
         return np.flatnonzero((first != last) | (islands.sizes != self.sizes[last]))
 
-    def add(self, islands: "Islands", links: np.ndarray, slips: np.ndarray) -> None:
+    def add(self, islands: Islands, links: np.ndarray, slips: np.ndarray) -> None:
         """Add islands, with the contacts that they leave; what was known of their bodies goes."""
         island = np.repeat(np.arange(len(islands.sizes)), islands.sizes)
         free = self.free[islands.members]

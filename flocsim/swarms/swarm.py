@@ -25,15 +25,13 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.islands import run_islands, watch_paths
-from flocsim.swarms.leaving import Leaving
-from flocsim.swarms.neighbours import find_islands
+from flocsim.swarms.bonds import BondGauge, Bonds
+from flocsim.swarms.clusters import Clusters, Gauge, Neighbours
+from flocsim.swarms.islands import find_islands, run_islands, watch_paths
+from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
-from flocsim.swarms.together.bonds import BondGauge, Bonds
-from flocsim.swarms.together.clusters import Clusters
-from flocsim.swarms.together.contacts import Gauge, Neighbours
-from flocsim.swarms.together.shielding import Shielding
+from flocsim.swarms.shielding import Shielding
 from flocsim.system import System, check_bodies, check_forces, check_limits, read_seed
 
 
@@ -82,8 +80,8 @@ class SwarmTrajectory:
         at = range(len(self.t))[at]
         motion = np.concatenate([self.position, self.velocity], axis=2)
         before = (float(self.t[at - 1]), motion[at - 1]) if at else None
-        touching = self.gauge.neighbours(self.position[at], within)
-        return self.bond_gauge().bonds(float(self.t[at]), motion[at], touching, before)
+        near = self.neighbours(at, within)
+        return self.bond_gauge().bonds(float(self.t[at]), motion[at], near, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:
         """Σ m v of all bodies that move (2,) [kg m/s], at a time of ``t``."""
@@ -260,17 +258,15 @@ class Swarm:
         progress = self.begin(end, threads=threads, max_steps=max_steps)
         seen, status = [progress.seen()], Status.FINISHED
         for stop in stops:
-            while (status := progress.advance(stop)) == Status.PAUSED:
-                if watch is not None and watch(progress.time):
+            status = Status.PAUSED
+            while status == Status.PAUSED:
+                status = progress.advance(stop)
+                common = status in (Status.PAUSED, Status.FINISHED)
+                if common and watch is not None and watch(progress.time) and progress.time < end:
                     status = Status.STOPPED
-                    break
             seen.append(progress.seen())
             if status != Status.FINISHED:
                 break
-            if watch is not None and watch(progress.time):
-                status = Status.STOPPED if progress.time < end else status
-                if status == Status.STOPPED:
-                    break
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,

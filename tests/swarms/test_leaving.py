@@ -9,7 +9,7 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere
 from flocsim.integrators import Status
 from flocsim.swarms.arrays import with_links
-from flocsim.swarms.leaving import REENTER, REMOVE, Leaving
+from flocsim.swarms.placement import REENTER, REMOVE, Leaving
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R, forces
 

@@ -30,9 +30,17 @@ from flocsim.ensembles.storage.identity import (
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished
-from flocsim.ensembles.swarms.assembly import PLACED, appended, groups_of, results_from
-from flocsim.ensembles.swarms.checks import FORM, Form, check_part
-from flocsim.ensembles.swarms.records import Found, part_of
+from flocsim.ensembles.swarms.records import (
+    FORM,
+    PLACED,
+    Form,
+    Found,
+    appended,
+    check_part,
+    groups_of,
+    part_of,
+    results_from,
+)
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
@@ -108,9 +116,6 @@ def largest_pair(swarm: Swarm) -> System:
 CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
 """The modules that decide what a swarm does."""
 
-LEFT_OUT = ("scene.checkpoint",)
-"""Keys that change nothing that is computed."""
-
 
 def check_study(config: Config) -> None:
     """Raise the FlocsimError that the study would meet: forces, sizes, library, room in the box."""
@@ -163,8 +168,7 @@ def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
     codes = [fingerprint(run_islands, swarm.fillings())]
     codes += [f"{law} {fingerprint(each, {})}" for law, each in sorted(pieces.laws.items())]
     facts["kernels.swarms"] = hashlib.blake2b("\n".join(codes).encode(), digest_size=12).hexdigest()
-    for name in LEFT_OUT:
-        facts.pop(name, None)
+    facts.pop("scene.checkpoint", None)  # changes nothing that is computed
     return json.loads(json.dumps(facts))
 
 
@@ -235,7 +239,9 @@ def verdict(found: SwarmResults) -> tuple[int, str]:
 
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     """What a journal has of swarms, of which those appear that have begun."""
-    asked, form, unread = sessions[-1]["asked"]["replicates"], form_of(sessions[-1]["asked"]), 0
+    told = sessions[-1]["asked"]
+    asked, unread = told["replicates"], 0
+    form = Form(**{name: told["swarm"][name] for name in FORM})
     if not form.times or form.bodies < 1:
         raise FileError(f"{path} does not record what is kept of a swarm")
     parts: dict[int, list[Record]] = {}
@@ -274,13 +280,6 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     return Unfinished(
         path, FORMAT, made, done, asked * len(form.times), notes, sessions, unread, "snapshots"
     )
-
-
-def form_of(asked: dict) -> Form:
-    """What the records of swarms look like, by what a session says."""
-    about = asked["swarm"]
-    times, bounds = (tuple(map(float, about[name])) for name in ("times", "bounds"))
-    return Form(about["bodies"], bounds, times, about["periodic"])
 
 
 KIND = Kind(

@@ -1,5 +1,6 @@
 """A study of swarms: the bodies of any replicate, by its number."""
 
+import functools
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,8 +15,16 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
-from flocsim.ensembles.swarms.checks import Form, check_ends, check_part
-from flocsim.ensembles.swarms.records import MOMENT, Found, Left, Read, part_of
+from flocsim.ensembles.swarms.records import (
+    MOMENT,
+    Form,
+    Found,
+    Left,
+    Read,
+    check_ends,
+    check_part,
+    part_of,
+)
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.geometry.shapes.shape import Shape
@@ -23,9 +32,8 @@ from flocsim.integrators.base import Status
 from flocsim.io.records import Record
 from flocsim.io.results.swarm_file import ENDS
 from flocsim.plausibility.settling import terminal_motion
-from flocsim.swarms.leaving import KEEP, Leaving
-from flocsim.swarms.placement import floor, place_at_random
-from flocsim.swarms.swarm import Swarm
+from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
+from flocsim.swarms.swarm import Swarm, stops_of
 from flocsim.system import System
 
 SPHERE = -1
@@ -74,7 +82,6 @@ class SwarmStudy(StudyKind):
     pool: FlocPool = attrs.field(init=False)
     choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
     """Places of the measured flocs that bodies are drawn from."""
-    any_swarm: Swarm | None = attrs.field(init=False, default=None)
     trial: int = attrs.field(init=False, default=0)
     row: ClassVar[np.dtype] = ROW
     compared: ClassVar[tuple[str, ...]] = ("trial",)
@@ -95,18 +102,12 @@ class SwarmStudy(StudyKind):
     @property
     def stops(self) -> list[float]:
         """Times of the snapshots [s], the start first."""
-        count = math.floor(self.scene.duration / self.scene.interval * (1.0 + 1e-12))
-        times = [place * self.scene.interval for place in range(count + 1)]
-        if self.scene.duration - times[-1] > 1e-9 * self.scene.duration:
-            return [*times, self.scene.duration]
-        return [*times[:-1], self.scene.duration]
+        return [0.0, *stops_of(self.scene.duration, self.scene.interval, None)]
 
-    @property
+    @functools.cached_property
     def first(self) -> Swarm:
         """The swarm of the first replicate at its start."""
-        if self.any_swarm is None:
-            self.any_swarm = self.swarm(0)[0]
-        return self.any_swarm
+        return self.swarm(0)[0]
 
     @property
     def form(self) -> Form:
@@ -205,7 +206,9 @@ class SwarmStudy(StudyKind):
         """The bodies of a replicate, by its random numbers."""
         numbers = rng.random((self.scene.number, 2))
         if self.scene.is_measured:
-            flocs = self.draw_measured(numbers[:, 0])
+            places = self.choosable
+            weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
+            flocs = [int(places[quantile(weights, each)]) for each in numbers[:, 0].tolist()]
             radii = [self.flocs[each].measured_size for each in flocs]
         else:
             radii = lognormal(self.scene, numbers[:, 0]).tolist()
@@ -218,12 +221,6 @@ class SwarmStudy(StudyKind):
         self.pool.made.clear()
         names = flocs if self.vertices > 1 else [SPHERE] * len(flocs)
         return Drawn(np.array(names, dtype=np.int32), shapes)
-
-    def draw_measured(self, numbers: np.ndarray) -> list[int]:
-        """Places of measured flocs, each with its weight."""
-        places = self.choosable
-        weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
-        return [int(places[quantile(weights, number)]) for number in numbers.tolist()]
 
     def floc_for(self, radius: float, number: float) -> int:
         """Place of a floc of the pool nearest in r_eq/r to a body of that radius [m]."""
@@ -251,14 +248,15 @@ class SwarmStudy(StudyKind):
         rng = self.generator(replicate)
         drawn = self.draw(rng)
         area = self.box_of(drawn.shapes)
-        repeats = "x" in self.scene.periodic, "y" in self.scene.periodic
-        return drawn, area, place_at_random(drawn.shapes, area, rng, repeats, self.scene.gap)
+        scene = self.scene
+        return drawn, area, place_at_random(drawn.shapes, area, rng, scene.repeats, scene.gap)
 
     def periods(self, area: tuple[float, float]) -> tuple[float | None, float | None]:
         """Width and height of a box [m], None along axes along which it does not repeat itself."""
-        width, height = area
-        periodic = self.scene.periodic
-        return width if "x" in periodic else None, height if "y" in periodic else None
+        width, height = (
+            side if again else None for side, again in zip(area, self.scene.repeats, strict=True)
+        )
+        return width, height
 
     def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
         """(the Swarm of a replicate at its start, its bodies before, its box [m]).
@@ -288,9 +286,8 @@ class SwarmStudy(StudyKind):
         scene = self.scene
         if scene.leaving == KEEP:
             return None
-        repeats = "x" in scene.periodic, "y" in scene.periodic
         key = self.config.seed, replicate
-        return Leaving(scene.leaving, box, repeats, scene.floor, key, swarm.gauge())
+        return Leaving(scene.leaving, box, scene.repeats, scene.floor, key, swarm.gauge())
 
 
 def settling(system: System, body: Body) -> Body:

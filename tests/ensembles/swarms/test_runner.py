@@ -14,8 +14,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.swarms.checks import check_part
-from flocsim.ensembles.swarms.records import Left, Part, part_of
+from flocsim.ensembles.swarms.records import Left, Part, check_part, part_of
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError, UsageError

@@ -22,8 +22,7 @@ from flocsim.body import Body
 from flocsim.forces.base import Force
 from flocsim.forces.shape_drag import drag_radius, follows_shape
 from flocsim.hydrodynamics.clusters import mobilities
-from flocsim.swarms.together.clusters import placed_together
-from flocsim.swarms.together.contacts import Gauge, Neighbours
+from flocsim.swarms.clusters import Gauge, placed_together
 
 NEARLY = 0.01
 """Bodies count as touching up to this share of their mean r_eq: to the flow around both it is all
@@ -49,12 +48,9 @@ class Shielding:
         drag of its bodies."""
         free = known[:, at.FREE] == 1.0
         near = self.gauge.neighbours(position, self.nearly)
-        both = free[near.pairs].all(axis=1)
-        held = Neighbours(near.pairs[both], near.gap[both], near.vector[both])
-        label, places = placed_together(len(free), held)
+        label, places = placed_together(len(free), near.among(free))
         size = np.bincount(label)
-        on_wall = np.unique(label[near.pairs[~both]])
-        size[on_wall] = 1
+        size[label[near.pairs[~free[near.pairs].all(axis=1)]]] = 1  # on a wall
         known[:, at.SHIELDING : at.SHIELDING + 3] = at.UNSHIELDED
         members = np.flatnonzero((size[label] > 1) & free)
         if not len(members):

@@ -14,7 +14,7 @@ from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators import BackwardEuler, DormandPrince54, Overdamped, VelocityVerlet
 from flocsim.swarms.placement import floor
-from flocsim.swarms.together.shielding import Shielding, between, congruent, inverses, roots
+from flocsim.swarms.shielding import Shielding, between, congruent, inverses, roots
 from tests.forces.test_shape_drag import STRAINED, TWO_TO_ONE
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R, crowd
