@@ -3,6 +3,7 @@
 Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
 """
 
+from collections import namedtuple
 from functools import cache
 from typing import Annotated, Any, NamedTuple
 
@@ -492,26 +493,10 @@ class BodyView(NamedTuple):
     shielding_yy: float = 1.0
 
 
-class PlainBodyView(NamedTuple):
-    """BodyView without the numbers of its shape, where no kernel of a scene reads any."""
-
-    time: float
-    x: float
-    y: float
-    angle: float
-    vx: float
-    vy: float
-    spin: float
-    mass: float
-    buoyant_mass: float
-    inertia: float
-    radius: float
-    elongation: float
-    long_axis: float
-    kick_x: float
-    kick_y: float
-    kick_turn: float
-
+PlainBodyView: Any = namedtuple(  # type: ignore[misc]
+    "PlainBodyView", BodyView._fields[: BodyView._fields.index("resistance_xx")]
+)
+"""BodyView without the numbers of its shape, where no kernel of a scene reads any."""
 
 NUMBERS_OF_SHAPES = frozenset(BodyView._fields) - frozenset(PlainBodyView._fields)
 """What a BodyView has besides."""
@@ -786,8 +771,8 @@ def work_of(
 
 def copy_of(work: Work) -> Work:
     """The same work in arrays of its own."""
-    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
     elimination = Elimination(*(array.copy() for array in work.elimination))
+    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
     return Work(elimination=elimination, **copies)
 
 
@@ -800,36 +785,28 @@ def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
     return larger
 
 
+def wider(arrays: Any, size: int, **axes: int) -> Any:
+    """A NamedTuple of arrays in which some {name: axis} have room for so many along an axis."""
+    return arrays._replace(
+        **{name: grown(getattr(arrays, name), axis, size) for name, axis in axes.items()}
+    )
+
+
 def with_room(work: Work) -> Work:
     """The same work with twice the room for what has found none: see FULL."""
-    full = work.tally[FULL]
+    full, elimination = work.tally[FULL], work.elimination
     work.tally[FULL] = NOTHING_FULL
     if full == PAIRS_FULL:
-        n, pairs = len(work.bodies), 2 * len(work.pairs)
-        elimination = work.elimination._replace(pairs=grown(work.elimination.pairs, 0, pairs))
-        return work._replace(
-            jacobian=grown(work.jacobian, 1, 2 * n + 2 * pairs),
-            pairs=grown(work.pairs, 0, pairs),
-            budget=grown(work.budget, 0, pairs),
-            along=grown(work.along, 0, pairs),
-            elimination=elimination,
-        )
+        pairs = 2 * len(work.pairs)
+        work = wider(work, pairs, pairs=0, budget=0, along=0)
+        work = wider(work, 2 * len(work.bodies) + 2 * pairs, jacobian=1)
+        return work._replace(elimination=wider(elimination, pairs, pairs=0))
     if full == BLOCKS_FULL:
-        room = 2 * len(work.elimination.column)
-        elimination = work.elimination._replace(
-            column=grown(work.elimination.column, 0, room),
-            blocks=grown(work.elimination.blocks, 0, room),
-            graph=grown(work.elimination.graph, 0, room),
-        )
-        return work._replace(elimination=elimination)
+        room = 2 * len(elimination.column)
+        return work._replace(elimination=wider(elimination, room, column=0, blocks=0, graph=0))
     return with_capacity(work, 2 * len(work.candidates))
 
 
 def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
-    return work._replace(
-        slip=grown(work.slip, 1, capacity),
-        candidates=grown(work.candidates, 0, capacity),
-        geometry=grown(work.geometry, 1, capacity),
-        kept=grown(work.kept, 0, capacity),
-    )
+    return wider(work, capacity, slip=1, candidates=0, geometry=1, kept=0)

@@ -13,7 +13,7 @@ import numpy as np
 
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
-from flocsim.arrays import Scene, Work, grown, work_of
+from flocsim.arrays import Scene, Work, wider, work_of
 from flocsim.integrators.base import Integrator
 from flocsim.run import with_more
 from flocsim.swarms.arrays import Found, Swarm, found_of
@@ -192,11 +192,7 @@ class Runner:
             if first == last:
                 return
             if place.work.tally[at.FULL] == at.NOTHING_FULL:
-                links, slips = own.found.links, own.found.slips
-                more = 2 * len(links)
-                own.found = own.found._replace(
-                    links=grown(links, 0, more), slips=grown(slips, 0, more)
-                )
+                own.found = wider(own.found, 2 * len(own.found.links), links=0, slips=0)
             else:
                 self.driver, place.work = with_more(self.driver, place.work)
 
