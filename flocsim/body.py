@@ -17,7 +17,7 @@ from flocsim.constants import (
     WATER_VISCOSITY,
 )
 from flocsim.errors import RangeError, UsageError
-from flocsim.fields import choice, flag, in_unit, is_number, quantity, word_or_quantity
+from flocsim.fields import choice, flag, in_unit, is_number, only, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import charges_of_bodies
@@ -212,13 +212,6 @@ class FractalDensity:
         return water + (self.solid - water) * thinned
 
 
-def check_shape(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Shape):
-        raise UsageError(
-            f"shape must be a Sphere or a SpheroPolygon, or a Shape of your own, found {value!r}"
-        )
-
-
 @attrs.frozen(eq=False)
 class Body:
     """A rigid shape with a mass, a place and a motion.
@@ -229,7 +222,9 @@ class Body:
     zero unless given.
     """
 
-    shape: Shape = attrs.field(validator=check_shape)
+    shape: Shape = attrs.field(
+        validator=only(Shape, "shape must be a Sphere or a SpheroPolygon, or a Shape of your own")
+    )
     position: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_position)
     angle: float = quantity("rad", default=0.0)
     velocity: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_velocity)

@@ -14,15 +14,8 @@ import numpy as np
 
 from flocsim.arrays import ContactView, PairView
 from flocsim.compiler.reads import reached
+from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
-from flocsim.forces.check import (
-    SAMPLE_BODIES,
-    SAMPLE_CONTACTS,
-    fields_read,
-    kernel_arguments,
-    results,
-    sample_pairs,
-)
 from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
@@ -139,7 +132,9 @@ def no_partner(system):
 
 
 def body_derivative(system, force):
-    reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
+    reads = check.fields_read(
+        force, system.fluid, force.kernel_in(system.fluid), check.SAMPLE_BODIES
+    )
     known = (("velocity", VELOCITIES), ("position", PLACES))
     by = [name for name, fields in known if reads & fields]
     if not by:
@@ -150,8 +145,8 @@ def body_derivative(system, force):
 def pair_derivative(system, force):
     if force.acts_on in ASK_FOR_BOTH:
         return "derivatives from differences of its sum"
-    samples = sample_pairs(force.reach)
-    damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
+    samples = check.sample_pairs(force.reach)
+    damped = "gap_rate" in check.fields_read(force, system.fluid, force.kernel, samples)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
     rate = ", by the gap's rate from differences" if damped else ""
     return f"derivative by the gap {slope}{rate}"
@@ -189,7 +184,7 @@ def gap_between(a, b, size):
 def sliding(system, force):
     if force.slip_limit is None:
         return "no sliding"
-    limits = tried(system, force, force.slip_limit, SAMPLE_CONTACTS)
+    limits = tried(system, force, force.slip_limit, check.SAMPLE_CONTACTS)
     return "slides at its limit" if min(limits) < math.inf else "no sliding: its limit is infinite"
 
 
@@ -246,7 +241,7 @@ def exerts_torque(system, force):
         return False
     if isinstance(force, BodyForce):
         kernel = force.kernel_in(system.fluid)
-        return any(result[2] != 0.0 for result in tried(system, force, kernel, SAMPLE_BODIES))
+        return any(result[2] != 0.0 for result in tried(system, force, kernel, check.SAMPLE_BODIES))
     if not counting(system.bodies):
         return False
     if isinstance(force, PairResistance):
@@ -255,21 +250,21 @@ def exerts_torque(system, force):
         if force.acts_on == "orientations":
             return True
         return force.acts_on != "centres" and not system.spheres_only
-    sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)
+    sideways = tried(system, force, force.kernel, check.SAMPLE_CONTACTS)
     return not system.spheres_only or any(result[1] != 0.0 for result in sideways)
 
 
 def holds_slip(system, force):
     """Whether a contact force's tangential part depends on the tangential displacement."""
-    views = [SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
+    views = [check.SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
     one, other = tried(system, force, force.kernel, views)
     return one[1] != other[1]
 
 
 def tried(system, force, kernel, views):
     """What a kernel, uncompiled, returns for some views."""
-    arguments = kernel_arguments(force, system.fluid, kernel)
-    return list(results(force, kernel, views, arguments))
+    arguments = check.kernel_arguments(force, system.fluid, kernel)
+    return list(check.results(force, kernel, views, arguments))
 
 
 def differentiates(system):

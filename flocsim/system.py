@@ -17,7 +17,7 @@ from flocsim.body import NO_OUTLINES, Body, Fluid, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.explain import explain
-from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.double_layer import refuse_unlike
@@ -83,30 +83,12 @@ def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
     return forces
 
 
-def check_fluid(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Fluid):
-        raise UsageError(f"the fluid must be a Fluid object, found {value!r}")
-
-
-def check_limits(until: float, max_steps: int) -> None:
-    """UsageError unless ``until`` is a time above zero and ``max_steps`` a whole number."""
-    if not is_number(until) or not until > 0.0:
-        raise UsageError(f"until must be a time above 0 s, found {until!r}")
-    if not is_whole(max_steps) or max_steps < 0:
-        raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
-
-
 def read_seed(value: Any) -> tuple[int, ...]:
     """A whole number from 0, or some of them, as a tuple; UsageError for anything else."""
     numbers = (value,) if is_whole(value) else as_tuple(value, "seed")
     if not numbers or not all(is_whole(each) and each >= 0 for each in numbers):
         raise UsageError(f"seed must be a whole number from 0, or some of them, found {value!r}")
     return tuple(int(each) for each in numbers)
-
-
-def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Integrator):
-        raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -124,8 +106,12 @@ class System:
 
     bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
     forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
-    integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
-    fluid: Fluid = attrs.field(factory=Fluid, validator=check_fluid)
+    integrator: Integrator = attrs.field(
+        factory=Implicit, validator=only(Integrator, "the integrator must be an Integrator object")
+    )
+    fluid: Fluid = attrs.field(
+        factory=Fluid, validator=only(Fluid, "the fluid must be a Fluid object")
+    )
     seed: tuple[int, ...] = attrs.field(default=0, converter=read_seed, kw_only=True)
     pieces: Pieces = attrs.field(init=False, repr=False)
 
@@ -280,8 +266,8 @@ class System:
         as STOPPED, where it returns what counts as true. A PlausibilityWarning says, once for each,
         what of the scene is implausible.
         """
-        end: float = in_unit(until, "s", "until")
-        check_limits(end, max_steps)
+        end = above_zero(until, "s", "until")
+        check_whole(max_steps, 0, "max_steps")
         if shields_clusters(self.forces):
             raise UsageError(
                 "a System does not know its clusters: run a Swarm, or leave the drag's clusters out"
@@ -331,9 +317,12 @@ class System:
             )
         scene = origin.ended.scene
         if not all(
-            np.array_equal(getattr(run.scene, name), getattr(scene, name))
-            for name in ("first", "vertices")
-        ) or not np.array_equal(run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]):
+            np.array_equal(own, other)
+            for own, other in (
+                (run.scene.first, scene.first), (run.scene.vertices, scene.vertices),
+                (run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]),
+            )
+        ):  # fmt: skip
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further

@@ -18,7 +18,7 @@ from flocsim.arrays import PairView, work_of
 from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
-from flocsim.fields import in_unit, is_number
+from flocsim.fields import above_zero, is_number
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.outline import asks_for_both, refuse_outlines
@@ -40,14 +40,6 @@ def antiderivatives() -> np.ndarray:
     powers = np.vander(NODES, increasing=True)
     rising = NODES[:, None] ** np.arange(1, 13) - (-1.0) ** np.arange(1, 13)
     return (rising / np.arange(1, 13)) @ np.linalg.inv(powers)
-
-
-def length(name: str, value: float | str) -> float:
-    """A length above zero [m]; UsageError for anything else."""
-    number = in_unit(value, "m", name)
-    if not is_number(number) or not number > 0.0:
-        raise UsageError(f"{name} must be a length above 0 m, found {value!r}")
-    return float(number)
 
 
 def repulsion(
@@ -153,8 +145,8 @@ def splitting_probability(
     ``release``: their centres' distance at first [m]; ``dimensions`` 2, as in a System, or 3.
     UsageError unless r_i + r_j ≤ release ≤ escape.
     """
-    r_i, r_j = (length("radii", each) for each in radii)
-    near, far = length("release", release), length("escape", escape)
+    r_i, r_j = (above_zero(each, "m", "radii") for each in radii)
+    near, far = above_zero(release, "m", "release"), above_zero(escape, "m", "escape")
     check_conditions(temperature, dimensions)
     touch = r_i + r_j
     if not touch <= near <= far or not touch < far:
@@ -178,7 +170,7 @@ def stability_ratio(
     a relative diffusion D.  Source: Fuchs (1934), as in Russel, Saville and Schowalter (1989),
     Colloidal Dispersions, section 8.4.
     """
-    r_i, r_j = (length("radii", each) for each in radii)
+    r_i, r_j = (above_zero(each, "m", "radii") for each in radii)
     check_conditions(temperature, 3)
     touch = r_i + r_j
     end = FAR * touch

@@ -9,13 +9,8 @@ from flocsim.arrays import BodyView
 from flocsim.body import Body
 from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
+from flocsim.forces import shape_drag
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.shape_drag import (
-    body_resistance,
-    follows_shape,
-    resistance_matrices,
-    resistance_numbers,
-)
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
@@ -38,7 +33,7 @@ def lone_view(system, body, vx=0.0, vy=0.0, spin=0.0):
     return BodyView(
         0.0, 0.0, 0.0, body.angle, vx, vy, spin, body.mass, body.buoyant_mass(system.fluid),
         body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
-        *resistance_numbers(system.forces, body),
+        *shape_drag.resistance_numbers(system.forces, body),
     )  # fmt: skip
 
 
@@ -88,7 +83,7 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
     """
     if not mobility > 0.0:
         return mobility
-    if follows_shape(system.forces):
+    if shape_drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
     size = NEARLY_AT_REST * speed + 1e-9
     try:
@@ -104,7 +99,7 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
     shape that of the direction in which it resists most, held at its angle."""
     if not mobility > 0.0:
         return mobility
-    if follows_shape(system.forces):
+    if shape_drag.follows_shape(system.forces):
         return held_mobility(system, body)
     try:
         there = resistance(system, body, speed)
@@ -115,13 +110,13 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
 
 def held_mobility(system: Any, body: Body) -> float:
     """The least mobility [s/kg] of a body whose drag follows its shape, held from turning."""
-    resistance, _ = resistance_matrices(body_resistance(body))
+    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
     return float(1.0 / (system.fluid.viscosity * np.linalg.eigvalsh(resistance[:2, :2])[-1]))
 
 
 def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
     """(least, largest) [s/kg] by direction of a body free to turn, whose drag follows its shape."""
-    resistance, _ = resistance_matrices(body_resistance(body))
+    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
     mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
     least, largest = np.linalg.eigvalsh(mobility).tolist()
     return least, largest
@@ -156,7 +151,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     known = (force, lone_view(system, body), pieces.parameters)
-    velocity = np.zeros(3 if follows_shape(system.forces) else 2)
+    velocity = np.zeros(3 if shape_drag.follows_shape(system.forces) else 2)
     for _ in range(ITERATIONS):
         try:
             slope = derivative(*known, velocity)

@@ -11,7 +11,7 @@ import numpy as np
 from flocsim.body import NO_BOX, Body, Fluid
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
-from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.fields import above_zero, check_whole, in_unit, is_number
 from flocsim.forces.base import Force
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
@@ -32,7 +32,7 @@ from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 from flocsim.swarms.shielding import Shielding
-from flocsim.system import System, check_bodies, check_forces, check_limits, read_seed
+from flocsim.system import System, check_bodies, check_forces, read_seed
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -247,11 +247,10 @@ class Swarm:
         ``watch(time)`` is called at every common time, and ends the run where it returns what
         counts as true. A run that ends early says why in ``status``.
         """
-        end: float = in_unit(until, "s", "until")
-        check_limits(end, max_steps)
+        end = above_zero(until, "s", "until")
+        check_whole(max_steps, 0, "max_steps")
+        check_whole(threads, 1, "threads")
         stops = stops_of(end, every, times)
-        if not is_whole(threads) or threads < 1:
-            raise UsageError(f"threads must be a whole number of at least 1, found {threads!r}")
         began = time.perf_counter()
         gauge = self.gauge()
         self.check_overlaps(gauge)
@@ -298,8 +297,6 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
 
 def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:
     """The times that a run is to keep [s], ``end`` the last; UsageError for what are none."""
-    if not is_number(end) or not end > 0.0:
-        raise UsageError(f"until must be a time above 0 s, found {end!r}")
     if times is not None and every is not None:
         raise UsageError("give the times to keep with times or with every, not both")
     if times is not None:
@@ -311,9 +308,7 @@ def stops_of(end: float, every: float | str | None, times: Sequence[float] | Non
         return listed if listed and listed[-1] == end else [*listed, end]
     if every is None:
         return [end]
-    step = float(in_unit(every, "s", "every"))
-    if not step > 0.0:
-        raise UsageError(f"every must be a time above 0 s, found {every!r}")
+    step = above_zero(every, "s", "every")
     count = max(1, round(end / step))
     whole = abs(count * step - end) <= 1e-9 * end
     kept = [step * number for number in range(1, count if whole else math.ceil(end / step))]

@@ -22,31 +22,21 @@ from flocsim.errors import UsageError, visible
 from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
 from flocsim.io.plots.sweep import SWARM_SWEEP_FIGURES
-from flocsim.io.results.swarm_file import (
-    COUNTS,
-    GROUPS,
-    SCALES,
-    WALL,
-    SwarmResults,
-    mean,
-    read_swarm,
-    table_of,
-    table_rows,
-)
+from flocsim.io.results import swarm_file
 from flocsim.io.terminal import aligned
 
 
-def summary(results: SwarmResults) -> Summary:
+def summary(results: swarm_file.SwarmResults) -> Summary:
     """What a results file of swarms says of its study; ValueError where that cannot be read."""
     failed = [f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")]
     warnings = [str(line) for line in stored(results.run, "warnings")]
     return Summary(facts_of(results), origin(results.run, ["trial"]), warnings, failed)
 
 
-def facts_of(results: SwarmResults) -> Facts:
+def facts_of(results: swarm_file.SwarmResults) -> Facts:
     """[(name, value)] of swarms, also of those that still run."""
     bodies, ends = results.groups["bodies"], results.groups["ends"]
-    free = bodies["floc"][0] != WALL
+    free = bodies["floc"][0] != swarm_file.WALL
     radii = 1e6 * bodies["r_eq"][:, free]
     width, height = 1e6 * bodies["box"].mean(axis=0)
     events = results.groups["events"]
@@ -71,7 +61,7 @@ def sweep_rows(found: Any) -> list[tuple[str, ...]]:
     names = ("clusters", "mean_size", "settling")
     for place in np.ndindex(*map(len, axes)):
         last = {name: table.columns[name].values[place][:, -1] for name in names}
-        clusters, size, settling = (float(mean(last[name])) for name in names)
+        clusters, size, settling = (float(swarm_file.mean(last[name])) for name in names)
         keys = (visible(in_words(axis[k]), "") for axis, k in zip(axes, place, strict=True))
         time = in_words(float(table.axes["time"].values[-1]))
         rows.append((*keys, str(len(last["clusters"])), time,
@@ -79,7 +69,7 @@ def sweep_rows(found: Any) -> list[tuple[str, ...]]:
     return rows
 
 
-def figures(found: SwarmResults) -> Figures:
+def figures(found: swarm_file.SwarmResults) -> Figures:
     """{name: function} of the figures that swarms have."""
     there = {
         "classes": len(found.scales["class"]) > 1,
@@ -88,7 +78,7 @@ def figures(found: SwarmResults) -> Figures:
     return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
 
 
-def first_swarm(found: SwarmResults) -> tuple:
+def first_swarm(found: swarm_file.SwarmResults) -> tuple:
     """(times, positions, velocities, shapes) of the first swarm; UsageError where bodies have left
     it."""
     moments = found.groups["snapshots"]
@@ -103,13 +93,13 @@ def first_swarm(found: SwarmResults) -> tuple:
     return found.scales["time"][known], position, velocity, shapes
 
 
-def tables(results: SwarmResults) -> list[Table | str]:
+def tables(results: swarm_file.SwarmResults) -> list[Table | str]:
     """Clusters over time."""
-    heads, *rows = table_rows(results)
+    heads, *rows = swarm_file.table_rows(results)
     return [Table("Clusters over time, means over swarms", heads, rows)]
 
 
-def asked(results: SwarmResults) -> dict[str, Any]:
+def asked(results: swarm_file.SwarmResults) -> dict[str, Any]:
     """The axes of results, and how many replicates there are."""
     return {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))], "delta": [0.0],
             "replicates": len(results.scales["replicate"])}  # fmt: skip
@@ -136,20 +126,20 @@ class SwarmComparison(Differences):
     times: np.ndarray = attrs.field(kw_only=True)
 
     noun = "swarms"
-    indices = {"mean_size": ("time",)} | dict.fromkeys(COUNTS, ("time",))
+    indices = {"mean_size": ("time",)} | dict.fromkeys(swarm_file.COUNTS, ("time",))
     word = "quantity"
 
     def labelled(self, quantity: str) -> Labelled:
         """The arrays of one quantity with their axis; UsageError for an unknown one."""
-        axes = {"time": Column(("time",), self.times, about_of(SCALES["time"]))}
-        _, units, text = COUNTS[self.known(quantity)]
+        axes = {"time": Column(("time",), self.times, about_of(swarm_file.SCALES["time"]))}
+        _, units, text = swarm_file.COUNTS[self.known(quantity)]
         facts = {"quantity": text, "paired": int(self.paired)}
         return labelled_of(axes, self.arrays[quantity], OF_MEANS, facts, units)
 
     def table(self, quantity: str = "mean_size") -> str:
         """The same as text; a star marks intervals without 0."""
         arrays = {name: each.values for name, each in self.labelled(quantity).columns.items()}
-        _, units, text = COUNTS[quantity]
+        _, units, text = swarm_file.COUNTS[quantity]
         rows = [["time [s]", "n", "first", "second", "difference [95 %]"]]
         for place, time in enumerate(self.times):
             each = {name: values[place] for name, values in arrays.items()}
@@ -163,7 +153,7 @@ class SwarmComparison(Differences):
         return "\n".join([*self.changes, title, "", *aligned(rows)])
 
 
-def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
+def compare(first: swarm_file.SwarmResults, second: swarm_file.SwarmResults) -> SwarmComparison:
     """The SwarmComparison of two files: of replicates of one number, paired where their bodies
     begin alike."""
     times = common(first.scales["time"], second.scales["time"], "time")
@@ -176,7 +166,7 @@ def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
         name: mean_differences(
             mine["counts"][name][:, at[0]], yours["counts"][name][:, at[1]],
             pairs if paired else None,
-        ) for name in COUNTS
+        ) for name in swarm_file.COUNTS
     }  # fmt: skip
     changes = changes_between(first, second)
     return SwarmComparison(paired, pairs if paired else 0, arrays, changes, times=np.array(times))
@@ -220,12 +210,13 @@ def mean_differences(
 
 
 CONTENTS = Contents(
-    title="results of a swarm study", read=read_swarm, summary=summary,
-    table=table_of, figures=figures, drawn={"a swarm study": SWARM_FIGURES}, tables=tables,
+    title="results of a swarm study", read=swarm_file.read_swarm, summary=summary,
+    table=swarm_file.table_of, tables=tables,
+    figures=figures, drawn={"a swarm study": SWARM_FIGURES},
     so_far=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
-    opened=lambda path, folder=None, sources=None: read_swarm(path),
+    opened=lambda path, folder=None, sources=None: swarm_file.read_swarm(path),
     compare=compare,
-    compared={name: words for name, (_, _, words) in COUNTS.items()},
-    joined=Joined({"counts": GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
+    compared={name: words for name, (_, _, words) in swarm_file.COUNTS.items()},
+    joined=Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
     animate=write_swarm_animation, motion=first_swarm,
 )  # fmt: skip

@@ -15,16 +15,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
-from flocsim.ensembles.swarms.records import (
-    MOMENT,
-    Form,
-    Found,
-    Left,
-    Read,
-    check_ends,
-    check_part,
-    part_of,
-)
+from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.geometry.shapes.shape import Shape
@@ -87,7 +78,7 @@ class SwarmStudy(StudyKind):
     compared: ClassVar[tuple[str, ...]] = ("trial",)
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
-    check_rows = staticmethod(check_ends)
+    check_rows = staticmethod(records.check_ends)
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -110,10 +101,10 @@ class SwarmStudy(StudyKind):
         return self.swarm(0)[0]
 
     @property
-    def form(self) -> Form:
+    def form(self) -> records.Form:
         """What its records look like."""
         scene = self.scene
-        return Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
+        return records.Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
 
     @property
     def pieces(self) -> int:
@@ -153,14 +144,15 @@ class SwarmStudy(StudyKind):
         return [] if is_on_disk(self.first.begin(TRIAL_SECONDS).runner.driver) else list(kinds)
 
     def run_task(
-        self, place: Place, replicate: int, halted: Callable[[], bool], left: Left | None = None,
+        self, place: Place, replicate: int, halted: Callable[[], bool],
+        left: records.Left | None = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
         """One replicate from where it was left; its bodies and snapshots are kept as they come."""
         kept = keep or (lambda description, data, counts: None)
         ended = run_replicate(
-            self, replicate, lambda part: kept(*part.described(), part.of == MOMENT), left, halted,
-            going,
+            self, replicate, lambda part: kept(*part.described(), part.of == records.MOMENT),
+            left, halted, going,
         )  # fmt: skip
         if ended is None:
             return None, None
@@ -181,21 +173,21 @@ class SwarmStudy(StudyKind):
 
     def check_part(self, description: dict, data: bytes) -> None:
         """ValueError for what cannot have been kept of a replicate."""
-        check_part(part_of(description, data), self.form)
+        records.check_part(records.part_of(description, data), self.form)
 
     def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
         """ValueError where bodies or snapshots of a finished replicate are not there."""
         [*finished] = rows["finished"]
-        if len(finished) > 1 or not Found.of(parts).has(self.pieces if finished[0] else 0):
+        if len(finished) > 1 or not records.Found.of(parts).has(self.pieces if finished[0] else 0):
             raise ValueError("some of its snapshots are missing")
 
     def counts_part(self, description: dict) -> bool:
         """Whether it is a snapshot."""
-        return description["of"] == MOMENT
+        return description["of"] == records.MOMENT
 
-    def left_of(self, parts: list[Record], read: Read) -> Left | None:
+    def left_of(self, parts: list[Record], read: records.Read) -> records.Left | None:
         """Where a replicate goes on."""
-        return Found.of(parts).left(read)
+        return records.Found.of(parts).left(read)
 
     def generator(self, replicate: int) -> np.random.Generator:
         """The random numbers of a replicate."""

@@ -306,7 +306,7 @@ def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, m
         raise FileError("the disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(kind, "write_swarm", full)
+        patch.setattr(kind.swarm_file, "write_swarm", full)
         assert main(["swarm", str(path), "--quiet"]) == 74
     assert main(["swarm", str(path), "--quiet", "--resume"]) == 0
     assert read_swarm("swarm.h5").run["computed"] == 0
