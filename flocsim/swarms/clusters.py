@@ -18,23 +18,16 @@ from flocsim.hydrodynamics.clusters import mobilities
 
 
 def measure_gaps(scene, work, within):
-    """List the pairs whose bounding circles are nearer than that, their gaps as budgets [m]; False
+    """List the pairs whose bounding circles are nearer than that: their gaps as budgets, and first
+    in ``along`` the ways from the earlier to the later body, by the nearest image [m]; False
     without room."""
     if not list_near(scene, work, within):
         return False
     for pair in range(work.tally[at.PAIRS]):
         a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
         work.budget[pair] = gap_between(scene, work, a, b)
+        work.along[pair, 0], work.along[pair, 1] = separation(scene, work, at.NOW, a, b)
     return True
-
-
-def vectors_between(scene, work, vectors):
-    """From the earlier to the later body of every listed pair, by the nearest image [m]."""
-    for pair in range(work.tally[at.PAIRS]):
-        x, y = separation(
-            scene, work, at.NOW, work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-        )
-        vectors[pair, 0], vectors[pair, 1] = x, y
 
 
 @attrs.frozen(eq=False)
@@ -59,22 +52,18 @@ class Gauge:
     def __init__(self, scene: Scene, fillings: dict[Callable, Callable]) -> None:
         self.scene = scene
         geometry = {hook: fillings[hook] for hook in (gap_between, separation) if hook in fillings}
-        self.gaps = compose(measure_gaps, geometry)
-        self.vectors = compose(vectors_between, geometry)
+        self.measure = compose(measure_gaps, geometry)
         n = len(scene.bodies)
         self.work = work_of(scene, np.zeros((n, 3)), np.zeros((n, 3)), 1, blocks=0, all_pairs=False)
 
     def neighbours(self, position: np.ndarray, within: float = 0.0) -> Neighbours:
         """The pairs nearer than a gap [m] where the bodies are at ``position`` (n, 3)."""
         self.work.motion[at.NOW, :, :3] = position
-        while not self.gaps(self.scene, self.work, within):
+        while not self.measure(self.scene, self.work, within):
             self.work = with_room(self.work)
-        count = int(self.work.tally[at.PAIRS])
-        vectors = np.zeros((count, 2))
-        self.vectors(self.scene, self.work, vectors)
-        gaps = self.work.budget[:count]
-        near = gaps < within if within > 0.0 else gaps <= 0.0
-        return Neighbours(self.work.pairs[:count, :2][near], gaps[near], vectors[near])
+        gaps = self.work.budget[: self.work.tally[at.PAIRS]]
+        near = np.flatnonzero(gaps < within if within > 0.0 else gaps <= 0.0)
+        return Neighbours(self.work.pairs[near, :2], gaps[near], self.work.along[near, :2])
 
 
 ROUNDING = 1e-6

@@ -158,19 +158,6 @@ class Progress:
         fastest = float(np.hypot(*(velocity - velocity.mean(axis=0)).T).max())
         return way / fastest if fastest > 0.0 else math.inf
 
-    def longest_span(self) -> float:
-        """The longest window in which the images of bodies can be told apart, and shielding is of
-        the clusters that there are [s]."""
-        way = LONGEST_WAY * min(self.box)
-        if self.shielding is not None:
-            way = min(way, WAY * self.mean_radius)
-        return self.time_to_go(way) if way < math.inf else math.inf
-
-    @property
-    def error(self) -> float:
-        """The largest stated error of position of a body [m]."""
-        return float(self.stated[self.free].max(initial=0.0))
-
     @property
     def median_error(self) -> float:
         """The stated error of position that half of the bodies that move keep below [m]."""
@@ -181,7 +168,7 @@ class Progress:
         gone."""
         motion = self.swarm.motion.copy()
         motion[self.gone] = math.nan
-        return self.time, motion, self.error
+        return self.time, motion, float(self.stated[self.free].max(initial=0.0))
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
@@ -231,9 +218,11 @@ class Progress:
         if not self.free.any():
             self.time = stop
             return Status.FINISHED
-        swarm, span = self.swarm, min(self.span, self.longest_span())
+        swarm, way = self.swarm, LONGEST_WAY * min(self.box)
         if self.shielding is not None:
+            way = min(way, WAY * self.mean_radius)
             self.shielding.apply(swarm.bodies, swarm.motion[:, :3])
+        span = min(self.span, self.time_to_go(way))
         least = swarm._replace(wander=self.least_wander)
         clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
         finished = Finished(self.free)
@@ -257,9 +246,14 @@ class Progress:
                 return status
         self.take_over(finished)
         self.let_leave()
-        if not whole:
-            self.choose_span(span, islands.work / clusters.work)
-        return Status.FINISHED if whole else Status.PAUSED
+        if whole:
+            return Status.FINISHED
+        crowd = islands.work / clusters.work
+        if crowd > CROWDED:
+            self.span = SHORTER * span
+        elif crowd < SPARSE:
+            self.span = LONGER * span
+        return Status.PAUSED
 
     def run_fresh(self, fresh: Islands, finished: Finished, look: Look | None) -> Status:
         """Run islands to the window's end, and let their bodies stray as far as they have: FINISHED
@@ -315,11 +309,3 @@ class Progress:
                 self.returns[members] += 1
                 count = int(self.returns[members[0]])
                 self.leaving.returned(self.swarm, members, self.free, count)
-
-    def choose_span(self, span: float, crowd: float) -> None:
-        """The length of the next window from that of the last one, and the work that its islands
-        took over that of the least ones."""
-        if crowd > CROWDED:
-            self.span = SHORTER * span
-        elif crowd < SPARSE:
-            self.span = LONGER * span

@@ -92,10 +92,6 @@ class ThreadArrays:
             )  # fmt: skip
         return self.by_size[size]
 
-    def forget_above(self, size: int) -> None:
-        """Give back the arrays for more bodies than that: no island is so large any more."""
-        self.by_size = {each: arrays for each, arrays in self.by_size.items() if each <= size}
-
 
 @attrs.define
 class Islands:
@@ -206,7 +202,8 @@ class Runner:
         largest = int(islands.sizes.max(initial=0))
 
         def work_off(own: ThreadArrays) -> None:
-            own.forget_above(largest)
+            # No island is larger any more.
+            own.by_size = {each: its for each, its in own.by_size.items() if each <= largest}
             while chunks and not own.halted:
                 try:
                     first, last = chunks.pop()

@@ -89,11 +89,6 @@ def values_of(law, view, parameters, which):
     return answer if isinstance(answer, tuple) else (answer,)
 
 
-def is_answer(name, value):
-    """Whether a law of this name may give a value."""
-    return abs(value) < LARGEST or (name in MAY_BE_INFINITE and not math.isnan(value))
-
-
 def kernel_of(force, law, fluid):
     """The function of a force that a law calls."""
     if family(law) == "body":
@@ -117,8 +112,9 @@ def wrong_answer(force: Any, pieces: Pieces, views: dict[str, list], fluid: Any)
         for view in views.get(family(name), ()):
             for event in each_event:
                 which = () if event is None else (event,)
+                most = math.inf if name in MAY_BE_INFINITE else LARGEST
                 values = values_of(law, view, parameters, which)
-                wrong = [value for value in values if not is_answer(name, value)]
+                wrong = [value for value in values if not abs(value) <= most]
                 if wrong:
                     what = where(kernel_of(force, name, fluid))
                     slope = "a slope of " if name.endswith("derivatives") else ""

@@ -83,7 +83,12 @@ def frames_of(trajectory: Any, count: int) -> collision.Frames:
     sizes = [shape.bounding_radius for shape in shapes]
     touch, _ = touch_and_zone(trajectory)
     times = instants_along(trajectory.t, position, sizes, count, touch)
-    return frames_at(shapes, times, places_at(trajectory, times), position)
+    if hasattr(trajectory, "at"):
+        places = trajectory.at(times).position
+    else:  # a motion from a file
+        states = np.concatenate([position, trajectory.velocity], axis=2)
+        places = np.array([motion_at(trajectory.t, states, time)[:, :3] for time in times])
+    return frames_at(shapes, times, places, position)
 
 
 def touch_and_zone(trajectory: Any) -> tuple[float, float]:
@@ -91,14 +96,6 @@ def touch_and_zone(trajectory: Any) -> tuple[float, float]:
     other run."""
     row = getattr(trajectory, "row", None)
     return (math.nan, math.nan) if row is None else (row["t_collision"], row["D_0"])
-
-
-def places_at(trajectory: Any, times: np.ndarray) -> np.ndarray:
-    """The places (f, n, 3) at some times; of a motion from a file by Hermite's cubic."""
-    if hasattr(trajectory, "at"):
-        return trajectory.at(times).position
-    states = np.concatenate([trajectory.position, trajectory.velocity], axis=2)
-    return np.array([motion_at(trajectory.t, states, time)[:, :3] for time in times])
 
 
 def title_of(trajectory: Any) -> str:

@@ -3,7 +3,7 @@
 import functools
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
 import attrs
@@ -222,25 +222,17 @@ class SwarmStudy(StudyKind):
         near = nearest_in_ratio(ratios, radius / self.config.shapes.radius, self.pool.pool)
         return near[int(number * len(near))]
 
-    def box_of(self, shapes: Sequence[Shape]) -> tuple[float, float]:
-        """Width and height of the box [m]."""
-        scene = self.scene
-        if scene.box is not None:
-            return scene.box
-        assert scene.area_fraction is not None, "a scene has either a radius or a library"
-        area = sum(shape.area for shape in shapes) / scene.area_fraction
-        width = math.sqrt(area / scene.aspect)
-        return width, area / width
-
     def placed(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.ndarray]:
         """(the bodies of a replicate, its box [m], their places (n, 3)).
 
         UsageError where bodies find no place.
         """
-        rng = self.generator(replicate)
-        drawn = self.draw(rng)
-        area = self.box_of(drawn.shapes)
-        scene = self.scene
+        rng, scene = self.generator(replicate), self.scene
+        drawn, area = self.draw(rng), scene.box
+        if area is None:
+            covered = sum(shape.area for shape in drawn.shapes) / scene.area_fraction
+            width = math.sqrt(covered / scene.aspect)
+            area = width, covered / width
         return drawn, area, place_at_random(drawn.shapes, area, rng, scene.repeats, scene.gap)
 
     def periods(self, area: tuple[float, float]) -> tuple[float | None, float | None]:
