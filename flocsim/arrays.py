@@ -3,6 +3,7 @@
 Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
 """
 
+import math
 from collections import namedtuple
 from functools import cache
 from typing import Annotated, Any, NamedTuple
@@ -576,6 +577,13 @@ class ContactView(NamedTuple):
     radius_j: float
 
 
+# What a Scene has where there are no such forces, and where nothing repeats.
+NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
+NO_LAYER = (0.0, 0.0, -1.0)
+NO_WATER = (np.zeros((0, TABLE_COLUMNS, 4)), np.zeros(WATER_SIZE))
+NO_BOX = (math.inf, math.inf)
+
+
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers."""
 
@@ -594,18 +602,19 @@ class Scene(NamedTuple):
     field: Annotated[np.ndarray, ("nodes", FIELD_COLUMNS)]  # see POTENTIAL
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws
-    surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
-    centre_reach: float  # the same of centre forces [m]
-    outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
-    layer: tuple[float, float, float]  # of the charges' double layers: forces.outline
-    smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
-    events: int  # how many the contact forces have
-    box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
-    kicks: tuple[float, float, float, float]  # how long random forces stay: integrators.loop.kicks
-    key: tuple[int, int]  # what they are drawn by
-    pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)]  # forces.pair_resistance
-    water: Annotated[np.ndarray, (WATER_SIZE,)]  # see VISCOSITY
-    listed_reach: float  # the gap up to which outlines are listed for what acts between them [m]
+    surface_reach: float = -1.0  # the gap up to which surface forces act [m]; −1: there are none
+    centre_reach: float = -1.0  # the same of centre forces [m]
+    outlines: tuple[float, float, float, float] = NO_OUTLINES  # of forces between: forces.outline
+    layer: tuple[float, float, float] = NO_LAYER  # of the charges' double layers: forces.outline
+    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)  # see flocsim.forces.smoothing
+    events: int = 0  # how many the contact forces have
+    box: tuple[float, float] = NO_BOX  # periods along x and y [m]
+    # How long random forces stay (integrators.loop.kicks), and what they are drawn by.
+    kicks: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    key: tuple[int, int] = (0, 0)
+    pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)] = NO_WATER[0]
+    water: Annotated[np.ndarray, (WATER_SIZE,)] = NO_WATER[1]  # see VISCOSITY
+    listed_reach: float = -1.0  # the gap up to which outlines are listed for what acts between them
 
 
 class Elimination(NamedTuple):

@@ -12,8 +12,8 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.arrays import Scene, copy_of, work_of
-from flocsim.body import NO_OUTLINES, Body, Fluid, scene_of
+from flocsim.arrays import NO_OUTLINES, Scene, copy_of, work_of
+from flocsim.body import Body, Fluid, of_forces, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.explain import explain
@@ -173,17 +173,15 @@ class System:
 
         KernelError for a law that cannot be compiled.
         """
-        pieces = self.pieces
+        shapes = [body.shape for body in self.bodies]
+        pair_table, water = water_between(self.forces, self.bodies, self.fluid)
         return scene_of(
-            self.bodies, self.fluid, pieces.parameters,
+            self.bodies, self.fluid, **of_forces(self.pieces),
             laws=self.laws(jit=jit) if laws is None else laws,
-            surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
-            outlines=pieces.outlines, layer=pieces.layer,
-            smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
-            events=pieces.events,
+            smoothing=smoothing_of(self.pieces.smoothness, shapes),
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
-            water_between=water_between(self.forces, self.bodies, self.fluid),
+            pair_table=pair_table, water=water,
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:

@@ -27,11 +27,11 @@ def no_force(view, parameters):
     return 0.0, 0.0, 0.0
 
 
-def lone_view(system, body, vx=0.0, vy=0.0, spin=0.0):
-    """The BodyView of a body at the origin."""
+def lone_view(system, body):
+    """The BodyView of a body at rest at the origin."""
     shape = body.shape
     return BodyView(
-        0.0, 0.0, 0.0, body.angle, vx, vy, spin, body.mass, body.buoyant_mass(system.fluid),
+        0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
         body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
         *shape_drag.resistance_numbers(system.forces, body),
     )  # fmt: skip

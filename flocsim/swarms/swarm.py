@@ -8,7 +8,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.body import NO_BOX, Body, Fluid
+from flocsim.arrays import NO_BOX
+from flocsim.body import Body, Fluid
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, in_unit, is_number
