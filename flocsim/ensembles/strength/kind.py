@@ -85,12 +85,10 @@ class Bonds:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The collision types."""
         return tuple(self.results.types)
 
     @property
     def delta(self) -> tuple[float, ...]:
-        """The displacements."""
         return tuple(float(each) for each in self.results.delta)
 
 
@@ -140,7 +138,6 @@ class StrengthStudy(StudyKind):
 
     @property
     def title(self) -> str:
-        """The study in a few words."""
         return f"{self.size} bound doublets of {self.scene.results.path} in {self.scene.flow}"
 
     def unneeded(self, place: int) -> list[Interval]:
@@ -160,7 +157,6 @@ class StrengthStudy(StudyKind):
         return next((place, each[0]) for place, each in self.wanted.items() if each)
 
     def first_of(self, code: Code) -> tuple[Condition, int]:
-        """What stands for a kind of code."""
         place, replicate = self.first
         return self.conditions[place], replicate
 
@@ -207,7 +203,6 @@ class StrengthStudy(StudyKind):
         return row, self.note(place, replicate, words) if row["status"] == FAILED else None
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which doublets have a run that failed."""
         return column("status") == FAILED
 
 

@@ -108,7 +108,6 @@ class SwarmStudy(StudyKind):
 
     @property
     def pieces(self) -> int:
-        """Snapshots of each replicate."""
         return len(self.stops)
 
     @property
@@ -118,7 +117,6 @@ class SwarmStudy(StudyKind):
 
     @property
     def title(self) -> str:
-        """The study in a few words."""
         number, duration = self.scene.number, self.scene.duration
         return f"{self.config.replicates} swarms of {number} bodies, {duration:g} s"
 
@@ -168,11 +166,9 @@ class SwarmStudy(StudyKind):
         return row, self.note(place, replicate, why)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which replicates ended before their time."""
         return column("finished") == 0
 
     def check_part(self, description: dict, data: bytes) -> None:
-        """ValueError for what cannot have been kept of a replicate."""
         records.check_part(records.part_of(description, data), self.form)
 
     def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
@@ -182,11 +178,9 @@ class SwarmStudy(StudyKind):
             raise ValueError("some of its snapshots are missing")
 
     def counts_part(self, description: dict) -> bool:
-        """Whether it is a snapshot."""
         return description["of"] == records.MOMENT
 
     def left_of(self, parts: list[Record], read: records.Read) -> records.Left | None:
-        """Where a replicate goes on."""
         return records.Found.of(parts).left(read)
 
     def generator(self, replicate: int) -> np.random.Generator:
