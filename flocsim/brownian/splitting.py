@@ -35,13 +35,6 @@ FAR = 1e3
 """Distance, in r_i + r_j, up to which W is integrated as it stands; beyond, V counts as none."""
 
 
-def antiderivatives() -> np.ndarray:
-    """Matrix (12, 12) from values at the nodes to integrals from −1 up to each node."""
-    powers = np.vander(NODES, increasing=True)
-    rising = NODES[:, None] ** np.arange(1, 13) - (-1.0) ** np.arange(1, 13)
-    return (rising / np.arange(1, 13)) @ np.linalg.inv(powers)
-
-
 def repulsion(
     forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid
 ) -> Callable[[np.ndarray], np.ndarray]:
@@ -121,7 +114,10 @@ class Profile:
         self.total = sum(radii)
         force = repulsion(forces, radii, fluid)(self.gaps.ravel()).reshape(self.gaps.shape)
         force = force / (BOLTZMANN * temperature)
-        within = self.half * (force @ antiderivatives().T)
+        # From values at the nodes to integrals from −1 up to each node.
+        degrees = np.arange(1, 13)
+        rising = (NODES[:, None] ** degrees - (-1.0) ** degrees) / degrees
+        within = self.half * (force @ (rising @ np.linalg.inv(np.vander(NODES, increasing=True))).T)
         whole = (self.half * force) @ WEIGHTS
         behind = np.concatenate([np.cumsum(whole[::-1])[::-1], [0.0]])
         self.potential = behind[:-1, None] - within

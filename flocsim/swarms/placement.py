@@ -240,6 +240,7 @@ class Leaving:
         rises = not self.repeats[1] and low[1] > self.area[1]
         others = present.copy()
         others[members] = False
+        there, radii = swarm.motion[others, :2], swarm.bodies[others, at.BOUNDING_RADIUS]
         out, clear = 0.0, CLEAR * max(wide, tall)
         while True:
             for _ in range(FEW_TRIALS):
@@ -250,17 +251,11 @@ class Leaving:
                     # Left through a side of a box that repeats itself upwards.
                     up = rng.random() * self.area[1]
                 shift = np.array([across, up]) - low
-                if self.is_clear(swarm, place + shift, reach + clear, others):
+                apart = (nearest(there - each, self.area, self.repeats) for each in place + shift)
+                if all(
+                    np.all(np.hypot(*ways.T) >= radii + radius)
+                    for ways, radius in zip(apart, reach + clear, strict=True)
+                ):
                     swarm.motion[members, :2] = place + shift
                     return
             out += tall
-
-    def is_clear(
-        self, swarm: Swarm, places: np.ndarray, reach: np.ndarray, others: np.ndarray
-    ) -> bool:
-        """Whether circles keep clear of those around other bodies."""
-        there, radii = swarm.motion[others, :2], swarm.bodies[others, at.BOUNDING_RADIUS]
-        return all(
-            np.all(np.hypot(*nearest(there - place, self.area, self.repeats).T) >= radii + radius)
-            for place, radius in zip(places, reach, strict=True)
-        )

@@ -150,7 +150,15 @@ class Swarm:
         if all(body.fixed for body in self.bodies):
             raise UsageError("a Swarm needs at least one body that moves")
         refuse_outlines(self.forces, "a swarm")
-        self.check_reach()
+        for name, force in system.pieces.used.items():
+            many = len(self.bodies) > MANY and not self.all_pairs
+            if many and getattr(force, "reach", 0.0) == math.inf:
+                size = np.mean([body.shape.equivalent_radius for body in self.bodies])
+                raise UsageError(
+                    f"{name} has no finite reach, so each of {len(self.bodies)} bodies would act "
+                    f"on all others: give it one (its property `reach`, of some {size:.1g} m), or "
+                    "set all_pairs=True"
+                )
         self.check_box()
         if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
@@ -173,18 +181,6 @@ class Swarm:
     def bond_gauge(self) -> BondGauge:
         """What tells the kinds of bonds of its bodies, wherever they are."""
         return BondGauge(self)
-
-    def check_reach(self) -> None:
-        """UsageError for forces that reach all bodies of many."""
-        if len(self.bodies) > MANY and not self.all_pairs:
-            for name, force in self.system.pieces.used.items():
-                if getattr(force, "reach", 0.0) == math.inf:
-                    size = np.mean([body.shape.equivalent_radius for body in self.bodies])
-                    raise UsageError(
-                        f"{name} has no finite reach, so each of {len(self.bodies)} bodies would "
-                        f"act on all others: give it one (its property `reach`, of some {size:.1g} "
-                        "m), or set all_pairs=True"
-                    )
 
     def check_box(self) -> None:
         """UsageError for a box in which bodies would meet themselves, or a flow that does not

@@ -58,20 +58,13 @@ def views_of(system, scene, work, time, located):
         rows = range(work.tally[at.CANDIDATES])
         touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
         flag_near(scene, work, at.NOW, 0.0)
-        views["surface"] = [
-            surface_view(scene, work, time, at.NOW, first, end) for first, end in runs_of(work)
-        ]
+        first, views["surface"] = 0, []
+        while first < len(rows):
+            end = run_end(work, first)
+            views["surface"].append(surface_view(scene, work, time, at.NOW, first, end))
+            first = end
         views["contact"] = [contact_view(scene, work, at.NOW, row) for row in touching]
     return views
-
-
-def runs_of(work):
-    """(first row, row behind the last) of the listed pairs of features of every two bodies."""
-    row = 0
-    while row < work.tally[at.CANDIDATES]:
-        end = run_end(work, row)
-        yield row, end
-        row = end
 
 
 def family(law):
