@@ -312,11 +312,8 @@ def pairs_of(system):
 
 
 def all_scales(system):
-    """{name: time [s]}, the shortest over bodies or pairs, of settling the longest.
-
-    1/ω0 = √(M/k) of a contact and 1/λ of its damping; √(M/|dF/dd|) where centre or surface forces
-    are steepest; Stokes relaxation m/(6πγ r), at rest; settling by a radius.
-    """
+    """{name: time [s]}, the shortest over the pairs: 1/ω0 = √(M/k) of a contact and 1/λ of its
+    damping, √(M/|dF/dd|) where centre or surface forces are steepest; and those of bodies."""
     laws, known = system.pieces.laws, system.pieces.parameters
     found = collections.defaultdict(list)
     for a, b, mass in pairs_of(system):
@@ -336,16 +333,24 @@ def all_scales(system):
                 slopes = [slope_of(force, each, "gap", 1e-3 * each.gap, known) for each in views]
                 steepest = vibration_time(mass, max(map(abs, slopes)))
                 found[f"{name} forces at their steepest"].append(steepest)
-    force = laws.get("body_force")
-    for body in system.bodies if force else ():
-        if body.fixed:
-            continue
+    return {name: min(times) for name, times in found.items()} | body_scales(system)
+
+
+def body_scales(system):
+    """The same of the free bodies: Stokes relaxation m/(6πγ r), at rest, the shortest, and settling
+    by a radius, the longest."""
+    force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
+    free = [body for body in system.bodies if not body.fixed]
+    if force is None or not free:
+        return {}
+    relaxation, settling = [], []
+    for body in free:
         view = lone_view(system, body)._replace(x=body.position[0], y=body.position[1])
         resistance = -slope_of(force, view, "vy", 1e-9, known, 1)
-        found[RELAXATION].append(decay_time(body.mass, resistance))
+        relaxation.append(decay_time(body.mass, resistance))
         alone, radius = settled(system, body), body.shape.equivalent_radius
-        found[SETTLING].append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)
-    return {name: (max if name == SETTLING else min)(times) for name, times in found.items()}
+        settling.append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)
+    return {RELAXATION: min(relaxation), SETTLING: max(settling)}
 
 
 def slope_of(force, view, field, size, parameters, part=None):
