@@ -47,18 +47,22 @@ def balance(force, view, parameters, velocity):
 
 
 def derivative(force, view, parameters, velocity):
-    """∂(fx, fy, …)/∂(vx, vy, …) by central differences."""
+    """∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN where a force gives no number."""
     size = 1e-3 * np.abs(velocity).max() + 1e-9
     columns = []
-    for step in np.eye(len(velocity)) * size:
-        ahead = balance(force, view, parameters, velocity + step)
-        behind = balance(force, view, parameters, velocity - step)
-        columns.append((ahead - behind) / (2.0 * size))
+    try:
+        for step in np.eye(len(velocity)) * size:
+            ahead = balance(force, view, parameters, velocity + step)
+            behind = balance(force, view, parameters, velocity - step)
+            columns.append((ahead - behind) / (2.0 * size))
+    except (ArithmeticError, ValueError):
+        return np.full((2, 2), np.nan)
     return np.array(columns).T
 
 
 def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> float:
-    """How much the body forces on a body grow with its speed along gravity [kg/s].
+    """How much the body forces on a body grow with its speed along gravity [kg/s]; NaN where one of
+    them gives no number.
 
     At a ``speed`` [m/s] against the flow at the origin; ``size``: of the difference, by default a
     thousandth of the speed.
@@ -68,8 +72,12 @@ def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> floa
     u, v = system.fluid.velocity
     size = size or 1e-3 * speed + 1e-9
     view = lone_view(system, body)
-    ends = [balance(force, view, pieces.parameters, (u, v - speed + by))[1] for by in (size, -size)]
-    return float(ends[1] - ends[0]) / (2.0 * size)
+    ends = (u, v - speed + size), (u, v - speed - size)
+    try:
+        ahead, behind = (balance(force, view, pieces.parameters, end)[1] for end in ends)
+    except (ArithmeticError, ValueError):
+        return math.nan
+    return float(behind - ahead) / (2.0 * size)
 
 
 @np.errstate(all="ignore")
@@ -85,11 +93,7 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
         return mobility
     if shape_drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
-    size = NEARLY_AT_REST * speed + 1e-9
-    try:
-        at_rest = resistance(system, body, 0.0, size)
-    except (ArithmeticError, ValueError):
-        return mobility
+    at_rest = resistance(system, body, 0.0, NEARLY_AT_REST * speed + 1e-9)
     return max(mobility, 1.0 / at_rest) if at_rest * mobility > VANISHING else mobility
 
 
@@ -101,10 +105,7 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
         return mobility
     if shape_drag.follows_shape(system.forces):
         return held_mobility(system, body)
-    try:
-        there = resistance(system, body, speed)
-    except (ArithmeticError, ValueError):
-        return mobility
+    there = resistance(system, body, speed)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
 
 
@@ -128,13 +129,9 @@ def no_number(system, body, velocity):
     for force in system.pieces.used.values():
         own = laws_of([force], system.fluid)
         law = own.laws.get("body_force")
-        try:
-            known = (law, lone_view(system, body), own.parameters)
-            if law is None or np.isfinite(derivative(*known, velocity)).all():
-                continue
-        except (ArithmeticError, ValueError):
-            pass
-        return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
+        known = (law, lone_view(system, body), own.parameters)
+        if law is not None and not np.isfinite(derivative(*known, velocity)).all():
+            return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
     return f"the body forces overflow at {at}"
 
 
@@ -153,10 +150,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     known = (force, lone_view(system, body), pieces.parameters)
     velocity = np.zeros(3 if shape_drag.follows_shape(system.forces) else 2)
     for _ in range(ITERATIONS):
-        try:
-            slope = derivative(*known, velocity)
-        except (ArithmeticError, ValueError):
-            slope = np.full((2, 2), np.nan)
+        slope = derivative(*known, velocity)
         if not np.isfinite(slope).all():
             raise UsageError(f"no terminal velocity: {no_number(system, body, velocity)}")
         if not abs(np.linalg.det(slope)) > 0.0:
