@@ -202,22 +202,21 @@ def quantity(
 def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes a quantity of both bodies of a pair, or a list of one for each."""
 
-    def listed(value: Any) -> bool:
-        return isinstance(value, list | tuple)
+    def numbers(value: Any, name: str) -> Any:
+        if isinstance(value, list | tuple):
+            return tuple(in_unit(each, unit, name) for each in value)
+        return in_unit(value, unit, name)
 
     def read(value: Any) -> Any:
         try:
-            if not listed(value):
-                return in_unit(value, unit, "")
-            return tuple(in_unit(each, unit, "") for each in value)
+            return numbers(value, "")
         except RangeError:
-            return value
+            return value  # validate, which knows the name, says what is wrong
 
     def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-        each = value if listed(value) else (value,)
-        for one in each:
-            in_unit(one, unit, attribute.name)
-        if len(each) not in ((2,) if listed(value) else (1,)) or not all(map(is_number, each)):
+        found = numbers(value, attribute.name)
+        each = found if isinstance(found, tuple) and len(found) == 2 else (found,)
+        if not all(map(is_number, each)):
             raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
     allowed = "a finite number, or a list of two"

@@ -12,7 +12,7 @@ from flocsim.arrays import NO_BOX
 from flocsim.body import Body, Fluid
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
-from flocsim.fields import above_zero, check_whole, in_unit, is_number
+from flocsim.fields import above_zero, check_whole, in_unit
 from flocsim.forces.base import Force
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
@@ -114,10 +114,8 @@ def read_box(box: Any) -> tuple[float, float]:
         ) from None
     sides = []
     for side, name in ((width, "width"), (height, "height")):
-        length = math.inf if side is None else in_unit(side, "m", f"the box's {name}")
-        if (not is_number(length) and length != math.inf) or not length > 0.0:
-            raise UsageError(f"the box's {name} must be a length above 0 m, found {side!r}")
-        sides.append(float(length))
+        endless = side is None or (isinstance(side, float) and side == math.inf)
+        sides.append(math.inf if endless else above_zero(side, "m", f"the box's {name}"))
     return sides[0], sides[1]
 
 
