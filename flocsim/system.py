@@ -15,7 +15,7 @@ import flocsim.arrays as at
 from flocsim.arrays import NO_OUTLINES, Scene, copy_of, work_of
 from flocsim.body import Body, Fluid, of_forces, scene_of
 from flocsim.compiler.composer import compose
-from flocsim.errors import KernelError, KernelWarning, UsageError
+from flocsim.errors import KernelError, KernelWarning, PlausibilityWarning, UsageError
 from flocsim.explain import explain
 from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
@@ -35,7 +35,7 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
-from flocsim.plausibility.doubts import warn_of
+from flocsim.plausibility.doubts import doubts_of
 from flocsim.run import Run
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 from flocsim.trajectories.replay import Origin
@@ -276,7 +276,8 @@ class System:
             raise UsageError("amplification is that of a whole run: leave start out")
         if watch is not None and not callable(watch):
             raise UsageError(f"watch must be a function of a State, found {watch!r}")
-        warn_of(self, stacklevel=2)
+        for line in doubts_of([self]):
+            warnings.warn(line, PlausibilityWarning, stacklevel=2)
         began = time.perf_counter()
 
         def fresh(record: bool = False) -> Run:

@@ -6,14 +6,13 @@ these is held to the same. Reynolds and Stokes numbers are those of bodies at th
 """
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import attrs
 
 from flocsim.body import Body, Fluid
-from flocsim.errors import PlausibilityWarning, UsageError
+from flocsim.errors import UsageError
 from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
@@ -141,12 +140,6 @@ def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:
         f"{' and '.join(contacts)} both act at every contact, and their forces add up: if one of "
         f"them is to replace the other, {drop.format(plain[0])}"
     )
-
-
-def warn_of(system: Any, stacklevel: int) -> None:
-    """A PlausibilityWarning for each of a System's doubts, told as of the caller's caller."""
-    for line in doubts_of([system]):
-        warnings.warn(line, PlausibilityWarning, stacklevel=stacklevel + 1)
 
 
 @attrs.frozen

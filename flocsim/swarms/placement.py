@@ -226,7 +226,7 @@ class Leaving:
             array[gone] = 0.0
         pairs = swarm.links[:, [LATER_BODY, EARLIER_BODY]]
         kept = ~gone[pairs].any(axis=1)
-        return with_links(swarm, [(swarm.links[kept], swarm.slips[kept])])
+        return with_links(swarm, swarm.links[kept], swarm.slips[kept])
 
     def returned(self, swarm: Swarm, members: np.ndarray, present: np.ndarray, count: int) -> None:
         """Move a cluster back in, for the ``count``-th time."""

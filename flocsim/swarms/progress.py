@@ -172,11 +172,9 @@ class Progress:
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
-        swarm = self.swarm
-        numbers = {"time": self.time, "span": self.span}
-        return {
-            **{name: getattr(swarm, name).copy() for name in STATE},
-            **{name: np.array(value) for name, value in numbers.items()},
+        return {name: getattr(self.swarm, name).copy() for name in STATE} | {
+            "time": np.array(self.time),
+            "span": np.array(self.span),
             "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
             "gone": self.gone.astype(np.int64),
             "returns": self.returns.copy(),
@@ -188,7 +186,7 @@ class Progress:
         for name in STATE:
             if name not in OF_CONTACTS:
                 getattr(self.swarm, name)[...] = state[name]
-        self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
+        self.swarm = with_links(self.swarm, state["links"], state["slips"])
         self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
@@ -228,10 +226,8 @@ class Progress:
         finished = Finished(self.free)
         for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
-            swarm.times[sw.BEGIN], swarm.times[sw.END] = (
-                self.time,
-                stop if whole else self.time + span,
-            )
+            swarm.times[sw.BEGIN] = self.time
+            swarm.times[sw.END] = stop if whole else self.time + span
             length = swarm.times[sw.END] - self.time
             islands = self.runner.islands_of(swarm, length, self.reach, self.box)
             fresh = islands.chosen(finished.missing(islands))
@@ -283,7 +279,7 @@ class Progress:
         swarm.motion[~free, : at.VX] += length * swarm.motion[~free, at.VX :]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
-        self.swarm = with_links(swarm, [(finished.links, finished.slips)])
+        self.swarm = with_links(swarm, finished.links, finished.slips)
         self.time = float(swarm.times[sw.END])
         self.stated[...] = swarm.stated
         self.effort.windows += 1
