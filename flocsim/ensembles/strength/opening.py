@@ -165,12 +165,9 @@ class Doublet:
         r_i, r_j = (body.shape.equivalent_radius for body in known.bodies)
         return sphere_rate(known.forces, (r_i, r_j), known.fluid) or 1.0
 
-    def opens_at(self, rate: float) -> bool | None:
-        """Whether a flow of a rate [1/s] opens the doublet; None where every run fails."""
-        return self.answer(rate)[0]
-
     def answer(self, rate: float) -> tuple[bool | None, float]:
-        """The same by the first of the tries that ends, and the tolerance [m] of the last made."""
+        """Whether a flow of a rate [1/s] opens the doublet, by the first of the tries that ends,
+        None where every run fails; and the tolerance [m] of the last made."""
         found, tolerance = None, math.nan
         for method, most_steps in self.tries:
             found, tolerance = self.opened_by(method, most_steps, rate), float(method.tolerance)
