@@ -4,7 +4,6 @@ run, results from records.
 
 import hashlib
 import json
-import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -114,8 +113,7 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
     for replicate in range(comm.rank, study.config.replicates, comm.size):
         try:
             drawn, box, _ = study.placed(replicate)
-            width, height = study.periods(box)
-            check_box(drawn.shapes, (width or math.inf, height or math.inf), study.first.reach)
+            check_box(drawn.shapes, study.periods(box), study.first.reach)
         except UsageError as error:
             first = replicate, str(error)
             break

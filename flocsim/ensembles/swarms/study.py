@@ -229,11 +229,9 @@ class SwarmStudy(StudyKind):
             area = width, covered / width
         return drawn, area, place_at_random(drawn.shapes, area, rng, scene.repeats, scene.gap)
 
-    def periods(self, area: tuple[float, float]) -> tuple[float | None, float | None]:
-        """Width and height of a box [m], None along axes along which it does not repeat itself."""
-        width, height = (
-            side if again else None for side, again in zip(area, self.scene.repeats, strict=True)
-        )
+    def periods(self, area: tuple[float, float]) -> tuple[float, float]:
+        """Width and height of a box [m], inf along axes along which it does not repeat itself."""
+        width, height = np.where(self.scene.repeats, area, math.inf).tolist()
         return width, height
 
     def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
@@ -303,8 +301,7 @@ def trial_of(swarm: Swarm) -> int:
     (x, y), reach = free[0].position, sum(body.shape.bounding_radius for body in free)
     free[1:] = [attrs.evolve(body, position=(x, y + 1.001 * reach)) for body in free[1:]]
     bodies = [*free, *(body for body in swarm.bodies if body.fixed)]
-    box = tuple(None if np.isinf(side) else side for side in swarm.box)
-    few = Swarm(bodies, swarm.forces, swarm.integrator, swarm.fluid, box=box)
+    few = Swarm(bodies, swarm.forces, swarm.integrator, swarm.fluid, box=swarm.box)
     few.gauge().neighbours(few.system.motion()[0])
     progress = few.begin(TRIAL_SECONDS)
     while progress.advance(TRIAL_SECONDS) == Status.PAUSED:
