@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flocsim.ensembles.pairs.opened import StudyResults
     from flocsim.ensembles.studies.study import Study
     from flocsim.ensembles.studies.sweep import sweep
-    from flocsim.ensembles.swarms.comparison import SwarmComparison
+    from flocsim.ensembles.swarms.contents import SwarmComparison
     from flocsim.forces.base import Force
     from flocsim.geometry.shapes.shape import Shape, Sphere
     from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
@@ -44,7 +44,7 @@ HOMES = {
     "State": "trajectories.trajectory",
     "Status": "integrators.base",
     "Swarm": "swarms.swarm",
-    "SwarmComparison": "ensembles.swarms.comparison",
+    "SwarmComparison": "ensembles.swarms.contents",
     "SwarmResults": "io.results.swarm_file",
     "SwarmTrajectory": "swarms.swarm",
     "Study": "ensembles.studies.study",

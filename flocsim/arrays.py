@@ -3,6 +3,8 @@
 Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
 """
 
+import math
+from collections import namedtuple
 from functools import cache
 from typing import Annotated, Any, NamedTuple
 
@@ -456,7 +458,7 @@ class BodyView(NamedTuple):
     goes along [m², m², m³] (flocsim.hydrodynamics.PrismDrag), 0 where no drag follows shapes.
 
     ``shielding_xx``, ``_xy`` and ``_yy``: Q, symmetric, by which the drag R of a body in a cluster
-    of a swarm becomes Q R Q (flocsim.swarms.together.shielding); 1, 0 and 1 elsewhere.
+    of a swarm becomes Q R Q (flocsim.swarms.shielding); 1, 0 and 1 elsewhere.
     """
 
     time: float
@@ -492,26 +494,10 @@ class BodyView(NamedTuple):
     shielding_yy: float = 1.0
 
 
-class PlainBodyView(NamedTuple):
-    """BodyView without the numbers of its shape, where no kernel of a scene reads any."""
-
-    time: float
-    x: float
-    y: float
-    angle: float
-    vx: float
-    vy: float
-    spin: float
-    mass: float
-    buoyant_mass: float
-    inertia: float
-    radius: float
-    elongation: float
-    long_axis: float
-    kick_x: float
-    kick_y: float
-    kick_turn: float
-
+PlainBodyView: Any = namedtuple(  # type: ignore[misc]
+    "PlainBodyView", BodyView._fields[: BodyView._fields.index("resistance_xx")]
+)
+"""BodyView without the numbers of its shape, where no kernel of a scene reads any."""
 
 NUMBERS_OF_SHAPES = frozenset(BodyView._fields) - frozenset(PlainBodyView._fields)
 """What a BodyView has besides."""
@@ -591,6 +577,13 @@ class ContactView(NamedTuple):
     radius_j: float
 
 
+# What a Scene has where there are no such forces, and where nothing repeats.
+NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
+NO_LAYER = (0.0, 0.0, -1.0)
+NO_WATER = (np.zeros((0, TABLE_COLUMNS, 4)), np.zeros(WATER_SIZE))
+NO_BOX = (math.inf, math.inf)
+
+
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers."""
 
@@ -609,18 +602,19 @@ class Scene(NamedTuple):
     field: Annotated[np.ndarray, ("nodes", FIELD_COLUMNS)]  # see POTENTIAL
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.laws
-    surface_reach: float  # the gap up to which surface forces act [m]; −1: there are none
-    centre_reach: float  # the same of centre forces [m]
-    outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
-    layer: tuple[float, float, float]  # of the charges' double layers: forces.outline
-    smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
-    events: int  # how many the contact forces have
-    box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
-    kicks: tuple[float, float, float, float]  # how long random forces stay: integrators.loop.kicks
-    key: tuple[int, int]  # what they are drawn by
-    pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)]  # forces.pair_resistance
-    water: Annotated[np.ndarray, (WATER_SIZE,)]  # see VISCOSITY
-    listed_reach: float  # the gap up to which outlines are listed for what acts between them [m]
+    surface_reach: float = -1.0  # the gap up to which surface forces act [m]; −1: there are none
+    centre_reach: float = -1.0  # the same of centre forces [m]
+    outlines: tuple[float, float, float, float] = NO_OUTLINES  # of forces between: forces.outline
+    layer: tuple[float, float, float] = NO_LAYER  # of the charges' double layers: forces.outline
+    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)  # see flocsim.forces.smoothing
+    events: int = 0  # how many the contact forces have
+    box: tuple[float, float] = NO_BOX  # periods along x and y [m]
+    # How long random forces stay (integrators.loop.kicks), and what they are drawn by.
+    kicks: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    key: tuple[int, int] = (0, 0)
+    pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)] = NO_WATER[0]
+    water: Annotated[np.ndarray, (WATER_SIZE,)] = NO_WATER[1]  # see VISCOSITY
+    listed_reach: float = -1.0  # the gap up to which outlines are listed for what acts between them
 
 
 class Elimination(NamedTuple):
@@ -786,8 +780,8 @@ def work_of(
 
 def copy_of(work: Work) -> Work:
     """The same work in arrays of its own."""
-    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
     elimination = Elimination(*(array.copy() for array in work.elimination))
+    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
     return Work(elimination=elimination, **copies)
 
 
@@ -800,36 +794,28 @@ def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
     return larger
 
 
+def wider(arrays: Any, size: int, **axes: int) -> Any:
+    """A NamedTuple of arrays in which some {name: axis} have room for so many along an axis."""
+    return arrays._replace(
+        **{name: grown(getattr(arrays, name), axis, size) for name, axis in axes.items()}
+    )
+
+
 def with_room(work: Work) -> Work:
     """The same work with twice the room for what has found none: see FULL."""
-    full = work.tally[FULL]
+    full, elimination = work.tally[FULL], work.elimination
     work.tally[FULL] = NOTHING_FULL
     if full == PAIRS_FULL:
-        n, pairs = len(work.bodies), 2 * len(work.pairs)
-        elimination = work.elimination._replace(pairs=grown(work.elimination.pairs, 0, pairs))
-        return work._replace(
-            jacobian=grown(work.jacobian, 1, 2 * n + 2 * pairs),
-            pairs=grown(work.pairs, 0, pairs),
-            budget=grown(work.budget, 0, pairs),
-            along=grown(work.along, 0, pairs),
-            elimination=elimination,
-        )
+        pairs = 2 * len(work.pairs)
+        work = wider(work, pairs, pairs=0, budget=0, along=0)
+        work = wider(work, 2 * len(work.bodies) + 2 * pairs, jacobian=1)
+        return work._replace(elimination=wider(elimination, pairs, pairs=0))
     if full == BLOCKS_FULL:
-        room = 2 * len(work.elimination.column)
-        elimination = work.elimination._replace(
-            column=grown(work.elimination.column, 0, room),
-            blocks=grown(work.elimination.blocks, 0, room),
-            graph=grown(work.elimination.graph, 0, room),
-        )
-        return work._replace(elimination=elimination)
+        room = 2 * len(elimination.column)
+        return work._replace(elimination=wider(elimination, room, column=0, blocks=0, graph=0))
     return with_capacity(work, 2 * len(work.candidates))
 
 
 def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
-    return work._replace(
-        slip=grown(work.slip, 1, capacity),
-        candidates=grown(work.candidates, 0, capacity),
-        geometry=grown(work.geometry, 1, capacity),
-        kept=grown(work.kept, 0, capacity),
-    )
+    return wider(work, capacity, slip=1, candidates=0, geometry=1, kept=0)

@@ -9,7 +9,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim import water
-from flocsim.arrays import RESISTANCE_COLUMNS, UNSHIELDED, Scene
+from flocsim.arrays import NO_LAYER, NO_OUTLINES, RESISTANCE_COLUMNS, UNSHIELDED, Scene
 from flocsim.constants import (
     ROOM_TEMPERATURE,
     WATER_DENSITY,
@@ -17,7 +17,7 @@ from flocsim.constants import (
     WATER_VISCOSITY,
 )
 from flocsim.errors import RangeError, UsageError
-from flocsim.fields import choice, flag, in_unit, is_number, quantity, word_or_quantity
+from flocsim.fields import choice, flag, in_unit, is_number, only, quantity, word_or_quantity
 from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import charges_of_bodies
@@ -27,25 +27,6 @@ from flocsim.laws import LAWS
 
 NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""
-
-NO_SMOOTHING = (1.0, 0.0, 0.0)
-"""``Scene.smoothing`` of a scene without surface forces."""
-
-NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
-"""``Scene.outlines`` of a scene without forces between outlines."""
-
-NO_LAYER = (0.0, 0.0, -1.0)
-"""``Scene.layer`` of a scene without charges."""
-
-NO_WATER = (np.zeros((0, at.TABLE_COLUMNS, 4)), np.zeros(at.WATER_SIZE))
-"""``Scene.pair_table`` and ``Scene.water`` where nothing acts between bodies through the water."""
-
-NO_BOX = (math.inf, math.inf)
-"""``Scene.box`` where nothing repeats."""
-
-
-NO_KICKS = (0.0, 0.0, 0.0, 0.0)
-"""``Scene.kicks`` of a scene without random forces."""
 
 
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
@@ -212,13 +193,6 @@ class FractalDensity:
         return water + (self.solid - water) * thinned
 
 
-def check_shape(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Shape):
-        raise UsageError(
-            f"shape must be a Sphere or a SpheroPolygon, or a Shape of your own, found {value!r}"
-        )
-
-
 @attrs.frozen(eq=False)
 class Body:
     """A rigid shape with a mass, a place and a motion.
@@ -229,7 +203,9 @@ class Body:
     zero unless given.
     """
 
-    shape: Shape = attrs.field(validator=check_shape)
+    shape: Shape = attrs.field(
+        validator=only(Shape, "shape must be a Sphere or a SpheroPolygon, or a Shape of your own")
+    )
     position: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_position)
     angle: float = quantity("rad", default=0.0)
     velocity: tuple[float, float] = attrs.field(default=(0.0, 0.0), converter=read_velocity)
@@ -279,27 +255,29 @@ class Body:
         return self.mass * (1.0 - fluid.density / self.density)
 
 
+def of_forces(pieces: Any) -> dict[str, Any]:
+    """{field of a Scene: its value} of what forces add up to, flocsim.forces.codegen.Pieces."""
+    return {
+        "parameters": np.array(pieces.parameters, dtype=float),
+        "surface_reach": float(pieces.surface_reach), "centre_reach": float(pieces.centre_reach),
+        "outlines": pieces.outlines, "layer": pieces.layer, "events": int(pieces.events),
+    }  # fmt: skip
+
+
 def scene_of(
     bodies: Sequence[Body],
     fluid: Fluid,
-    parameters: Sequence[float] = (),
+    parameters: Sequence[float] | np.ndarray = (),
+    *,
     laws: Any = NO_LAWS,
-    surface_reach: float = -1.0,
-    centre_reach: float = -1.0,
     outlines: tuple[float, float, float, float] = NO_OUTLINES,
     layer: tuple[float, float, float] = NO_LAYER,
-    smoothing: tuple[float, float, float] = NO_SMOOTHING,
-    events: int = 0,
-    box: tuple[float, float] = NO_BOX,
-    kicks: tuple[float, float, float, float] = NO_KICKS,
-    key: tuple[int, int] = (0, 0),
     resistances: Sequence[Sequence[float]] | None = None,
-    water_between: tuple[np.ndarray, np.ndarray] = NO_WATER,
+    **others: Any,
 ) -> Scene:
-    """The bodies as one Scene of fresh arrays, with what their forces make of it
-    (flocsim.forces.codegen.Pieces); without, a scene that has no laws. ``resistances``: of every
-    body, where a drag follows their shapes (flocsim.forces.shape_drag);
-    ``water_between``: Scene.pair_table and Scene.water (flocsim.forces.pair_resistance)."""
+    """The bodies as one Scene of fresh arrays, with what their forces make of it; without, a scene
+    that has no laws. ``resistances``: of every body, where a drag follows their shapes
+    (flocsim.forces.shape_drag); ``others``: further fields of the Scene."""
     shapes = [body.shape for body in bodies]
     columns: tuple[list[float], ...] = (
         [body.mass for body in bodies],
@@ -315,7 +293,7 @@ def scene_of(
     )
     water = np.zeros((len(bodies), RESISTANCE_COLUMNS)) if resistances is None else resistances
     alone = np.tile(UNSHIELDED, (len(bodies), 1))
-    return Scene(
+    scene = Scene(
         bodies=np.hstack([np.array(columns, dtype=float).T, np.array(water), alone]),
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
@@ -323,16 +301,9 @@ def scene_of(
         **field_of_bodies(shapes, layer[0])._asdict(),
         parameters=np.array(parameters, dtype=float),
         laws=laws,
-        surface_reach=float(surface_reach),
-        centre_reach=float(centre_reach),
         outlines=outlines,
         layer=layer,
-        smoothing=smoothing,
-        events=int(events),
-        box=box,
-        kicks=kicks,
-        key=key,
-        pair_table=water_between[0],
-        water=water_between[1],
-        listed_reach=max(float(surface_reach), water_between[1][at.NEAR_CUT] or -1.0),
+        **others,
     )
+    reach = max(scene.surface_reach, scene.water[at.NEAR_CUT] or -1.0)
+    return scene._replace(listed_reach=reach)

@@ -15,11 +15,7 @@ def visible(text: str, keep: str = "\n\t") -> str:
     Names of files, of flocs and of types come from others. ``keep``: those that stay.
     """
 
-    def written_out(found):
-        letter = found[0]
-        return letter if letter in keep else ascii(letter)[1:-1]
-
-    return UNSEEN.sub(written_out, text)
+    return UNSEEN.sub(lambda found: found[0] if found[0] in keep else ascii(found[0])[1:-1], text)
 
 
 class FlocsimError(Exception):

@@ -5,24 +5,18 @@ really given, so that they cannot disagree with what runs. Time scales are slope
 uncompiled kernels by differences, so that a user's own force counts like the built-in ones.
 """
 
+import collections
 import math
 import types
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from flocsim.arrays import ContactView, PairView
 from flocsim.compiler.reads import reached
+from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
-from flocsim.forces.check import (
-    SAMPLE_BODIES,
-    SAMPLE_CONTACTS,
-    fields_read,
-    kernel_arguments,
-    results,
-    sample_pairs,
-)
 from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
@@ -54,6 +48,9 @@ OVERLAP_SHARE = 1e-3
 
 GAPS = 10.0 ** np.linspace(-10.0, -5.0, 101)
 """Gaps [m] searched for the steepest pair force."""
+
+RELAXATION, SETTLING = "Stokes relaxation", "settling by a radius"
+"""Time scales of bodies; the second is the one that limits no step."""
 
 STABLE = 2.0
 """Velocity Verlet is stable below 2/ω of a vibration, an explicit step below 2 τ of a decay."""
@@ -139,7 +136,9 @@ def no_partner(system):
 
 
 def body_derivative(system, force):
-    reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
+    reads = check.fields_read(
+        force, system.fluid, force.kernel_in(system.fluid), check.SAMPLE_BODIES
+    )
     known = (("velocity", VELOCITIES), ("position", PLACES))
     by = [name for name, fields in known if reads & fields]
     if not by:
@@ -150,8 +149,8 @@ def body_derivative(system, force):
 def pair_derivative(system, force):
     if force.acts_on in ASK_FOR_BOTH:
         return "derivatives from differences of its sum"
-    samples = sample_pairs(force.reach)
-    damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
+    samples = check.sample_pairs(force.reach)
+    damped = "gap_rate" in check.fields_read(force, system.fluid, force.kernel, samples)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
     rate = ", by the gap's rate from differences" if damped else ""
     return f"derivative by the gap {slope}{rate}"
@@ -189,7 +188,7 @@ def gap_between(a, b, size):
 def sliding(system, force):
     if force.slip_limit is None:
         return "no sliding"
-    limits = tried(system, force, force.slip_limit, SAMPLE_CONTACTS)
+    limits = tried(system, force, force.slip_limit, check.SAMPLE_CONTACTS)
     return "slides at its limit" if min(limits) < math.inf else "no sliding: its limit is infinite"
 
 
@@ -246,7 +245,7 @@ def exerts_torque(system, force):
         return False
     if isinstance(force, BodyForce):
         kernel = force.kernel_in(system.fluid)
-        return any(result[2] != 0.0 for result in tried(system, force, kernel, SAMPLE_BODIES))
+        return any(result[2] != 0.0 for result in tried(system, force, kernel, check.SAMPLE_BODIES))
     if not counting(system.bodies):
         return False
     if isinstance(force, PairResistance):
@@ -255,21 +254,21 @@ def exerts_torque(system, force):
         if force.acts_on == "orientations":
             return True
         return force.acts_on != "centres" and not system.spheres_only
-    sideways = tried(system, force, force.kernel, SAMPLE_CONTACTS)
+    sideways = tried(system, force, force.kernel, check.SAMPLE_CONTACTS)
     return not system.spheres_only or any(result[1] != 0.0 for result in sideways)
 
 
 def holds_slip(system, force):
     """Whether a contact force's tangential part depends on the tangential displacement."""
-    views = [SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
+    views = [check.SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
     one, other = tried(system, force, force.kernel, views)
     return one[1] != other[1]
 
 
 def tried(system, force, kernel, views):
     """What a kernel, uncompiled, returns for some views."""
-    arguments = kernel_arguments(force, system.fluid, kernel)
-    return list(results(force, kernel, views, arguments))
+    arguments = check.kernel_arguments(force, system.fluid, kernel)
+    return list(check.results(force, kernel, views, arguments))
 
 
 def differentiates(system):
@@ -285,25 +284,17 @@ def differentiates(system):
     return assemble_jacobian in found
 
 
-class Scale(NamedTuple):
-    """A time scale [s] of the scene."""
-
-    name: str
-    time: float
-    limits_steps: bool
-
-
 def scale_lines(system):
     """The lines of the report: scales, how many are stiff, what an explicit method would need."""
-    scales = [scale for scale in all_scales(system) if 0.0 < scale.time < math.inf]
+    scales = {name: time for name, time in all_scales(system).items() if 0.0 < time < math.inf}
     if not scales:
         return ["time scales: none, as nothing restores or damps the motion"]
-    slowest = max(scale.time for scale in scales)
-    stiff = sum(slowest > STIFF * scale.time for scale in scales)
-    words = ", ".join(f"{scale.name} {scale.time:.2g} s" for scale in scales)
+    slowest = max(scales.values())
+    stiff = sum(slowest > STIFF * time for time in scales.values())
+    words = ", ".join(f"{name} {time:.2g} s" for name, time in scales.items())
     most = "over 100 times shorter than the slowest"
     head = f"time scales: {words}; {stiff} of {len(scales)} stiff ({most})"
-    limits = [scale.time for scale in scales if scale.limits_steps]
+    limits = [time for name, time in scales.items() if name != SETTLING]
     if not limits:
         return [head]
     step = STABLE * min(limits)
@@ -314,15 +305,52 @@ def scale_lines(system):
     ]
 
 
-def all_scales(system):
-    """Contact, pair forces, drag and settling, the shortest over the bodies or pairs."""
-    return [*contact_scales(system), *pair_scales(system), *body_scales(system)]
-
-
 def pairs_of(system):
     """(bodies a, b, M of the pair) for every two bodies of which one is free."""
     for a, b in counting(system.bodies):
         yield a, b, 1.0 / sum(1.0 / body.mass for body in (a, b) if not body.fixed)
+
+
+def all_scales(system):
+    """{name: time [s]}, the shortest over the pairs: 1/ω0 = √(M/k) of a contact and 1/λ of its
+    damping, √(M/|dF/dd|) where centre or surface forces are steepest; and those of bodies."""
+    laws, known = system.pieces.laws, system.pieces.parameters
+    found = collections.defaultdict(list)
+    for a, b, mass in pairs_of(system):
+        if force := laws.get("contact_force"):
+            radii = a.shape.radius, b.shape.radius
+            overlap = OVERLAP_SHARE * sum(radii)
+            view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
+            stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
+            damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
+            found["contact 1/omega0"].append(vibration_time(mass, stiffness))
+            found["contact damping 1/lambda"].append(decay_time(mass, damping))
+        r_a, r_b = a.shape.equivalent_radius, b.shape.equivalent_radius
+        view = PairView(0.0, 0.0, 0.0, r_a + r_b, r_a, r_b, r_a * r_b / (r_a + r_b), mass)
+        for name in ("centre", "surface"):
+            if force := laws.get(f"{name}_force"):
+                views = (view._replace(gap=gap) for gap in GAPS)
+                slopes = [slope_of(force, each, "gap", 1e-3 * each.gap, known) for each in views]
+                steepest = vibration_time(mass, max(map(abs, slopes)))
+                found[f"{name} forces at their steepest"].append(steepest)
+    return {name: min(times) for name, times in found.items()} | body_scales(system)
+
+
+def body_scales(system):
+    """The same of the free bodies: Stokes relaxation m/(6πγ r), at rest, the shortest, and settling
+    by a radius, the longest."""
+    force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
+    free = [body for body in system.bodies if not body.fixed]
+    if force is None or not free:
+        return {}
+    relaxation, settling = [], []
+    for body in free:
+        view = lone_view(system, body)._replace(x=body.position[0], y=body.position[1])
+        resistance = -slope_of(force, view, "vy", 1e-9, known, 1)
+        relaxation.append(decay_time(body.mass, resistance))
+        alone, radius = settled(system, body), body.shape.equivalent_radius
+        settling.append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)
+    return {RELAXATION: min(relaxation), SETTLING: max(settling)}
 
 
 def slope_of(force, view, field, size, parameters, part=None):
@@ -334,26 +362,6 @@ def slope_of(force, view, field, size, parameters, part=None):
     return (ends[0] - ends[1]) / (2.0 * size)
 
 
-def contact_scales(system):
-    """1/ω0 = √(M/k) of a contact and 1/λ of its damping, the shortest over the pairs."""
-    force, known = system.pieces.laws.get("contact_force"), system.pieces.parameters
-    vibration, decay = [], []
-    for a, b, mass in pairs_of(system) if force else ():
-        radii = a.shape.radius, b.shape.radius
-        overlap = OVERLAP_SHARE * sum(radii)
-        view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
-        stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
-        damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
-        vibration.append(vibration_time(mass, stiffness))
-        decay.append(decay_time(mass, damping))
-    if not vibration:
-        return []
-    return [
-        Scale("contact 1/omega0", min(vibration), True),
-        Scale("contact damping 1/lambda", min(decay), True),
-    ]
-
-
 def vibration_time(mass, stiffness):
     """√(M/|k|) [s]; inf without stiffness."""
     return math.sqrt(mass / abs(stiffness)) if stiffness != 0.0 else math.inf
@@ -362,42 +370,3 @@ def vibration_time(mass, stiffness):
 def decay_time(mass, damping):
     """M/c [s]; inf without damping."""
     return mass / damping if damping > 0.0 else math.inf
-
-
-def pair_scales(system):
-    """√(M/|dF/dd|) where centre or surface forces are steepest, the shortest over the pairs."""
-    found, known = [], system.pieces.parameters
-    for name in ("centre", "surface"):
-        force, times = system.pieces.laws.get(f"{name}_force"), []
-        for a, b, mass in pairs_of(system) if force else ():
-            r_a, r_b = a.shape.equivalent_radius, b.shape.equivalent_radius
-            view = PairView(0.0, 0.0, 0.0, r_a + r_b, r_a, r_b, r_a * r_b / (r_a + r_b), mass)
-            slopes = [
-                slope_of(force, view._replace(gap=gap), "gap", 1e-3 * gap, known) for gap in GAPS
-            ]
-            times.append(vibration_time(mass, max(map(abs, slopes))))
-        if times:
-            found.append(Scale(f"{name} forces at their steepest", min(times), True))
-    return found
-
-
-def body_scales(system):
-    """Stokes relaxation m/(6πγ r), at rest, and the time of settling by a radius, of the free
-    bodies."""
-    force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
-    free = [body for body in system.bodies if not body.fixed]
-    if force is None or not free:
-        return []
-    relaxation, settling = [], []
-    for body in free:
-        radius = body.shape.equivalent_radius
-        at_rest = lone_view(system, body)
-        at_rest = at_rest._replace(x=body.position[0], y=body.position[1])
-        resistance = -slope_of(force, at_rest, "vy", 1e-9, known, 1)
-        alone = settled(system, body)
-        settling.append(radius / alone.speed if alone and alone.speed > 0.0 else math.inf)
-        relaxation.append(decay_time(body.mass, resistance))
-    return [
-        Scale("Stokes relaxation", min(relaxation), True),
-        Scale("settling by a radius", max(settling), False),
-    ]

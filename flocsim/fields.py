@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 
 from flocsim.constants import BOLTZMANN
-from flocsim.errors import RangeError
+from flocsim.errors import RangeError, UsageError
 
 KINDS = {
     "m": ("a length", "16.41 um"),
@@ -123,6 +123,21 @@ def in_unit(value: Any, unit: str, name: str) -> Any:
         raise RangeError(f"{name} must be {kind_of(unit)}, found {value!r}{hint}") from None
 
 
+def above_zero(value: Any, unit: str, name: str) -> float:
+    """A number above zero, or a text such as "16.41 um", as one of the unit; UsageError for others,
+    with the ``name`` of what it is for."""
+    number = in_unit(value, unit, name)
+    if not is_number(number) or not number > 0.0:
+        raise UsageError(f"{name} must be {KINDS[unit][0]} above 0 {unit}, found {value!r}")
+    return float(number)
+
+
+def check_whole(value: Any, least: int, name: str) -> None:
+    """UsageError unless a value is a whole number of at least so much."""
+    if not is_whole(value) or value < least:
+        raise UsageError(f"{name} must be a whole number of at least {least}, found {value!r}")
+
+
 def checked_field(
     check: Callable[[Any], bool], allowed: str, default: Any, *, kw_only: bool = False,
     **metadata: Any,
@@ -187,22 +202,21 @@ def quantity(
 def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes a quantity of both bodies of a pair, or a list of one for each."""
 
-    def listed(value: Any) -> bool:
-        return isinstance(value, list | tuple)
+    def numbers(value: Any, name: str) -> Any:
+        if isinstance(value, list | tuple):
+            return tuple(in_unit(each, unit, name) for each in value)
+        return in_unit(value, unit, name)
 
     def read(value: Any) -> Any:
         try:
-            if not listed(value):
-                return in_unit(value, unit, "")
-            return tuple(in_unit(each, unit, "") for each in value)
+            return numbers(value, "")
         except RangeError:
-            return value
+            return value  # validate, which knows the name, says what is wrong
 
     def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-        each = value if listed(value) else (value,)
-        for one in each:
-            in_unit(one, unit, attribute.name)
-        if len(each) not in ((2,) if listed(value) else (1,)) or not all(map(is_number, each)):
+        found = numbers(value, attribute.name)
+        each = found if isinstance(found, tuple) and len(found) == 2 else (found,)
+        if not all(map(is_number, each)):
             raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
     allowed = "a finite number, or a list of two"
@@ -226,6 +240,16 @@ def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:
     return checked_field(
         lambda value: isinstance(value, bool), "true or false", default, flag=True, help=help
     )
+
+
+def only(kind: type, allowed: str) -> Callable[[object, attrs.Attribute, Any], None]:
+    """A validator that lets objects of a class pass; UsageError says what is ``allowed``."""
+
+    def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
+        if not isinstance(value, kind):
+            raise UsageError(f"{allowed}, found {value!r}")
+
+    return validate
 
 
 def kind_of(unit: str) -> str:

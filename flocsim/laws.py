@@ -15,14 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import (
-    BodyView,
-    ContactView,
-    OrientedView,
-    OutlineView,
-    PairView,
-    PlainBodyView,
-)
+import flocsim.arrays as at
 from flocsim.compiler.composer import compile_law
 from flocsim.compiler.constants import Intrinsic
 from flocsim.hooks import hook
@@ -131,7 +124,13 @@ def outline_pressure(scene, view):
     return scene.laws[OUTLINE_PRESSURE](view, scene.parameters)
 
 
-VIEWS = *(BodyView,) * 3, *(PairView,) * 4, *(ContactView,) * 4, OutlineView, OrientedView
+VIEWS = (
+    *(at.BodyView,) * 3,
+    *(at.PairView,) * 4,
+    *(at.ContactView,) * 4,
+    at.OutlineView,
+    at.OrientedView,
+)
 """What each law is given, beside the parameters; those of bodies may be PlainBodyViews."""
 
 NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1, 1
@@ -140,7 +139,7 @@ NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1, 1
 
 def view_of(index: int, plain: bool) -> Any:
     """What a law is given; ``plain``: whether no kernel reads the numbers of shapes."""
-    return PlainBodyView if plain and VIEWS[index] is BodyView else VIEWS[index]
+    return at.PlainBodyView if plain and VIEWS[index] is at.BodyView else VIEWS[index]
 
 
 @functools.cache

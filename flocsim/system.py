@@ -12,12 +12,12 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.arrays import Scene, copy_of, work_of
-from flocsim.body import NO_OUTLINES, Body, Fluid, scene_of
+from flocsim.arrays import NO_OUTLINES, Scene, copy_of, work_of
+from flocsim.body import Body, Fluid, of_forces, scene_of
 from flocsim.compiler.composer import compose
-from flocsim.errors import KernelError, KernelWarning, UsageError
+from flocsim.errors import KernelError, KernelWarning, PlausibilityWarning, UsageError
 from flocsim.explain import explain
-from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.double_layer import refuse_unlike
@@ -35,7 +35,7 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
-from flocsim.plausibility.doubts import warn_of
+from flocsim.plausibility.doubts import doubts_of
 from flocsim.run import Run
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 from flocsim.trajectories.replay import Origin
@@ -83,30 +83,12 @@ def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
     return forces
 
 
-def check_fluid(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Fluid):
-        raise UsageError(f"the fluid must be a Fluid object, found {value!r}")
-
-
-def check_limits(until: float, max_steps: int) -> None:
-    """UsageError unless ``until`` is a time above zero and ``max_steps`` a whole number."""
-    if not is_number(until) or not until > 0.0:
-        raise UsageError(f"until must be a time above 0 s, found {until!r}")
-    if not is_whole(max_steps) or max_steps < 0:
-        raise UsageError(f"max_steps must be a whole number from 0, found {max_steps!r}")
-
-
 def read_seed(value: Any) -> tuple[int, ...]:
     """A whole number from 0, or some of them, as a tuple; UsageError for anything else."""
     numbers = (value,) if is_whole(value) else as_tuple(value, "seed")
     if not numbers or not all(is_whole(each) and each >= 0 for each in numbers):
         raise UsageError(f"seed must be a whole number from 0, or some of them, found {value!r}")
     return tuple(int(each) for each in numbers)
-
-
-def check_integrator(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-    if not isinstance(value, Integrator):
-        raise UsageError(f"the integrator must be an Integrator object, found {value!r}")
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -124,8 +106,12 @@ class System:
 
     bodies: tuple[Body, ...] = attrs.field(converter=check_bodies)
     forces: tuple[Force, ...] = attrs.field(default=(), converter=check_forces)
-    integrator: Integrator = attrs.field(factory=Implicit, validator=check_integrator)
-    fluid: Fluid = attrs.field(factory=Fluid, validator=check_fluid)
+    integrator: Integrator = attrs.field(
+        factory=Implicit, validator=only(Integrator, "the integrator must be an Integrator object")
+    )
+    fluid: Fluid = attrs.field(
+        factory=Fluid, validator=only(Fluid, "the fluid must be a Fluid object")
+    )
     seed: tuple[int, ...] = attrs.field(default=0, converter=read_seed, kw_only=True)
     pieces: Pieces = attrs.field(init=False, repr=False)
 
@@ -187,17 +173,15 @@ class System:
 
         KernelError for a law that cannot be compiled.
         """
-        pieces = self.pieces
+        shapes = [body.shape for body in self.bodies]
+        pair_table, water = water_between(self.forces, self.bodies, self.fluid)
         return scene_of(
-            self.bodies, self.fluid, pieces.parameters,
+            self.bodies, self.fluid, **of_forces(self.pieces),
             laws=self.laws(jit=jit) if laws is None else laws,
-            surface_reach=pieces.surface_reach, centre_reach=pieces.centre_reach,
-            outlines=pieces.outlines, layer=pieces.layer,
-            smoothing=smoothing_of(pieces.smoothness, [body.shape for body in self.bodies]),
-            events=pieces.events,
+            smoothing=smoothing_of(self.pieces.smoothness, shapes),
             kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
-            water_between=water_between(self.forces, self.bodies, self.fluid),
+            pair_table=pair_table, water=water,
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:
@@ -280,8 +264,8 @@ class System:
         as STOPPED, where it returns what counts as true. A PlausibilityWarning says, once for each,
         what of the scene is implausible.
         """
-        end: float = in_unit(until, "s", "until")
-        check_limits(end, max_steps)
+        end = above_zero(until, "s", "until")
+        check_whole(max_steps, 0, "max_steps")
         if shields_clusters(self.forces):
             raise UsageError(
                 "a System does not know its clusters: run a Swarm, or leave the drag's clusters out"
@@ -292,7 +276,8 @@ class System:
             raise UsageError("amplification is that of a whole run: leave start out")
         if watch is not None and not callable(watch):
             raise UsageError(f"watch must be a function of a State, found {watch!r}")
-        warn_of(self, stacklevel=2)
+        for line in doubts_of([self]):
+            warnings.warn(line, PlausibilityWarning, stacklevel=2)
         began = time.perf_counter()
 
         def fresh(record: bool = False) -> Run:
@@ -331,9 +316,12 @@ class System:
             )
         scene = origin.ended.scene
         if not all(
-            np.array_equal(getattr(run.scene, name), getattr(scene, name))
-            for name in ("first", "vertices")
-        ) or not np.array_equal(run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]):
+            np.array_equal(own, other)
+            for own, other in (
+                (run.scene.first, scene.first), (run.scene.vertices, scene.vertices),
+                (run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]),
+            )
+        ):  # fmt: skip
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further

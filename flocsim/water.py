@@ -10,6 +10,8 @@ Ionic strength of sea water: Millero (1982), Ocean Sci. Eng. 7, 403.
 
 import math
 
+from numpy.polynomial.polynomial import polyval
+
 from flocsim.constants import AVOGADRO, BOLTZMANN, ELEMENTARY_CHARGE, VACUUM_PERMITTIVITY
 
 ZERO_CELSIUS = 273.15
@@ -18,10 +20,7 @@ ZERO_CELSIUS = 273.15
 
 def polynomial(t: float, *coefficients: float) -> float:
     """c₀ + c₁ t + c₂ t² + …"""
-    value = 0.0
-    for coefficient in reversed(coefficients):
-        value = value * t + coefficient
-    return value
+    return float(polyval(t, coefficients))
 
 
 def density(temperature: float, salinity: float = 0.0) -> float:

@@ -54,10 +54,9 @@ INNER_ROWS = {
     "swarms": [
         ["swarm"],
         ["progress"],
-        ["leaving"],
-        ["runner", "together"],
-        ["islands", "neighbours", "placement"],
-        ["arrays", "methods"],
+        ["bonds", "placement", "runner", "shielding"],
+        ["clusters", "islands"],
+        ["arrays"],
     ],
     "brownian": [["meeting"], ["splitting"]],
     "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],

@@ -28,17 +28,19 @@ Two spheres touch at one point, and no load along their line of centres is carri
 import math
 
 import flocsim.arrays as at
-from flocsim.bonds.bond import (
+from flocsim.bonds.certificate import (
+    CALM,
     HOOK,
     NO_BOND,
     REST,
     are_spheres,
+    capacity,
     is_closed,
+    lets_out,
     radii_of,
     resting_contact,
     size_of,
 )
-from flocsim.bonds.certificate import CALM, capacity, lets_out
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER

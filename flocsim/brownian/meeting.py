@@ -9,9 +9,8 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim import hooks
 from flocsim.body import Body, Fluid
-from flocsim.brownian.splitting import length
 from flocsim.errors import UsageError
-from flocsim.fields import is_whole
+from flocsim.fields import above_zero, check_whole
 from flocsim.forces.base import Force
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.contact.near_pairs import gap_between
@@ -87,9 +86,8 @@ def brownian_meetings(
         raise UsageError(f"a meeting is one of two bodies, found {len(bodies)}")
     if not thermal_in(forces):
         raise UsageError("a brownian meeting needs a Thermal force of a temperature above 0 K")
-    if not is_whole(replicates) or replicates < 1:
-        raise UsageError(f"replicates must be a whole number of at least 1, found {replicates!r}")
-    near, far = length("release", release), length("escape", escape)
+    check_whole(replicates, 1, "replicates")
+    near, far = above_zero(release, "m", "release"), above_zero(escape, "m", "escape")
     touch = sum(body.shape.bounding_radius for body in bodies)
     if not touch < near < far:
         raise UsageError(

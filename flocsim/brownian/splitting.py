@@ -18,7 +18,7 @@ from flocsim.arrays import PairView, work_of
 from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
-from flocsim.fields import in_unit, is_number
+from flocsim.fields import above_zero, is_number
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.outline import asks_for_both, refuse_outlines
@@ -33,21 +33,6 @@ LEAST_GAP, PANELS_A_DECADE = 1e-13, 40
 
 FAR = 1e3
 """Distance, in r_i + r_j, up to which W is integrated as it stands; beyond, V counts as none."""
-
-
-def antiderivatives() -> np.ndarray:
-    """Matrix (12, 12) from values at the nodes to integrals from −1 up to each node."""
-    powers = np.vander(NODES, increasing=True)
-    rising = NODES[:, None] ** np.arange(1, 13) - (-1.0) ** np.arange(1, 13)
-    return (rising / np.arange(1, 13)) @ np.linalg.inv(powers)
-
-
-def length(name: str, value: float | str) -> float:
-    """A length above zero [m]; UsageError for anything else."""
-    number = in_unit(value, "m", name)
-    if not is_number(number) or not number > 0.0:
-        raise UsageError(f"{name} must be a length above 0 m, found {value!r}")
-    return float(number)
 
 
 def repulsion(
@@ -129,7 +114,10 @@ class Profile:
         self.total = sum(radii)
         force = repulsion(forces, radii, fluid)(self.gaps.ravel()).reshape(self.gaps.shape)
         force = force / (BOLTZMANN * temperature)
-        within = self.half * (force @ antiderivatives().T)
+        # From values at the nodes to integrals from −1 up to each node.
+        degrees = np.arange(1, 13)
+        rising = (NODES[:, None] ** degrees - (-1.0) ** degrees) / degrees
+        within = self.half * (force @ (rising @ np.linalg.inv(np.vander(NODES, increasing=True))).T)
         whole = (self.half * force) @ WEIGHTS
         behind = np.concatenate([np.cumsum(whole[::-1])[::-1], [0.0]])
         self.potential = behind[:-1, None] - within
@@ -153,8 +141,8 @@ def splitting_probability(
     ``release``: their centres' distance at first [m]; ``dimensions`` 2, as in a System, or 3.
     UsageError unless r_i + r_j ≤ release ≤ escape.
     """
-    r_i, r_j = (length("radii", each) for each in radii)
-    near, far = length("release", release), length("escape", escape)
+    r_i, r_j = (above_zero(each, "m", "radii") for each in radii)
+    near, far = above_zero(release, "m", "release"), above_zero(escape, "m", "escape")
     check_conditions(temperature, dimensions)
     touch = r_i + r_j
     if not touch <= near <= far or not touch < far:
@@ -178,7 +166,7 @@ def stability_ratio(
     a relative diffusion D.  Source: Fuchs (1934), as in Russel, Saville and Schowalter (1989),
     Colloidal Dispersions, section 8.4.
     """
-    r_i, r_j = (length("radii", each) for each in radii)
+    r_i, r_j = (above_zero(each, "m", "radii") for each in radii)
     check_conditions(temperature, 3)
     touch = r_i + r_j
     end = FAR * touch

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.body import NO_WATER, Body, Fluid
+from flocsim.body import Body, Fluid
 from flocsim.compiler.disk_cache import kept
 from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import RangeError, UsageError
@@ -166,7 +166,7 @@ def water_between(
     forces = list(forces)
     force = resistance_of_pairs(forces)
     if force is None or len(bodies) < 2:
-        return NO_WATER
+        return at.NO_WATER
     if len(bodies) > 2:
         refuse_pair_resistance([force], f"a System of {len(bodies)} bodies")
     if any(body.fixed for body in bodies):

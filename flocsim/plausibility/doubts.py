@@ -6,14 +6,13 @@ these is held to the same. Reynolds and Stokes numbers are those of bodies at th
 """
 
 import math
-import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import attrs
 
 from flocsim.body import Body, Fluid
-from flocsim.errors import PlausibilityWarning, UsageError
+from flocsim.errors import UsageError
 from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
 from flocsim.forces.double_layer import DoubleLayer
@@ -60,9 +59,15 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
     bodies = [body for system in systems for body in system.bodies]
     lines = [line for name, force in forces.items() for line in unusual(force, name)]
     lines += unusual(first.fluid, names.fluid)
-    warm = bool(thermal_in(forces.values()))
+    warm = bool(thermal_in(forces.values()))  # then bodies may be as small as they like
     for body in bodies:
-        lines += [*unusual(body, names.body), *about_shape(body, warm)]
+        lines += unusual(body, names.body)
+        size = body.shape.equivalent_radius
+        if not warm or size >= RADIUS.low:
+            lines.append(RADIUS.doubt("equivalent radius", size))
+        if len(body.shape.vertices) > 1:
+            share = body.shape.radius / size
+            lines.append(ROUNDING.doubt("spheroradius / equivalent radius", share))
     settled = [each for system in systems for each in all_settled(system)]
     # Fixed bodies alone do not act on each other.
     meeting = [len(each.bodies) for each in systems if not all(body.fixed for body in each.bodies)]
@@ -73,16 +78,6 @@ def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
         about_contacts(max(meeting, default=0), forces, names.drop),
     ]
     return [line for line in dict.fromkeys(lines) if line]
-
-
-def about_shape(body: Body, warm: bool) -> list[str]:
-    """Lines on the size of a body, which thermal motion allows to be as small as it likes, and on
-    its spheroradius where it has edges."""
-    size = body.shape.equivalent_radius
-    lines = [] if warm and size < RADIUS.low else [RADIUS.doubt("equivalent radius", size)]
-    if len(body.shape.vertices) > 1:
-        lines.append(ROUNDING.doubt("spheroradius / equivalent radius", body.shape.radius / size))
-    return lines
 
 
 def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cure: str) -> str:
@@ -145,12 +140,6 @@ def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:
         f"{' and '.join(contacts)} both act at every contact, and their forces add up: if one of "
         f"them is to replace the other, {drop.format(plain[0])}"
     )
-
-
-def warn_of(system: Any, stacklevel: int) -> None:
-    """A PlausibilityWarning for each of a System's doubts, told as of the caller's caller."""
-    for line in doubts_of([system]):
-        warnings.warn(line, PlausibilityWarning, stacklevel=stacklevel + 1)
 
 
 @attrs.frozen

@@ -9,13 +9,8 @@ from flocsim.arrays import BodyView
 from flocsim.body import Body
 from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
+from flocsim.forces import shape_drag
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.shape_drag import (
-    body_resistance,
-    follows_shape,
-    resistance_matrices,
-    resistance_numbers,
-)
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
@@ -32,13 +27,13 @@ def no_force(view, parameters):
     return 0.0, 0.0, 0.0
 
 
-def lone_view(system, body, vx=0.0, vy=0.0, spin=0.0):
-    """The BodyView of a body at the origin."""
+def lone_view(system, body):
+    """The BodyView of a body at rest at the origin."""
     shape = body.shape
     return BodyView(
-        0.0, 0.0, 0.0, body.angle, vx, vy, spin, body.mass, body.buoyant_mass(system.fluid),
+        0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
         body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
-        *resistance_numbers(system.forces, body),
+        *shape_drag.resistance_numbers(system.forces, body),
     )  # fmt: skip
 
 
@@ -52,18 +47,22 @@ def balance(force, view, parameters, velocity):
 
 
 def derivative(force, view, parameters, velocity):
-    """∂(fx, fy, …)/∂(vx, vy, …) by central differences."""
+    """∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN where a force gives no number."""
     size = 1e-3 * np.abs(velocity).max() + 1e-9
     columns = []
-    for step in np.eye(len(velocity)) * size:
-        ahead = balance(force, view, parameters, velocity + step)
-        behind = balance(force, view, parameters, velocity - step)
-        columns.append((ahead - behind) / (2.0 * size))
+    try:
+        for step in np.eye(len(velocity)) * size:
+            ahead = balance(force, view, parameters, velocity + step)
+            behind = balance(force, view, parameters, velocity - step)
+            columns.append((ahead - behind) / (2.0 * size))
+    except (ArithmeticError, ValueError):
+        return np.full((2, 2), np.nan)
     return np.array(columns).T
 
 
 def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> float:
-    """How much the body forces on a body grow with its speed along gravity [kg/s].
+    """How much the body forces on a body grow with its speed along gravity [kg/s]; NaN where one of
+    them gives no number.
 
     At a ``speed`` [m/s] against the flow at the origin; ``size``: of the difference, by default a
     thousandth of the speed.
@@ -73,8 +72,12 @@ def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> floa
     u, v = system.fluid.velocity
     size = size or 1e-3 * speed + 1e-9
     view = lone_view(system, body)
-    ends = [balance(force, view, pieces.parameters, (u, v - speed + by))[1] for by in (size, -size)]
-    return float(ends[1] - ends[0]) / (2.0 * size)
+    ends = (u, v - speed + size), (u, v - speed - size)
+    try:
+        ahead, behind = (balance(force, view, pieces.parameters, end)[1] for end in ends)
+    except (ArithmeticError, ValueError):
+        return math.nan
+    return float(behind - ahead) / (2.0 * size)
 
 
 @np.errstate(all="ignore")
@@ -88,13 +91,9 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
     """
     if not mobility > 0.0:
         return mobility
-    if follows_shape(system.forces):
+    if shape_drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
-    size = NEARLY_AT_REST * speed + 1e-9
-    try:
-        at_rest = resistance(system, body, 0.0, size)
-    except (ArithmeticError, ValueError):
-        return mobility
+    at_rest = resistance(system, body, 0.0, NEARLY_AT_REST * speed + 1e-9)
     return max(mobility, 1.0 / at_rest) if at_rest * mobility > VANISHING else mobility
 
 
@@ -104,24 +103,21 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
     shape that of the direction in which it resists most, held at its angle."""
     if not mobility > 0.0:
         return mobility
-    if follows_shape(system.forces):
+    if shape_drag.follows_shape(system.forces):
         return held_mobility(system, body)
-    try:
-        there = resistance(system, body, speed)
-    except (ArithmeticError, ValueError):
-        return mobility
+    there = resistance(system, body, speed)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
 
 
 def held_mobility(system: Any, body: Body) -> float:
     """The least mobility [s/kg] of a body whose drag follows its shape, held from turning."""
-    resistance, _ = resistance_matrices(body_resistance(body))
+    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
     return float(1.0 / (system.fluid.viscosity * np.linalg.eigvalsh(resistance[:2, :2])[-1]))
 
 
 def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
     """(least, largest) [s/kg] by direction of a body free to turn, whose drag follows its shape."""
-    resistance, _ = resistance_matrices(body_resistance(body))
+    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
     mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
     least, largest = np.linalg.eigvalsh(mobility).tolist()
     return least, largest
@@ -133,13 +129,9 @@ def no_number(system, body, velocity):
     for force in system.pieces.used.values():
         own = laws_of([force], system.fluid)
         law = own.laws.get("body_force")
-        try:
-            known = (law, lone_view(system, body), own.parameters)
-            if law is None or np.isfinite(derivative(*known, velocity)).all():
-                continue
-        except (ArithmeticError, ValueError):
-            pass
-        return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
+        known = (law, lone_view(system, body), own.parameters)
+        if law is not None and not np.isfinite(derivative(*known, velocity)).all():
+            return f"{where(force.kernel_in(system.fluid))} gives no number at {at}"
     return f"the body forces overflow at {at}"
 
 
@@ -156,12 +148,9 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     known = (force, lone_view(system, body), pieces.parameters)
-    velocity = np.zeros(3 if follows_shape(system.forces) else 2)
+    velocity = np.zeros(3 if shape_drag.follows_shape(system.forces) else 2)
     for _ in range(ITERATIONS):
-        try:
-            slope = derivative(*known, velocity)
-        except (ArithmeticError, ValueError):
-            slope = np.full((2, 2), np.nan)
+        slope = derivative(*known, velocity)
         if not np.isfinite(slope).all():
             raise UsageError(f"no terminal velocity: {no_number(system, body, velocity)}")
         if not abs(np.linalg.det(slope)) > 0.0:

@@ -1,6 +1,5 @@
 """The arrays of a swarm: what is known of every body between two common times."""
 
-from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -134,10 +133,8 @@ def found_of(room: int) -> Found:
     )
 
 
-def with_links(swarm: Swarm, parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> Swarm:
-    """The swarm with the contacts (links, slips) of all islands, in the order of their bodies."""
-    links = np.concatenate([links for links, _ in parts] or [swarm.links[:0]])
-    slips = np.concatenate([slips for _, slips in parts] or [swarm.slips[:0]])
+def with_links(swarm: Swarm, links: np.ndarray, slips: np.ndarray) -> Swarm:
+    """The swarm with these contacts, in the order of their bodies."""
     order = np.lexsort(links.T[::-1])
     links, slips = np.ascontiguousarray(links[order]), np.ascontiguousarray(slips[order])
     first = np.searchsorted(links[:, LATER_BODY], np.arange(len(swarm.bodies) + 1))

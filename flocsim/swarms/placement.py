@@ -1,10 +1,15 @@
-"""Where the bodies of a swarm begin: at random, one after another, without overlaps.
+"""Where the bodies of a swarm begin in a box, its walls, and what becomes of those that leave it.
 
 Random sequential placement, the largest first: a body gets a random place and angle, again and
 again until it fits between those that are there. Discs of one size can fill .547 of a plane so,
 after endless trials; far less is reached in practice, and less by shapes that reach out.
 
 Walls and floors are fixed bodies made from a segment.
+
+Bodies leave a box through a side at which it does not repeat itself. Looked at between two windows:
+a cluster leaves, as a whole, when the circles around all its bodies are outside. It is removed, or
+moved back in over the opposite side (the top, where it left through a wall at the side), as it is
+and with all its contacts, at a random place across which keeps clear of others.
 """
 
 import math
@@ -15,93 +20,75 @@ from typing import Any
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim.body import Body, read_position
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import WallShape
+from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
+from flocsim.swarms.clusters import Gauge, placed_together
 
 MOST_TRIALS = 5_000
 """Places tried for a body before it is said that none is left."""
 
 
-@attrs.define
-class Cells:
-    """Bodies that are there, by the cells of a grid: those within its width of a place lie in the
-    nine cells around."""
+def nearest(ways: np.ndarray, area: tuple[float, float], repeats: tuple[bool, bool]) -> np.ndarray:
+    """Ways (…, 2) [m] between places of an area that repeats itself along the axes flagged, by the
+    nearest images."""
+    return ways - np.where(repeats, area * np.floor(ways / area + 0.5), 0.0)
 
-    width: float
-    box: tuple[float, float]
-    counts: tuple[int, int]
-    found: dict[tuple[int, int], list[int]] = attrs.Factory(dict)
 
-    @classmethod
-    def of(cls, width: float, box: tuple[float, float]) -> "Cells":
-        """Cells that are as wide as asked for, or a little wider."""
-        wide, high = (max(1, int(side / width)) for side in box)
-        return cls(width, box, (wide, high))
+class Placement:
+    """Bodies placed so far in an area that repeats itself along the axes flagged.
 
-    def cell_of(self, place: np.ndarray) -> tuple[int, int]:
-        column, row = (
-            int(axis / side * count) % count
-            for axis, side, count in zip(place[:2], self.box, self.counts, strict=True)
-        )
-        return column, row
+    Those within a ``width`` [m] of a place lie in the nine ``cells`` of a grid around it, which are
+    as wide, or a little wider.
+    """
+
+    def __init__(
+        self, shapes: Sequence[Shape], area: tuple[float, float], repeats: tuple[bool, bool],
+        gap: float, width: float,
+    ) -> None:  # fmt: skip
+        self.shapes, self.area, self.repeats, self.gap = shapes, area, repeats, gap
+        self.reach = np.array([shape.bounding_radius for shape in shapes])
+        self.places = np.zeros((len(shapes), 3))
+        self.counts = [max(1, int(side / width)) for side in area]
+        self.cells: dict[tuple[int, int], list[int]] = {}
+
+    def cells_around(self, place: np.ndarray, rings: int) -> set[tuple[int, int]]:
+        """The cell of a place, and so many ``rings`` around it, across the seams."""
+        (wide, high), (many, more) = self.area, self.counts
+        column, row = int(place[0] / wide * many), int(place[1] / high * more)
+        steps = range(-rings, rings + 1)
+        return {((column + i) % many, (row + j) % more) for i in steps for j in steps}
 
     def add(self, body: int, place: np.ndarray) -> None:
-        self.found.setdefault(self.cell_of(place), []).append(body)
-
-    def around(self, place: np.ndarray) -> list[int]:
-        """The bodies in the cells around a place, those across the seams included."""
-        row, column = self.cell_of(place)
-        cells = {
-            ((row + i) % self.counts[0], (column + j) % self.counts[1])
-            for i in (-1, 0, 1)
-            for j in (-1, 0, 1)
-        }
-        return [body for cell in sorted(cells) for body in self.found.get(cell, ())]
-
-
-@attrs.define
-class Placement:
-    """Bodies placed so far in an area that repeats itself along the axes flagged."""
-
-    shapes: Sequence[Shape]
-    area: tuple[float, float]
-    repeats: tuple[bool, bool]
-    gap: float
-    places: np.ndarray
-    cells: Cells
-
-    def towards(self, place: np.ndarray, other: int) -> np.ndarray:
-        """The way from another body to a place, by the nearest image [m]."""
-        way = place[:2] - self.places[other, :2]
-        for axis in range(2):
-            if self.repeats[axis]:
-                way[axis] -= self.area[axis] * round(way[axis] / self.area[axis])
-        return way
+        self.places[body] = place
+        [cell] = self.cells_around(place, 0)
+        self.cells.setdefault(cell, []).append(body)
 
     def fits(self, body: int, place: np.ndarray) -> bool:
         """Whether a body keeps its distance from all that are there."""
-        shape = self.shapes[body]
-        for axis in range(2):
-            if not self.repeats[axis]:
-                inside = shape.bounding_radius
-                if not inside <= place[axis] <= self.area[axis] - inside:
-                    return False
-        return all(self.clear_of(shape, place, other) for other in self.cells.around(place))
+        shape, reach = self.shapes[body], self.reach[body]
+        for axis, side, again in zip(place[:2], self.area, self.repeats, strict=True):
+            if not again and not reach <= axis <= side - reach:
+                return False
+        near = [each for cell in self.cells_around(place, 1) for each in self.cells.get(cell, ())]
+        ways = nearest(place[:2] - self.places[near, :2], self.area, self.repeats)
+        apart = np.hypot(*ways.T) - reach - self.reach[near]
+        return all(
+            self.clear_of(shape, (*ways[k].tolist(), place[2]), near[k])
+            for k in np.flatnonzero(apart < self.gap)
+        )
 
-    def clear_of(self, shape: Shape, place: np.ndarray, other: int) -> bool:
-        """Whether a shape keeps its distance from another body."""
-        way, there = self.towards(place, other), self.shapes[other]
-        apart = math.hypot(*way) - shape.bounding_radius - there.bounding_radius
-        if apart >= self.gap:
-            return True
+    def clear_of(self, shape: Shape, place: Sequence[float], other: int) -> bool:
+        """Whether a shape, at a place seen from another body, keeps its distance from that."""
+        there = self.shapes[other]
         if len(shape.vertices) == 1 and len(there.vertices) == 1:
             return False
-        a = shape.placed_parts(float(way[0]), float(way[1]), float(place[2]))
-        b = there.placed_parts(0.0, 0.0, self.places[other, 2])
+        a, b = shape.placed_parts(*place), there.placed_parts(0.0, 0.0, self.places[other, 2])
         return all(
             core_gap(one, two) - one.radius - two.radius >= self.gap for one, two in product(a, b)
         )
@@ -126,8 +113,7 @@ def place_at_random(
                 f"the area is {side:.3g} m {name}, too small for bodies of up to {widest:.3g} m"
             )
     # Cells smaller than bodies reach would miss neighbours; one of a whole axis is all of it.
-    cells = Cells.of(widest, area)
-    placement = Placement(shapes, area, repeats, gap, np.zeros((len(shapes), 3)), cells)
+    placement = Placement(shapes, area, repeats, gap, widest)
     filled, whole = 0.0, area[0] * area[1]
     order = sorted(range(len(shapes)), key=lambda body: -shapes[body].bounding_radius)
     for count, body in enumerate(order):
@@ -142,8 +128,7 @@ def place_at_random(
                 f"at random, and {MOST_TRIALS} trials found no room for the next: together they "
                 f"would fill {total:.3f}; ask for a smaller fraction"
             )
-        placement.places[body] = place
-        cells.add(body, place)
+        placement.add(body, place)
         filled += shapes[body].area
     return placement.places
 
@@ -176,3 +161,101 @@ def floor(
     thickness = THIN * wide if radius is None else float(in_unit(radius, "m", "radius"))
     level = top - thickness
     return wall((-beyond, level), (wide + beyond, level), thickness)
+
+
+KEEP, REMOVE, REENTER = "keep", "remove", "reenter"
+
+FEW_TRIALS = 200
+"""Places tried for what comes back, before it is put further out."""
+
+CLEAR = 0.05
+"""What comes back keeps clear of others by this share of its own size."""
+
+PARKED = 10.0
+"""Bodies that are gone lie outside, so many times the largest apart."""
+
+
+@attrs.frozen(eq=False)
+class Leaving:
+    """A rule for a swarm in the area (0, 0) to ``area`` [m], which repeats itself along the axes
+    flagged in ``repeats``; nothing leaves through a ``floor``.
+
+    ``key``: whole numbers that say, with the body and how often it has come back, where it comes
+    back. ``gauge`` tells which bodies touch.
+    """
+
+    rule: str
+    area: tuple[float, float]
+    repeats: tuple[bool, bool]
+    floor: bool
+    key: Sequence[int]
+    gauge: Gauge
+
+    def outside(self, swarm: Swarm, present: np.ndarray) -> np.ndarray:
+        """Which bodies are outside, with all of their circles, and will not come back themselves:
+        through the top only what rises."""
+        x, y = swarm.motion[:, at.X], swarm.motion[:, at.Y]
+        reach = swarm.bodies[:, at.BOUNDING_RADIUS]
+        found = np.zeros(len(x), bool)
+        if not self.repeats[0]:
+            found |= (x < -reach) | (x > self.area[0] + reach)
+        if not self.repeats[1]:
+            found |= (y > self.area[1] + reach) & (swarm.motion[:, at.VY] > 0.0)
+            if not self.floor:
+                found |= y < -reach
+        return found & present
+
+    def leaving(self, swarm: Swarm, present: np.ndarray) -> list[np.ndarray]:
+        """The clusters that leave, each as its bodies, in the order of their first ones."""
+        out = self.outside(swarm, present)
+        if not out.any():
+            return []
+        near = self.gauge.neighbours(swarm.motion[:, : at.ANGLE + 1]).among(present)
+        labels, _ = placed_together(len(out), near)
+        clusters = [np.flatnonzero(labels == label) for label in np.unique(labels[out])]
+        whole = [members for members in clusters if out[members].all()]
+        return sorted(whole, key=lambda members: int(members[0]))
+
+    def removed(self, swarm: Swarm, gone: np.ndarray) -> Swarm:
+        """The swarm without some bodies (n,) bool, which lie outside from now on."""
+        swarm.motion[gone] = 0.0
+        apart = PARKED * max(float(swarm.bodies[:, at.BOUNDING_RADIUS].max()), *self.area)
+        axis = at.X if not self.repeats[0] else at.Y
+        swarm.motion[gone, axis] = -apart * (2.0 + np.arange(len(gone)))[gone]
+        for array in (swarm.stated, swarm.strayed, swarm.carried, swarm.errors):
+            array[gone] = 0.0
+        pairs = swarm.links[:, [LATER_BODY, EARLIER_BODY]]
+        kept = ~gone[pairs].any(axis=1)
+        return with_links(swarm, swarm.links[kept], swarm.slips[kept])
+
+    def returned(self, swarm: Swarm, members: np.ndarray, present: np.ndarray, count: int) -> None:
+        """Move a cluster back in, for the ``count``-th time."""
+        rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(
+            tuple(self.key), spawn_key=(int(members[0]), count)
+        )))  # fmt: skip
+        place, reach = swarm.motion[members, :2], swarm.bodies[members, at.BOUNDING_RADIUS]
+        low = (place - reach[:, None]).min(axis=0)
+        high = (place + reach[:, None]).max(axis=0)
+        wide, tall = high - low
+        rises = not self.repeats[1] and low[1] > self.area[1]
+        others = present.copy()
+        others[members] = False
+        there, radii = swarm.motion[others, :2], swarm.bodies[others, at.BOUNDING_RADIUS]
+        out, clear = 0.0, CLEAR * max(wide, tall)
+        while True:
+            for _ in range(FEW_TRIALS):
+                across = rng.random() * (self.area[0] if self.repeats[0] else
+                                         max(self.area[0] - wide, 0.0))  # fmt: skip
+                up = -tall - out if rises else self.area[1] + out
+                if self.repeats[1]:
+                    # Left through a side of a box that repeats itself upwards.
+                    up = rng.random() * self.area[1]
+                shift = np.array([across, up]) - low
+                apart = (nearest(there - each, self.area, self.repeats) for each in place + shift)
+                if all(
+                    np.all(np.hypot(*ways.T) >= radii + radius)
+                    for ways, radius in zip(apart, reach + clear, strict=True)
+                ):
+                    swarm.motion[members, :2] = place + shift
+                    return
+            out += tall

@@ -9,7 +9,6 @@ bodies as before is not run again (`Finished`).
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -18,12 +17,9 @@ import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import Swarm, with_links
-from flocsim.swarms.leaving import REMOVE, Leaving
+from flocsim.swarms.placement import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
-from flocsim.swarms.together.shielding import WAY, Shielding
-
-if TYPE_CHECKING:
-    from flocsim.swarms.runner import Islands
+from flocsim.swarms.shielding import WAY, Shielding
 
 NONE = -1
 """Label of a body whose island has not been run."""
@@ -48,7 +44,7 @@ class Finished:
         later = links[:, sw.LATER_BODY]
         return np.where(self.free[later], later, links[:, sw.EARLIER_BODY])
 
-    def missing(self, islands: "Islands") -> np.ndarray:
+    def missing(self, islands: Islands) -> np.ndarray:
         """Which islands are not among them. One of the same free bodies, and as many fixed ones,
         has the same of these: it can reach no fewer than before."""
         if not len(self.sizes):
@@ -59,7 +55,7 @@ class Finished:
         first = np.minimum.reduceat(np.where(free, labels, len(self.sizes)), starts)
         return np.flatnonzero((first != last) | (islands.sizes != self.sizes[last]))
 
-    def add(self, islands: "Islands", links: np.ndarray, slips: np.ndarray) -> None:
+    def add(self, islands: Islands, links: np.ndarray, slips: np.ndarray) -> None:
         """Add islands, with the contacts that they leave; what was known of their bodies goes."""
         island = np.repeat(np.arange(len(islands.sizes)), islands.sizes)
         free = self.free[islands.members]
@@ -162,19 +158,6 @@ class Progress:
         fastest = float(np.hypot(*(velocity - velocity.mean(axis=0)).T).max())
         return way / fastest if fastest > 0.0 else math.inf
 
-    def longest_span(self) -> float:
-        """The longest window in which the images of bodies can be told apart, and shielding is of
-        the clusters that there are [s]."""
-        way = LONGEST_WAY * min(self.box)
-        if self.shielding is not None:
-            way = min(way, WAY * self.mean_radius)
-        return self.time_to_go(way) if way < math.inf else math.inf
-
-    @property
-    def error(self) -> float:
-        """The largest stated error of position of a body [m]."""
-        return float(self.stated[self.free].max(initial=0.0))
-
     @property
     def median_error(self) -> float:
         """The stated error of position that half of the bodies that move keep below [m]."""
@@ -185,15 +168,13 @@ class Progress:
         gone."""
         motion = self.swarm.motion.copy()
         motion[self.gone] = math.nan
-        return self.time, motion, self.error
+        return self.time, motion, float(self.stated[self.free].max(initial=0.0))
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the rest of the run follows from, as arrays by name."""
-        swarm = self.swarm
-        numbers = {"time": self.time, "span": self.span}
-        return {
-            **{name: getattr(swarm, name).copy() for name in STATE},
-            **{name: np.array(value) for name, value in numbers.items()},
+        return {name: getattr(self.swarm, name).copy() for name in STATE} | {
+            "time": np.array(self.time),
+            "span": np.array(self.span),
             "effort": np.array(attrs.astuple(self.effort), dtype=np.int64),
             "gone": self.gone.astype(np.int64),
             "returns": self.returns.copy(),
@@ -205,7 +186,7 @@ class Progress:
         for name in STATE:
             if name not in OF_CONTACTS:
                 getattr(self.swarm, name)[...] = state[name]
-        self.swarm = with_links(self.swarm, [(state["links"], state["slips"])])
+        self.swarm = with_links(self.swarm, state["links"], state["slips"])
         self.time, self.span = float(state["time"]), float(state["span"])
         self.effort = Effort(*state["effort"].tolist())
         self.returns[...] = state["returns"]
@@ -235,18 +216,18 @@ class Progress:
         if not self.free.any():
             self.time = stop
             return Status.FINISHED
-        swarm, span = self.swarm, min(self.span, self.longest_span())
+        swarm, way = self.swarm, LONGEST_WAY * min(self.box)
         if self.shielding is not None:
+            way = min(way, WAY * self.mean_radius)
             self.shielding.apply(swarm.bodies, swarm.motion[:, :3])
+        span = min(self.span, self.time_to_go(way))
         least = swarm._replace(wander=self.least_wander)
         clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
         finished = Finished(self.free)
         for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
-            swarm.times[sw.BEGIN], swarm.times[sw.END] = (
-                self.time,
-                stop if whole else self.time + span,
-            )
+            swarm.times[sw.BEGIN] = self.time
+            swarm.times[sw.END] = stop if whole else self.time + span
             length = swarm.times[sw.END] - self.time
             islands = self.runner.islands_of(swarm, length, self.reach, self.box)
             fresh = islands.chosen(finished.missing(islands))
@@ -261,9 +242,14 @@ class Progress:
                 return status
         self.take_over(finished)
         self.let_leave()
-        if not whole:
-            self.choose_span(span, islands.work / clusters.work)
-        return Status.FINISHED if whole else Status.PAUSED
+        if whole:
+            return Status.FINISHED
+        crowd = islands.work / clusters.work
+        if crowd > CROWDED:
+            self.span = SHORTER * span
+        elif crowd < SPARSE:
+            self.span = LONGER * span
+        return Status.PAUSED
 
     def run_fresh(self, fresh: Islands, finished: Finished, look: Look | None) -> Status:
         """Run islands to the window's end, and let their bodies stray as far as they have: FINISHED
@@ -293,7 +279,7 @@ class Progress:
         swarm.motion[~free, : at.VX] += length * swarm.motion[~free, at.VX :]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
-        self.swarm = with_links(swarm, [(finished.links, finished.slips)])
+        self.swarm = with_links(swarm, finished.links, finished.slips)
         self.time = float(swarm.times[sw.END])
         self.stated[...] = swarm.stated
         self.effort.windows += 1
@@ -319,11 +305,3 @@ class Progress:
                 self.returns[members] += 1
                 count = int(self.returns[members[0]])
                 self.leaving.returned(self.swarm, members, self.free, count)
-
-    def choose_span(self, span: float, crowd: float) -> None:
-        """The length of the next window from that of the last one, and the work that its islands
-        took over that of the least ones."""
-        if crowd > CROWDED:
-            self.span = SHORTER * span
-        elif crowd < SPARSE:
-            self.span = LONGER * span

@@ -13,7 +13,7 @@ import numpy as np
 
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
-from flocsim.arrays import Scene, Work, work_of
+from flocsim.arrays import Scene, Work, wider, work_of
 from flocsim.integrators.base import Integrator
 from flocsim.run import with_more
 from flocsim.swarms.arrays import Found, Swarm, found_of
@@ -67,18 +67,11 @@ class ThreadArrays:
         running = self.running
         return 0 if running is None else int(running.counts[at.STEPS] + running.counts[at.REJECTED])
 
-    def halt(self) -> None:
-        """Let the islands that run stop at their next steps."""
-        self.halted = True
+    def halt(self, halted: bool = True) -> None:
+        """Let the islands that run stop at their next steps; or those to come run on."""
+        self.halted = halted
         for each in [*self.by_size.values()]:
-            each.observed[0, sw.HALT] = 1.0
-
-    def begin(self) -> None:
-        """Begin a window."""
-        self.halted, self.running = False, None
-        self.found.filled[0] = 0
-        for each in self.by_size.values():
-            each.observed[0, sw.HALT] = 0.0
+            each.observed[0, sw.HALT] = float(halted)
 
     def of_size(self, size: int, integrator: Integrator) -> IslandArrays:
         """Arrays for islands of so many bodies."""
@@ -98,11 +91,6 @@ class ThreadArrays:
                 integrator.fresh_clock(), integrator.fresh_counts(0),
             )  # fmt: skip
         return self.by_size[size]
-
-    def forget_above(self, size: int) -> None:
-        """Give back the arrays for more bodies than that: no island is so large any more."""
-        for each in [each for each in self.by_size if each > size]:
-            del self.by_size[each]
 
 
 @attrs.define
@@ -167,12 +155,6 @@ class Runner:
     pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
     pool: ThreadPoolExecutor | None = None
 
-    def workers(self) -> ThreadPoolExecutor:
-        """The threads that run islands."""
-        if self.pool is None:
-            self.pool = ThreadPoolExecutor(len(self.threads))
-        return self.pool
-
     def islands_of(
         self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
     ) -> Islands:
@@ -206,7 +188,7 @@ class Runner:
             if first == last:
                 return
             if place.work.tally[at.FULL] == at.NOTHING_FULL:
-                own.found = larger(own.found)
+                own.found = wider(own.found, 2 * len(own.found.links), links=0, slips=0)
             else:
                 self.driver, place.work = with_more(self.driver, place.work)
 
@@ -220,7 +202,8 @@ class Runner:
         largest = int(islands.sizes.max(initial=0))
 
         def work_off(own: ThreadArrays) -> None:
-            own.forget_above(largest)
+            # No island is larger any more.
+            own.by_size = {each: its for each, its in own.by_size.items() if each <= largest}
             while chunks and not own.halted:
                 try:
                     first, last = chunks.pop()
@@ -234,17 +217,21 @@ class Runner:
             return int(done) + sum(own.tried for own in self.threads)
 
         for own in self.threads:
-            own.begin()
+            own.halt(False)
+            own.running, own.found.filled[0] = None, 0
         if self.pool is None:
             # Compiled here, by one thread, and where an interrupt is answered.
             self.run_chunk(self.threads[0], swarm, islands, 0, 0)
-        at_work = [self.workers().submit(work_off, own) for own in self.threads]
+            self.pool = ThreadPoolExecutor(len(self.threads))
+        at_work = [self.pool.submit(work_off, own) for own in self.threads]
         try:
             halted = self.watched(at_work, tried, look)
         finally:
             # Where this one is interrupted, the others stop as well.
-            if any(not each.done() for each in at_work):
-                self.halt(at_work)
+            while wait(at_work, 0.0).not_done:
+                for own in self.threads:
+                    own.halt()
+                wait(at_work, LOOK_SECONDS)
         for each in at_work:
             each.result()
         if halted:
@@ -255,7 +242,7 @@ class Runner:
         return links, np.concatenate([own.found.slips[:count] for own, count in both])
 
     def watched(
-        self, at_work: list["Future[None]"], tried: Callable[[], int], look: Look | None
+        self, at_work: list[Future[None]], tried: Callable[[], int], look: Look | None
     ) -> bool:
         """Wait for all threads, and look at them meanwhile; whether they are to leave off."""
         while wait(at_work, LOOK_SECONDS).not_done:
@@ -264,23 +251,6 @@ class Runner:
             if look is not None and look(tried()):
                 return True
         return False
-
-    def halt(self, at_work: list["Future[None]"]) -> None:
-        """Let all threads stop, and wait until they have."""
-        while True:
-            for own in self.threads:
-                own.halt()
-            if not wait(at_work, LOOK_SECONDS).not_done:
-                return
-
-
-def larger(found: Found) -> Found:
-    """The same with twice the room."""
-    other = found_of(2 * len(found.links))
-    count = found.filled[0]
-    other.links[:count], other.slips[:count] = found.links[:count], found.slips[:count]
-    other.filled[0] = count
-    return other
 
 
 def chunks_of(sizes: np.ndarray) -> list[tuple[int, int]]:

@@ -8,10 +8,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.body import NO_BOX, Body, Fluid
+from flocsim.arrays import NO_BOX
+from flocsim.body import Body, Fluid
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
-from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.fields import above_zero, check_whole, in_unit
 from flocsim.forces.base import Force
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
@@ -25,16 +26,14 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.islands import run_islands, watch_paths
-from flocsim.swarms.leaving import Leaving
-from flocsim.swarms.neighbours import find_islands
+from flocsim.swarms.bonds import BondGauge, Bonds
+from flocsim.swarms.clusters import Clusters, Gauge, Neighbours
+from flocsim.swarms.islands import find_islands, run_islands, watch_paths
+from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
-from flocsim.swarms.together.bonds import BondGauge, Bonds
-from flocsim.swarms.together.clusters import Clusters
-from flocsim.swarms.together.contacts import Gauge, Neighbours
-from flocsim.swarms.together.shielding import Shielding
-from flocsim.system import System, check_bodies, check_forces, check_limits, read_seed
+from flocsim.swarms.shielding import Shielding
+from flocsim.system import System, check_bodies, check_forces, read_seed
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -82,8 +81,8 @@ class SwarmTrajectory:
         at = range(len(self.t))[at]
         motion = np.concatenate([self.position, self.velocity], axis=2)
         before = (float(self.t[at - 1]), motion[at - 1]) if at else None
-        touching = self.gauge.neighbours(self.position[at], within)
-        return self.bond_gauge().bonds(float(self.t[at]), motion[at], touching, before)
+        near = self.neighbours(at, within)
+        return self.bond_gauge().bonds(float(self.t[at]), motion[at], near, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:
         """Σ m v of all bodies that move (2,) [kg m/s], at a time of ``t``."""
@@ -115,10 +114,8 @@ def read_box(box: Any) -> tuple[float, float]:
         ) from None
     sides = []
     for side, name in ((width, "width"), (height, "height")):
-        length = math.inf if side is None else in_unit(side, "m", f"the box's {name}")
-        if (not is_number(length) and length != math.inf) or not length > 0.0:
-            raise UsageError(f"the box's {name} must be a length above 0 m, found {side!r}")
-        sides.append(float(length))
+        endless = side is None or (isinstance(side, float) and side == math.inf)
+        sides.append(math.inf if endless else above_zero(side, "m", f"the box's {name}"))
     return sides[0], sides[1]
 
 
@@ -151,7 +148,15 @@ class Swarm:
         if all(body.fixed for body in self.bodies):
             raise UsageError("a Swarm needs at least one body that moves")
         refuse_outlines(self.forces, "a swarm")
-        self.check_reach()
+        for name, force in system.pieces.used.items():
+            many = len(self.bodies) > MANY and not self.all_pairs
+            if many and getattr(force, "reach", 0.0) == math.inf:
+                size = np.mean([body.shape.equivalent_radius for body in self.bodies])
+                raise UsageError(
+                    f"{name} has no finite reach, so each of {len(self.bodies)} bodies would act "
+                    f"on all others: give it one (its property `reach`, of some {size:.1g} m), or "
+                    "set all_pairs=True"
+                )
         self.check_box()
         if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
@@ -174,18 +179,6 @@ class Swarm:
     def bond_gauge(self) -> BondGauge:
         """What tells the kinds of bonds of its bodies, wherever they are."""
         return BondGauge(self)
-
-    def check_reach(self) -> None:
-        """UsageError for forces that reach all bodies of many."""
-        if len(self.bodies) > MANY and not self.all_pairs:
-            for name, force in self.system.pieces.used.items():
-                if getattr(force, "reach", 0.0) == math.inf:
-                    size = np.mean([body.shape.equivalent_radius for body in self.bodies])
-                    raise UsageError(
-                        f"{name} has no finite reach, so each of {len(self.bodies)} bodies would "
-                        f"act on all others: give it one (its property `reach`, of some {size:.1g} "
-                        "m), or set all_pairs=True"
-                    )
 
     def check_box(self) -> None:
         """UsageError for a box in which bodies would meet themselves, or a flow that does not
@@ -249,28 +242,25 @@ class Swarm:
         ``watch(time)`` is called at every common time, and ends the run where it returns what
         counts as true. A run that ends early says why in ``status``.
         """
-        end: float = in_unit(until, "s", "until")
-        check_limits(end, max_steps)
+        end = above_zero(until, "s", "until")
+        check_whole(max_steps, 0, "max_steps")
+        check_whole(threads, 1, "threads")
         stops = stops_of(end, every, times)
-        if not is_whole(threads) or threads < 1:
-            raise UsageError(f"threads must be a whole number of at least 1, found {threads!r}")
         began = time.perf_counter()
         gauge = self.gauge()
         self.check_overlaps(gauge)
         progress = self.begin(end, threads=threads, max_steps=max_steps)
         seen, status = [progress.seen()], Status.FINISHED
         for stop in stops:
-            while (status := progress.advance(stop)) == Status.PAUSED:
-                if watch is not None and watch(progress.time):
+            status = Status.PAUSED
+            while status == Status.PAUSED:
+                status = progress.advance(stop)
+                common = status in (Status.PAUSED, Status.FINISHED)
+                if common and watch is not None and watch(progress.time) and progress.time < end:
                     status = Status.STOPPED
-                    break
             seen.append(progress.seen())
             if status != Status.FINISHED:
                 break
-            if watch is not None and watch(progress.time):
-                status = Status.STOPPED if progress.time < end else status
-                if status == Status.STOPPED:
-                    break
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
@@ -302,8 +292,6 @@ def check_box(shapes: Sequence[Shape], box: tuple[float, float], reach: float) -
 
 def stops_of(end: float, every: float | str | None, times: Sequence[float] | None) -> list[float]:
     """The times that a run is to keep [s], ``end`` the last; UsageError for what are none."""
-    if not is_number(end) or not end > 0.0:
-        raise UsageError(f"until must be a time above 0 s, found {end!r}")
     if times is not None and every is not None:
         raise UsageError("give the times to keep with times or with every, not both")
     if times is not None:
@@ -315,9 +303,7 @@ def stops_of(end: float, every: float | str | None, times: Sequence[float] | Non
         return listed if listed and listed[-1] == end else [*listed, end]
     if every is None:
         return [end]
-    step = float(in_unit(every, "s", "every"))
-    if not step > 0.0:
-        raise UsageError(f"every must be a time above 0 s, found {every!r}")
+    step = above_zero(every, "s", "every")
     count = max(1, round(end / step))
     whole = abs(count * step - end) <= 1e-9 * end
     kept = [step * number for number in range(1, count if whole else math.ceil(end / step))]

@@ -58,20 +58,13 @@ def views_of(system, scene, work, time, located):
         rows = range(work.tally[at.CANDIDATES])
         touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
         flag_near(scene, work, at.NOW, 0.0)
-        views["surface"] = [
-            surface_view(scene, work, time, at.NOW, first, end) for first, end in runs_of(work)
-        ]
+        first, views["surface"] = 0, []
+        while first < len(rows):
+            end = run_end(work, first)
+            views["surface"].append(surface_view(scene, work, time, at.NOW, first, end))
+            first = end
         views["contact"] = [contact_view(scene, work, at.NOW, row) for row in touching]
     return views
-
-
-def runs_of(work):
-    """(first row, row behind the last) of the listed pairs of features of every two bodies."""
-    row = 0
-    while row < work.tally[at.CANDIDATES]:
-        end = run_end(work, row)
-        yield row, end
-        row = end
 
 
 def family(law):
@@ -87,11 +80,6 @@ def values_of(law, view, parameters, which):
     except (ArithmeticError, ValueError):
         answer = compose(law, {})(view, parameters, *which)
     return answer if isinstance(answer, tuple) else (answer,)
-
-
-def is_answer(name, value):
-    """Whether a law of this name may give a value."""
-    return abs(value) < LARGEST or (name in MAY_BE_INFINITE and not math.isnan(value))
 
 
 def kernel_of(force, law, fluid):
@@ -117,8 +105,9 @@ def wrong_answer(force: Any, pieces: Pieces, views: dict[str, list], fluid: Any)
         for view in views.get(family(name), ()):
             for event in each_event:
                 which = () if event is None else (event,)
+                most = math.inf if name in MAY_BE_INFINITE else LARGEST
                 values = values_of(law, view, parameters, which)
-                wrong = [value for value in values if not is_answer(name, value)]
+                wrong = [value for value in values if not abs(value) <= most]
                 if wrong:
                     what = where(kernel_of(force, name, fluid))
                     slope = "a slope of " if name.endswith("derivatives") else ""

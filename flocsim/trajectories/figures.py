@@ -13,14 +13,7 @@ from flocsim.geometry.contact.overlap import placed_contacts
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule
 from flocsim.io.outputs import figure_rule
-from flocsim.io.plots.collision import (
-    Frames,
-    draw_distance,
-    draw_energies,
-    draw_forces,
-    draw_strip,
-    write_animation,
-)
+from flocsim.io.plots import collision
 from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.replay import motion_at
@@ -64,12 +57,12 @@ def instants_along(
 
 def frames_at(
     shapes: Sequence[Shape], times: np.ndarray, places: np.ndarray, position: np.ndarray
-) -> Frames:
+) -> collision.Frames:
     """The Frames at some times (f,) [s], where the bodies are at ``places`` (f, n, 3); their paths
     are those of all of the motion, ``position`` (k, n, 3)."""
     seen, whole = seen_from_first(places), seen_from_first(position)
     apart = len(shapes) > 1
-    return Frames(
+    return collision.Frames(
         times,
         [[shape.outline(*each[n]) for n, shape in enumerate(shapes)] for each in seen],
         [placed_contacts(shapes, each) for each in seen],
@@ -82,7 +75,7 @@ FIGURES = ("strip", "distance", "forces", "energies")
 MOST_FRAMES = 500
 
 
-def frames_of(trajectory: Any, count: int) -> Frames:
+def frames_of(trajectory: Any, count: int) -> collision.Frames:
     """So many Frames, evenly along the way of the bodies against each other."""
     if not is_whole(count) or not 2 <= count <= MOST_FRAMES:
         raise UsageError(f"frames must be a whole number from 2 to {MOST_FRAMES}, found {count!r}")
@@ -90,7 +83,12 @@ def frames_of(trajectory: Any, count: int) -> Frames:
     sizes = [shape.bounding_radius for shape in shapes]
     touch, _ = touch_and_zone(trajectory)
     times = instants_along(trajectory.t, position, sizes, count, touch)
-    return frames_at(shapes, times, places_at(trajectory, times), position)
+    if hasattr(trajectory, "at"):
+        places = trajectory.at(times).position
+    else:  # a motion from a file
+        states = np.concatenate([position, trajectory.velocity], axis=2)
+        places = np.array([motion_at(trajectory.t, states, time)[:, :3] for time in times])
+    return frames_at(shapes, times, places, position)
 
 
 def touch_and_zone(trajectory: Any) -> tuple[float, float]:
@@ -98,14 +96,6 @@ def touch_and_zone(trajectory: Any) -> tuple[float, float]:
     other run."""
     row = getattr(trajectory, "row", None)
     return (math.nan, math.nan) if row is None else (row["t_collision"], row["D_0"])
-
-
-def places_at(trajectory: Any, times: np.ndarray) -> np.ndarray:
-    """The places (f, n, 3) at some times; of a motion from a file by Hermite's cubic."""
-    if hasattr(trajectory, "at"):
-        return trajectory.at(times).position
-    states = np.concatenate([trajectory.position, trajectory.velocity], axis=2)
-    return np.array([motion_at(trajectory.t, states, time)[:, :3] for time in times])
 
 
 def title_of(trajectory: Any) -> str:
@@ -123,21 +113,21 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
     title = plain(title_of(trajectory) if title is None else title, MOST_OF_TITLE)
     touch, zone = touch_and_zone(trajectory)
     if figure == "strip":
-        return draw_strip(frames_of(trajectory, frames), title, zone)
+        return collision.draw_strip(frames_of(trajectory, frames), title, zone)
     if figure == "energies":
         found = trajectory.energies()
         kinetic = found.kinetic.sum(axis=1)
-        return draw_energies(found.t, found.work, kinetic.tolist(), title)
+        return collision.draw_energies(found.t, found.work, kinetic.tolist(), title)
     check_pair(trajectory)
     if figure == "distance":
-        return draw_distance(*distances(trajectory), zone, title)
+        return collision.draw_distance(*distances(trajectory), zone, title)
     apart = trajectory.position[:, 1, :2] - trajectory.position[:, 0, :2]
     direction = apart / np.hypot(*apart.T)[:, None]
     along = {
         name: np.sum(force[:, 1, :2] * direction, axis=1)
         for name, force in trajectory.forces().items()
     }
-    return draw_forces(trajectory.t, along, touch, title)
+    return collision.draw_forces(trajectory.t, along, touch, title)
 
 
 def animated(
@@ -150,7 +140,7 @@ def animated(
     seen = frames_of(trajectory, frames)
     _, zone = touch_and_zone(trajectory)
     told = plain(title, MOST_OF_TITLE)
-    write_animation(path, seen, distances(trajectory), zone, told, rule or figure_rule())
+    collision.write_animation(path, seen, distances(trajectory), zone, told, rule or figure_rule())
 
 
 def distances(trajectory: Any) -> tuple[list[float], list[float]]:

@@ -12,8 +12,8 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.arrays import Scene, Work, copy_of, with_room
-from flocsim.body import NO_WATER, Body, Fluid
+from flocsim.arrays import NO_WATER, Scene, Work, copy_of, with_room
+from flocsim.body import Body, Fluid, of_forces
 from flocsim.forces.base import ContactForce, Force, names_of
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.pair_resistance import PairResistance
@@ -85,11 +85,6 @@ class Instant:
     scene: Scene
     work: Work
 
-    @property
-    def motion(self) -> np.ndarray:
-        """x, y, angle and their rates (n, 6)."""
-        return self.work.motion[at.NOW]
-
     def forces(self, scene: Scene) -> np.ndarray:
         """(n, 3) force and torque on every body [N, N, N m] of a scene with these or other laws."""
         sum_forces(scene, self.work, self.time, at.NOW)
@@ -127,16 +122,10 @@ class Replay:
         """The run's scene with the laws of these of its forces, uncompiled."""
         shapes = [body.shape for body in self.origin.bodies]
         pieces = laws_of(forces, self.origin.fluid, shapes)
-        water = NO_WATER
+        scene = self.run.scene._replace(laws=law_table(pieces.laws, jit=False), **of_forces(pieces))
         if any(isinstance(force, PairResistance) for force in forces):
-            water = self.run.scene.pair_table, self.run.scene.water
-        return self.run.scene._replace(
-            laws=law_table(pieces.laws, jit=False),
-            parameters=np.array(pieces.parameters, dtype=float),
-            surface_reach=float(pieces.surface_reach),
-            centre_reach=float(pieces.centre_reach), events=int(pieces.events),
-            outlines=pieces.outlines, layer=pieces.layer, pair_table=water[0], water=water[1],
-        )  # fmt: skip
+            return scene
+        return scene._replace(pair_table=NO_WATER[0], water=NO_WATER[1])
 
     @functools.cached_property
     def single_scenes(self) -> dict[str, Scene]:
@@ -291,7 +280,7 @@ def energies_of(origin: Origin, times: np.ndarray, velocity: np.ndarray) -> Ener
     free = np.array([0.0 if body.fixed else 1.0 for body in origin.bodies])[:, None]
 
     def powers(instant: Instant) -> np.ndarray:
-        rates = instant.motion[:, 3:].copy() * free
+        rates = instant.work.motion[at.NOW, :, 3:] * free
         return np.array([np.sum(instant.forces(scene) * rates) for scene in smooth.values()])
 
     order = np.sort(np.concatenate([times, times[:-1] + 0.5 * np.diff(times)]))

@@ -12,7 +12,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.errors import UsageError
-from flocsim.fields import in_unit, is_number, is_whole
+from flocsim.fields import check_whole, in_unit, is_number
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Status
@@ -221,8 +221,7 @@ class Trajectory:
         end: float = in_unit(until, "s", "until")
         if not is_number(end) or not end > self.t[-1]:
             raise UsageError(f"until must be a time above {self.t[-1]:g} s, found {until!r}")
-        if not is_whole(max_steps) or max_steps < 0:
-            raise UsageError(f"max_steps must be a whole number of at least 0, found {max_steps!r}")
+        check_whole(max_steps, 0, "max_steps")
         if self.status in ENDED_FOR_GOOD or self.row is not None:
             reason = self.status.reason if self.row is None else "its study has decided it"
             raise UsageError(f"this run cannot continue: {reason}")

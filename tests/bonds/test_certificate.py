@@ -9,8 +9,15 @@ from scipy.optimize import brentq
 
 from flocsim import Sphere
 from flocsim.bonds import certificate
-from flocsim.bonds.bond import HOOK, NO_BOND, REST
-from flocsim.bonds.certificate import SAFETY, capacity, is_certain, is_certain_in_kicks
+from flocsim.bonds.certificate import (
+    HOOK,
+    NO_BOND,
+    REST,
+    SAFETY,
+    capacity,
+    is_certain,
+    is_certain_in_kicks,
+)
 from flocsim.bonds.rest import FAR_LONGER, is_hooked, kind_at_rest
 from flocsim.constants import BOLTZMANN
 from flocsim.forces import Contact, VanDerWaals

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds import rest
-from flocsim.bonds.bond import is_closed, size_of
+from flocsim.bonds.certificate import is_closed, size_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.slip_transfer import contact_point
 from tests.helpers.tiers import rest_slow

@@ -7,7 +7,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
 from flocsim.arrays import work_of
-from flocsim.bonds.bond import Load, bond_between
+from flocsim.bonds.certificate import Load, bond_between
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.modes import set_modes

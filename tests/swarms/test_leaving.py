@@ -9,7 +9,7 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere
 from flocsim.integrators import Status
 from flocsim.swarms.arrays import with_links
-from flocsim.swarms.leaving import REENTER, REMOVE, Leaving
+from flocsim.swarms.placement import REENTER, REMOVE, Leaving
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R, forces
 
@@ -76,7 +76,7 @@ def test_a_cluster_comes_back_as_it_is():
     swarm = swarm_at([*pair, *others])
     progress = progress_of(swarm, REENTER)
     links = np.array([[1, 0, 1, 0, at.TOUCHES]])
-    progress.swarm = with_links(progress.swarm, [(links, np.array([[1e-9, 0.0, 0.0, 0.0, 0.0]]))])
+    progress.swarm = with_links(progress.swarm, links, np.array([[1e-9, 0.0, 0.0, 0.0, 0.0]]))
     progress.swarm.motion[:2, 3:] = [1e-4, -2e-4, 3.0]
     before = progress.swarm.motion.copy()
     progress.let_leave()

@@ -12,8 +12,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import Contact, DoubleLayer, StokesDrag, Thermal
 from flocsim.integrators import Overdamped
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.islands import run_islands
-from flocsim.swarms.neighbours import find_islands
+from flocsim.swarms.islands import find_islands, run_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 

@@ -169,7 +169,7 @@ def test_what_a_contact_goes_by_besides_places_goes_on_behind_a_window():
     )
     arrays = swarm.begin(1.0).swarm
     links = np.array([[1, 0, 1, 0, at.GRAZES]])
-    arrays = with_links(arrays, [(links, np.array([[1e-12, 2e-13, 3e-9, 4e-14, 5.0]]))])
+    arrays = with_links(arrays, links, np.array([[1e-12, 2e-13, 3e-9, 4e-14, 5.0]]))
     system = System(swarm.bodies, forces(), fluid=WATER)
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())

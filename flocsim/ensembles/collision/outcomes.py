@@ -20,8 +20,16 @@ the rest time is that of a whole turn.
 import math
 
 import flocsim.arrays as at
-from flocsim.bonds.bond import CERTIFICATE, NO_BOND, Load, bond_between, doublet_pose, way_between
-from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
+from flocsim.bonds.certificate import (
+    CERTIFICATE,
+    NO_BOND,
+    Load,
+    bond_between,
+    doublet_pose,
+    is_certain,
+    is_certain_in_kicks,
+    way_between,
+)
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
 from flocsim.geometry.contact.circle_tree import core_distance
 from flocsim.geometry.contact.near_pairs import gap_between, pose_of

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.bonds.bond import NO_BOND, are_spheres, bond_between, radii_of
+from flocsim.bonds.certificate import NO_BOND, are_spheres, bond_between, radii_of
 from flocsim.ensembles.collision import outcomes as seen
 from flocsim.ensembles.collision.meetings import GAPS
 from flocsim.ensembles.collision.outcomes import bond_in_kicks, look_at_pair

@@ -46,7 +46,7 @@ from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.storage.identity import identity_of, short
 from flocsim.ensembles.study import Study
 from flocsim.errors import RangeError
-from flocsim.explain import STABLE, all_scales
+from flocsim.explain import SETTLING, STABLE, all_scales
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.base import Integrator
 
@@ -256,7 +256,7 @@ def stable_cost(study, ladder):
     """
     name = study.config.scene.names[ladder.condition]
     pair = next(pair for each, pair in sphere_pairs(study.config, study.flocs) if each == name)
-    limits = [scale.time for scale in all_scales(pair.system) if scale.limits_steps]
+    limits = [time for name, time in all_scales(pair.system).items() if name != SETTLING]
     steps = mean([each.time for each in ladder.exact]) / (STABLE * min(limits)) if limits else 0.0
     return STAGES * WEIGHTS[DormandPrince54] * steps
 

@@ -19,7 +19,7 @@ from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
-from flocsim.explain import body_scales
+from flocsim.explain import RELAXATION, body_scales
 from flocsim.forces import ContactForce
 from flocsim.integrators import Overdamped
 from flocsim.io.confidence import wilson
@@ -65,8 +65,8 @@ def stokes_number(config: Config, flocs: Sequence[Floc] | None = None) -> float:
     """
     numbers = []
     for _, pair in sphere_pairs(config, flocs, "fastest"):
-        times = [each.time for each in body_scales(pair.system) if each.limits_steps]
-        numbers += [each / pair.turn_time for each in times]
+        time = body_scales(pair.system).get(RELAXATION)
+        numbers += [] if time is None else [time / pair.turn_time]
     return max(numbers, default=0.0)
 
 

@@ -22,20 +22,12 @@ from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Halted, Opening
 from flocsim.errors import FileError, UsageError
-from flocsim.fields import is_number, is_whole
+from flocsim.fields import check_whole, is_number
 from flocsim.forces.outline import refuse_outlines
 from flocsim.io.records import Record
+from flocsim.io.results import strength_file
 from flocsim.io.results.run_group import now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
-from flocsim.io.results.strength_file import (
-    FORMAT,
-    ROW,
-    STATUS,
-    Strengths,
-    check_opened,
-    read_strengths,
-    write_strengths,
-)
 
 TESTING = ("ensembles/strength/opening.py",)
 """The code by which a doublet is tested; that by which it is run is part of the study's identity,
@@ -79,8 +71,8 @@ class Bonds:
     def __attrs_post_init__(self):
         if self.flow not in FLOWS:
             raise UsageError(f"flow must be one of {', '.join(FLOWS)}, found {self.flow!r}")
-        if self.count is not None and (not is_whole(self.count) or self.count < 1):
-            raise UsageError(f"count must be a whole number of at least 1, found {self.count!r}")
+        if self.count is not None:
+            check_whole(self.count, 1, "count")
         if not is_number(self.precision) or not 1e-9 <= self.precision <= 1.0:
             raise UsageError(f"precision must lie between 1e-9 and 1, found {self.precision!r}")
         found = list(bound_doublets(self.results))
@@ -93,12 +85,10 @@ class Bonds:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The collision types."""
         return tuple(self.results.types)
 
     @property
     def delta(self) -> tuple[float, ...]:
-        """The displacements."""
         return tuple(float(each) for each in self.results.delta)
 
 
@@ -119,11 +109,11 @@ class StrengthStudy(StudyKind):
     bonds: dict[tuple[int, int], int] = attrs.field(init=False)
     wanted: dict[int, list[int]] = attrs.field(init=False)
     rows: dict[Code, dict[str, Any]] = attrs.field(init=False, factory=dict)
-    row: ClassVar[np.dtype] = ROW
-    compared: ClassVar[tuple[str, ...]] = tuple(ROW.fields or ())
+    row: ClassVar[np.dtype] = strength_file.ROW
+    compared: ClassVar[tuple[str, ...]] = tuple(strength_file.ROW.fields or ())
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "doublets"
-    check_rows = staticmethod(check_opened)
+    check_rows = staticmethod(strength_file.check_opened)
 
     def __attrs_post_init__(self):
         refuse_outlines(self.config.forces, "the strength of a bond")
@@ -148,7 +138,6 @@ class StrengthStudy(StudyKind):
 
     @property
     def title(self) -> str:
-        """The study in a few words."""
         return f"{self.size} bound doublets of {self.scene.results.path} in {self.scene.flow}"
 
     def unneeded(self, place: int) -> list[Interval]:
@@ -168,7 +157,6 @@ class StrengthStudy(StudyKind):
         return next((place, each[0]) for place, each in self.wanted.items() if each)
 
     def first_of(self, code: Code) -> tuple[Condition, int]:
-        """What stands for a kind of code."""
         place, replicate = self.first
         return self.conditions[place], replicate
 
@@ -215,7 +203,6 @@ class StrengthStudy(StudyKind):
         return row, self.note(place, replicate, words) if row["status"] == FAILED else None
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which doublets have a run that failed."""
         return column("status") == FAILED
 
 
@@ -244,16 +231,16 @@ def digest_of(results: Any) -> str:
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The doublets of an earlier survey, in arrays of all replicates."""
-    found = read_strengths(output)
+    found = strength_file.read_strengths(output)
     axes = [found.conditions.axes[name].values.tolist() for name in AXES]
     at = tuple(found.column(name) for name in (*AXES, "replicate"))
     count = int(at[3].max(initial=-1)) + 1
     if len(set(zip(*at, strict=True))) < len(at[0]) or np.any(at[3] < 0):
         raise ValueError("it has the same doublet twice")
     columns = {}
-    for name in ROW.fields or ():
+    for name in strength_file.ROW.fields or ():
         blank = NOT_APPLICABLE if name == "bond" else 0
-        columns[name] = np.full((*map(len, axes), count), blank, ROW[name])
+        columns[name] = np.full((*map(len, axes), count), blank, strength_file.ROW[name])
         columns[name][at] = found.column(name)
     places = places_in(*axes)
     there: dict[Condition, list[Interval]] = {condition: [] for condition in places}
@@ -268,21 +255,21 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
 def results(
     study: StrengthStudy, start: Beginning, count: int, run: dict, comm: Communicator,
     output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
-) -> Strengths:  # fmt: skip
+) -> strength_file.Strengths:  # fmt: skip
     """The Strengths of all that was tested, in the order of the study."""
     store, bound = start.store, np.array(study.asked()["strength"]["bound"])
     about = start.identity | {"complete": True, "cpus": run["cpus"]}
     about["date"] = store.old.more.about.get("date") if store.old else now()
     found = strengths_in(store, bound.reshape(study.shape[:3]), about, study.bonds)
     if output is not None:
-        write_strengths(output, found, start.replacing)
+        strength_file.write_strengths(output, found, start.replacing)
     return found
 
 
 def in_words(opening: Opening) -> str:
     """What was found of one doublet, in words."""
     runs = f"({opening.runs} runs)"
-    word = STATUS[opening.status]
+    word = strength_file.STATUS[opening.status]
     if word == "opened":
         return f"opens at {opening.opens:.4g} 1/s {runs}"
     if word == "opens_at_least_rate":
@@ -305,10 +292,14 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     bound = np.array(survey["bound"], dtype=np.int64).reshape(shape)
     about = survey["about"] | {"asked": survey["wanted"], "complete": False}
     with ReadOnlyJournal(str(path)) as journal:
-        store, notes, unread = store_of(journal, sessions, found, asked, ROW, check_opened)
+        store, notes, unread = store_of(
+            journal, sessions, found, asked, strength_file.ROW, strength_file.check_opened
+        )
         made = strengths_in(store, bound, about)
     done, wanted = store.there(), survey["wanted"]
-    return Unfinished(path, FORMAT, made, done, wanted, notes, sessions, unread, "doublets")
+    return Unfinished(
+        path, strength_file.FORMAT, made, done, wanted, notes, sessions, unread, "doublets"
+    )
 
 
 KIND = Kind(

@@ -9,13 +9,12 @@ from statistics import fmean
 import attrs
 import numpy as np
 
-from flocsim.arrays import PairView
 from flocsim.body import Body, Fluid
+from flocsim.brownian.splitting import repulsion
 from flocsim.constants import MINIMUM_GAP
 from flocsim.ensembles.estimates.strengths import FAILED, HOLDS, OPENED, OPENS_AT_LEAST
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force
-from flocsim.forces.codegen import laws_of
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
@@ -83,12 +82,8 @@ class Opening:
 def strongest(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
     """The largest attraction of two spheres at any gap [N]."""
     refuse_outlines(forces, "the strength of a bond")
-    pieces, (r_i, r_j) = laws_of(forces, fluid), radii
-    reduced = r_i * r_j / (r_i + r_j)
-    gaps = [0.0, *np.geomspace(1e-2 * MINIMUM_GAP, 10.0 * (r_i + r_j), 400).tolist()]
-    views = [PairView(0.0, g, 0.0, g + r_i + r_j, r_i, r_j, reduced, 1.0) for g in gaps]
-    laws = [pieces.laws[name] for name in ("centre_force", "surface_force") if name in pieces.laws]
-    return max(0.0, *(-sum(law(view, pieces.parameters) for law in laws) for view in views))
+    gaps = np.append(0.0, np.geomspace(1e-2 * MINIMUM_GAP, 10.0 * sum(radii), 400))
+    return max(0.0, float(-repulsion(forces, radii, fluid)(gaps).min()))
 
 
 def sphere_rate(forces: Sequence[Force], radii: tuple[float, float], fluid: Fluid) -> float:
@@ -136,8 +131,8 @@ class Doublet:
 
     Weight, thermal motion and how long water takes to come between the two are left out, and
     inertia is, too, unless the methods are others than Overdamped: what is tested is the bond, at
-    both bodies' drag. ``tries``: methods with the steps
-    that each may try; a run that has not ended by then is made again by the next.
+    both bodies' drag. ``tries``: methods with the steps that each may try; a run that has not ended
+    by then is made again by the next.
     """
 
     start: Trajectory
@@ -166,17 +161,13 @@ class Doublet:
 
     def rate_of_spheres(self) -> float:
         """The rate that would open two spheres of the same radii [1/s]; 1 without attraction."""
-        r_i, r_j = (body.shape.equivalent_radius for body in self.bodies)
         known = self.start.known()
-        found = sphere_rate(known.forces, (r_i, r_j), known.fluid)
-        return found if found > 0.0 else 1.0
-
-    def opens_at(self, rate: float) -> bool | None:
-        """Whether a flow of a rate [1/s] opens the doublet; None where every run fails."""
-        return self.answer(rate)[0]
+        r_i, r_j = (body.shape.equivalent_radius for body in known.bodies)
+        return sphere_rate(known.forces, (r_i, r_j), known.fluid) or 1.0
 
     def answer(self, rate: float) -> tuple[bool | None, float]:
-        """The same by the first of the tries that ends, and the tolerance [m] of the last made."""
+        """Whether a flow of a rate [1/s] opens the doublet, by the first of the tries that ends,
+        None where every run fails; and the tolerance [m] of the last made."""
         found, tolerance = None, math.nan
         for method, most_steps in self.tries:
             found, tolerance = self.opened_by(method, most_steps, rate), float(method.tolerance)

@@ -4,7 +4,6 @@ run, results from records.
 
 import hashlib
 import json
-import math
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,19 +19,11 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import names_in
-from flocsim.ensembles.storage.identity import (
-    PHYSICS,
-    config_facts,
-    digest,
-    machine_facts,
-    shape_numbers,
-)
+from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
 from flocsim.ensembles.storage.unfinished import Unfinished
-from flocsim.ensembles.swarms.assembly import PLACED, appended, groups_of, results_from
-from flocsim.ensembles.swarms.checks import FORM, Form, check_part
-from flocsim.ensembles.swarms.records import Found, part_of
+from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
@@ -40,14 +31,7 @@ from flocsim.explain import force_lines, scale_lines
 from flocsim.fields import is_whole
 from flocsim.forces import ContactForce
 from flocsim.io.records import CHUNK, SNAPSHOT, Record
-from flocsim.io.results.swarm_file import (
-    ENDS,
-    FORMAT,
-    SwarmResults,
-    check_swarm,
-    read_swarm,
-    write_swarm,
-)
+from flocsim.io.results import swarm_file
 from flocsim.io.terminal import duration
 from flocsim.plausibility.doubts import doubts_of, settled
 from flocsim.swarms.islands import run_islands
@@ -105,11 +89,8 @@ def largest_pair(swarm: Swarm) -> System:
     return attrs.evolve(swarm.system, bodies=bodies)
 
 
-CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
+CODE = (*identity.PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
 """The modules that decide what a swarm does."""
-
-LEFT_OUT = ("scene.checkpoint",)
-"""Keys that change nothing that is computed."""
 
 
 def check_study(config: Config) -> None:
@@ -132,8 +113,7 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
     for replicate in range(comm.rank, study.config.replicates, comm.size):
         try:
             drawn, box, _ = study.placed(replicate)
-            width, height = study.periods(box)
-            check_box(drawn.shapes, (width or math.inf, height or math.inf), study.first.reach)
+            check_box(drawn.shapes, study.periods(box), study.first.reach)
         except UsageError as error:
             first = replicate, str(error)
             break
@@ -148,23 +128,22 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
 def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:
     """{name: text or number} of all that the replicates of a study follow from."""
     config, swarm = study.config, study.first
-    facts = config_facts(study.config, ("scene", "shapes", "bodies", "fluid"))
-    facts |= machine or machine_facts(CODE)
+    facts = identity.config_facts(study.config, ("scene", "shapes", "bodies", "fluid"))
+    facts |= machine or identity.machine_facts(CODE)
     facts["shapes.vertices"] = list(config.shapes.vertices)
     shapes = [floc.shapes.get(study.vertices) for floc in study.flocs]
-    numbers = [shape_numbers(shape) for shape in shapes if shape is not None]
+    numbers = [identity.shape_numbers(shape) for shape in shapes if shape is not None]
     sizes = [[floc.ratio, floc.size or 0.0] for floc in study.flocs]
     if any(floc.weight != 1.0 for floc in study.flocs):
-        facts["flocs.weight"] = digest(np.array([floc.weight for floc in study.flocs]))
-    facts[f"flocs.{study.vertices}"] = digest(np.concatenate([np.ravel(sizes), *numbers]))
+        facts["flocs.weight"] = identity.digest(np.array([floc.weight for floc in study.flocs]))
+    facts[f"flocs.{study.vertices}"] = identity.digest(np.concatenate([np.ravel(sizes), *numbers]))
     pieces = swarm.system.pieces
     numbers = [*pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events]
-    facts["numbers.the swarm"] = digest(np.array(numbers, float))
+    facts["numbers.the swarm"] = identity.digest(np.array(numbers, float))
     codes = [fingerprint(run_islands, swarm.fillings())]
     codes += [f"{law} {fingerprint(each, {})}" for law, each in sorted(pieces.laws.items())]
     facts["kernels.swarms"] = hashlib.blake2b("\n".join(codes).encode(), digest_size=12).hexdigest()
-    for name in LEFT_OUT:
-        facts.pop(name, None)
+    facts.pop("scene.checkpoint", None)  # changes nothing that is computed
     return json.loads(json.dumps(facts))
 
 
@@ -176,7 +155,7 @@ def doubts(study: SwarmStudy) -> list[str]:
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The replicates of a results file."""
-    found = read_swarm(output)
+    found = swarm_file.read_swarm(output)
     ends, run = found.groups["ends"], found.run
     count, vertices = len(ends["finished"]), int(run.get("vertices", 0))
     trial = int(str(run.get("trial", "0")), 16)
@@ -187,30 +166,30 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
 def results(
     study: SwarmStudy, start: Beginning, count: int, run: dict, comm: Communicator,
     output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
-) -> SwarmResults:  # fmt: skip
+) -> swarm_file.SwarmResults:  # fmt: skip
     """The SwarmResults of so many replicates; written to ``output`` where there is one."""
     store, form, groups = start.store, study.form, {}
     begun = min(store.old.count, count) if store.old else 0
     if store.old:
         groups = first_of(store.old.more, begun)
     if begun < count:
-        found = [Found.of(store.parts[0, replicate]) for replicate in range(begun, count)]
-        new = groups_of(form, found, store.journal.read)
-        groups = appended(groups, new) if groups else new
-    groups["ends"] = {name: store.read(0, name, 0, count) for name in ENDS}
+        found = [records.Found.of(store.parts[0, replicate]) for replicate in range(begun, count)]
+        new = records.groups_of(form, found, store.journal.read)
+        groups = records.appended(groups, new) if groups else new
+    groups["ends"] = {name: store.read(0, name, 0, count) for name in swarm_file.ENDS}
     # Of the rows, as a run that found all of them has made no trial itself.
     run["trial"] = f"{int(store.read(0, 'trial', 0, 1)[0]):016x}"
-    made = results_from(form, groups, run)
+    made = records.results_from(form, groups, run)
     if output is not None:
-        write_swarm(output, made, start.replacing)
+        swarm_file.write_swarm(output, made, start.replacing)
     return made
 
 
-def first_of(found: SwarmResults, count: int) -> dict[str, dict[str, np.ndarray]]:
+def first_of(found: swarm_file.SwarmResults, count: int) -> dict[str, dict[str, np.ndarray]]:
     """The groups of the first replicates of results."""
     groups = {}
     for group, columns in found.groups.items():
-        listed = [columns[name] for name in PLACED if name in columns]
+        listed = [columns[name] for name in records.PLACED if name in columns]
         kept = listed[0] < count if listed else slice(count)
         groups[group] = {name: values[kept] for name, values in columns.items()}
     return groups
@@ -221,7 +200,7 @@ def facts(study: SwarmStudy) -> dict[str, Any]:
     return {"periodic": study.scene.periodic, "vertices": study.vertices}
 
 
-def verdict(found: SwarmResults) -> tuple[int, str]:
+def verdict(found: swarm_file.SwarmResults) -> tuple[int, str]:
     """0, or the code of an error where no swarm has come to its end; what to say of those."""
     finished = found.groups["ends"]["finished"]
     missed = int(np.count_nonzero(finished == 0))
@@ -235,7 +214,9 @@ def verdict(found: SwarmResults) -> tuple[int, str]:
 
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     """What a journal has of swarms, of which those appear that have begun."""
-    asked, form, unread = sessions[-1]["asked"]["replicates"], form_of(sessions[-1]["asked"]), 0
+    told = sessions[-1]["asked"]
+    asked, unread = told["replicates"], 0
+    form = records.Form(**{name: told["swarm"][name] for name in records.FORM})
     if not form.times or form.bodies < 1:
         raise FileError(f"{path} does not record what is kept of a swarm")
     parts: dict[int, list[Record]] = {}
@@ -248,14 +229,14 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
             if each.kind != SNAPSHOT:
                 continue
             try:
-                check_part(part_of(about, journal.read(each.offset, each.length)), form)
+                records.check_part(records.part_in(each, journal.read), form)
             except ValueError:
                 unread += each.length
                 continue
-            replicate = about.get("replicate")
-            if replicate is not None and is_whole(replicate) and 0 <= replicate < asked:
+            replicate: Any = about.get("replicate")
+            if is_whole(replicate) and 0 <= replicate < asked:
                 parts.setdefault(replicate, []).append(each)
-        swarms = {replicate: Found.of(records) for replicate, records in sorted(parts.items())}
+        swarms = {number: records.Found.of(each) for number, each in sorted(parts.items())}
         swarms = {replicate: each for replicate, each in swarms.items() if each.bodies}
         done = sum(len(each.moments) for each in swarms.values())
         if not done:
@@ -264,23 +245,26 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
         if known > done:
             raise FileError(f"{path} has no readable swarms: snapshots of it are missing")
         seen = attrs.evolve(form, times=form.times[:known])
-        groups = groups_of(seen, list(swarms.values()), journal.read)
-    groups["ends"] = {name: np.zeros(len(swarms), kind) for name, (kind, _, _) in ENDS.items()}
-    made = results_from(seen, groups, {"periodic": form.periodic}, np.array(list(swarms)))
+        groups = records.groups_of(seen, list(swarms.values()), journal.read)
+    groups["ends"] = {
+        name: np.zeros(len(swarms), kind) for name, (kind, _, _) in swarm_file.ENDS.items()
+    }
+    made = records.results_from(seen, groups, {"periodic": form.periodic}, np.array(list(swarms)))
     try:
-        check_swarm(made.scales, groups)
+        swarm_file.check_swarm(made.scales, groups)
     except ValueError as error:
         raise FileError(f"{path} has no readable swarms: {error}") from error
     return Unfinished(
-        path, FORMAT, made, done, asked * len(form.times), notes, sessions, unread, "snapshots"
+        path,
+        swarm_file.FORMAT,
+        made,
+        done,
+        asked * len(form.times),
+        notes,
+        sessions,
+        unread,
+        "snapshots",
     )
-
-
-def form_of(asked: dict) -> Form:
-    """What the records of swarms look like, by what a session says."""
-    about = asked["swarm"]
-    times, bounds = (tuple(map(float, about[name])) for name in ("times", "bounds"))
-    return Form(about["bodies"], bounds, times, about["periodic"])
 
 
 KIND = Kind(
@@ -289,5 +273,5 @@ KIND = Kind(
     doubts=doubts, facts=facts, old_rows=old_rows, results=results,
     total=lambda found: len(found.scales["replicate"]), verdict=verdict,
     dry_run=lambda config, ranks, pilot: dry_run(config, ranks),
-    so_far=so_far, asked={"swarm": FORM},
+    so_far=so_far, asked={"swarm": records.FORM},
 )  # fmt: skip

@@ -13,11 +13,10 @@ from flocsim.geometry.shapes.parts import table_of
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import GONE, OF_CLUSTERS, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
+from flocsim.swarms.bonds import Bonds
+from flocsim.swarms.clusters import Clusters, Gauge
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.swarm import Swarm
-from flocsim.swarms.together.bonds import Bonds
-from flocsim.swarms.together.clusters import Clusters
-from flocsim.swarms.together.contacts import Gauge
 
 
 def run_replicate(
@@ -127,23 +126,19 @@ def moment_part(
     # A record has numbers only.
     arrays = {"motion": np.where(progress.gone[:, None], 0.0, motion), "cluster": label}
     arrays["bonds"] = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
-    arrays["clusters"] = cluster_rows(found, bonds)
+    later, earlier = found.label[bonds.pairs].T
+    inside = later[(later == earlier) & (later >= 0)]
+    columns = {
+        "mass": found.mass, "gyration": found.gyration, "hydrodynamic": found.hydrodynamic,
+        "speed": -found.velocity[:, 1], "porosity": found.porosity,
+        "bonds": np.bincount(inside, minlength=len(found)),
+    }  # fmt: skip
+    rows = np.column_stack([columns[name] for name in OF_CLUSTERS]).astype(float)
+    # −1 for what one that percolates has not.
+    arrays["clusters"] = np.where(np.isnan(rows), -1.0, rows)
     bounds = np.array([0.0, *study.scene.bounds, np.inf])
     arrays["counts"] = found.counts(bounds).astype(np.int64)
     return Part(MOMENT, arrays, facts)
-
-
-def cluster_rows(clusters: Clusters, bonds: Bonds) -> np.ndarray:
-    """OF_CLUSTERS of every cluster (c, 6), −1 for what one that percolates has not."""
-    later, earlier = clusters.label[bonds.pairs].T
-    inside = later[(later == earlier) & (later >= 0)]
-    columns = {
-        "mass": clusters.mass, "gyration": clusters.gyration,
-        "hydrodynamic": clusters.hydrodynamic, "speed": -clusters.velocity[:, 1],
-        "porosity": clusters.porosity, "bonds": np.bincount(inside, minlength=len(clusters)),
-    }  # fmt: skip
-    rows = np.column_stack([columns[name] for name in OF_CLUSTERS]).astype(float)
-    return np.where(np.isnan(rows), -1.0, rows)
 
 
 def summary_of(clusters: Clusters) -> dict[str, float]:

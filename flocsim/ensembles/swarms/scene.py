@@ -180,6 +180,11 @@ class SwarmScene:
         return (0.0,)
 
     @property
+    def repeats(self) -> tuple[bool, bool]:
+        """Whether the box is periodic along x, and y."""
+        return "x" in self.periodic, "y" in self.periodic
+
+    @property
     def interval(self) -> float:
         """Time between two snapshots [s]."""
         return self.duration / SNAPSHOTS if isinstance(self.every, str) else self.every

@@ -1,8 +1,9 @@
 """A study of swarms: the bodies of any replicate, by its number."""
 
+import functools
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
 import attrs
@@ -14,8 +15,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
-from flocsim.ensembles.swarms.checks import Form, check_ends, check_part
-from flocsim.ensembles.swarms.records import MOMENT, Found, Left, Read, part_of
+from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.geometry.shapes.shape import Shape
@@ -23,9 +23,8 @@ from flocsim.integrators.base import Status
 from flocsim.io.records import Record
 from flocsim.io.results.swarm_file import ENDS
 from flocsim.plausibility.settling import terminal_motion
-from flocsim.swarms.leaving import KEEP, Leaving
-from flocsim.swarms.placement import floor, place_at_random
-from flocsim.swarms.swarm import Swarm
+from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
+from flocsim.swarms.swarm import Swarm, stops_of
 from flocsim.system import System
 
 SPHERE = -1
@@ -74,13 +73,12 @@ class SwarmStudy(StudyKind):
     pool: FlocPool = attrs.field(init=False)
     choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
     """Places of the measured flocs that bodies are drawn from."""
-    any_swarm: Swarm | None = attrs.field(init=False, default=None)
     trial: int = attrs.field(init=False, default=0)
     row: ClassVar[np.dtype] = ROW
     compared: ClassVar[tuple[str, ...]] = ("trial",)
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
-    check_rows = staticmethod(check_ends)
+    check_rows = staticmethod(records.check_ends)
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -95,28 +93,21 @@ class SwarmStudy(StudyKind):
     @property
     def stops(self) -> list[float]:
         """Times of the snapshots [s], the start first."""
-        count = math.floor(self.scene.duration / self.scene.interval * (1.0 + 1e-12))
-        times = [place * self.scene.interval for place in range(count + 1)]
-        if self.scene.duration - times[-1] > 1e-9 * self.scene.duration:
-            return [*times, self.scene.duration]
-        return [*times[:-1], self.scene.duration]
+        return [0.0, *stops_of(self.scene.duration, self.scene.interval, None)]
 
-    @property
+    @functools.cached_property
     def first(self) -> Swarm:
         """The swarm of the first replicate at its start."""
-        if self.any_swarm is None:
-            self.any_swarm = self.swarm(0)[0]
-        return self.any_swarm
+        return self.swarm(0)[0]
 
     @property
-    def form(self) -> Form:
+    def form(self) -> records.Form:
         """What its records look like."""
         scene = self.scene
-        return Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
+        return records.Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
 
     @property
     def pieces(self) -> int:
-        """Snapshots of each replicate."""
         return len(self.stops)
 
     @property
@@ -126,7 +117,6 @@ class SwarmStudy(StudyKind):
 
     @property
     def title(self) -> str:
-        """The study in a few words."""
         number, duration = self.scene.number, self.scene.duration
         return f"{self.config.replicates} swarms of {number} bodies, {duration:g} s"
 
@@ -152,14 +142,15 @@ class SwarmStudy(StudyKind):
         return [] if is_on_disk(self.first.begin(TRIAL_SECONDS).runner.driver) else list(kinds)
 
     def run_task(
-        self, place: Place, replicate: int, halted: Callable[[], bool], left: Left | None = None,
+        self, place: Place, replicate: int, halted: Callable[[], bool],
+        left: records.Left | None = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
         """One replicate from where it was left; its bodies and snapshots are kept as they come."""
         kept = keep or (lambda description, data, counts: None)
         ended = run_replicate(
-            self, replicate, lambda part: kept(*part.described(), part.of == MOMENT), left, halted,
-            going,
+            self, replicate, lambda part: kept(*part.described(), part.of == records.MOMENT),
+            left, halted, going,
         )  # fmt: skip
         if ended is None:
             return None, None
@@ -175,26 +166,22 @@ class SwarmStudy(StudyKind):
         return row, self.note(place, replicate, why)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which replicates ended before their time."""
         return column("finished") == 0
 
     def check_part(self, description: dict, data: bytes) -> None:
-        """ValueError for what cannot have been kept of a replicate."""
-        check_part(part_of(description, data), self.form)
+        records.check_part(records.part_of(description, data), self.form)
 
     def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
         """ValueError where bodies or snapshots of a finished replicate are not there."""
         [*finished] = rows["finished"]
-        if len(finished) > 1 or not Found.of(parts).has(self.pieces if finished[0] else 0):
+        if len(finished) > 1 or not records.Found.of(parts).has(self.pieces if finished[0] else 0):
             raise ValueError("some of its snapshots are missing")
 
     def counts_part(self, description: dict) -> bool:
-        """Whether it is a snapshot."""
-        return description["of"] == MOMENT
+        return description["of"] == records.MOMENT
 
-    def left_of(self, parts: list[Record], read: Read) -> Left | None:
-        """Where a replicate goes on."""
-        return Found.of(parts).left(read)
+    def left_of(self, parts: list[Record], read: records.Read) -> records.Left | None:
+        return records.Found.of(parts).left(read)
 
     def generator(self, replicate: int) -> np.random.Generator:
         """The random numbers of a replicate."""
@@ -205,7 +192,9 @@ class SwarmStudy(StudyKind):
         """The bodies of a replicate, by its random numbers."""
         numbers = rng.random((self.scene.number, 2))
         if self.scene.is_measured:
-            flocs = self.draw_measured(numbers[:, 0])
+            places = self.choosable
+            weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
+            flocs = [int(places[quantile(weights, each)]) for each in numbers[:, 0].tolist()]
             radii = [self.flocs[each].measured_size for each in flocs]
         else:
             radii = lognormal(self.scene, numbers[:, 0]).tolist()
@@ -219,12 +208,6 @@ class SwarmStudy(StudyKind):
         names = flocs if self.vertices > 1 else [SPHERE] * len(flocs)
         return Drawn(np.array(names, dtype=np.int32), shapes)
 
-    def draw_measured(self, numbers: np.ndarray) -> list[int]:
-        """Places of measured flocs, each with its weight."""
-        places = self.choosable
-        weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
-        return [int(places[quantile(weights, number)]) for number in numbers.tolist()]
-
     def floc_for(self, radius: float, number: float) -> int:
         """Place of a floc of the pool nearest in r_eq/r to a body of that radius [m]."""
         if not self.flocs:
@@ -233,32 +216,23 @@ class SwarmStudy(StudyKind):
         near = nearest_in_ratio(ratios, radius / self.config.shapes.radius, self.pool.pool)
         return near[int(number * len(near))]
 
-    def box_of(self, shapes: Sequence[Shape]) -> tuple[float, float]:
-        """Width and height of the box [m]."""
-        scene = self.scene
-        if scene.box is not None:
-            return scene.box
-        assert scene.area_fraction is not None, "a scene has either a radius or a library"
-        area = sum(shape.area for shape in shapes) / scene.area_fraction
-        width = math.sqrt(area / scene.aspect)
-        return width, area / width
-
     def placed(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.ndarray]:
         """(the bodies of a replicate, its box [m], their places (n, 3)).
 
         UsageError where bodies find no place.
         """
-        rng = self.generator(replicate)
-        drawn = self.draw(rng)
-        area = self.box_of(drawn.shapes)
-        repeats = "x" in self.scene.periodic, "y" in self.scene.periodic
-        return drawn, area, place_at_random(drawn.shapes, area, rng, repeats, self.scene.gap)
+        rng, scene = self.generator(replicate), self.scene
+        drawn, area = self.draw(rng), scene.box
+        if area is None:
+            covered = sum(shape.area for shape in drawn.shapes) / scene.area_fraction
+            width = math.sqrt(covered / scene.aspect)
+            area = width, covered / width
+        return drawn, area, place_at_random(drawn.shapes, area, rng, scene.repeats, scene.gap)
 
-    def periods(self, area: tuple[float, float]) -> tuple[float | None, float | None]:
-        """Width and height of a box [m], None along axes along which it does not repeat itself."""
-        width, height = area
-        periodic = self.scene.periodic
-        return width if "x" in periodic else None, height if "y" in periodic else None
+    def periods(self, area: tuple[float, float]) -> tuple[float, float]:
+        """Width and height of a box [m], inf along axes along which it does not repeat itself."""
+        width, height = np.where(self.scene.repeats, area, math.inf).tolist()
+        return width, height
 
     def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
         """(the Swarm of a replicate at its start, its bodies before, its box [m]).
@@ -288,9 +262,8 @@ class SwarmStudy(StudyKind):
         scene = self.scene
         if scene.leaving == KEEP:
             return None
-        repeats = "x" in scene.periodic, "y" in scene.periodic
         key = self.config.seed, replicate
-        return Leaving(scene.leaving, box, repeats, scene.floor, key, swarm.gauge())
+        return Leaving(scene.leaving, box, scene.repeats, scene.floor, key, swarm.gauge())
 
 
 def settling(system: System, body: Body) -> Body:
@@ -328,8 +301,7 @@ def trial_of(swarm: Swarm) -> int:
     (x, y), reach = free[0].position, sum(body.shape.bounding_radius for body in free)
     free[1:] = [attrs.evolve(body, position=(x, y + 1.001 * reach)) for body in free[1:]]
     bodies = [*free, *(body for body in swarm.bodies if body.fixed)]
-    box = tuple(None if np.isinf(side) else side for side in swarm.box)
-    few = Swarm(bodies, swarm.forces, swarm.integrator, swarm.fluid, box=box)
+    few = Swarm(bodies, swarm.forces, swarm.integrator, swarm.fluid, box=swarm.box)
     few.gauge().neighbours(few.system.motion()[0])
     progress = few.begin(TRIAL_SECONDS)
     while progress.advance(TRIAL_SECONDS) == Status.PAUSED:

@@ -7,8 +7,18 @@ import pytest
 
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
-from flocsim.bonds.bond import CERTIFICATE, HOOK, NO_BOND, REST, bond_between, energy_of
-from flocsim.bonds.certificate import CALM, SAFETY, attraction_at, is_held
+from flocsim.bonds.certificate import (
+    CALM,
+    CERTIFICATE,
+    HOOK,
+    NO_BOND,
+    REST,
+    SAFETY,
+    attraction_at,
+    bond_between,
+    energy_of,
+    is_held,
+)
 from flocsim.bonds.rest import FAR_LONGER, HANGING, NEST, STILL
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import make_encounter

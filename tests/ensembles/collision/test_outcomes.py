@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import work_of
-from flocsim.bonds.bond import NO_BOND, REST
+from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.encounter import make_encounter

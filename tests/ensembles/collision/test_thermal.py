@@ -8,7 +8,7 @@ from scipy.special import erfc, ive, kve
 
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
-from flocsim.bonds.bond import CERTIFICATE, NO_BOND, REST
+from flocsim.bonds.certificate import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import KICKED, OBSERVER, make_encounter

@@ -14,8 +14,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.swarms.checks import check_part
-from flocsim.ensembles.swarms.records import Left, Part, part_of
+from flocsim.ensembles.swarms.records import Left, Part, check_part, part_of
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError, UsageError
@@ -307,7 +306,7 @@ def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, m
         raise FileError("the disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(kind, "write_swarm", full)
+        patch.setattr(kind.swarm_file, "write_swarm", full)
         assert main(["swarm", str(path), "--quiet"]) == 74
     assert main(["swarm", str(path), "--quiet", "--resume"]) == 0
     assert read_swarm("swarm.h5").run["computed"] == 0

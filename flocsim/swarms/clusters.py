@@ -1,4 +1,4 @@
-"""Clusters of a swarm: which bodies hang together, how large, open and fast such clusters are."""
+"""Which bodies of a swarm are near each other at an instant, and the clusters that they make."""
 
 import functools
 import math
@@ -7,10 +7,64 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
+from flocsim.arrays import Scene, with_room, work_of
 from flocsim.body import Body
 from flocsim.compiler.composer import compose
+from flocsim.geometry.contact.body_pairs import list_near
+from flocsim.geometry.contact.near_pairs import gap_between
+from flocsim.geometry.contact.separation import separation
 from flocsim.hydrodynamics.clusters import mobilities
-from flocsim.swarms.together.contacts import Neighbours
+
+
+def measure_gaps(scene, work, within):
+    """List the pairs whose bounding circles are nearer than that: their gaps as budgets, and first
+    in ``along`` the ways from the earlier to the later body, by the nearest image [m]; False
+    without room."""
+    if not list_near(scene, work, within):
+        return False
+    for pair in range(work.tally[at.PAIRS]):
+        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        work.budget[pair] = gap_between(scene, work, a, b)
+        work.along[pair, 0], work.along[pair, 1] = separation(scene, work, at.NOW, a, b)
+    return True
+
+
+@attrs.frozen(eq=False)
+class Neighbours:
+    """Pairs of bodies, not both fixed, that are near each other: ``pairs`` (m, 2), the later one
+    first; ``gap`` (m,) [m] between their outlines, below 0 where they overlap; ``vector`` (m, 2)
+    [m] from the centroid of the earlier one to that of the later one's nearest image."""
+
+    pairs: np.ndarray
+    gap: np.ndarray
+    vector: np.ndarray
+
+    def among(self, chosen: np.ndarray) -> "Neighbours":
+        """Those pairs of which both bodies are ``chosen`` (n,) bool."""
+        both = chosen[self.pairs].all(axis=1)
+        return Neighbours(self.pairs[both], self.gap[both], self.vector[both])
+
+
+class Gauge:
+    """Measures the gaps of a scene's bodies, wherever they are."""
+
+    def __init__(self, scene: Scene, fillings: dict[Callable, Callable]) -> None:
+        self.scene = scene
+        geometry = {hook: fillings[hook] for hook in (gap_between, separation) if hook in fillings}
+        self.measure = compose(measure_gaps, geometry)
+        n = len(scene.bodies)
+        self.work = work_of(scene, np.zeros((n, 3)), np.zeros((n, 3)), 1, blocks=0, all_pairs=False)
+
+    def neighbours(self, position: np.ndarray, within: float = 0.0) -> Neighbours:
+        """The pairs nearer than a gap [m] where the bodies are at ``position`` (n, 3)."""
+        self.work.motion[at.NOW, :, :3] = position
+        while not self.measure(self.scene, self.work, within):
+            self.work = with_room(self.work)
+        gaps = self.work.budget[: self.work.tally[at.PAIRS]]
+        near = np.flatnonzero(gaps < within if within > 0.0 else gaps <= 0.0)
+        return Neighbours(self.work.pairs[near, :2], gaps[near], self.work.along[near, :2])
+
 
 ROUNDING = 1e-6
 """Ways round a cluster that differ by less than this share of its extent differ by rounding: the
@@ -55,10 +109,8 @@ def walk_together(pairs, vectors, first, other, way, labels, places, queue):
         clusters += 1
 
 
-@functools.cache
-def walk() -> Callable:
-    """The compiled function."""
-    return compose(walk_together, {}, what="the search for clusters")
+walk = functools.cache(lambda: compose(walk_together, {}, what="the search for clusters"))
+"""Makes the compiled function."""
 
 
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
@@ -123,8 +175,7 @@ class Clusters:
         free = np.array([not body.fixed for body in bodies])
         if present is not None:
             free = free & present
-        both = free[neighbours.pairs].all(axis=1)
-        held = Neighbours(neighbours.pairs[both], neighbours.gap[both], neighbours.vector[both])
+        held = neighbours.among(free)
         labels, places = placed_together(len(bodies), held)
         endless = percolating(held, labels, places)
         names, firsts, label = np.unique(labels[free], return_index=True, return_inverse=True)
@@ -237,10 +288,8 @@ def support_areas(starts, first, points, radii, x, y, angle, furthest, areas):
         areas[c] = 0.5 * area
 
 
-@functools.cache
-def supports() -> Callable:
-    """The compiled function."""
-    return compose(support_areas, {}, what="the hulls of clusters")
+supports = functools.cache(lambda: compose(support_areas, {}, what="the hulls of clusters"))
+"""Makes the compiled function."""
 
 
 def hull_areas(

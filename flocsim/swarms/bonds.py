@@ -20,16 +20,17 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.arrays import with_room, work_of
-from flocsim.bonds.bond import (
+from flocsim.bonds.certificate import (
     CERTIFICATE,
     NO_BOND,
     Load,
     bond_between,
     doublet_pose,
+    is_certain,
+    is_certain_in_kicks,
     radii_of,
     way_between,
 )
-from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
 from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
@@ -39,8 +40,7 @@ from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
 from flocsim.plausibility.settling import free_mobilities, least_mobility, terminal_motion
-from flocsim.swarms.together.clusters import placed_together
-from flocsim.swarms.together.contacts import Neighbours
+from flocsim.swarms.clusters import Neighbours, placed_together
 
 KINDS = ("touching", "certificate", "hook", "rest")
 """Kinds of bonds: those of pairs, and none that is proved."""
@@ -146,10 +146,9 @@ class BondGauge:
     ) -> Bonds:  # fmt: skip
         """The Bonds of the pairs that touch at ``motion`` (n, 6), or are handed over as near;
         ``before``: an earlier time and the motion then."""
-        both = self.free[touching.pairs].all(axis=1)
+        held = touching.among(self.free)
         on_wall = np.zeros(len(self.free), bool)
-        on_wall[touching.pairs[~both].ravel()] = True
-        held = Neighbours(touching.pairs[both], touching.gap[both], touching.vector[both])
+        on_wall[touching.pairs[~self.free[touching.pairs].all(axis=1)]] = True
         kinds = np.zeros(len(held.pairs), dtype=np.int64)
         if not len(held.pairs):
             return Bonds(held.pairs, kinds)

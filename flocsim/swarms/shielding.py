@@ -22,8 +22,7 @@ from flocsim.body import Body
 from flocsim.forces.base import Force
 from flocsim.forces.shape_drag import drag_radius, follows_shape
 from flocsim.hydrodynamics.clusters import mobilities
-from flocsim.swarms.together.clusters import placed_together
-from flocsim.swarms.together.contacts import Gauge, Neighbours
+from flocsim.swarms.clusters import Gauge, placed_together
 
 NEARLY = 0.01
 """Bodies count as touching up to this share of their mean r_eq: to the flow around both it is all
@@ -49,63 +48,51 @@ class Shielding:
         drag of its bodies."""
         free = known[:, at.FREE] == 1.0
         near = self.gauge.neighbours(position, self.nearly)
-        both = free[near.pairs].all(axis=1)
-        held = Neighbours(near.pairs[both], near.gap[both], near.vector[both])
-        label, places = placed_together(len(free), held)
+        label, places = placed_together(len(free), near.among(free))
         size = np.bincount(label)
-        on_wall = np.unique(label[near.pairs[~both]])
-        size[on_wall] = 1
+        size[label[near.pairs[~free[near.pairs].all(axis=1)]]] = 1  # on a wall
         known[:, at.SHIELDING : at.SHIELDING + 3] = at.UNSHIELDED
         members = np.flatnonzero((size[label] > 1) & free)
         if not len(members):
             return
         _, own_label = np.unique(label[members], return_inverse=True)
         resistance = self.resistances(known[members], position[members, 2], members)
-        found = mobilities(own_label, places[members], self.radii[members], inverses(resistance))
-        together = np.column_stack([np.bincount(own_label, axis) for axis in resistance.T])
-        shielding = between(together, inverses(found))
-        known[members, at.SHIELDING : at.SHIELDING + 3] = shielding[own_label]
+        own = packed(np.linalg.inv(resistance))
+        found = mobilities(own_label, places[members], self.radii[members], own)
+        together = np.zeros((len(found), 2, 2))
+        np.add.at(together, own_label, resistance)
+        shielding = between(together, np.linalg.inv(unpacked(found)))
+        known[members, at.SHIELDING : at.SHIELDING + 3] = packed(shielding)[own_label]
 
     def resistances(self, known: np.ndarray, angle: np.ndarray, members: np.ndarray) -> np.ndarray:
-        """(xx, xy, yy) (n, 3) of every one's drag alone, held from turning, over the viscosity."""
+        """(n, 2, 2) of every one's drag alone, held from turning, over the viscosity."""
         if not self.shaped:
-            drag = 6.0 * math.pi * self.radii[members]
-            return np.column_stack([drag, 0.0 * drag, drag])
-        xx, xy, yy = known[:, at.RESISTANCE : at.RESISTANCE + 3].T
+            return 6.0 * math.pi * self.radii[members, None, None] * np.eye(2)
         c, s = np.cos(angle), np.sin(angle)
-        return np.column_stack([
-            c * c * xx - 2.0 * c * s * xy + s * s * yy,
-            c * s * (xx - yy) + (c * c - s * s) * xy,
-            s * s * xx + 2.0 * c * s * xy + c * c * yy,
-        ])  # fmt: skip
+        turn = np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
+        own = unpacked(known[:, at.RESISTANCE : at.RESISTANCE + 3])
+        return turn @ own @ np.swapaxes(turn, 1, 2)
 
 
-def inverses(matrices: np.ndarray) -> np.ndarray:
-    """Of symmetric ones (xx, xy, yy) (n, 3)."""
-    xx, xy, yy = matrices.T
-    return np.column_stack([yy, -xy, xx]) / (xx * yy - xy * xy)[:, None]
+def unpacked(columns: np.ndarray) -> np.ndarray:
+    """Symmetric matrices (n, 2, 2) of their (xx, xy, yy) (n, 3)."""
+    return columns[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+
+
+def packed(matrices: np.ndarray) -> np.ndarray:
+    """The other way round."""
+    return matrices[:, [0, 0, 1], [0, 1, 1]]
 
 
 def between(together: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Q (n, 3) with Q K Q = R, of K ``together`` and R ``wanted``: K⁻½ (K½ R K½)½ K⁻½."""
+    """Q (n, 2, 2) with Q K Q = R, of K ``together`` and R ``wanted``: K⁻½ (K½ R K½)½ K⁻½."""
     outer = roots(together)
-    inner = roots(congruent(outer, wanted))
-    return congruent(inverses(outer), inner)
+    inverse = np.linalg.inv(outer)
+    return inverse @ roots(outer @ wanted @ outer) @ inverse
 
 
 def roots(matrices: np.ndarray) -> np.ndarray:
-    """Square roots of positive ones (n, 3): (M + √det 1)/√(tr M + 2 √det)."""
-    xx, xy, yy = matrices.T
-    root = np.sqrt(xx * yy - xy * xy)
-    return np.column_stack([xx + root, xy, yy + root]) / np.sqrt(xx + yy + 2.0 * root)[:, None]
-
-
-def congruent(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
-    """A B A (n, 3) of symmetric A ``outer`` and B ``inner``."""
-    a, b, c = outer.T
-    d, e, f = inner.T
-    return np.column_stack([
-        a * a * d + 2.0 * a * b * e + b * b * f,
-        a * b * d + (a * c + b * b) * e + b * c * f,
-        b * b * d + 2.0 * b * c * e + c * c * f,
-    ])  # fmt: skip
+    """Square roots of positive ones (n, 2, 2): (M + √det 1)/√(tr M + 2 √det)."""
+    root = np.sqrt(np.linalg.det(matrices))[:, None, None]
+    trace = np.trace(matrices, axis1=1, axis2=2)[:, None, None]
+    return (matrices + root * np.eye(2)) / np.sqrt(trace + 2.0 * root)

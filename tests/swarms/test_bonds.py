@@ -9,8 +9,7 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Body, Sphere, Swarm
 from flocsim.arrays import work_of
-from flocsim.bonds.bond import CERTIFICATE, HOOK, NO_BOND, REST
-from flocsim.bonds.certificate import CALM
+from flocsim.bonds.certificate import CALM, CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision.encounter import make_encounter
@@ -20,7 +19,7 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators.events.modes import set_modes
-from flocsim.swarms.together.bonds import BondGauge, alone
+from flocsim.swarms.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R

@@ -1,1 +1,0 @@
-"""What hangs together in a swarm: gaps, clusters, and what holds them."""
