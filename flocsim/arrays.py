@@ -613,7 +613,7 @@ class Scene(NamedTuple):
     centre_reach: float  # the same of centre forces [m]
     outlines: tuple[float, float, float, float]  # of forces between outlines: forces.outline
     layer: tuple[float, float, float]  # of the charges' double layers: forces.outline
-    smoothing: tuple[float, float, float]  # see flocsim.forces.smoothing
+    smoothing: tuple[float, float, float]  # see flocsim.forces.outline
     events: int  # how many the contact forces have
     box: tuple[float, float]  # periods along x and y [m]; inf: nothing repeats
     kicks: tuple[float, float, float, float]  # how long random forces stay: integrators.loop.kicks

@@ -298,7 +298,7 @@ def scene_of(
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it
     (flocsim.forces.codegen.Pieces); without, a scene that has no laws. ``resistances``: of every
-    body, where a drag follows their shapes (flocsim.forces.shape_drag);
+    body, where a drag follows their shapes (flocsim.forces.drag);
     ``water_between``: Scene.pair_table and Scene.water (flocsim.forces.pair_resistance)."""
     shapes = [body.shape for body in bodies]
     columns: tuple[list[float], ...] = (

@@ -21,7 +21,6 @@ from flocsim.forces.check import (
     fields_read,
     kernel_arguments,
     results,
-    sample_pairs,
 )
 from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
@@ -139,7 +138,7 @@ def no_partner(system):
 
 
 def body_derivative(system, force):
-    reads = fields_read(force, system.fluid, force.kernel_in(system.fluid), SAMPLE_BODIES)
+    reads = fields_read(force, system.fluid, force.kernel_in(system.fluid))
     known = (("velocity", VELOCITIES), ("position", PLACES))
     by = [name for name, fields in known if reads & fields]
     if not by:
@@ -150,8 +149,7 @@ def body_derivative(system, force):
 def pair_derivative(system, force):
     if force.acts_on in ASK_FOR_BOTH:
         return "derivatives from differences of its sum"
-    samples = sample_pairs(force.reach)
-    damped = "gap_rate" in fields_read(force, system.fluid, force.kernel, samples)
+    damped = "gap_rate" in fields_read(force, system.fluid, force.kernel)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
     rate = ", by the gap's rate from differences" if damped else ""
     return f"derivative by the gap {slope}{rate}"

@@ -24,7 +24,7 @@ from flocsim.arrays import (
     PlainBodyView,
 )
 from flocsim.compiler.composer import compile_law
-from flocsim.compiler.constants import Intrinsic
+from flocsim.compiler.fingerprint import Intrinsic
 from flocsim.hooks import hook
 
 LAWS = (

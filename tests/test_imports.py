@@ -45,8 +45,8 @@ INNER_ROWS = {
     "compiler": [
         ["composer"],
         ["units"],
-        ["fingerprint", "interpreter_calls"],
-        ["constants", "numba_internals", "linker"],
+        ["fingerprint", "refused"],
+        ["numba_internals", "linker"],
         ["by_pointer", "disk_cache", "object_code", "reads", "waiting"],
         ["processor"],
     ],
@@ -60,7 +60,7 @@ INNER_ROWS = {
         ["arrays", "methods"],
     ],
     "brownian": [["meeting"], ["splitting"]],
-    "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "lone_body"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

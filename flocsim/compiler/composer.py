@@ -30,9 +30,9 @@ from flocsim.compiler.by_pointer import (
     words_in,
 )
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import function_at
+from flocsim.compiler.refused import refuse_interpreter
 from flocsim.compiler.units import Code, argument_names, options_text
 
 _composed: dict = {}

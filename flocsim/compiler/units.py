@@ -26,8 +26,7 @@ from typing import Any, NamedTuple
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import types_within
-from flocsim.compiler.constants import Intrinsic
-from flocsim.compiler.fingerprint import hashed, tell
+from flocsim.compiler.fingerprint import Intrinsic, hashed, tell
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import Called, ObjectCode, link
 from flocsim.compiler.processor import compiled_for, numba_settings

@@ -10,7 +10,7 @@ from flocsim.body import Body
 from flocsim.compiler.reads import where
 from flocsim.errors import UsageError
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.shape_drag import (
+from flocsim.forces.drag import (
     body_resistance,
     follows_shape,
     resistance_matrices,
