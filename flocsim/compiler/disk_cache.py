@@ -61,16 +61,6 @@ def cache_path() -> Path:
     return Path(named) if named else own_folder()
 
 
-def owner_name(number: int) -> str:
-    """A user in words, "alice" or "user 1234"."""
-    import pwd
-
-    try:
-        return pwd.getpwuid(number).pw_name
-    except KeyError:
-        return f"user {number}"
-
-
 def home_folder() -> Path | None:
     """The user's home: who can exchange that can do anything, so that no folder above matters."""
     import pwd
@@ -100,8 +90,12 @@ def why_unsafe(folder: Path) -> str:
         with contextlib.suppress(OSError):  # what cannot be seen cannot be loaded either
             found = os.lstat(each)
             if not is_ours(found):
+                try:
+                    owner = each.owner()
+                except KeyError:
+                    owner = f"user {found.st_uid}"
                 return (
-                    f"{each} belongs to {owner_name(found.st_uid)}, not to you or root: "
+                    f"{each} belongs to {owner}, not to you or root: "
                     "set FLOCSIM_CACHE to a folder of your own"
                 )
             sticky = each != folder and found.st_mode & stat.S_ISVTX
@@ -211,15 +205,15 @@ def write(name: str, key: str, data: bytes) -> None:
         try:
             make_folder(folder)
             if reason := why_unsafe(folder):
-                return warn_once(f"no compiled code is kept: {reason}")
-            replace(folder / file_name(name, key), MARK + digest(name, key, data) + data)
+                warn_once(f"no compiled code is kept: {reason}")
+            else:
+                replace(folder / file_name(name, key), MARK + digest(name, key, data) + data)
         except OSError as error:
             warn_once(
                 f"no compiled code is kept: the cache folder {folder} cannot be written "
                 f"({error.strerror}); set FLOCSIM_CACHE to one that can"
             )
-        return None
-    return None
+        return
 
 
 def kept(name: str, key: str, make: Callable[[], bytes]) -> bytes:

@@ -83,7 +83,13 @@ class Code:
         if (data := disk_cache.read(self.name, key)) is not None:
             # What fails was written by this code, and yet is of no use: it is compiled anew.
             with contextlib.suppress(Exception):
-                return from_files(data)
+                head, packed = data.split(b"\n", 1)
+                code = ObjectCode.unpacked(packed)
+                units = {
+                    symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
+                    for symbol, file in json.loads(head).items()
+                }
+                return link(code, units), code.returned
         build = Build(self, whole)
         code = build.entry(*typed(), disk_cache.read(self.name, begun) if whole else None)
         if build.lasts:
@@ -95,17 +101,6 @@ class Code:
 def key_of(told, function):
     """What the machine code of a function depends on beside the name: types, processor."""
     return repr((told, compiled_for(hasattr(function, "loops"))))
-
-
-def from_files(data):
-    """(address, what it returns) of an engine as the disk has it, of units that it has, too."""
-    head, packed = data.split(b"\n", 1)
-    code = ObjectCode.unpacked(packed)
-    units = {
-        symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
-        for symbol, file in json.loads(head).items()
-    }
-    return link(code, units), code.returned
 
 
 class Build:
@@ -134,6 +129,8 @@ class Build:
     def entry(self, signature, readers, known, begun=None):
         """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
         be compiled. ``begun``: of the engine without what is postponed, as the disk has it."""
+        from numba import NumbaError
+
         from flocsim.compiler import numba_internals as internals
 
         if text := lacking(COMPILING, "compiling"):
@@ -146,7 +143,7 @@ class Build:
                 self.known |= known
                 found = self.completed(code.entry, begun.split(b"\n", 1)[1]) if begun else None
                 return found or self.compiled(code.entry, code.name, signature, readers)
-        except internals.compiler_error() as error:
+        except NumbaError as error:
             raise KernelError(compiler_complaint(str(error))) from None
         finally:
             internals.forget(self.parts)
@@ -170,7 +167,8 @@ class Build:
 
         def unit_for(given):
             symbol, unit = self.unit(function, given)
-            self.calls[symbol] = Called(symbol, function.apart, told_types(given), unit.returned)
+            types = list(map(str, given))
+            self.calls[symbol] = Called(symbol, function.apart, types, unit.returned)
             return symbol, unit.returned
 
         return internals.call_of_unit(argument_names(function), unit_for)
@@ -197,8 +195,9 @@ class Build:
     def unit(self, function, given):
         """(symbol, ObjectCode) of a function marked @apart for arguments of such numba types."""
         self.known |= types_within(given)
-        told = told_types(given)
-        symbol = symbol_of(function.apart, told)
+        told = list(map(str, given))
+        words = " ".join([function.apart, *told])
+        symbol = f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
         function = made_of(function, self.whole)
         if symbol not in self.units:
             name, key = unit_of(function).name, key_of(told, function)
@@ -222,17 +221,6 @@ class Build:
             if self.unit(calls[each.function], given)[1].returned != each.returned:
                 return None
         return code
-
-
-def told_types(given):
-    """numba types in words."""
-    return [str(each) for each in given]
-
-
-def symbol_of(function, told):
-    """By what name a unit is called: that of its function, for arguments of such types."""
-    words = " ".join([function, *told])
-    return f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
 
 
 class Unit(NamedTuple):
