@@ -596,7 +596,7 @@ class Scene(NamedTuple):
 
     bodies: Annotated[np.ndarray, ("n", SCENE_BODY_COLUMNS)]  # see MASS
     first: np.ndarray  # (n + 1,): where a body's core points begin
-    vertices: np.ndarray  # (points, 2 or more): geometry.contact.circle_tree.Outlines
+    vertices: np.ndarray  # (points, 2 or more): geometry.contact.compounds.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
     pieces: Annotated[
         np.ndarray, ("pieces", PIECE_COLUMNS)

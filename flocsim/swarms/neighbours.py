@@ -2,16 +2,15 @@
 
 Each body is expected to go straight on, and allowed to stray from that path by so much
 (``wander``): discs of its bounding radius, that way, and half of what acts reaches, which move
-along their paths (sweep.py). Where two of them meet, the bodies are of one island. Fixed bodies do
-not pass on what acts on them: each is a part of all islands that can reach it.
+along their paths (geometry.contact.body_pairs). Where two of them meet, the bodies are of one
+island. Fixed bodies do not pass on what acts on them: each is a part of all islands that can reach
+it.
 """
 
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.compounds import ONWARD, SWELL
-from flocsim.geometry.contact.separation import nearest_way
-from flocsim.geometry.contact.sweep import (
+from flocsim.geometry.contact.body_pairs import (
     MOVES,
     PLACE_X,
     PLACE_Y,
@@ -20,6 +19,8 @@ from flocsim.geometry.contact.sweep import (
     WAY_Y,
     near_pairs,
 )
+from flocsim.geometry.contact.compounds import ONWARD, SWELL
+from flocsim.geometry.contact.separation import nearest_way
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.radau.contact_frames import unite
 

@@ -102,11 +102,11 @@ def posed(pose, x, y):
     return c * x - s * y + shift_x, s * x + c * y + shift_y
 
 
-def circle_reach(tree, pose, row, other):
-    """(squared distance of centres, sum of radii) of two circles, rows of the tree."""
-    x, y = posed(pose, tree[row, CIRCLE_X], tree[row, CIRCLE_Y])
-    dx, dy = x - tree[other, CIRCLE_X], y - tree[other, CIRCLE_Y]
-    return dx * dx + dy * dy, tree[row, CIRCLE_RADIUS] + tree[other, CIRCLE_RADIUS]
+def edge_distance2(vertices, x, y, start, end):
+    """Squared distance of a point from the edge between two core points [m²]."""
+    return segment_distance2(
+        x, y, vertices[start, at.X], vertices[start, at.Y], vertices[end, at.X], vertices[end, at.Y]
+    )
 
 
 def plan_of(tree, side_a, side_b):
@@ -130,9 +130,13 @@ def goes_on(walk):
 
 
 def circles_met(tree, pose, plan, walk):
+    """(squared distance of centres, sum of radii) of the circles of the two nodes."""
     i, j, _, _ = walk
     row_a, row_b, _, _, _, _ = plan
-    return circle_reach(tree, pose, row_a + i, row_b + j)
+    one, other = row_a + i, row_b + j
+    x, y = posed(pose, tree[one, CIRCLE_X], tree[one, CIRCLE_Y])
+    dx, dy = x - tree[other, CIRCLE_X], y - tree[other, CIRCLE_Y]
+    return dx * dx + dy * dy, tree[one, CIRCLE_RADIUS] + tree[other, CIRCLE_RADIUS]
 
 
 def within(tree, pose, plan, walk, distance):
@@ -188,15 +192,7 @@ def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
         x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
-            distance2 = segment_distance2(
-                x,
-                y,
-                vertices[start, at.X],
-                vertices[start, at.Y],
-                vertices[end, at.X],
-                vertices[end, at.Y],
-            )
-            least2 = min(least2, distance2)
+            least2 = min(least2, edge_distance2(vertices, x, y, start, end))
     return min(least, math.sqrt(least2))
 
 

@@ -4,13 +4,16 @@ Both trees of circles are walked against each other (see circle_tree.py), in the
 """
 
 import math
+from collections.abc import Callable
 
 import flocsim.arrays as at
+from flocsim.geometry.contact import points
 from flocsim.geometry.contact.circle_tree import (
     START,
     at_leaves,
     core_distance,
     descended,
+    edge_distance2,
     goes_on,
     passed,
     plan_of,
@@ -21,7 +24,7 @@ from flocsim.geometry.contact.circle_tree import (
     within,
 )
 from flocsim.geometry.contact.separation import length_of, separation
-from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import edge_count, edge_end
 from flocsim.hooks import hook
 
 
@@ -39,14 +42,11 @@ def add_pair(work, pair, a, point, b, start, end):
     if row == work.candidates.shape[0]:
         work.tally[at.FULL] = at.CANDIDATES_FULL
         return False
-    work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.VERTEX] = a, point
-    (
-        work.candidates[row, at.EDGE_BODY],
-        work.candidates[row, at.EDGE_START],
-        work.candidates[row, at.EDGE_END],
-    ) = b, start, end
-    work.candidates[row, at.CLOSED], work.candidates[row, at.NEAR] = 0, 0
-    work.candidates[row, at.SLIDING], work.candidates[row, at.PAIR] = 0, pair
+    new = work.candidates
+    new[row, at.VERTEX_BODY], new[row, at.VERTEX] = a, point
+    new[row, at.EDGE_BODY], new[row, at.EDGE_START], new[row, at.EDGE_END] = b, start, end
+    new[row, at.CLOSED], new[row, at.NEAR] = 0, 0
+    new[row, at.SLIDING], new[row, at.PAIR] = 0, pair
     work.tally[at.CANDIDATES] = row + 1
     return True
 
@@ -64,15 +64,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
         x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
-            distance2 = segment_distance2(
-                x,
-                y,
-                vertices[start, at.X],
-                vertices[start, at.Y],
-                vertices[end, at.X],
-                vertices[end, at.Y],
-            )
-            if distance2 < reach * reach:
+            if edge_distance2(vertices, x, y, start, end) < reach * reach:
                 room = add_pair(work, pair, a, point, b, start, end) and room
     return room
 
@@ -125,3 +117,17 @@ def gap_between(scene, work, a, b):
     """The distance between two outlines now [m], negative where they overlap."""
     contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
     return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact
+
+
+def turn_nothing(work, state, body):
+    """Spheres look the same at every angle."""
+
+
+SPHERES_ONLY: dict[Callable, Callable] = {
+    points.turn_body: turn_nothing,
+    list_polygons: list_spheres,
+    gap_between: sphere_gap,
+    points.locate_polygons: points.locate_spheres,
+}
+"""What replaces the polygon code in a scene of spheres, for flocsim.compiler.composer.compose: one
+pair per two bodies."""

@@ -26,8 +26,8 @@ from flocsim.geometry.contact.circle_tree import (
     side_of,
     tree_of,
 )
+from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
-from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.cores import edges_of, from_edges
 from tests.helpers.tiers import given_often
 
