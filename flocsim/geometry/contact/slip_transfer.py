@@ -83,11 +83,8 @@ def rolls_on_to(scene, work, row, other):
     """Whether a pair of features of the same two bodies neighbours another, either way round."""
     pairs = work.candidates
     point, start, end = pairs[row, at.VERTEX], pairs[row, at.EDGE_START], pairs[row, at.EDGE_END]
-    on, first, last = (
-        pairs[other, at.VERTEX],
-        pairs[other, at.EDGE_START],
-        pairs[other, at.EDGE_END],
-    )
+    on = pairs[other, at.VERTEX]
+    first, last = pairs[other, at.EDGE_START], pairs[other, at.EDGE_END]
     if pairs[row, at.VERTEX_BODY] == pairs[other, at.VERTEX_BODY]:
         near = same_corner(scene, pairs[row, at.VERTEX_BODY], point, on)
         return near and (start in (first, last) or end in (first, last))
@@ -141,11 +138,8 @@ def hand_over(scene, work):
     """
     for row in range(work.tally[at.CANDIDATES]):
         opened = work.geometry[at.NOW, row, at.GAP] >= 0.0
-        if (
-            work.slip[at.NOW, row] != 0.0
-            and opened
-            and work.candidates[row, at.CLOSED] != at.GRAZES
-        ):
+        grazes = work.candidates[row, at.CLOSED] == at.GRAZES
+        if work.slip[at.NOW, row] != 0.0 and opened and not grazes:
             heir = heir_of(scene, work, row)
             if heir >= 0:
                 own, given = work.slip[at.NOW, heir], work.slip[at.NOW, row]

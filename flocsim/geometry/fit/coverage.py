@@ -7,7 +7,7 @@ counts are kept per pixel, so that a moved vertex needs only its two edges recou
 Kernels are plain Python on scalars and arrays; ``compiled`` makes them fast.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -95,10 +95,20 @@ def crossed_and_near(
     return odd, near > 0
 
 
-def covered(shape: tuple[int, int], vertices: np.ndarray, radius: float) -> np.ndarray:
-    """The pixels (h, w) bool whose centres the swept polygon covers."""
-    odd, near = crossed_and_near(shape, vertices, radius)
-    return odd | near
+def wrong_pixels(mask: np.ndarray, rings: Sequence[np.ndarray], radius: float) -> tuple[int, int]:
+    """(V, pixels covered outside of the mask) of a shape of several rings [px], y up, on an array
+    that all of it fits in."""
+    points = np.concatenate(rings) * (1.0, -1.0)
+    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
+    margin = max(0, int(np.ceil(beyond.max() + radius))) + 2
+    around = np.pad(mask, margin)
+    inside, close = np.zeros(around.shape, bool), np.zeros(around.shape, bool)
+    for ring in rings:
+        odd, near = crossed_and_near(around.shape, ring * (1.0, -1.0) + margin, radius)
+        inside ^= odd
+        close |= near
+    solid = inside | close
+    return int(np.count_nonzero(solid != around)), int(np.count_nonzero(solid & ~around))
 
 
 def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int]:

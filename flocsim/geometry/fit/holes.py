@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.geometry.fit.coverage import compiled, crossed_and_near
-from flocsim.geometry.fit.search import COARSE, DIRECTIONS, FINE, hole_search
+from flocsim.geometry.fit.coverage import crossed_and_near
+from flocsim.geometry.fit.search import COARSE, FINE, searched
 from flocsim.geometry.fit.simple import is_simple
-from flocsim.geometry.fit.starts import even_points, telling_points, trace_outline
+from flocsim.geometry.fit.starts import telling_points, trace_outline
 from flocsim.geometry.shapes.outline import simplicity_fault
 
 FEWEST_PIXELS = 9
@@ -75,12 +75,15 @@ def hole_ring(
             continue
         trials = [ring]
         if search:
-            trials.insert(0, searched_hole(~inside, ring, radius, weights))
+            steps = np.append(COARSE[2:], FINE[1:])
+            trials.insert(0, searched(~inside, ring, radius, steps, weights, hole=True)[0])
         for trial in trials:
             placed = (trial - margin) * (1.0, -1.0)
             if simplicity_fault(rings[0], [*rings[1:], placed]) is not None:
                 continue
-            wrong, outside = wrong_in_hole(~inside, trial, radius)
+            crossed, near = crossed_and_near(inside.shape, trial, radius)
+            solid = ~crossed | near
+            wrong, outside = np.count_nonzero(solid == inside), np.any(solid & inside)
             if wrong < least and not (weights[1] and outside):
                 best, least = placed, wrong
         if best is not None:
@@ -92,41 +95,4 @@ def ring_around(inside: np.ndarray, count: int, reach: float) -> np.ndarray:
     """``count`` points that tell most of what lies within a reach [px] of a hole's pixels."""
     from scipy.ndimage import distance_transform_edt
 
-    wide = distance_transform_edt(~inside) <= reach
-    outline = trace_outline(wide)
-    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    return telling_points(points, count)
-
-
-def searched_hole(
-    mask: np.ndarray, ring: np.ndarray, radius: float, weights: tuple[int, int]
-) -> np.ndarray:
-    """The ring around a hole after the search for the least V; ``mask``: all but the hole."""
-    vertices, active = np.array(ring), np.ones(len(ring), bool)
-    steps = np.append(COARSE[2:], FINE[1:])
-    compiled(hole_search)(mask, vertices, radius, DIRECTIONS, steps, active, weights)
-    return vertices
-
-
-def wrong_in_hole(mask: np.ndarray, ring: np.ndarray, radius: float) -> tuple[int, int]:
-    """(V, pixels covered outside of the mask) around one hole; ``mask``: all but the hole."""
-    inside, near = crossed_and_near(mask.shape, ring, radius)
-    solid = ~inside | near
-    return int(np.count_nonzero(solid != mask)), int(np.count_nonzero(solid & ~mask))
-
-
-def wrong_with_holes(
-    mask: np.ndarray, rings: Sequence[np.ndarray], radius: float
-) -> tuple[int, int]:
-    """(V, pixels covered outside of the mask) of a shape of several rings [px], y up."""
-    points = np.concatenate(rings) * (1.0, -1.0)
-    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
-    margin = max(0, int(np.ceil(beyond.max() + radius))) + 2
-    around = np.pad(mask, margin)
-    inside, close = np.zeros(around.shape, bool), np.zeros(around.shape, bool)
-    for ring in rings:
-        odd, near = crossed_and_near(around.shape, ring * (1.0, -1.0) + margin, radius)
-        inside ^= odd
-        close |= near
-    solid = inside | close
-    return int(np.count_nonzero(solid != around)), int(np.count_nonzero(solid & ~around))
+    return telling_points(trace_outline(distance_transform_edt(~inside) <= reach), count)
