@@ -83,7 +83,7 @@ def hole_ring(
                 continue
             crossed, near = crossed_and_near(inside.shape, trial, radius)
             solid = ~crossed | near
-            wrong, outside = np.count_nonzero(solid == inside), np.any(solid & inside)
+            wrong, outside = int(np.count_nonzero(solid == inside)), np.any(solid & inside)
             if wrong < least and not (weights[1] and outside):
                 best, least = placed, wrong
         if best is not None:

@@ -13,7 +13,6 @@ from flocsim.errors import ImageError
 from flocsim.io.images.outlines import EIGHT, Outline, filled, pieces
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.reading import (
-    MOST_LABELS,
     MOST_PIXELS,
     SUFFIXES,
     check_array,
@@ -21,6 +20,7 @@ from flocsim.io.images.reading import (
     check_file,
     check_shape,
     check_spread,
+    one_line,
     read_array,
     read_pixels,
 )
@@ -29,6 +29,8 @@ from flocsim.io.images.regions import NAN, Filters, sorted_out
 ARRAYS = (".npy", ".npz")
 MOST_BYTES = 8 * MOST_PIXELS
 """Of all masks of a file."""
+
+MOST_LABELS = 100_000
 
 PLAIN_INSIDE = (1, 255, 65535)
 """What alone beside 0 means "inside", not one floc of that number."""
@@ -90,7 +92,7 @@ def _arrays(path):
     except ImageError:
         raise
     except Exception as problem:
-        reason = " ".join(str(problem).split())[:120] or type(problem).__name__
+        reason = one_line(problem)
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
 
 

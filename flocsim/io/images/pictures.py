@@ -5,7 +5,6 @@ import numpy as np
 
 from flocsim.errors import ImageError
 from flocsim.io.images.background import (
-    light_surface,
     low_pass,
     robust_deviation,
     sampled,
@@ -179,7 +178,7 @@ def _contrast(grey, smooth, light, flocs, noise_scale):
     if flocs == "bright":
         smooth -= smooth_surface(smooth, DEGREE) if light is None else light
         return smooth, left_over * robust_deviation(fine)
-    light = light_surface(smooth, DEGREE) if light is None else light
+    light = smooth_surface(smooth, DEGREE, logarithmic=True) if light is None else light
     floor = max(UNLIT * light.max(), np.finfo(float).tiny)
     np.maximum(light, floor, out=light)
     smooth /= light
