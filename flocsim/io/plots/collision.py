@@ -342,14 +342,8 @@ def rings_path(rings):
     """The rings of a body as one path, in which those of holes stay open."""
     from matplotlib.path import Path as Outline
 
-    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in closed(rings)))
-
-
-def closed(rings):
-    """The rings, each with its first point again at its end."""
-    for ring in rings:
-        ring = np.asarray(ring)
-        yield ring if np.array_equal(ring[0], ring[-1]) else np.concatenate([ring, ring[:1]])
+    ends = [ring if np.array_equal(ring[0], ring[-1]) else [*ring, ring[0]] for ring in rings]
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in ends))
 
 
 def frame_axes(axes, centre, half):

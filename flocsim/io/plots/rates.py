@@ -10,11 +10,11 @@ import numpy as np
 
 from flocsim.io.plots.results import panel_grid
 from flocsim.io.plots.style import (
-    MARKERS,
     Figure,
     add_line_legend,
     drawing,
     graded_colours,
+    marker,
     note,
     plain,
     set_log_axis,
@@ -89,7 +89,7 @@ def draw_line(axes, kernel, name, place, colour):
     known = np.isfinite(value)
     left_open = ~known & np.isfinite(high)
     axes.vlines(ratio[left_open], low[left_open], high[left_open], color=colour, linestyle=":")
-    style = {"color": colour, "marker": MARKERS[v % len(MARKERS)]}
+    style = {"color": colour, "marker": marker(v)}
     if kernel.vertices[v] == 1:
         style |= {"linestyle": ":", "markerfacecolor": "white"}
     axes.errorbar(
@@ -106,7 +106,7 @@ def legend(axes, kernel, colours):
     for v, count in enumerate(kernel.vertices):
         word = "spheres" if count == 1 else f"N = {count}"
         hollow = {"linestyle": ":", "markerfacecolor": "white"} if count == 1 else {}
-        axes.plot([], [], color="0.3", marker=MARKERS[v % len(MARKERS)], label=word, **hollow)
+        axes.plot([], [], color="0.3", marker=marker(v), label=word, **hollow)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
@@ -143,7 +143,7 @@ def over_rate(found: Strengths) -> Figure:
                 any_opened += len(rates)
                 if len(rates):
                     axes.plot(rates, shares, drawstyle="steps-post", color=colours[place],
-                              marker=MARKERS[place % len(MARKERS)], markersize=3)  # fmt: skip
+                              marker=marker(place), markersize=3)  # fmt: skip
             axes.set(ylim=(0.0, 1.04), xscale="log")
             if not any_opened:
                 note(axes, "no bond opened")
