@@ -101,6 +101,12 @@ def compose(
     return _composed[key]
 
 
+@functools.cache
+def compiled(entry: Callable, *, allocates: bool = False, what: str = "its kernels") -> Callable:
+    """The same of a function without hooks, looked at once: what it reaches is what it was then."""
+    return compose(entry, {}, allocates=allocates, what=what)
+
+
 def is_on_disk(driver: Any) -> bool:
     """Whether a composed driver has been compiled on this machine, for some types of arguments."""
     return disk_cache.has(driver.code.name)

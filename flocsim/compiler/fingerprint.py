@@ -17,6 +17,8 @@ import types
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flocsim.compiler.processor import compilers, numba_settings
 from flocsim.compiler.reads import (
     chains,
@@ -63,18 +65,12 @@ def told(value: Any) -> str:
         return f"{value.name} of {told_class(type(value))}"
     if is_named_tuple(type(value)):
         return f"{told_class(type(value))}({', '.join(map(told, value))})"
-    line = told_number(value) or told_by_name(value) or told_of_numba(value)
+    if isinstance(value, np.number | np.bool_):
+        return f"{value.dtype.str} {value.tobytes().hex()}"
+    line = told_by_name(value) or told_of_numba(value)
     if line is None:
         raise Untold(complaint(value))
     return line
-
-
-def told_number(value):
-    """The line of a number of numpy's; None for anything else."""
-    numpy = sys.modules.get("numpy")
-    if numpy is None or not isinstance(value, (numpy.number, numpy.bool_)):
-        return None
-    return f"{value.dtype.str} {value.tobytes().hex()}"
 
 
 def is_named_tuple(kind):

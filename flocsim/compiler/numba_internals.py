@@ -309,17 +309,6 @@ ANNOTATIONS = "AnnotateTypes"
 """The pass that keeps all that numba thought of a function, to be looked at."""
 
 
-def is_plain(state: Any) -> bool:
-    """Whether a function that numba compiles allocates no arrays and defines no other inside."""
-    code = state.func_id.code
-    return not state.flags.nrt and not any(hasattr(each, "co_code") for each in code.co_consts)
-
-
-def calls_python(library: Any) -> bool:
-    """Whether a library's own code takes the interpreter's lock, or makes Python objects."""
-    return any(each.name.startswith(PYTHON_CALLS) for each in library._final_module.functions)
-
-
 @functools.cache
 def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """{option: value} of numba.njit for functions that are only linked into others, for one that is
@@ -344,7 +333,11 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
                 name = state.func_id.func_qualname
                 state.library = library_class(state.targetctx.codegen(), name)
                 changed = super().run_pass(state)
-                if library_class is linked and calls_python(state.library):
+                made = state.library._final_module.functions
+                # Whether it takes the interpreter's lock, or makes Python objects.
+                if library_class is linked and any(
+                    each.name.startswith(PYTHON_CALLS) for each in made
+                ):
                     raise UnsupportedError(
                         "it calls Python while it runs, or raises an exception with numbers in it",
                         state.func_ir.loc,
@@ -355,12 +348,17 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
             """numba's usual passes with another last one."""
 
             def define_pipelines(self):
+                code = self.state.func_id.code
+                # It allocates no arrays and defines no other function inside.
+                is_plain = not self.state.flags.nrt and not any(
+                    hasattr(each, "co_code") for each in code.co_consts
+                )
                 passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
                 passes.passes = [
                     (Lowering if each is NativeLowering else each, what)
                     for each, what in passes.passes
                     if each.__name__ != ANNOTATIONS
-                    and not (each.__name__ in NEEDLESS_PASSES and is_plain(self.state))
+                    and not (each.__name__ in NEEDLESS_PASSES and is_plain)
                 ]
                 passes.finalize()
                 return [passes]

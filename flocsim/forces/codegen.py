@@ -219,26 +219,25 @@ def write_body_laws(source, forces):
 
 
 def write_pair_laws(source, forces, kind):
-    force_terms, slope_terms, damping_terms = [], [], []
+    """The sum of pair forces, and its derivatives by the gap and, negative, by the gap's rate."""
+    sums, derivatives = [], []
     for force in forces:
         condition = f"pair.gap < {source.value(reach_of(force))}"
         call = source.call(force, force.kernel, "pair")
-        force_terms.append((condition, call))
+        sums.append((condition, call))
         if force.slope is None:
             slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
         else:
             slope = source.call(force, force.slope, "pair")
-        slope_terms.append((condition, slope))
+        damping = "0.0"
         if "gap_rate" in fields_read(force, source.fluid, force.kernel):
             change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
-            damping_terms.append((condition, f"-({change})"))
+            damping = f"-({change})"
+        derivatives.append((condition, f"{slope}, {damping}"))
     if forces:
         source.functions += [
-            sum_function(f"{kind}_force", "pair", force_terms, 1),
-            sum_function(f"{kind}_slope", "pair", slope_terms, 1),
-            sum_function(f"{kind}_damping", "pair", damping_terms, 1),
-            f"def {kind}_derivatives(pair, parameters):\n"
-            f"    return {kind}_slope(pair, parameters), {kind}_damping(pair, parameters)\n",
+            sum_function(f"{kind}_force", "pair", sums, 1),
+            sum_function(f"{kind}_derivatives", "pair", derivatives, 2),
         ]
 
 
@@ -263,7 +262,7 @@ def write_contact_laws(source, forces):
             limits.append(source.call(force, force.slip_limit, view))
         if force.has_events:
             call = source.call(force, force.events, view)
-            events.append((event_count(force, source.fluid), call))
+            events += [f"{call}[{k}]" for k in range(event_count(force, source.fluid))]
     if terms:
         source.functions.append(sum_function("contact_force", "contact", terms, 2))
         fields = ("overlap", "overlap_rate", "slip", "slip_rate")
@@ -274,18 +273,11 @@ def write_contact_laws(source, forces):
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
         source.functions.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
     if events:
-        source.functions.append(event_text(events))
-    return sum(count for count, _ in events)
-
-
-def event_text(events):
-    """Source of the function that gives the event of a number, those of all forces in a row."""
-    lines, first = ["def contact_event(contact, parameters, which):"], 0
-    for count, call in events:
-        for each in range(count):
-            lines += [f"    if which == {first + each}:", f"        return {call}[{each}]"]
-        first += count
-    return "\n".join([*lines, "    return 1.0"]) + "\n"
+        lines = ["def contact_event(contact, parameters, which):"]
+        for number, event in enumerate(events):
+            lines += [f"    if which == {number}:", f"        return {event}"]
+        source.functions.append("\n".join([*lines, "    return 1.0"]) + "\n")
+    return len(events)
 
 
 def sort_forces(pieces, forces, fluid):

@@ -245,10 +245,6 @@ class DoubleLayer(PairForce):
     def kernel_in(self, fluid: Fluid) -> Callable:
         return DoubleLayer.pressure if self.law == "outline" else self.kernel
 
-    def without_charges(self) -> "DoubleLayer":
-        """What is a pressure of it where superposition is between charges (forces/outline.py)."""
-        return BesideCharges(**attrs.asdict(self, recurse=False))
-
     @staticmethod
     def pressure(point, parts, kappa, closest):
         """Of plates [Pa], in powers of exp(−κd), which do not overflow."""
@@ -275,7 +271,7 @@ class DoubleLayer(PairForce):
 
 @attrs.frozen
 class BesideCharges(DoubleLayer):
-    """A double layer less what superposition makes of it."""
+    """A double layer less what superposition makes of it, which is between charges."""
 
     @property
     def parts(self) -> tuple[float, float, float]:

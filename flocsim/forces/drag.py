@@ -55,11 +55,6 @@ def reynolds_number(speed: float, radius: float, viscosity: float, density: floa
     return 2.0 * radius * density * speed / viscosity
 
 
-def inertial_factor(reynolds):
-    """1 + 0.15 Re^0.687: how many times Stokes's drag a sphere has (Schiller and Naumann)."""
-    return 1.0 + 0.15 * reynolds**0.687
-
-
 def resisted(body, c, s, vx, vy, spin):
     """R (v − u, ω − Ω) in the frame of a shape that has turned by an angle of this cosine and sine,
     over the viscosity."""
@@ -88,7 +83,7 @@ def sphere_load(body, x, y, spin, viscosity, density, options):
         rotation *= turning_factor(body.radius, permeability)
     if with_inertia:
         reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
-        translation *= inertial_factor(reynolds)
+        translation *= 1.0 + 0.15 * reynolds**0.687
     return -translation * x, -translation * y, -rotation * spin
 
 

@@ -15,6 +15,7 @@ import functools
 import math
 from collections.abc import Iterable, Sequence
 
+import attrs
 import numpy as np
 
 from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
@@ -22,7 +23,7 @@ from flocsim.constants import LARGEST_BIAS, MINIMUM_GAP
 from flocsim.errors import UsageError
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import fields_read, kernel_arguments, reach_of, results, sample_pairs
-from flocsim.forces.dlvo import DoubleLayer
+from flocsim.forces.dlvo import BesideCharges, DoubleLayer
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import THIN, is_thin
 from flocsim.geometry.surfaces.field import FADED
@@ -84,7 +85,7 @@ def pressures_of(forces: Sequence[PairForce], layer: DoubleLayer | None) -> list
         if force is not layer:
             found.append(force)
         elif layer.boundary != "superposition":
-            found.append(layer.without_charges())
+            found.append(BesideCharges(**attrs.asdict(layer, recurse=False)))
     return found
 
 

@@ -7,20 +7,16 @@ counts are kept per pixel, so that a moved vertex needs only its two edges recou
 Kernels are plain Python on scalars and arrays; ``compiled`` makes them fast.
 """
 
-from collections.abc import Callable, Sequence
-from functools import cache
-from typing import Any
+import functools
+from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.compiler.composer import compose
+from flocsim.compiler import composer
 from flocsim.geometry.shapes.cores import is_near
 
-
-@cache
-def compiled(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """A kernel of a fit, compiled on first use and kept on disk."""
-    return compose(kernel, {}, allocates=True)
+compiled = functools.partial(composer.compiled, allocates=True)
+"""A kernel of a fit, compiled on first use and kept on disk."""
 
 
 def crossing(ax, ay, bx, by, y):
