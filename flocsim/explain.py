@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flocsim.arrays import ContactView, PairView
-from flocsim.compiler.reads import reached
+from flocsim.compiler.linker import reached
 from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.check import (
     SAMPLE_BODIES,

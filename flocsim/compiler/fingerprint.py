@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flocsim.compiler.processor import compilers, numba_settings
-from flocsim.compiler.reads import (
+from flocsim.compiler.linker import (
     chains,
     is_versioned,
     module_reads,
@@ -28,6 +27,7 @@ from flocsim.compiler.reads import (
     refuse_closure,
     where,
 )
+from flocsim.compiler.processor import compilers, numba_settings
 from flocsim.errors import KernelError
 
 LITERALS = (bool, int, float, complex, str, bytes, type(None))

@@ -33,9 +33,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from flocsim.compiler.by_pointer import address_of_data, is_array
+from flocsim.compiler.linker import PACKAGE, is_in_library, names_in, where
 from flocsim.compiler.object_code import LENT, ObjectCode
 from flocsim.compiler.processor import BASELINE, baseline
-from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
 from flocsim.errors import KernelError
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")

@@ -16,7 +16,7 @@ import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from flocsim.compiler.reads import (
+from flocsim.compiler.linker import (
     ATTRIBUTE_LOADS,
     PACKAGE,
     is_versioned,

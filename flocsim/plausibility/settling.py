@@ -7,7 +7,7 @@ import numpy as np
 
 from flocsim.arrays import BodyView
 from flocsim.body import Body
-from flocsim.compiler.reads import where
+from flocsim.compiler.linker import where
 from flocsim.errors import UsageError
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.drag import (

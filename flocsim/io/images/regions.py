@@ -46,7 +46,7 @@ class Region:
     mask that came without a picture; parted: the confidence that it is a floc apart from one that
     it touched, NaN for all others; band: masks as it would have been cut at a higher and at a lower
     level, in the bbox widened by the same on every side, None where it is not known; weight: for
-    how many flocs it stands, of which the filters kept it alone (selection.weighed); reason: why it
+    how many flocs it stands, of which the filters kept it alone (pictures.weighed); reason: why it
     is left out, "" for a floc. The labels of what is left out count on from those of the flocs.
     """
 

@@ -6,8 +6,7 @@ import shapely
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.fit.coverage import wrong_pixels
-from flocsim.geometry.fit.fit import fit_mask
-from flocsim.geometry.fit.holes import FEWEST_PIXELS, find_holes
+from flocsim.geometry.fit.fit import FEWEST_PIXELS, find_holes, fit_mask
 
 Y, X = np.mgrid[0:90, 0:100]
 OUTER = (X - 50) ** 2 / 1.3 + (Y - 45) ** 2 < 38**2
