@@ -55,12 +55,6 @@ def own_folder() -> Path:
     return Path(platformdirs.user_cache_dir("flocsim"))
 
 
-def cache_path() -> Path:
-    """The folder of compiled code: FLOCSIM_CACHE, else the user's own."""
-    named = os.environ.get("FLOCSIM_CACHE")
-    return Path(named) if named else own_folder()
-
-
 def home_folder() -> Path | None:
     """The user's home: who can exchange that can do anything, so that no folder above matters."""
     import pwd
@@ -114,9 +108,10 @@ def resolved(folder: Path) -> Path:
 
 
 def folders() -> Iterator[Path]:
-    """Where compiled code is looked for: in the cache folder, and in the user's own if the first
-    one cannot be written; only in those where nobody else can have put it."""
-    first = resolved(cache_path())
+    """Where compiled code is looked for: in FLOCSIM_CACHE, and in the user's own folder if that is
+    not named or cannot be written; only in those where nobody else can have put it."""
+    named = os.environ.get("FLOCSIM_CACHE")
+    first = resolved(Path(named) if named else own_folder())
     for folder in [first] if is_writable(first) else [first, resolved(own_folder())]:
         if reason := why_unsafe(folder):
             warn_once(f"no compiled code is kept: {reason}")
@@ -248,12 +243,7 @@ def replace(path, content):
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
-    remove_abandoned(path.parent)
-
-
-def remove_abandoned(folder):
-    """Remove what killed processes have left unfinished."""
-    for each in folder.glob(f".*{UNFINISHED}"):
+    for each in path.parent.glob(f".*{UNFINISHED}"):  # by processes that were killed
         with contextlib.suppress(OSError):
             if time.time() - os.lstat(each).st_mtime > ABANDONED:
                 os.unlink(each)

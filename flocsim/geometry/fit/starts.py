@@ -36,11 +36,11 @@ def trace_outline(mask: np.ndarray) -> np.ndarray:
             return np.array(middles)
 
 
-def even_points(outline: np.ndarray, count: int, shift: float = 0.0) -> np.ndarray:
-    """`count` points evenly spaced along the closed outline; `shift` in spacings moves them on."""
+def even_points(outline: np.ndarray, count: int) -> np.ndarray:
+    """`count` points evenly spaced along the closed outline."""
     closed = np.vstack([outline, outline[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    places = (np.arange(count) + shift) / count * along[-1]
+    places = np.arange(count) / count * along[-1]
     return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
 
 

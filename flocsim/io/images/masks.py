@@ -85,27 +85,24 @@ def _arrays(path):
         if path.suffix.lower() == ".npy":
             with open(path, "rb") as file:
                 return [("", read_array(file, path.stat().st_size, str(path)))]
+        arrays, left = {}, MOST_BYTES
         with zipfile.ZipFile(path) as archive:
             check_entries(path, archive.infolist())
-            arrays = dict(_members(path, archive))
+            for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
+                left -= entry.file_size
+                if left < 0:
+                    raise ImageError(
+                        f"{path}: would be more than {MOST_BYTES} bytes after decompression"
+                    )
+                key = entry.filename.removesuffix(".npy")
+                with archive.open(entry) as file:
+                    arrays[key] = read_array(file, entry.file_size, f"{path} {key}")
         return _unpacked(path, arrays) if "shapes" in arrays else list(arrays.items())
     except ImageError:
         raise
     except Exception as problem:
         reason = one_line(problem)
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
-
-
-def _members(path, archive):
-    """(key, array) of each file of an open archive, in the order of their names."""
-    left = MOST_BYTES
-    for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
-        left -= entry.file_size
-        if left < 0:
-            raise ImageError(f"{path}: would be more than {MOST_BYTES} bytes after decompression")
-        key = entry.filename.removesuffix(".npy")
-        with archive.open(entry) as file:
-            yield key, read_array(file, entry.file_size, f"{path} {key}")
 
 
 def _unpacked(path, arrays):

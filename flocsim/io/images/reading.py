@@ -174,11 +174,34 @@ def _decode_with_pillow(path, frame):
 
 
 def _decode_with_tifffile(path, frame):
+    """The pixels of a page; ImageError for one that is too large, or unpacks to more than these."""
     import tifffile
 
     try:
         with tifffile.TiffFile(path) as tiff:
-            page = check_tiff(path, tiff, frame)
+            if frame >= len(tiff.pages):
+                raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
+            page = tiff.pages[frame]
+            check_shape(path, page.shape)
+            check_promise(path, int(np.prod(page.shape[:2])))
+            check_shape(path, (page.imagelength, page.imagewidth))
+            if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
+                raise ImageError(
+                    f"{path}: its packing {page.compression!s:.40} is unknown; save it "
+                    "uncompressed, or as PNG"
+                )
+            rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
+            wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
+            if wanted > 64 * MOST_PIXELS:
+                raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
+            for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
+                if page.compression in DEFLATED:
+                    tiff.filehandle.seek(offset)
+                    packed = tiff.filehandle.read(length)
+                    if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
+                        raise ImageError(
+                            f"{path}: a part of it decompresses to more than {wanted} bytes"
+                        )
             return np.asarray(page.asarray())
     except ImageError:
         raise
@@ -187,33 +210,6 @@ def _decode_with_tifffile(path, frame):
             f"{path}: cannot be read as a TIFF ({one_line(problem)}); "
             "save it uncompressed, or as PNG"
         ) from problem
-
-
-def check_tiff(path, tiff, frame=0):
-    """The page of a TIFF; ImageError for one that is too large, or unpacks to more than its
-    pixels."""
-    if frame >= len(tiff.pages):
-        raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
-    page = tiff.pages[frame]
-    check_shape(path, page.shape)
-    check_promise(path, int(np.prod(page.shape[:2])))
-    check_shape(path, (page.imagelength, page.imagewidth))
-    if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
-        raise ImageError(
-            f"{path}: its packing {page.compression!s:.40} is unknown; save it uncompressed, or as "
-            "PNG"
-        )
-    rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
-    wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
-    if wanted > 64 * MOST_PIXELS:
-        raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
-    for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
-        if page.compression in DEFLATED:
-            tiff.filehandle.seek(offset)
-            packed = tiff.filehandle.read(length)
-            if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
-                raise ImageError(f"{path}: a part of it decompresses to more than {wanted} bytes")
-    return page
 
 
 def one_line(problem: Exception) -> str:

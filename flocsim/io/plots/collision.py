@@ -281,7 +281,10 @@ def draw_zone(axes, zone_distance):
     axes.set_ylim(low, high)
     axes.axhspan(low, level, color=INSIDE_COLOUR, zorder=0)
     axes.axhline(level, color="0.35", linestyle=(0, (4, 2)), linewidth=0.9)
-    side = free_side(axes, level, level + margin)
+    # Where fewer points of the panel's first line lie above the zone's.
+    x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
+    crowded = x[(y >= level) & (y <= level + margin)]
+    side = "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
     axes.annotate(
         f"$D_0$ = {level:.4g} µm",
         (0.0 if side == "left" else 1.0, level),
@@ -292,13 +295,6 @@ def draw_zone(axes, zone_distance):
         color="0.25",
         bbox=PALE,
     )
-
-
-def free_side(axes, low, high):
-    """ "left" or "right": where fewer points of the panel's first line lie between two heights."""
-    x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
-    crowded = x[(y >= low) & (y <= high)]
-    return "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
 
 
 def windows(outlines_per_frame):

@@ -20,7 +20,6 @@ from flocsim.io.plots.style import (
     set_log_axis,
     type_titles,
 )
-from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.schema import Results
 from flocsim.io.results.strength_file import STATUS, Strengths
 
@@ -32,26 +31,20 @@ WATER_WORDS = "with hydrodynamic interaction"
 FAILED = STATUS.index("failed")
 
 
-def kernel_of(results: Results) -> Kernel:
-    """The rates of results that are known to have some."""
-    assert results.kernel is not None, "a figure of a kernel study"
-    return results.kernel
-
-
 def kernels(results: Results) -> Figure:
     """Kernels over those of equivalent spheres, against size: panels by mechanism, lines by N."""
-    return by_ratio(
-        kernel_of(results), "efficiency3", "β₃ of shapes over that\nof equivalent spheres"
-    )
+    return by_ratio(results, "efficiency3", "β₃ of shapes over that\nof equivalent spheres")
 
 
 def efficiency(results: Results) -> Figure:
     """Efficiencies: encounters that aggregate of those that touch, against size."""
-    return by_ratio(kernel_of(results), "alpha", "efficiency α")
+    return by_ratio(results, "alpha", "efficiency α")
 
 
-def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
+def by_ratio(results: Results, name: str, label: str) -> Figure:
     """An estimate of all pairs against r_i/r_j, the larger one's size in colours, N by markers."""
+    kernel = results.kernel
+    assert kernel is not None, "a figure of a kernel study"
     with drawing(2.6 * len(kernel.mechanisms) + 1.6, 2.9) as figure:
         panels = figure.subplots(1, len(kernel.mechanisms), squeeze=False, sharey=True)[0]
         chosen = chosen_sizes(len(kernel.labels))

@@ -316,8 +316,7 @@ class Labels:
         corners = [(right, top - height), (right, bottom), (left - width, top - height),
                    (left - width, bottom), (left, top - height), (left, bottom)]  # fmt: skip
         boxes = [self.inside(x, y, width, height) for x, y in corners]
-        free = (box for box in boxes if not any(meets(box, other) for other in self.taken))
-        box = next(free, boxes[0])
+        box = next(filter(self.is_free, boxes), boxes[0])
         self.taken.append(box)
         self.axes.text(box[0], box[1], text, color=colour, fontsize=size, va="top", ha="left",
                        path_effects=[withStroke(linewidth=0.9, foreground="black")])  # fmt: skip
@@ -327,10 +326,12 @@ class Labels:
         y = min(max(y, 0.0), max(self.shape[0] - 1.0 - 1.3 * height, 0.0))
         return x, y, x + width, y + height
 
-
-def meets(box, other):
-    """Whether two boxes overlap."""
-    return box[0] < other[2] and other[0] < box[2] and box[1] < other[3] and other[1] < box[3]
+    def is_free(self, box):
+        left, top, right, bottom = box
+        return not any(
+            left < other[2] and other[0] < right and top < other[3] and other[1] < bottom
+            for other in self.taken
+        )
 
 
 MASK, CORE, DISK = "#c7c7c7", "#0072B2", "#D55E00"
