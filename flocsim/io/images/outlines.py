@@ -276,11 +276,11 @@ class Search:
         parts = self.cut(focus, mask, box, level)
         found = []
         if len(parts) > 1:  # each has a level of its own
-            parts = [
-                each
-                for part in parts
-                for each in self.cut_alone(focus, mask, box, base, part, parts)
-            ]
+            own, cut = np.zeros((2, *focus.contrast.shape), bool)
+            own[box] = mask
+            for part, place, _ in parts:
+                cut[place] |= part
+            parts = [each for part in parts for each in self.cut_alone(focus, own, cut, base, part)]
         for part, place, level in parts:
             whole, wide = widened(filled(part), place, 1, focus.contrast.shape)
             softness = focus.softness(whole, wide)
@@ -301,27 +301,22 @@ class Search:
             if part.sum() >= least
         ]
 
-    def cut_alone(self, focus, mask, box, base, part, parts):
-        """One of several parts of a mask as it is cut at a level of its own."""
+    def cut_alone(self, focus, own, cut, base, part):
+        """One of several parts of a mask as it is cut at a level of its own; ``own``: the mask in
+        all of the island, ``cut``: all of its parts."""
         from scipy.ndimage import binary_dilation
 
         zone, place = widened(part[0], part[1], AROUND, focus.contrast.shape)
-        zone = binary_dilation(zone, EIGHT, AROUND)
-        for other, where, _ in parts:
-            if where is not part[1]:
-                here, there = overlap(place, where)
-                zone[here] &= ~other[there]
-        here, there = overlap(place, box)
-        own = np.zeros_like(zone)
-        own[here] = mask[there]
-        beyond = binary_dilation(own & ~zone, EIGHT)
-        zone &= own
+        others = cut[place] & ~zone
+        zone = binary_dilation(zone, EIGHT, AROUND) & ~others
+        beyond = binary_dilation(own[place] & ~zone, EIGHT)
+        zone &= own[place]
         level = max(self.level(focus, zone, place, base), self.floor)
         alone = self.cut(focus, zone, place, level)
         for each, where, _ in alone:
-            here, there = overlap(where, place)
             edge = rim(each)
-            if (edge[here] & beyond[there]).sum() > CUT_OFF * edge.sum():
+            within = moved(where, -place[0].start, -place[1].start)
+            if (edge & beyond[within]).sum() > CUT_OFF * edge.sum():
                 return [part]  # its zone would be its outline
         return alone or [part]
 
@@ -388,16 +383,6 @@ def edge_of(steep, told):
     before, behind = np.flatnonzero(~at_edge[:peak]), np.flatnonzero(~at_edge[peak:])
     first = int(before[-1]) + 1 if before.size else 0
     return first, peak + int(behind[0]) - 1 if behind.size else len(steep) - 1
-
-
-def overlap(box, other):
-    """The places, in each of two boxes, of what they share."""
-    shared = [(max(a.start, b.start), min(a.stop, b.stop)) for a, b in zip(box, other, strict=True)]
-    return tuple(
-        tuple(slice(start - s.start, max(stop, start) - s.start)
-              for (start, stop), s in zip(shared, within, strict=True))
-        for within in (box, other)
-    )  # fmt: skip
 
 
 def filled(foreground: np.ndarray) -> np.ndarray:
