@@ -7,22 +7,8 @@ import math
 from collections.abc import Callable
 
 import flocsim.arrays as at
+from flocsim.geometry.contact import circle_tree as trees
 from flocsim.geometry.contact import points
-from flocsim.geometry.contact.circle_tree import (
-    START,
-    at_leaves,
-    core_distance,
-    descended,
-    edge_distance2,
-    goes_on,
-    passed,
-    plan_of,
-    posed,
-    reversed_pose,
-    run_of,
-    side_of,
-    within,
-)
 from flocsim.geometry.contact.separation import length_of, separation
 from flocsim.geometry.shapes.cores import edge_count, edge_end
 from flocsim.hooks import hook
@@ -57,14 +43,14 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     vertices = scene.vertices
     first_b, points_b, _, _ = side_b
     edges = first_b + edge_count(points_b)
-    start_a, end_a = run_of(side_a, leaf_a)
-    start_b, end_b = run_of(side_b, leaf_b)
+    start_a, end_a = trees.run_of(side_a, leaf_a)
+    start_b, end_b = trees.run_of(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
+        x, y = trees.posed(pose, vertices[point, at.X], vertices[point, at.Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
-            if edge_distance2(vertices, x, y, start, end) < reach * reach:
+            if trees.edge_distance2(vertices, x, y, start, end) < reach * reach:
                 room = add_pair(work, pair, a, point, b, start, end) and room
     return room
 
@@ -73,27 +59,27 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 def list_polygons(scene, work, pair, cutoff):
     """List the pairs of features of two bodies, both ways round; False for a full list."""
     a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-    side_a, side_b = side_of(scene, a), side_of(scene, b)
+    side_a, side_b = trees.side_of(scene, a), trees.side_of(scene, b)
     _, points_a, _, _ = side_a
     _, points_b, _, _ = side_b
     if points_a == 1 and points_b == 1:
         return list_spheres(scene, work, pair, cutoff)
     reach = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS] + cutoff
     pose = pose_of(scene, work, a, b)
-    back = reversed_pose(pose)
-    plan = plan_of(scene.tree, side_a, side_b)
-    walk = START
+    back = trees.reversed_pose(pose)
+    plan = trees.plan_of(scene.tree, side_a, side_b)
+    walk = trees.START
     room = True
-    while goes_on(walk) and room:
-        if not within(scene.tree, pose, plan, walk, reach):
-            walk = passed(plan, walk)
-        elif at_leaves(plan, walk):
+    while trees.goes_on(walk) and room:
+        if not trees.within(scene.tree, pose, plan, walk, reach):
+            walk = trees.passed(plan, walk)
+        elif trees.at_leaves(plan, walk):
             i, j, _, _ = walk
             room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
             room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
-            walk = passed(plan, walk)
+            walk = trees.passed(plan, walk)
         else:
-            walk = descended(plan, walk)
+            walk = trees.descended(plan, walk)
     return room
 
 
@@ -116,7 +102,7 @@ def sphere_gap(scene, work, a, b):
 def gap_between(scene, work, a, b):
     """The distance between two outlines now [m], negative where they overlap."""
     contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
-    return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact
+    return trees.core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact
 
 
 def turn_nothing(work, state, body):

@@ -12,16 +12,8 @@ import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.images.regions import Region
-from flocsim.io.plots.style import (
-    MOST_OF_TITLE,
-    Figure,
-    drawing,
-    house_style,
-    plain,
-    set_log_axis,
-    set_vertex_axis,
-    vertex_positions,
-)
+from flocsim.io.plots import style
+from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.shapes.fit_report import (
     CLASS_LIMIT,
     SHARES,
@@ -139,8 +131,8 @@ def draw_dimension(axes, areas, perimeters):
         label = f"$D_{{f2}}$ = {slope.value:.2f} ± {slope.error:.2f}"
         axes.plot(ends, middle * ends ** (0.5 * slope.value), color="#D55E00", label=label)
     axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
-    set_log_axis(axes.xaxis)
-    set_log_axis(axes.yaxis)
+    style.set_log_axis(axes.xaxis)
+    style.set_log_axis(axes.yaxis)
     axes.legend()
 
 
@@ -166,7 +158,7 @@ def figure_3(entries: Sequence[ShapeEntry]) -> Figure:
 
 def draw_errors(axes, entries):
     counts = [count for count in entries[0].fits if count > 1] or [1]
-    places = np.asarray(vertex_positions(counts), float)
+    places = np.asarray(style.vertex_positions(counts), float)
     for shift, (sign, colour, marker) in zip((-DODGE, DODGE), CLASS_STYLES, strict=True):
         members = [e for e in entries if (e.equivalent_radius <= CLASS_LIMIT) == (sign == "≤")]
         if not members:
@@ -180,7 +172,7 @@ def draw_errors(axes, entries):
         if 1 in entries[0].fits:
             spheres = np.mean([e.fits[1].relative_error for e in members])
             axes.axhline(spheres, color=colour, linestyle="--", linewidth=0.8)
-    set_vertex_axis(axes, counts)
+    style.set_vertex_axis(axes, counts)
 
 
 POPULATION_FIGURES: dict[str, Callable[[Sequence[ShapeEntry]], Figure]] = {
@@ -235,14 +227,14 @@ def draw_overlay(
     # The picture fills the figure, but for a strip for the title.
     height, width = (size * LONGEST_SIDE / max(grey.shape) for size in grey.shape)
     flocs, rejected = list(flocs), list(rejected)
-    with house_style():
+    with style.house_style():
         figure = matplotlib_figure.Figure(figsize=(max(width, 4.0), max(height, 2.0) + STRIP))
         top = 1.0 - STRIP / figure.get_figheight()
         axes = figure.add_axes((0.0, 0.0, 1.0, top))
         axes.imshow(stretched(grey), cmap="gray", interpolation="nearest", vmin=0.0, vmax=1.0)
         axes.set_axis_off()
         figure.text(0.004, 1.0 - 0.05 / figure.get_figheight(),
-                    plain(title, MOST_OF_TITLE), va="top", fontsize=9)  # fmt: skip
+                    plain(title, style.MOST_OF_TITLE), va="top", fontsize=9)  # fmt: skip
         labels = Labels(axes, grey.shape, max(grey.shape) / LONGEST_SIDE)
         key = [Line2D([], [], color=FLOC_COLOUR, label=f"{len(flocs)} fitted")]
         for region, fit in flocs:
@@ -290,13 +282,13 @@ def stretched(grey: np.ndarray) -> np.ndarray:
     return spread ** np.clip(np.log(DARK_GREY) / np.log(dark), LEAST_GAMMA, 1.0)
 
 
-def draw_mask(axes, mask, bbox, colour, **style):
+def draw_mask(axes, mask, bbox, colour, **look):
     """The outline of a mask around a bbox, with the same margin on every side."""
     top, left, bottom, right = bbox
     margin = (mask.shape[0] - (bottom - top)) // 2
     columns = np.arange(left - margin, right + margin)
     rows = np.arange(top - margin, bottom + margin)
-    axes.contour(columns, rows, mask.astype(float), levels=[0.5], colors=[colour], **style)
+    axes.contour(columns, rows, mask.astype(float), levels=[0.5], colors=[colour], **look)
 
 
 class Labels:
@@ -387,7 +379,7 @@ def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
         panels[3].text(0.0, -0.02, "blue: missing, orange: in excess", fontsize=7, va="top",
                        transform=panels[3].transAxes)  # fmt: skip
         if name:
-            figure.suptitle(plain(name, MOST_OF_TITLE), x=0.01, ha="left", fontsize=9)
+            figure.suptitle(plain(name, style.MOST_OF_TITLE), x=0.01, ha="left", fontsize=9)
         return figure
 
 
