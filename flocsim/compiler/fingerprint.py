@@ -187,17 +187,6 @@ def globals_read(function: Any) -> Iterable[tuple[str, Any]]:
         yield ".".join(chain), value
 
 
-def told_of(function, name, value):
-    """The line of a value that a function reads; KernelError where there is none."""
-    try:
-        return told(value)
-    except Untold as error:
-        code = function.__code__
-        if "." not in name and not any(chain[0] == name for chain in chains(code)):
-            return "an attribute of that name is read, not the global"
-        raise KernelError(f"kernel {where(function)} reads the global {name!r}, {error}") from None
-
-
 def told_defaults(function):
     """The line of a function's default arguments; KernelError for one that could change."""
     defaults = {"": function.__defaults__ or (), **(function.__kwdefaults__ or {})}
@@ -249,7 +238,15 @@ def tell(entry: Any, fillings: dict[Callable, Callable], *, within: bool = False
                 # Two functions may share a name, so that a number has to tell which is called.
                 lines.append(f"{name}->{visit(value)}")
                 continue
-            lines.append(f"{name}={told_of(function, name, value)}")
+            try:
+                line = told(value)
+            except Untold as error:
+                if "." in name or any(chain[0] == name for chain in chains(function.__code__)):
+                    raise KernelError(
+                        f"kernel {where(function)} reads the global {name!r}, {error}"
+                    ) from None
+                line = "an attribute of that name is read, not the global"
+            lines.append(f"{name}={line}")
             read.append(value)
         return seen[function]
 

@@ -45,46 +45,35 @@ def line_of(instruction, code):
     return line or code.co_firstlineno
 
 
-def interpreter_call(function: types.FunctionType) -> tuple[str, int] | None:
-    """(name, line) of the first call of Python in a function's own code; None without one."""
-    known = function.__globals__
-    numba = sys.modules.get("numba")  # where it is not loaded, nothing of it can be called
-    forbidden = [print, getattr(numba, OBJECT_MODE, print)]
-    for opname, name, line in instructions(function.__code__):
-        if opname in ATTRIBUTE_LOADS:
-            calls = name == OBJECT_MODE
-        elif opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-            value = known.get(name, getattr(builtins, name, None))
-            calls = any(value is each for each in forbidden)
-        else:
-            continue
-        if calls:
-            return name, line
-    return None
-
-
 def refuse_interpreter(entry: Any, fillings: Mapping[Callable, Callable] | None = None) -> None:
     """KernelError where a function, or one that it reaches, calls Python while it runs compiled.
 
     ``fillings`` {hook: function}: what stands in the place of hooks.
     """
+    numba = sys.modules.get("numba")  # where it is not loaded, nothing of it can be called
+    forbidden = [print, getattr(numba, OBJECT_MODE, print)]
     fillings = fillings or {}
     pending, seen = [entry], set()
     while pending:
-        function = fillings.get(pending[-1], pending[-1])
-        pending.pop()
+        function = pending.pop()
+        function = fillings.get(function, function)
         if function in seen or not isinstance(function, types.FunctionType):
             continue
         seen.add(function)
         pending += [each for each in reached(function).values() if callable(each)]
         if function.__code__.co_filename.startswith(PACKAGE):
             continue  # flocsim's own do not, and are many
-        if (found := interpreter_call(function)) is not None:
-            name, line = found
-            raise KernelError(
-                f"kernel {where(function)} calls {name} in line {line}: compiled code cannot call "
-                "Python while it runs; take it out (to look into a kernel, call it from Python)"
-            )
+        for opname, name, line in instructions(function.__code__):
+            calls = opname in ATTRIBUTE_LOADS and name == OBJECT_MODE
+            if opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+                value = function.__globals__.get(name, getattr(builtins, name, None))
+                calls = any(value is each for each in forbidden)
+            if calls:
+                raise KernelError(
+                    f"kernel {where(function)} calls {name} in line {line}: compiled code cannot "
+                    "call Python while it runs; take it out (to look into a kernel, call it from "
+                    "Python)"
+                )
 
 
 CONTAINERS = {
@@ -104,52 +93,36 @@ ARRAY_MAKERS = {
 """Functions of numpy that give an array whatever they are given."""
 
 
-@functools.lru_cache(maxsize=1024)
-def returned(code: types.CodeType) -> tuple[tuple[int, int | None], ...]:
-    """(line, how many parts) of every return whose kind is seen: 0 for None, 1 for one number that
-    was computed or written there, k for a tuple of k; None where only a call could tell."""
-    found = []
-    before = None
-    for each in dis.get_instructions(code):
-        if each.opname == "RETURN_CONST":
-            found.append((line_of(each, code), parts_of(each.argval)))
-        elif each.opname == "RETURN_VALUE" and before is not None:
-            found.append((line_of(each, code), parts_left(before)))
-        before = each
-    return tuple(found)
-
-
-def parts_of(value):
-    """How many parts a constant has: 0 for None, 1 for a number, k for a tuple; None else."""
-    if value is None:
-        return 0
-    if isinstance(value, tuple):
-        return len(value)
+def parts_left(instruction):
+    """How many parts an instruction leaves to be returned: 0 for None, 1 for one number that is
+    computed or written there, k for a tuple of k; None where only a call could tell."""
+    if instruction.opname == "BUILD_TUPLE":
+        return instruction.arg
+    if instruction.opname in ("BINARY_OP", "UNARY_NEGATIVE", "COMPARE_OP"):
+        return 1
+    value = instruction.argval
+    if instruction.opname not in ("LOAD_CONST", "RETURN_CONST"):
+        return None
+    if value is None or isinstance(value, tuple):
+        return len(value or ())
     return 1 if isinstance(value, (int, float)) else None
 
 
-def parts_left(instruction):
-    """How many parts an instruction leaves to be returned; None where it does not show."""
-    if instruction.opname == "BUILD_TUPLE":
-        return instruction.arg
-    if instruction.opname == "LOAD_CONST":
-        return parts_of(instruction.argval)
-    if instruction.opname in ("BINARY_OP", "UNARY_NEGATIVE", "COMPARE_OP"):
-        return 1
-    return None
-
-
+@functools.lru_cache(maxsize=1024)
 def wrong_return(kernel: types.FunctionType, parts: int | None) -> str:
     """What a kernel returns somewhere in place of ``parts`` numbers (None: any tuple of them), in
     words; "" where nothing wrong shows."""
-    code = kernel.__code__
-    for line, count in returned(code):
-        place = f"{code.co_filename}:{line}"
+    code, before = kernel.__code__, None
+    for each in dis.get_instructions(code):
+        last = {"RETURN_CONST": each, "RETURN_VALUE": before}.get(each.opname)
+        count = parts_left(last) if last else None
+        place = f"{code.co_filename}:{line_of(each, code)}"
         if count == 0:
             return f"returns None on the way that ends in {place}"
         if count is not None and parts is not None and count != parts:
             what = "one number" if count == 1 else f"{count} numbers"
             return f"returns {what} in {place}"
+        before = each
     return ""
 
 

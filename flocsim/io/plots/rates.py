@@ -47,7 +47,10 @@ def by_ratio(results: Results, name: str, label: str) -> Figure:
     assert kernel is not None, "a figure of a kernel study"
     with drawing(2.6 * len(kernel.mechanisms) + 1.6, 2.9) as figure:
         panels = figure.subplots(1, len(kernel.mechanisms), squeeze=False, sharey=True)[0]
-        chosen = chosen_sizes(len(kernel.labels))
+        # Places of the larger classes whose lines are drawn: no more than can be told apart.
+        count = len(kernel.labels)
+        places = np.linspace(min(1, count - 1), count - 1, min(MOST_LINES, count))
+        chosen = np.unique(places.round().astype(int)).tolist()
         colours = dict(zip(chosen, graded_colours(len(chosen)), strict=True))
         for m, (axes, mechanism) in enumerate(zip(panels, kernel.mechanisms, strict=True)):
             for v in range(len(kernel.vertices)):
@@ -61,14 +64,6 @@ def by_ratio(results: Results, name: str, label: str) -> Figure:
         words = WATER_WORDS if kernel.water else BOUND_WORDS
         figure.supxlabel(words, fontsize=7, color="0.4")
         return figure
-
-
-def chosen_sizes(count: int) -> list[int]:
-    """Places of the larger classes whose lines are drawn: no more than can be told apart."""
-    first = min(1, count - 1)
-    return np.unique(
-        np.linspace(first, count - 1, min(MOST_LINES, count)).round().astype(int)
-    ).tolist()
 
 
 def draw_line(axes, kernel, name, place, colour):
