@@ -48,16 +48,6 @@ def level_runs(points, nodes):
     return np.minimum(bounds[:-1, None] + steps, bounds[1:, None]) % points
 
 
-def circles_around(runs, margin):
-    """Circles (k, 3) as x, y, radius around runs of points (k, m, 2)."""
-    choices = []
-    for centre in (0.5 * (runs.min(axis=1) + runs.max(axis=1)), 0.5 * (runs[:, 0] + runs[:, -1])):
-        reach = np.hypot(*np.moveaxis(runs - centre[:, None], -1, 0)).max(axis=1)
-        choices.append(np.column_stack([centre, reach + margin]))
-    box, chord = choices
-    return np.where(box[:, 2:] <= chord[:, 2:], box, chord)
-
-
 def tree_of(vertices: np.ndarray) -> np.ndarray:
     """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
 
@@ -69,7 +59,13 @@ def tree_of(vertices: np.ndarray) -> np.ndarray:
     nodes = 1
     while nodes <= leaves_of(points):
         runs = vertices[level_runs(points, nodes)]
-        tree[nodes : 2 * nodes] = circles_around(runs, margin)
+        middle, ends = runs.min(axis=1) + runs.max(axis=1), runs[:, 0] + runs[:, -1]
+        choices = []
+        for centre in (0.5 * middle, 0.5 * ends):
+            reach = np.hypot(*np.moveaxis(runs - centre[:, None], -1, 0)).max(axis=1)
+            choices.append(np.column_stack([centre, reach + margin]))
+        box, chord = choices
+        tree[nodes : 2 * nodes] = np.where(box[:, 2:] <= chord[:, 2:], box, chord)
         nodes *= 2
     return tree
 

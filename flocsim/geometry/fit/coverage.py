@@ -53,20 +53,14 @@ def count_edges(vertices, radius, odd, near):
         for row in range(rows):
             for column in range(first_pixel(crossing(ax, ay, bx, by, row), columns)):
                 odd[row, column] = not odd[row, column]
-        add_edge(near, ax, ay, bx, by, radius)
-
-
-def add_edge(near, ax, ay, bx, by, radius):
-    rows, columns = near.shape
-    for row in range(
-        first_pixel(min(ay, by) - radius, rows), first_pixel(max(ay, by) + radius + 1.0, rows)
-    ):
-        for column in range(
-            first_pixel(min(ax, bx) - radius, columns),
-            first_pixel(max(ax, bx) + radius + 1.0, columns),
-        ):
-            if is_near(column, row, ax, ay, bx, by, radius * radius):
-                near[row, column] += 1
+        top = first_pixel(min(ay, by) - radius, rows)
+        bottom = first_pixel(max(ay, by) + radius + 1.0, rows)
+        left = first_pixel(min(ax, bx) - radius, columns)
+        right = first_pixel(max(ax, bx) + radius + 1.0, columns)
+        for row in range(top, bottom):
+            for column in range(left, right):
+                if is_near(column, row, ax, ay, bx, by, radius * radius):
+                    near[row, column] += 1
 
 
 def count_wrong(mask, odd, near):

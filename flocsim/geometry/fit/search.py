@@ -78,32 +78,24 @@ def weighed(wrong, excess, weights):
     return wrong + balance * abs(excess) + outside * (wrong + excess)
 
 
-def stepped(vertices, k, directions, direction, step):
-    x, y = vertices[k]
-    across, down = directions[direction]
-    return x + step * across, y + step * down
-
-
 def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
     """Take the step of vertex k that lowers the objective the most, if any does.
 
     Returns (change of the objective, growth of the cover).
     """
     before, here, after = neighbours(vertices, k)
-    best, least, grown = -1, 0, 0
+    best, least, grown = here, 0, 0
     for direction in range(len(directions)):
-        new = stepped(vertices, k, directions, direction, step)
-        if not leaves_room(mask.shape, new, radius + 1.0):
+        x, y = here[0] + step * directions[direction, 0], here[1] + step * directions[direction, 1]
+        if not leaves_room(mask.shape, (x, y), radius + 1.0):
             continue
-        change, growth = move_vertex(mask, odd, near, before, here, after, new, radius, False)
+        change, growth = move_vertex(mask, odd, near, before, here, after, (x, y), radius, False)
         change = weighed(change, excess + growth, weights) - weighed(0, excess, weights)
-        x, y = new
         if change < least and stays_simple(vertices, k, x, y):
-            best, least, grown = direction, change, growth
-    if best >= 0:
-        new = stepped(vertices, k, directions, best, step)
-        move_vertex(mask, odd, near, before, here, after, new, radius, True)
-        vertices[k, 0], vertices[k, 1] = new
+            best, least, grown = (x, y), change, growth
+    if least < 0:
+        move_vertex(mask, odd, near, before, here, after, best, radius, True)
+        vertices[k, 0], vertices[k, 1] = best
     return least, grown
 
 
