@@ -23,8 +23,7 @@ import flocsim.arrays as at
 from flocsim.bonds.bond import CERTIFICATE, NO_BOND, Load, bond_between, doublet_pose, way_between
 from flocsim.bonds.certificate import is_certain, is_certain_in_kicks
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
-from flocsim.geometry.contact.circle_tree import core_distance
-from flocsim.geometry.contact.near_pairs import gap_between, pose_of
+from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
 from flocsim.laws import (

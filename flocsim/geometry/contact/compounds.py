@@ -19,17 +19,17 @@ from typing import NamedTuple
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
+from flocsim.geometry.contact import near_pairs, slip_transfer
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.circle_tree import (
+from flocsim.geometry.contact.near_pairs import (
     ROUNDING,
+    add_pair,
     edge_distance2,
     leaves_of,
     posed,
     run_of,
     tree_of,
 )
-from flocsim.geometry.contact.near_pairs import add_pair
 from flocsim.geometry.shapes.shape import Shape
 
 SWELL, ONWARD, BEGINS, POINT_COLUMNS = range(2, 6)
@@ -62,7 +62,7 @@ def ring_columns(ring: np.ndarray, swell: float) -> np.ndarray:
 
 
 def compound_tree(shape: Shape) -> np.ndarray:
-    """The tree (2N, 3) of circle_tree.tree_of over the swollen core points of a shape."""
+    """The tree (2N, 3) of near_pairs.tree_of over the swollen core points of a shape."""
     rows = point_columns(shape)
     points = len(rows)
     tree = np.zeros((2 * points, 3))
@@ -145,7 +145,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 
 
 def swollen_run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """circle_tree.run_distance of points and edges swept by the SWELL of their points."""
+    """near_pairs.run_distance of points and edges swept by the SWELL of their points."""
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
@@ -175,7 +175,7 @@ def same_corner(scene, body, point, other):
 
 FILLINGS: dict[Callable, Callable] = {
     near_pairs.list_one_way: list_one_way,
-    circle_tree.run_distance: swollen_run_distance,
+    near_pairs.run_distance: swollen_run_distance,
     contacts.row_radii: swollen_radii,
     slip_transfer.same_corner: same_corner,
 }
