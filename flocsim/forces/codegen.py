@@ -222,15 +222,16 @@ def write_pair_laws(source, forces, kind):
     """The sum of pair forces, and its derivatives by the gap and, negative, by the gap's rate."""
     sums, derivatives = [], []
     for force in forces:
+        kernel = force.kernel_in(source.fluid)
         condition = f"pair.gap < {source.value(reach_of(force))}"
-        call = source.call(force, force.kernel, "pair")
+        call = source.call(force, kernel, "pair")
         sums.append((condition, call))
         if force.slope is None:
             slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
         else:
             slope = source.call(force, force.slope, "pair")
         damping = "0.0"
-        if "gap_rate" in fields_read(force, source.fluid, force.kernel):
+        if "gap_rate" in fields_read(force, source.fluid, kernel):
             change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
             damping = f"-({change})"
         derivatives.append((condition, f"{slope}, {damping}"))
@@ -257,7 +258,7 @@ def write_contact_laws(source, forces):
     terms, limits, events = [], [], []
     for force in forces:
         view = "contact" if force.goes_on_apart else "pressed_contact(contact)"
-        terms.append(("", source.call(force, force.kernel, view)))
+        terms.append(("", source.call(force, force.kernel_in(source.fluid), view)))
         if force.slides:
             limits.append(source.call(force, force.slip_limit, view))
         if force.has_events:

@@ -152,12 +152,13 @@ def change_lengths(force: PairForce, fluid: Fluid) -> np.ndarray:
 
 @functools.lru_cache(maxsize=64)
 def lengths_known(force, fluid):
-    arguments, gaps = kernel_arguments(force, fluid, force.kernel), GAPS
+    kernel, gaps = force.kernel_in(fluid), GAPS
+    arguments = kernel_arguments(force, fluid, kernel)
     shortest = np.full(len(gaps) - 1, math.inf)
     for rate in (-1e-4, 1e-4):
         pair = sample_pairs(math.inf)[0]._replace(gap_rate=rate)
         views = [pair._replace(gap=gap, centre_distance=gap + 3e-6) for gap in gaps.tolist()]
-        values = [next(results(force, force.kernel, [each], arguments), 0.0) for each in views]
+        values = [next(results(force, kernel, [each], arguments), 0.0) for each in views]
         found = np.nan_to_num(np.abs(values), posinf=0.0)
         left = np.maximum.accumulate(found[::-1])[::-1]
         strong = left[1:] > WEAKEST * left[0]
