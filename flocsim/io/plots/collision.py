@@ -237,29 +237,25 @@ def write_animation(
     ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
     D_0 [m]; ``rule`` as in `save`. FileError if it cannot be written.
     """
-    pictures = [picture_of(frames, place, motion, zone_distance, title)
-                for place in range(len(frames.times))]  # fmt: skip
-    style.save_gif(path, pictures, MILLISECONDS, rule)
-
-
-def picture_of(frames, place, motion, zone_distance, title):
-    """One frame, beside the centre distance, as a Pillow image of 64 colours."""
     unit, factor = time_unit(motion[0])
     centres, half = windows(frames.outlines)
-    with drawing(6.4, 3.0) as figure:
-        bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-        draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
-        frame_axes(bodies, centres[place], half)
-        draw_scale_bar(bodies, centres[place], half)
-        bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
-        graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
-        now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
-        graph.plot(*now, "o", color=style.BODY_COLOURS[0])
-        graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
-        draw_zone(graph, zone_distance)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-        style.keep_titles_whole(figure)  # which draws it
-        return style.frame_of(figure)
+    pictures = []
+    for place, time in enumerate(frames.times * factor):
+        with drawing(6.4, 3.0) as figure:
+            bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
+            draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
+            frame_axes(bodies, centres[place], half)
+            draw_scale_bar(bodies, centres[place], half)
+            bodies.set_title(f"{time:.4g} {unit}", loc="center")
+            graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
+            distance = frames.centre_distance[place] * MICRO
+            graph.plot(time, distance, "o", color=style.BODY_COLOURS[0])
+            graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
+            draw_zone(graph, zone_distance)
+            figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+            style.keep_titles_whole(figure)  # which draws it
+            pictures.append(style.frame_of(figure))
+    style.save_gif(path, pictures, MILLISECONDS, rule)
 
 
 def draw_zone(axes, zone_distance):
