@@ -34,10 +34,10 @@ NO_EVENTS = {
 }
 
 SHARES = {
-    "classes": ("n_class", style.CLASS_COLOURS),
-    "bonds": ("n_bond", style.BOND_COLOURS),
+    "classes": ("pr_class", style.CLASS_COLOURS),
+    "bonds": ("pr_bond", style.BOND_COLOURS),
 }
-"""What is drawn as shares of a whole: its counts, its colours."""
+"""What is drawn as shares of a whole: its probabilities, its colours."""
 
 INSIDE, OUTSIDE = "all inside", "all outside"
 LETTERS = {
@@ -149,7 +149,7 @@ def draw_shares(axes, results, number, name):
 def share_bands(results, number, name):
     """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
     type."""
-    table, share = results.probabilities, f"pr_{SHARES[name][0].removeprefix('n_')}"
+    table, share = results.probabilities, SHARES[name][0]
     errors = over_delta(table, share, table[f"{share}_numerical"])[number]
     changes = [-errors, errors]
     for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
@@ -187,7 +187,7 @@ def over_delta(table, share, errors):
 
 def shares_of(results, number, name):
     """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
-    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+    share = SHARES[name][0]
     if results.replicates is None:
         counts = {
             name: values[number].sum(axis=1)
