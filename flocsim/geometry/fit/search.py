@@ -147,11 +147,6 @@ def searched(
     return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, weights, hole))
 
 
-def count_errors(mask: np.ndarray, vertices: np.ndarray, radius: float) -> int:
-    """V of the swept polygon against the mask: a search without steps."""
-    return searched(mask, vertices, radius, NO_STEPS)[1]
-
-
 def pattern_fit(
     mask: np.ndarray, count: int, radius: float, weights: tuple[int, int] = PLAIN
 ) -> np.ndarray:
