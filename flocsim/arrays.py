@@ -589,7 +589,7 @@ class Scene(NamedTuple):
 
     bodies: Annotated[np.ndarray, ("n", SCENE_BODY_COLUMNS)]  # see MASS
     first: np.ndarray  # (n + 1,): where a body's core points begin
-    vertices: np.ndarray  # (points, 2 or more): geometry.contact.circle_tree.Outlines
+    vertices: np.ndarray  # (points, 2 or more): geometry.contact.compounds.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
     pieces: Annotated[
         np.ndarray, ("pieces", PIECE_COLUMNS)
@@ -606,7 +606,7 @@ class Scene(NamedTuple):
     centre_reach: float = -1.0  # the same of centre forces [m]
     outlines: tuple[float, float, float, float] = NO_OUTLINES  # of forces between: forces.outline
     layer: tuple[float, float, float] = NO_LAYER  # of the charges' double layers: forces.outline
-    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)  # see flocsim.forces.smoothing
+    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)  # see flocsim.forces.outline
     events: int = 0  # how many the contact forces have
     box: tuple[float, float] = NO_BOX  # periods along x and y [m]
     # How long random forces stay (integrators.loop.kicks), and what they are drawn by.

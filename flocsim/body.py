@@ -18,7 +18,7 @@ from flocsim.constants import (
 )
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, in_unit, is_number, only, quantity, word_or_quantity
-from flocsim.geometry.contact.outlines import outlines_of
+from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import charges_of_bodies
 from flocsim.geometry.surfaces.field import field_of_bodies
@@ -277,7 +277,7 @@ def scene_of(
 ) -> Scene:
     """The bodies as one Scene of fresh arrays, with what their forces make of it; without, a scene
     that has no laws. ``resistances``: of every body, where a drag follows their shapes
-    (flocsim.forces.shape_drag); ``others``: further fields of the Scene."""
+    (flocsim.forces.drag); ``others``: further fields of the Scene."""
     shapes = [body.shape for body in bodies]
     columns: tuple[list[float], ...] = (
         [body.mass for body in bodies],

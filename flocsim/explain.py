@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.arrays import ContactView, PairView
-from flocsim.compiler.reads import reached
+from flocsim.compiler.linker import reached
 from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.codegen import PLACES, VELOCITIES
@@ -136,9 +136,7 @@ def no_partner(system):
 
 
 def body_derivative(system, force):
-    reads = check.fields_read(
-        force, system.fluid, force.kernel_in(system.fluid), check.SAMPLE_BODIES
-    )
+    reads = check.fields_read(force, system.fluid, force.kernel_in(system.fluid))
     known = (("velocity", VELOCITIES), ("position", PLACES))
     by = [name for name, fields in known if reads & fields]
     if not by:
@@ -149,8 +147,7 @@ def body_derivative(system, force):
 def pair_derivative(system, force):
     if force.acts_on in ASK_FOR_BOTH:
         return "derivatives from differences of its sum"
-    samples = check.sample_pairs(force.reach)
-    damped = "gap_rate" in check.fields_read(force, system.fluid, force.kernel, samples)
+    damped = "gap_rate" in check.fields_read(force, system.fluid, force.kernel)
     slope = "from differences of its kernel" if force.slope is None else "analytic"
     rate = ", by the gap's rate from differences" if damped else ""
     return f"derivative by the gap {slope}{rate}"

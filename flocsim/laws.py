@@ -17,7 +17,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.compiler.composer import compile_law
-from flocsim.compiler.constants import Intrinsic
+from flocsim.compiler.fingerprint import Intrinsic
 from flocsim.hooks import hook
 
 LAWS = (

@@ -20,13 +20,13 @@ from flocsim.explain import explain
 from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
 from flocsim.forces.codegen import Pieces, laws_of
-from flocsim.forces.double_layer import refuse_unlike
-from flocsim.forces.drag import shields_clusters
+from flocsim.forces.dlvo import refuse_unlike
+from flocsim.forces.drag import resistance_numbers, shields_clusters
+from flocsim.forces.outline import smoothing_of
 from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
-from flocsim.forces.shape_drag import resistance_numbers
-from flocsim.forces.smoothing import smoothing_of
 from flocsim.forces.thermal import key_of, kicks_of
-from flocsim.geometry.contact import compounds, spheres_only
+from flocsim.geometry.contact import compounds
+from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.overlap import overlap_fault
 from flocsim.hooks import HOOKS
 from flocsim.integrators.amplification import amplification_of
@@ -45,7 +45,7 @@ Fillings = dict[Callable, Callable]
 """{hook of flocsim.hooks.HOOKS: the function in its place}."""
 
 FAMILIES: dict[str, Fillings] = {
-    "spheres": spheres_only.FILLINGS,
+    "spheres": SPHERES_ONLY,
     "polygons": {},
     "compounds": compounds.FILLINGS,
 }

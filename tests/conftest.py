@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from flocsim.compiler import disk_cache, waiting
+from flocsim.compiler import disk_cache, units
 
 # Before numpy or numba is imported: they read these once.
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
@@ -48,7 +48,7 @@ def pytest_runtestloop():
 
 
 # What a test's commands print must not depend on what was compiled before it.
-waiting.WORTH_SAYING = math.inf
+units.WORTH_SAYING = math.inf
 
 # A first call may compile a kernel, so a deadline per example would fail on speed alone.
 for profile, examples in (("few", 30), ("many", 100)):

@@ -45,9 +45,9 @@ INNER_ROWS = {
     "compiler": [
         ["composer"],
         ["units"],
-        ["fingerprint", "interpreter_calls"],
-        ["constants", "numba_internals", "linker"],
-        ["by_pointer", "disk_cache", "object_code", "reads", "waiting"],
+        ["fingerprint", "refused"],
+        ["numba_internals"],
+        ["by_pointer", "disk_cache", "object_code", "linker"],
         ["processor"],
     ],
     "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],
@@ -59,7 +59,7 @@ INNER_ROWS = {
         ["arrays"],
     ],
     "brownian": [["meeting"], ["splitting"]],
-    "hydrodynamics": [["encounters", "prism"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "lone_body"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["velocity_verlet", "dormand_prince", "overdamped"],

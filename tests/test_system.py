@@ -8,7 +8,7 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact import spheres_only
+from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.hooks import HOOKS
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from flocsim.laws import compiled_calls
@@ -207,7 +207,7 @@ def test_spheres_alone_reach_no_polygon_code():
         assert name in spheres
     fillings = System(head_on(), [ELASTIC]).fillings()
     assert fillings[contacts.locate_polygons] is contacts.locate_spheres
-    assert spheres_only.FILLINGS.items() <= fillings.items()
+    assert SPHERES_ONLY.items() <= fillings.items()
 
 
 def test_few_bodies_leave_out_what_only_many_need():

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.reporting import Table, print_heading
 from flocsim import Body, Fluid, Sphere, Swarm
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
-from flocsim.hydrodynamics import prism
+from flocsim.hydrodynamics import lone_body
 from flocsim.hydrodynamics.clusters import mobilities
 
 R = 5e-6
@@ -103,10 +103,10 @@ def exact(rings, middle):
         for r in rings
     ]
     places = np.concatenate([
-        prism.surface([ring - middle], 4.0 / 3.0, spacing)
+        lone_body.surface([ring - middle], 4.0 / 3.0, spacing)
         for ring, spacing in zip(rings, spacings, strict=True)
     ])  # fmt: skip
-    loads = prism.loads(places, prism.RADIUS * float(np.mean(spacings)))
+    loads = lone_body.loads(places, lone_body.RADIUS * float(np.mean(spacings)))
     return np.linalg.inv(loads[:, :3])[:2, :2] / ALONE
 
 

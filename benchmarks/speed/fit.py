@@ -15,11 +15,10 @@ from scipy import stats
 
 from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.geometry.fit import fit_mask
-from flocsim.geometry.fit import paper as fit_paper
+from flocsim.geometry.fit import fit_mask, search
 from flocsim.geometry.fit.coverage import compiled, cover, move_vertex, neighbours, padded
 from flocsim.geometry.fit.edge_errors import leaves_room
-from flocsim.geometry.fit.search import count_errors, searched
+from flocsim.geometry.fit.search import searched
 from flocsim.geometry.fit.simple import stays_simple
 from flocsim.geometry.fit.starts import even_start, inset, trace_outline
 
@@ -86,14 +85,14 @@ def paper_counts(mask, vertices):
     """(ms of the paper's motion if it counts V over the whole picture, number of counts)."""
     room, _ = padded(mask, vertices, 1.0)
     start = even_start(room, vertices, 1.0)
-    settings = fit_paper.FORCE, fit_paper.DAMPING, fit_paper.SPACING
-    steps = compiled(fit_paper.damped_descent)(
-        room, np.array(start), np.array(start), 1.0, *settings, fit_paper.TIME_STEP,
-        fit_paper.PATIENCE,
+    settings = search.FORCE, search.DAMPING, search.SPACING
+    steps = compiled(search.damped_descent)(
+        room, np.array(start), np.array(start), 1.0, *settings, search.TIME_STEP,
+        search.PATIENCE,
     )  # fmt: skip
     began = time.process_time()
     for _ in range(20):
-        count_errors(room, start, 1.0)
+        searched(room, start, 1.0, search.NO_STEPS)
     each = (time.process_time() - began) / 20
     return 1e3 * each * steps * (4 * vertices + 1), steps * (4 * vertices + 1)
 

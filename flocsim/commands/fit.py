@@ -25,7 +25,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import read_number
 from flocsim.io.files import make_folder, write_file
 from flocsim.io.images.masks import MASK_SUFFIXES
-from flocsim.io.images.selection import label_image, read_names
+from flocsim.io.images.pictures import label_image, read_names
 from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format

@@ -1,11 +1,11 @@
 """From plain Python functions to machine code that is warm from disk and never stale.
 
 ``composer``: engines and laws compiled and kept.  ``fingerprint``: what a function does, as a hash.
-``interpreter_calls``: what of Python compiled code cannot call.
+``refused``: what a kernel may not do.
 ``disk_cache``: what is kept on disk, and what of it is to be trusted.
 ``processor``: what of the machine decides the last digits.
-``reads``: what a function reads beside its arguments.  ``constants``: which values a hash can tell.
-``waiting``: what is said while something is compiled.
+``linker``: what a function reads beside its arguments; clones of it that read others.
+``units``: what is compiled by itself; what is said meanwhile.
 ``object_code``: machine code, loaded without numba.
 ``by_pointer``: how arguments are handed over.
 ``numba_internals``: all else that leans on numba's private parts.  Imports errors only.

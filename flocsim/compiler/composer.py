@@ -30,9 +30,9 @@ from flocsim.compiler.by_pointer import (
     words_in,
 )
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.interpreter_calls import refuse_interpreter
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import function_at
+from flocsim.compiler.refused import refuse_interpreter
 from flocsim.compiler.units import Code, argument_names, options_text
 
 _composed: dict = {}
@@ -99,6 +99,12 @@ def compose(
         name = f"flocsim_scene_{key[0]}"
         _composed[key] = Compiled(Code(linked, name, allocates, what)) if jit else linked
     return _composed[key]
+
+
+@functools.cache
+def compiled(entry: Callable, *, allocates: bool = False, what: str = "its kernels") -> Callable:
+    """The same of a function without hooks, looked at once: what it reaches is what it was then."""
+    return compose(entry, {}, allocates=allocates, what=what)
 
 
 def is_on_disk(driver: Any) -> bool:

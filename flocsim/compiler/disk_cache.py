@@ -55,22 +55,6 @@ def own_folder() -> Path:
     return Path(platformdirs.user_cache_dir("flocsim"))
 
 
-def cache_path() -> Path:
-    """The folder of compiled code: FLOCSIM_CACHE, else the user's own."""
-    named = os.environ.get("FLOCSIM_CACHE")
-    return Path(named) if named else own_folder()
-
-
-def owner_name(number: int) -> str:
-    """A user in words, "alice" or "user 1234"."""
-    import pwd
-
-    try:
-        return pwd.getpwuid(number).pw_name
-    except KeyError:
-        return f"user {number}"
-
-
 def home_folder() -> Path | None:
     """The user's home: who can exchange that can do anything, so that no folder above matters."""
     import pwd
@@ -100,8 +84,12 @@ def why_unsafe(folder: Path) -> str:
         with contextlib.suppress(OSError):  # what cannot be seen cannot be loaded either
             found = os.lstat(each)
             if not is_ours(found):
+                try:
+                    owner = each.owner()
+                except KeyError:
+                    owner = f"user {found.st_uid}"
                 return (
-                    f"{each} belongs to {owner_name(found.st_uid)}, not to you or root: "
+                    f"{each} belongs to {owner}, not to you or root: "
                     "set FLOCSIM_CACHE to a folder of your own"
                 )
             sticky = each != folder and found.st_mode & stat.S_ISVTX
@@ -120,9 +108,10 @@ def resolved(folder: Path) -> Path:
 
 
 def folders() -> Iterator[Path]:
-    """Where compiled code is looked for: in the cache folder, and in the user's own if the first
-    one cannot be written; only in those where nobody else can have put it."""
-    first = resolved(cache_path())
+    """Where compiled code is looked for: in FLOCSIM_CACHE, and in the user's own folder if that is
+    not named or cannot be written; only in those where nobody else can have put it."""
+    named = os.environ.get("FLOCSIM_CACHE")
+    first = resolved(Path(named) if named else own_folder())
     for folder in [first] if is_writable(first) else [first, resolved(own_folder())]:
         if reason := why_unsafe(folder):
             warn_once(f"no compiled code is kept: {reason}")
@@ -211,15 +200,15 @@ def write(name: str, key: str, data: bytes) -> None:
         try:
             make_folder(folder)
             if reason := why_unsafe(folder):
-                return warn_once(f"no compiled code is kept: {reason}")
-            replace(folder / file_name(name, key), MARK + digest(name, key, data) + data)
+                warn_once(f"no compiled code is kept: {reason}")
+            else:
+                replace(folder / file_name(name, key), MARK + digest(name, key, data) + data)
         except OSError as error:
             warn_once(
                 f"no compiled code is kept: the cache folder {folder} cannot be written "
                 f"({error.strerror}); set FLOCSIM_CACHE to one that can"
             )
-        return None
-    return None
+        return
 
 
 def kept(name: str, key: str, make: Callable[[], bytes]) -> bytes:
@@ -254,12 +243,7 @@ def replace(path, content):
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
-    remove_abandoned(path.parent)
-
-
-def remove_abandoned(folder):
-    """Remove what killed processes have left unfinished."""
-    for each in folder.glob(f".*{UNFINISHED}"):
+    for each in path.parent.glob(f".*{UNFINISHED}"):  # by processes that were killed
         with contextlib.suppress(OSError):
             if time.time() - os.lstat(each).st_mtime > ABANDONED:
                 os.unlink(each)

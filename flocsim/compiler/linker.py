@@ -1,11 +1,147 @@
-"""Clones of functions, with others in the place of hooks: what a scene's driver reaches, as one."""
+"""What a function reads beside its arguments: globals, and attributes of the user's modules. And
+clones of functions, with others in the place of hooks: what a scene's driver reaches, as one."""
 
 import builtins
+import dis
+import functools
+import inspect
+import os
+import sys
+import sysconfig
 import types
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from flocsim.compiler.reads import is_users_module, module_reads, reached, refuse_closure
+from flocsim.errors import KernelError
+
+PACKAGE = str(Path(__file__).parents[1]) + os.sep
+"""Where the files of flocsim's own functions lie."""
+
+KNOWN_PACKAGES = {"numpy", "numba"}
+"""Packages whose version is part of the hash, as Python's own is."""
+
+ATTRIBUTE_LOADS = ("LOAD_ATTR", "LOAD_METHOD")
+
+
+def where(function: Any) -> str:
+    """ "name (file:line)" of a function, for messages."""
+    code = function.__code__
+    return f"{function.__qualname__} ({code.co_filename}:{code.co_firstlineno})"
+
+
+def refuse_closure(function: Any) -> None:
+    """KernelError where the function captures variables."""
+    if function.__closure__:
+        captured = ", ".join(function.__code__.co_freevars)
+        raise KernelError(
+            f"kernel {where(function)} captures {captured}; "
+            "make it a parameter (a field of the force) or a module constant"
+        )
+
+
+def names_in(code: types.CodeType) -> set[str]:
+    """Names of globals and attributes that the code reads, those of nested code included."""
+    names = set(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            names |= names_in(constant)
+    return names
+
+
+def is_versioned(module: Any) -> bool:
+    """Whether a module is Python's own, numpy's or numba's: its version is part of the hash.
+
+    A file of the user's that has the name of one of Python's modules is the user's.
+    """
+    root = module.__name__.partition(".")[0]
+    if root in KNOWN_PACKAGES:
+        return True
+    file = getattr(module, "__file__", None)
+    return root in sys.stdlib_module_names and (file is None or is_in_library(file))
+
+
+@functools.cache
+def is_in_library(file: str) -> bool:
+    """Whether a file belongs to Python's own library."""
+    folders = [os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
+    place = os.path.realpath(file)
+    within = any(place.startswith(folder + os.sep) for folder in folders)
+    return within and "site-packages" not in place and "dist-packages" not in place
+
+
+def is_users_module(value: Any) -> bool:
+    """Whether a value is a module whose code no version tells."""
+    return isinstance(value, types.ModuleType) and not is_versioned(value)
+
+
+def plain(value: Any) -> Any:
+    """The Python function behind one of @njit, which is compiled anew; anything else as it is."""
+    if not hasattr(value, "py_func"):
+        return value
+    from numba.extending import is_jitted
+
+    return value.py_func if is_jitted(value) else value
+
+
+def reached(function: Any) -> dict[str, Any]:
+    """The globals that a function reads: {name: value}."""
+    known = function.__globals__
+    names = sorted(names_in(function.__code__))
+    return {name: plain(known[name]) for name in names if name in known}
+
+
+@functools.lru_cache(maxsize=4096)
+def chains(code: types.CodeType) -> tuple[tuple[str, ...], ...]:
+    """Every read of a global with the attributes that follow: ``a.b.c`` gives ("a", "b", "c")."""
+    found = []
+    chain: list[str] = []
+    for instruction in dis.get_instructions(code):
+        if instruction.opname == "EXTENDED_ARG":
+            continue
+        if chain and instruction.opname in ATTRIBUTE_LOADS:
+            chain.append(instruction.argval)
+            continue
+        found.append(tuple(chain))
+        chain = [instruction.argval] if instruction.opname == "LOAD_GLOBAL" else []
+    nested = [each for each in code.co_consts if inspect.iscode(each)]
+    return tuple(each for each in found if each) + sum(map(chains, nested), ())
+
+
+def module_reads(function: Any) -> dict[tuple[str, ...], Any]:
+    """What a function reads of modules: {("module", …, "name"): value}.
+
+    A chain ends at the first value that is no module of the user's. Raises KernelError for one that
+    the module has not, and for a module that is used as a value, since nobody knows then which of
+    its attributes are read.
+    """
+    modules = {
+        name: value for name, value in reached(function).items()
+        if isinstance(value, types.ModuleType)
+    }  # fmt: skip
+    found: dict[tuple[str, ...], Any] = {}
+    if not modules:
+        return found
+    for chain in chains(function.__code__):
+        if chain[0] not in modules:
+            continue
+        value: Any = modules[chain[0]]
+        used = 1
+        while isinstance(value, types.ModuleType) and used < len(chain):
+            if not hasattr(value, chain[used]):
+                raise KernelError(
+                    f"kernel {where(function)} reads {'.'.join(chain[: used + 1])}, but "
+                    f"module {value.__name__} has no attribute {chain[used]}"
+                )
+            value = plain(getattr(value, chain[used]))
+            used += 1
+        if isinstance(value, types.ModuleType):
+            raise KernelError(
+                f"kernel {where(function)} uses the module {'.'.join(chain[:used])!r} as a value; "
+                "write module.name where a name of it is needed"
+            )
+        found[chain[:used]] = value
+    return found
 
 
 def apart(function: Callable) -> Callable:

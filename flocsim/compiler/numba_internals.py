@@ -33,9 +33,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from flocsim.compiler.by_pointer import address_of_data, is_array
+from flocsim.compiler.linker import PACKAGE, is_in_library, names_in, where
 from flocsim.compiler.object_code import LENT, ObjectCode
 from flocsim.compiler.processor import BASELINE, baseline
-from flocsim.compiler.reads import PACKAGE, is_in_library, names_in, where
 from flocsim.errors import KernelError
 
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
@@ -57,13 +57,6 @@ MANY = 50
 _one_at_a_time = threading.RLock()
 
 
-def compiler_error() -> type[Exception]:
-    """What numba raises for a function that it cannot compile."""
-    from numba.core.errors import NumbaError
-
-    return NumbaError
-
-
 def call_by_address(signature: Any) -> Callable:
     """A function for compiled code: ``call(address, *arguments)`` of a function of a signature.
 
@@ -71,47 +64,29 @@ def call_by_address(signature: Any) -> Callable:
     pointer: the seven words that make an array do not fit into registers.
     """
     from numba import types
-    from numba.core import cgutils
     from numba.core.errors import TypingError
-    from numba.extending import intrinsic
 
     def generate(context, builder, typed, values):
         values = [
             address_of_data(context, builder, given, value)
             for given, value in zip(typed.args, values, strict=True)
         ]
-        convention = context.call_conv
-        kind = convention.get_function_type(signature.return_type, signature.args)
+        returned, given = signature.return_type, signature.args
+        kind = context.call_conv.get_function_type(returned, given)
         function = builder.inttoptr(values[0], kind.as_pointer())
-        status, result = convention.call_function(
-            builder, function, signature.return_type, signature.args, values[1:]
-        )
-        with cgutils.if_unlikely(builder, status.is_error):
-            convention.return_status_propagate(builder, status)
-        return result
+        return call_within(context, builder, function, returned, given, values[1:])
 
     def as_handed(given):
         return types.CPointer(given.dtype) if is_array(given) else given
 
-    def typed_call(address, given):
+    def typed_call(address, *given):
         if tuple(map(as_handed, given)) != signature.args:
-            raise TypingError(f"a law takes {signature.args}, found {tuple(given)}")
+            raise TypingError(f"a law takes {signature.args}, found {given}")
         return signature.return_type(address, *given), generate
 
-    # An intrinsic has as many arguments as its function: the laws have two or three.
-    if len(signature.args) == 2:
-
-        @intrinsic
-        def call(typing, address, view, parameters):
-            return typed_call(address, (view, parameters))
-
-    else:
-
-        @intrinsic
-        def call(typing, address, view, parameters, which):
-            return typed_call(address, (view, parameters, which))
-
-    return call
+    return intrinsic_of(
+        ("address", *(f"given_{k}" for k in range(len(signature.args)))), typed_call
+    )
 
 
 def call_of_unit(names: tuple[str, ...], unit_for: Callable[[tuple[Any, ...]], Any]) -> Callable:
@@ -119,32 +94,55 @@ def call_of_unit(names: tuple[str, ...], unit_for: Callable[[tuple[Any, ...]], A
     ``unit_for(numba types)`` gives (symbol, what it returns), by that symbol."""
     from numba import types
     from numba.core import cgutils
-    from numba.extending import intrinsic
 
-    def typed_call(given):
+    def typed_call(*given):
         given = tuple(map(types.unliteral, given))
         symbol, returned = unit_for(given)
         kind = type_returned(returned)
 
         def generate(context, builder, typed, values):
-            convention = context.call_conv
-            called = convention.get_function_type(kind, given)
+            called = context.call_conv.get_function_type(kind, given)
             function = cgutils.get_or_insert_function(builder.module, called, symbol)
-            status, result = convention.call_function(builder, function, kind, given, values)
-            with cgutils.if_unlikely(builder, status.is_error):
-                convention.return_status_propagate(builder, status)
-            return result
+            return call_within(context, builder, function, kind, given, values)
 
         return kind(*given), generate
 
+    return intrinsic_of(names, typed_call)
+
+
+def call_within(context, builder, function, kind, given, values):
+    """LLVM's call of a function that numba has made; what is raised there is raised here."""
+    from numba.core import cgutils
+
+    convention = context.call_conv
+    status, result = convention.call_function(builder, function, kind, given, values)
+    with cgutils.if_unlikely(builder, status.is_error):
+        convention.return_status_propagate(builder, status)
+    return result
+
+
+def intrinsic_of(names, typed_call):
+    """numba's intrinsic of arguments of such names: it has as many as its function."""
+    from numba.extending import intrinsic
+
     taken = ", ".join(names)
     known: dict[str, Any] = {"typed_call": typed_call}
-    exec(f"def call(typing, {taken}):\n    return typed_call(({taken},))\n", known)
+    exec(f"def call(typing, {taken}):\n    return typed_call({taken})\n", known)
     return intrinsic(known["call"])
 
 
 UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of functions that neither Python nor C calls by numba's wrappers, which take time."""
+
+
+def letters() -> dict[str, Any]:
+    """{letter of struct.unpack: numba type} of what compiled functions return."""
+    from numba import types
+
+    return {
+        "": types.none, "?": types.boolean, "d": types.float64, "q": types.int64,
+        "Q": types.uint64, "f": types.float32, "i": types.int32,
+    }  # fmt: skip
 
 
 def returned_as(kind: Any) -> str:
@@ -155,26 +153,18 @@ def returned_as(kind: Any) -> str:
     if isinstance(kind, types.BaseTuple):
         parts: Any = kind
         return "".join(map(returned_as, parts))
-    letters = {
-        types.none: "", types.boolean: "?", types.float64: "d", types.int64: "q",
-        types.uint64: "Q", types.float32: "f", types.int32: "i",
-    }  # fmt: skip
-    plain = types.unliteral(kind)
-    if plain not in letters:
-        raise KernelError(f"a compiled function returns {kind}: let it return numbers")
-    return letters[plain]
+    for letter, known in letters().items():
+        if types.unliteral(kind) == known:
+            return letter
+    raise KernelError(f"a compiled function returns {kind}: let it return numbers")
 
 
-def type_returned(letters: str) -> Any:
+def type_returned(told: str) -> Any:
     """The numba type of numbers that are returned, told as ``returned_as`` does."""
     from numba import types
 
-    known = {
-        "?": types.boolean, "d": types.float64, "q": types.int64, "Q": types.uint64,
-        "f": types.float32, "i": types.int32,
-    }  # fmt: skip
-    kinds = [known[each] for each in letters]
-    return types.Tuple.from_types(kinds) if len(kinds) > 1 else next(iter(kinds), types.none)
+    known = letters()
+    return known[told] if len(told) < 2 else types.Tuple.from_types([known[each] for each in told])
 
 
 def object_code(function: Any, signature: Any, options: dict) -> tuple[ObjectCode, list[str], bool]:
@@ -319,17 +309,6 @@ ANNOTATIONS = "AnnotateTypes"
 """The pass that keeps all that numba thought of a function, to be looked at."""
 
 
-def is_plain(state: Any) -> bool:
-    """Whether a function that numba compiles allocates no arrays and defines no other inside."""
-    code = state.func_id.code
-    return not state.flags.nrt and not any(hasattr(each, "co_code") for each in code.co_consts)
-
-
-def calls_python(library: Any) -> bool:
-    """Whether a library's own code takes the interpreter's lock, or makes Python objects."""
-    return any(each.name.startswith(PYTHON_CALLS) for each in library._final_module.functions)
-
-
 @functools.cache
 def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """{option: value} of numba.njit for functions that are only linked into others, for one that is
@@ -354,7 +333,11 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
                 name = state.func_id.func_qualname
                 state.library = library_class(state.targetctx.codegen(), name)
                 changed = super().run_pass(state)
-                if library_class is linked and calls_python(state.library):
+                made = state.library._final_module.functions
+                # Whether it takes the interpreter's lock, or makes Python objects.
+                if library_class is linked and any(
+                    each.name.startswith(PYTHON_CALLS) for each in made
+                ):
                     raise UnsupportedError(
                         "it calls Python while it runs, or raises an exception with numbers in it",
                         state.func_ir.loc,
@@ -365,12 +348,17 @@ def compilers() -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
             """numba's usual passes with another last one."""
 
             def define_pipelines(self):
+                code = self.state.func_id.code
+                # It allocates no arrays and defines no other function inside.
+                is_plain = not self.state.flags.nrt and not any(
+                    hasattr(each, "co_code") for each in code.co_consts
+                )
                 passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
                 passes.passes = [
                     (Lowering if each is NativeLowering else each, what)
                     for each, what in passes.passes
                     if each.__name__ != ANNOTATIONS
-                    and not (each.__name__ in NEEDLESS_PASSES and is_plain(self.state))
+                    and not (each.__name__ in NEEDLESS_PASSES and is_plain)
                 ]
                 passes.finalize()
                 return [passes]
@@ -543,16 +531,9 @@ def is_installed(file: str) -> bool:
     return is_in_library(file) or file.startswith(known) or "-packages" in file
 
 
-def teachers(template: Any) -> list[Any]:
-    """The functions of the user's that stand behind a template of numba's for types."""
-    found = [getattr(each, "__func__", each) for each in vars(template).values()]
-    return [
-        each for each in found if inspect.isfunction(each) and not is_installed(file_of(each))
-    ]  # fmt: skip
-
-
-def file_of(function):
-    return function.__code__.co_filename
+def is_users(function: Any) -> bool:
+    """Whether something is a function of the user's."""
+    return inspect.isfunction(function) and not is_installed(function.__code__.co_filename)
 
 
 @functools.lru_cache(maxsize=1)
@@ -567,11 +548,11 @@ def taught(sizes: tuple[int, ...]) -> list[tuple[Any, str, Any]]:
     found = [
         (getattr(template, "key", None), getattr(template, "_attr", ""), function)
         for template in (*typing.functions, *typing.attributes)
-        for function in teachers(template)
+        for each in vars(template).values()
+        if is_users(function := getattr(each, "__func__", each))
     ]
     for function, key, _ in (*lowering.functions, *lowering.getattrs):
-        behind = inspect.unwrap(function)
-        if inspect.isfunction(behind) and not is_installed(file_of(behind)):
+        if is_users(behind := inspect.unwrap(function)):
             found.append((key, key if isinstance(key, str) else "", behind))
     return found
 

@@ -103,21 +103,16 @@ def function_at(entry: int, returned: str) -> Callable[[int], Any]:
     def function(address):
         answer, raised = ctypes.create_string_buffer(layout.size or 8), ctypes.c_void_p()
         if call(ctypes.addressof(answer), ctypes.addressof(raised), address):
-            raise exception_at(raised.value)
+            raise exception_at(raised.value or 0)
         numbers = layout.unpack_from(answer)
         return numbers if len(numbers) > 1 else next(iter(numbers), None)
 
     return function
 
 
-class Raised(ctypes.Structure):
-    """What numba's compiled code tells of an exception: a pickle (class, arguments, place)."""
-
-    _fields_ = [("data", ctypes.c_void_p), ("size", ctypes.c_int32)]
-
-
-def exception_at(address: int | None) -> BaseException:
-    """The exception that compiled code has raised."""
-    found = Raised.from_address(address or 0)
-    kind, arguments, _ = pickle.loads(ctypes.string_at(found.data, found.size))
+def exception_at(address: int) -> BaseException:
+    """The exception that numba's compiled code tells of: a pickle (class, arguments, place)."""
+    data = ctypes.c_void_p.from_address(address)
+    size = ctypes.c_int32.from_address(address + ctypes.sizeof(data))
+    kind, arguments, _ = pickle.loads(ctypes.string_at(data.value or 0, size.value))
     return kind(*(arguments or ()))

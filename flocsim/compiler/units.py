@@ -20,18 +20,16 @@ import json
 import re
 import sys
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import types_within
-from flocsim.compiler.constants import Intrinsic
-from flocsim.compiler.fingerprint import hashed, tell
+from flocsim.compiler.fingerprint import Intrinsic, hashed, tell
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import Called, ObjectCode, link
 from flocsim.compiler.processor import compiled_for, numba_settings
-from flocsim.compiler.waiting import compiling
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.limits import COMPILING, lacking
 
@@ -84,7 +82,13 @@ class Code:
         if (data := disk_cache.read(self.name, key)) is not None:
             # What fails was written by this code, and yet is of no use: it is compiled anew.
             with contextlib.suppress(Exception):
-                return from_files(data)
+                head, packed = data.split(b"\n", 1)
+                code = ObjectCode.unpacked(packed)
+                units = {
+                    symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
+                    for symbol, file in json.loads(head).items()
+                }
+                return link(code, units), code.returned
         build = Build(self, whole)
         code = build.entry(*typed(), disk_cache.read(self.name, begun) if whole else None)
         if build.lasts:
@@ -96,17 +100,6 @@ class Code:
 def key_of(told, function):
     """What the machine code of a function depends on beside the name: types, processor."""
     return repr((told, compiled_for(hasattr(function, "loops"))))
-
-
-def from_files(data):
-    """(address, what it returns) of an engine as the disk has it, of units that it has, too."""
-    head, packed = data.split(b"\n", 1)
-    code = ObjectCode.unpacked(packed)
-    units = {
-        symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
-        for symbol, file in json.loads(head).items()
-    }
-    return link(code, units), code.returned
 
 
 class Build:
@@ -135,6 +128,8 @@ class Build:
     def entry(self, signature, readers, known, begun=None):
         """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
         be compiled. ``begun``: of the engine without what is postponed, as the disk has it."""
+        from numba import NumbaError
+
         from flocsim.compiler import numba_internals as internals
 
         if text := lacking(COMPILING, "compiling"):
@@ -147,7 +142,7 @@ class Build:
                 self.known |= known
                 found = self.completed(code.entry, begun.split(b"\n", 1)[1]) if begun else None
                 return found or self.compiled(code.entry, code.name, signature, readers)
-        except internals.compiler_error() as error:
+        except NumbaError as error:
             raise KernelError(compiler_complaint(str(error))) from None
         finally:
             internals.forget(self.parts)
@@ -171,7 +166,8 @@ class Build:
 
         def unit_for(given):
             symbol, unit = self.unit(function, given)
-            self.calls[symbol] = Called(symbol, function.apart, told_types(given), unit.returned)
+            types = list(map(str, given))
+            self.calls[symbol] = Called(symbol, function.apart, types, unit.returned)
             return symbol, unit.returned
 
         return internals.call_of_unit(argument_names(function), unit_for)
@@ -198,8 +194,9 @@ class Build:
     def unit(self, function, given):
         """(symbol, ObjectCode) of a function marked @apart for arguments of such numba types."""
         self.known |= types_within(given)
-        told = told_types(given)
-        symbol = symbol_of(function.apart, told)
+        told = list(map(str, given))
+        words = " ".join([function.apart, *told])
+        symbol = f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
         function = made_of(function, self.whole)
         if symbol not in self.units:
             name, key = unit_of(function).name, key_of(told, function)
@@ -225,15 +222,40 @@ class Build:
         return code
 
 
-def told_types(given):
-    """numba types in words."""
-    return [str(each) for each in given]
+SECONDS_OF_A_FUNCTION = 0.035
+"""Seconds that one function of an engine takes (benchmarks/speed/compile_times.py): of some 400."""
+
+WORTH_SAYING = 2.0
+"""Seconds below which nothing is said: the laws of a scene and the parts of a fit take less."""
 
 
-def symbol_of(function, told):
-    """By what name a unit is called: that of its function, for arguments of such types."""
-    words = " ".join([function, *told])
-    return f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
+@contextlib.contextmanager
+def one_line(text: str) -> Iterator[None]:
+    """A line on stderr: how a library waits. A command puts another in its place."""
+    print(f"flocsim: {text}", file=sys.stderr, flush=True)
+    yield
+
+
+silent = contextlib.nullcontext
+"""Nothing is said: for processes of which another one speaks."""
+
+shown: Callable[[str], Any] = one_line
+"""How the line is shown: a context that lasts as long as the compiler works."""
+
+
+def show_by(way: Callable[[str], Any]) -> None:
+    """From now on show the line in this way."""
+    global shown
+    shown = way
+
+
+def compiling(what: str, functions: int) -> Any:
+    """A context in which so many functions are compiled; ``what`` they are, together."""
+    seconds = SECONDS_OF_A_FUNCTION * functions
+    if seconds < WORTH_SAYING:
+        return contextlib.nullcontext()
+    about = max(5, 5 * round(seconds / 5))
+    return shown(f"first run: compiling {what}, about {about} s, once")
 
 
 class Unit(NamedTuple):

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any
 
-from flocsim.compiler import waiting
+from flocsim.compiler import units
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
     StopRequested,
@@ -285,7 +285,7 @@ def run_command(arguments: argparse.Namespace) -> int:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
     if arguments.quiet:
-        waiting.show_by(waiting.silent)
+        units.show_by(units.silent)
     return guarded(comm, arguments)
 
 

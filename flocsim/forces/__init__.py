@@ -11,12 +11,11 @@ from flocsim.forces.base import (
     SurfaceForce,
 )
 from flocsim.forces.contact import Contact
-from flocsim.forces.double_layer import DoubleLayer
+from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
 from flocsim.forces.drag import StokesDrag
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.pair_resistance import Lubrication, PairResistance
 from flocsim.forces.thermal import Thermal
-from flocsim.forces.van_der_waals import VanDerWaals
 
 __all__ = [
     "BodyForce",

@@ -71,22 +71,17 @@ class PairForce(Force):
 
 @attrs.frozen
 class CentreForce(PairForce):
-    """A PairForce along the line of centres, of the gap between the equivalent spheres."""
+    """A PairForce along the line of centres, of the gap between the equivalent spheres: without
+    torque."""
 
-    @property
-    def acts_on(self) -> str:
-        """Always the centres: no torque."""
-        return "centres"
+    acts_on = "centres"
 
 
 @attrs.frozen
 class SurfaceForce(PairForce):
     """A PairForce between the two outlines, of the smooth gap between them (surface_gap.py)."""
 
-    @property
-    def acts_on(self) -> str:
-        """Always the surfaces: with torque."""
-        return "surfaces"
+    acts_on = "surfaces"
 
 
 @attrs.frozen
@@ -100,10 +95,7 @@ class OutlineForce(PairForce):
 
     depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere", kw_only=True)
 
-    @property
-    def acts_on(self) -> str:
-        """Always the outlines."""
-        return "outlines"
+    acts_on = "outlines"
 
 
 @attrs.frozen
@@ -117,10 +109,7 @@ class OrientedForce(PairForce):
     in both angles, and have faded at ``reach``.
     """
 
-    @property
-    def acts_on(self) -> str:
-        """Always as both bodies are turned: with torque."""
-        return "orientations"
+    acts_on = "orientations"
 
 
 @attrs.frozen

@@ -16,84 +16,61 @@ import numpy as np
 from flocsim.arrays import BodyView, ContactView, OrientedView, OutlineView, PairView
 from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import globals_read, tell
-from flocsim.compiler.reads import names_in, refuse_closure, where
+from flocsim.compiler.linker import names_in, refuse_closure, where
+from flocsim.compiler.refused import made_by, wrong_return
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
-from flocsim.forces.kernel_code import made_by, wrong_return
 
 SAMPLE_BODIES = (
     BodyView(
-        1e-3,
-        2e-6,
-        -3e-6,
-        0.5,
-        1e-4,
-        -2e-4,
-        3.0,
-        2e-10,
-        1e-10,
-        2e-21,
-        5e-6,
-        0.6,
-        0.3,
-        10.0,
-        -20.0,
-        30.0,
+        1e-3, 2e-6, -3e-6, 0.5, 1e-4, -2e-4, 3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.6, 0.3,
+        10.0, -20.0, 30.0,
     ),
     BodyView(
-        0.0,
-        -2e-6,
-        3e-6,
-        -0.5,
-        -1e-4,
-        2e-4,
-        -3.0,
-        2e-10,
-        1e-10,
-        2e-21,
-        5e-6,
-        0.0,
-        0.0,
-        -10.0,
-        20.0,
-        -30.0,
+        0.0, -2e-6, 3e-6, -0.5, -1e-4, 2e-4, -3.0, 2e-10, 1e-10, 2e-21, 5e-6, 0.0, 0.0,
+        -10.0, 20.0, -30.0,
     ),
-)
+)  # fmt: skip
 SAMPLE_CONTACTS = tuple(
     ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6)
     for rate in (1e-4, -1e-4) for slip in (1e-9, -1e-9)
 )  # fmt: skip
-SAMPLE_GAPS = (-1e-9, 1e-10, 1e-7)
-"""Gaps [m] of the sample pairs: in contact, nearly so, apart."""
+
+
+def sample_gaps(reach):
+    """Gaps [m] in contact, nearly so, and apart, within a reach."""
+    return [min(gap, 0.5 * reach) for gap in (-1e-9, 1e-10, 1e-7)]
 
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:
-    """PairViews with gaps of either sign, within the reach of the force [m]."""
-    gaps = [min(gap, 0.5 * reach) for gap in SAMPLE_GAPS]
+    """PairViews with gaps of either sign, within the reach of a force [m]."""
     return tuple(
         PairView(1e-3, gap, rate, gap + 3e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
-        for gap in gaps for rate in (-1e-4, 1e-4)
+        for gap in sample_gaps(reach) for rate in (-1e-4, 1e-4)
     )  # fmt: skip
 
 
-def sample_points(force: PairForce) -> tuple[OutlineView, ...]:
-    """OutlineViews with gaps of either sign, within the reach of a force between outlines [m]."""
-    gaps = [min(gap, 0.5 * reach_of(force)) for gap in SAMPLE_GAPS]
-    return tuple(
-        OutlineView(
-            1e-3, gap, gap, max(gap, 1e-10), max(gap, 1e-10), 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10
+def samples_of(force: Force) -> tuple:
+    """Views such as a force's kernels will get."""
+    if isinstance(force, BodyForce):
+        return SAMPLE_BODIES
+    if isinstance(force, ContactForce):
+        return SAMPLE_CONTACTS
+    assert isinstance(force, PairForce)
+    if force.acts_on == "outlines":
+        return tuple(
+            OutlineView(1e-3, gap, gap, apart, apart, 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
+            for gap in sample_gaps(reach_of(force))
+            for apart in [max(gap, 1e-10)]
         )
-        for gap in gaps
-    )
-
-
-def sample_orientations(force: PairForce) -> tuple[OrientedView, ...]:
-    """OrientedViews with gaps of either sign, within the reach of an oriented force [m]."""
-    gaps = [min(gap, 0.5 * reach_of(force)) for gap in SAMPLE_GAPS]
-    return tuple(
-        OrientedView(1e-3, gap, gap + 3e-6, angle, 1.0 - 2.0 * angle, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
-        for gap in gaps for angle in (-2.0, 0.0, 1.0)
-    )  # fmt: skip
+    if force.acts_on == "orientations":
+        return tuple(
+            OrientedView(
+                1e-3, gap, gap + 3e-6, angle, 1.0 - 2.0 * angle, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10
+            )
+            for gap in sample_gaps(reach_of(force)) for angle in (-2.0, 0.0, 1.0)
+        )  # fmt: skip
+    return sample_pairs(reach_of(force))
 
 
 def refusal(force, function, finding):
@@ -186,24 +163,27 @@ def failing_line(error):
     return f"{frame.filename}:{frame.lineno}"
 
 
-def is_arithmetic(error):
-    """Whether the numbers are to blame, which the compiled code answers with inf or nan."""
-    unpacking = "unpack" in str(error)
-    return isinstance(error, ArithmeticError) or (isinstance(error, ValueError) and not unpacking)
-
-
 def results(
     force: Force, kernel: Callable, samples: Iterable, arguments: Sequence
 ) -> Iterator[Any]:
-    """What a kernel returns for the samples, those beyond its arithmetic left out."""
+    """What a kernel returns for the samples, those beyond its arithmetic left out, which the
+    compiled code answers with inf or nan."""
     for view in samples:
         try:
             result = kernel(view, *arguments)
-        except Exception as error:
-            if not is_arithmetic(error):
-                raise refusal(force, kernel, failure(view, error)) from None
+        except ArithmeticError:
             continue
-        refuse_complex(force, kernel, view, result)
+        except Exception as error:
+            if isinstance(error, ValueError) and "unpack" not in str(error):
+                continue
+            raise refusal(force, kernel, failure(view, error)) from None
+        parts = result if isinstance(result, tuple) else (result,)
+        if any(isinstance(part, complex) for part in parts):
+            raise refusal(
+                force, kernel,
+                f"gives no real number at {asked_at(view)}: what is below zero has no power with a "
+                "fractional exponent; bound its base, as in max(x, 0.0)",
+            )  # fmt: skip
         yield result
 
 
@@ -228,37 +208,22 @@ def asked_at(view: Any) -> str:
     return f"t = {view.time:.3g} s and an angle of {view.angle:.3g} rad"
 
 
-def refuse_complex(force, kernel, view, result):
-    """KernelError for complex numbers, which uncompiled code has where compiled code has nan."""
-    for part in result if isinstance(result, tuple) else (result,):
-        if isinstance(part, complex):
-            raise refusal(
-                force, kernel,
-                f"gives no real number at {asked_at(view)}: what is below zero has no power with a "
-                "fractional exponent; bound its base, as in max(x, 0.0)",
-            )  # fmt: skip
-
-
-def are_numbers(result):
-    """Whether a result is a tuple of numbers."""
-    return isinstance(result, tuple) and all(isinstance(part, Real) for part in result)
-
-
-def check_results(force, fluid, kernel, samples, *parts):
-    """KernelError unless a kernel can be called and returns the named parts, each a number."""
+def check_results(force, fluid, kernel, *parts):
+    """KernelError unless a kernel can be called and returns the named parts, each a number; without
+    any, a tuple of numbers, always as many."""
     require_plain(force, kernel)
-    arguments = kernel_arguments(force, fluid, kernel)
-    wanted = f"({', '.join(parts)})" if len(parts) > 1 else f"one number, the {parts[0]}"
-    for result in results(force, kernel, samples, arguments):
-        several = are_numbers(result) and len(result) == len(parts)
-        if not (several if len(parts) > 1 else isinstance(result, Real)):
+    arguments, count = kernel_arguments(force, fluid, kernel), len(parts) or None
+    wanted = f"({', '.join(parts)})" if parts else "a tuple of numbers, always as many"
+    if len(parts) == 1:
+        wanted = f"one number, the {parts[0]}"
+    for result in results(force, kernel, samples_of(force), arguments):
+        found = (result,) if len(parts) == 1 else result
+        numbers = isinstance(found, tuple) and all(isinstance(part, Real) for part in found)
+        count = count or (len(found) if numbers else None)
+        if not numbers or not found or len(found) != count:
             raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
-    check_code(force, kernel, len(parts), wanted)
-
-
-def check_code(force, kernel, parts, wanted):
-    """KernelError for returns of other numbers in branches where no sample may come."""
-    if words := wrong_return(kernel, parts):
+    # Returns of other numbers in branches where no sample may come.
+    if words := wrong_return(kernel, count):
         raise refusal(force, kernel, f"{words}; it must return {wanted}")
 
 
@@ -277,7 +242,7 @@ class Watched:
         return self.view[index]
 
 
-def fields_read(force: Force, fluid: Fluid, kernel: Callable, samples: Iterable) -> set[str]:
+def fields_read(force: Force, fluid: Fluid, kernel: Callable) -> set[str]:
     """Names that a kernel reads of its view: those in its code and its helpers', and those that
     it is seen to read without a name."""
     names, pending, known = set(), [kernel], set()
@@ -287,7 +252,7 @@ def fields_read(force: Force, fluid: Fluid, kernel: Callable, samples: Iterable)
         names |= names_in(function.__code__)
         called = [value for _, value in globals_read(function) if inspect.isfunction(value)]
         pending += [each for each in called if each not in known]
-    watched = [Watched(view) for view in samples]
+    watched = [Watched(view) for view in samples_of(force)]
     for _ in results(force, kernel, watched, kernel_arguments(force, fluid, kernel)):
         pass
     return names.union(*(each.read for each in watched))
@@ -301,46 +266,6 @@ def reach_of(force: PairForce) -> float:
     return float(reach)
 
 
-def check_pair_force(force, fluid):
-    if force.acts_on == "outlines":
-        check_results(force, fluid, force.kernel_in(fluid), sample_points(force), "pressure [Pa]")
-        return
-    if force.acts_on == "orientations":
-        check_results(force, fluid, force.kernel, sample_orientations(force), "energy [J]")
-        return
-    samples = sample_pairs(reach_of(force))
-    check_results(force, fluid, force.kernel, samples, "repulsion [N]")
-    if force.slope is not None:
-        check_results(force, fluid, force.slope, samples, "slope [N/m]")
-
-
-def check_contact_force(force, fluid):
-    check_results(force, fluid, force.kernel, SAMPLE_CONTACTS, "normal", "tangential")
-    if force.slides:
-        check_results(force, fluid, force.slip_limit, SAMPLE_CONTACTS, "largest slip [m]")
-    if inspect.isfunction(getattr(force, "kink", None)):
-        raise refusal(
-            force, force.kink, "is called kink: name it events and return a tuple, one a kink"
-        )
-    if force.has_events:
-        check_events(force, fluid)
-
-
-def check_events(force, fluid):
-    """KernelError unless the events of a contact force are a tuple of always as many numbers."""
-    require_plain(force, force.events)
-    arguments = kernel_arguments(force, fluid, force.events)
-    found = list(results(force, force.events, SAMPLE_CONTACTS, arguments))
-    for result in found:
-        if not are_numbers(result) or len(result) != len(found[0]) or not result:
-            raise refusal(
-                force, force.events,
-                f"returns {result!r}; it must return a tuple of numbers, always as many",
-            )  # fmt: skip
-    parts = len(found[0]) if found else None
-    check_code(force, force.events, parts, "a tuple of numbers, always as many")
-
-
 def event_count(force: ContactForce, fluid: Fluid) -> int:
     arguments = kernel_arguments(force, fluid, force.events)
     return len(next(results(force, force.events, SAMPLE_CONTACTS, arguments), ()))
@@ -352,10 +277,21 @@ def check_kernel(force: Force, fluid: Fluid) -> None:
     Each is called uncompiled on samples of the view that it will get, which finds misspelt
     attributes, unknown parameters, and results of the wrong kind.
     """
+    kernel = force.kernel_in(fluid)
     if isinstance(force, BodyForce):
-        kernel = force.kernel_in(fluid)
-        check_results(force, fluid, kernel, SAMPLE_BODIES, "fx", "fy", "torque")
-    elif isinstance(force, ContactForce):
-        check_contact_force(force, fluid)
+        check_results(force, fluid, kernel, "fx", "fy", "torque")
     elif isinstance(force, PairForce):
-        check_pair_force(force, fluid)
+        wanted = {"outlines": "pressure [Pa]", "orientations": "energy [J]"}
+        check_results(force, fluid, kernel, wanted.get(force.acts_on, "repulsion [N]"))
+        if force.slope is not None and force.acts_on not in wanted:
+            check_results(force, fluid, force.slope, "slope [N/m]")
+    elif isinstance(force, ContactForce):
+        check_results(force, fluid, kernel, "normal", "tangential")
+        if force.slides:
+            check_results(force, fluid, force.slip_limit, "largest slip [m]")
+        if inspect.isfunction(kink := getattr(force, "kink", None)):
+            raise refusal(
+                force, kink, "is called kink: name it events and return a tuple, one a kink"
+            )
+        if force.has_events:
+            check_results(force, fluid, force.events)

@@ -18,22 +18,20 @@ from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
 from flocsim.forces.check import (
-    SAMPLE_BODIES,
     check_kernel,
     event_count,
     fields_read,
     kernel_arguments,
     reach_of,
-    sample_pairs,
 )
 from flocsim.forces.outline import (
     layer_along,
     layer_numbers,
     outlines_of_forces,
     pressures_of,
+    smoothness,
 )
 from flocsim.forces.pair_resistance import PairResistance, stand_in
-from flocsim.forces.smoothing import smoothness
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.laws import LAWS
 
@@ -46,47 +44,11 @@ def body_change(view, axis):
     return 1e-3 * abs((view.vx, view.vy, view.spin)[axis - 3]) + floor
 
 
-def changed_body(view, axis, by):
-    """A BodyView with one of x, y, angle (axis 0–2) or vx, vy, spin (3–5) changed."""
-    return BodyView(
-        view.time,
-        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
-        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
-        view.mass, view.buoyant_mass, view.inertia, view.radius,
-        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
-        view.resistance_xx, view.resistance_xy, view.resistance_yy,
-        view.resistance_xs, view.resistance_ys, view.resistance_ss,
-        view.strain_xx_x, view.strain_xx_y, view.strain_xx_s,
-        view.strain_xy_x, view.strain_xy_y, view.strain_xy_s,
-        view.shielding_xx, view.shielding_xy, view.shielding_yy,
-    )  # fmt: skip
-
-
-def changed_plain_body(view, axis, by):
-    """The same of a PlainBodyView."""
-    return PlainBodyView(
-        view.time,
-        view.x + by * (axis == 0), view.y + by * (axis == 1), view.angle + by * (axis == 2),
-        view.vx + by * (axis == 3), view.vy + by * (axis == 4), view.spin + by * (axis == 5),
-        view.mass, view.buoyant_mass, view.inertia, view.radius,
-        view.elongation, view.long_axis, view.kick_x, view.kick_y, view.kick_turn,
-    )  # fmt: skip
-
-
 def contact_change(view, axis):
     """How much to change an overlap, its rate, a slip or its rate (axis 0–3) by [m or m/s]."""
     value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
     floor = 1e-13 if axis % 2 == 0 else 1e-9
     return 1e-3 * abs(value) + floor
-
-
-def changed_contact(view, axis, by):
-    """A ContactView with its overlap, overlap rate, slip or slip rate (axis 0–3) changed."""
-    return ContactView(
-        view.overlap + by * (axis == 0), view.overlap_rate + by * (axis == 1),
-        view.slip + by * (axis == 2), view.slip_rate + by * (axis == 3),
-        view.effective_mass, view.radius_i, view.radius_j,
-    )  # fmt: skip
 
 
 def pressed_contact(view):
@@ -100,15 +62,12 @@ def pressed_contact(view):
     )  # fmt: skip
 
 
+VIEWS = BodyView, PlainBodyView, ContactView, PairView
 VELOCITIES = {"vx", "vy", "spin"}
 PLACES = {"x", "y", "angle", "time"}
 PLACES_OF_PAIRS = {
     "centres": "centre", "surfaces": "surface", "outlines": "outline", "orientations": "oriented",
 }  # fmt: skip
-CHANGES = (
-    body_change, changed_body, changed_plain_body, contact_change, changed_contact, pressed_contact,
-)  # fmt: skip
-
 ROOM = 64
 """Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
 another kind leave the text of a law as it is."""
@@ -171,9 +130,9 @@ class Source:
 @functools.lru_cache(maxsize=256)
 def made_laws(text, base, kernels):
     """{law: function} of a source text; the same functions for the same text and kernels."""
-    namespace = {"PairView": PairView, "BASE": base, "max": max, "min": min, "abs": abs}
-    namespace |= {each.__name__: each for each in CHANGES}
-    namespace |= dict(kernels)
+    known = (*VIEWS, body_change, contact_change, pressed_contact)
+    namespace = {"BASE": base, "max": max, "min": min, "abs": abs, **dict(kernels)}
+    namespace |= {each.__name__: each for each in known}
     exec(compile(text, "<scene>", "exec"), namespace)
     return {name: namespace[name] for name in LAWS if name in namespace}
 
@@ -206,19 +165,27 @@ def difference_text(call, field, size):
     return f"({shifted[0]} - {shifted[1]}) / (2.0 * {size})"
 
 
-def differences_text(name, force, view, parts, axes, keep, changed=None):
+def change_text(kind, changed):
+    """Source of a function that gives a view of a kind with one of its fields ``changed``, that of
+    an axis, by so much."""
+    fields = [
+        f"view.{name} + by * (axis == {changed.index(name)})" if name in changed else f"view.{name}"
+        for name in kind._fields
+    ]
+    return f"def changed(view, axis, by):\n    return {kind.__name__}({', '.join(fields)})\n"
+
+
+def differences_text(name, force, view, parts, axes, keep):
     """Source of a function with the one-sided differences of a sum of forces by some axes.
 
-    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis;
-    ``changed``: what changes a view, as `changed_contact`, where its name does not tell.
+    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis.
     """
-    changed = changed or f"changed_{view}"
     lines = [f"def {name}({view}, parameters):", f"    now = {force}({view}, parameters)"]
     found = [f"now[{part}]" for part in range(parts)] if keep else []
     for axis in axes:
         lines += [
             f"    size_{axis} = {view}_change({view}, {axis})",
-            f"    new_{axis} = {force}({changed}({view}, {axis}, size_{axis}), parameters)",
+            f"    new_{axis} = {force}(changed({view}, {axis}, size_{axis}), parameters)",
         ]
         found += [f"(new_{axis}[{part}] - now[{part}]) / size_{axis}" for part in range(parts)]
     return "\n".join([*lines, f"    return {', '.join(found)}"]) + "\n"
@@ -232,7 +199,7 @@ def write_body_laws(source, forces):
     for force in forces:
         kernel = force.kernel_in(source.fluid)
         call = source.call(force, kernel, "body")
-        reads = fields_read(force, source.fluid, kernel, SAMPLE_BODIES)
+        reads = fields_read(force, source.fluid, kernel)
         plain = plain and not reads & NUMBERS_OF_SHAPES
         terms["body_force"].append(("", call))
         if reads & VELOCITIES:
@@ -242,58 +209,48 @@ def write_body_laws(source, forces):
     source.functions += [
         sum_function(name, "body", some, 3) for name, some in terms.items() if some
     ]
+    fields = ("x", "y", "angle", "vx", "vy", "spin")
+    source.functions.append(change_text(PlainBodyView if plain else BodyView, fields))
     for name, axes in (("position", range(3)), ("velocity", range(3, 6))):
         if terms[f"{name}_force"]:
             law = f"{name}_derivatives", f"{name}_force"
-            changed = "changed_plain_body" if plain else "changed_body"
-            text = differences_text(*law, "body", 3, axes, keep=False, changed=changed)
-            source.functions.append(text)
+            source.functions.append(differences_text(*law, "body", 3, axes, keep=False))
     return plain
 
 
 def write_pair_laws(source, forces, kind):
-    force_terms, slope_terms, damping_terms = [], [], []
+    """The sum of pair forces, and its derivatives by the gap and, negative, by the gap's rate."""
+    sums, derivatives = [], []
     for force in forces:
+        kernel = force.kernel_in(source.fluid)
         condition = f"pair.gap < {source.value(reach_of(force))}"
-        call = source.call(force, force.kernel, "pair")
-        force_terms.append((condition, call))
+        call = source.call(force, kernel, "pair")
+        sums.append((condition, call))
         if force.slope is None:
             slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
         else:
             slope = source.call(force, force.slope, "pair")
-        slope_terms.append((condition, slope))
-        samples = sample_pairs(reach_of(force))
-        if "gap_rate" in fields_read(force, source.fluid, force.kernel, samples):
+        damping = "0.0"
+        if "gap_rate" in fields_read(force, source.fluid, kernel):
             change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
-            damping_terms.append((condition, f"-({change})"))
+            damping = f"-({change})"
+        derivatives.append((condition, f"{slope}, {damping}"))
     if forces:
         source.functions += [
-            sum_function(f"{kind}_force", "pair", force_terms, 1),
-            sum_function(f"{kind}_slope", "pair", slope_terms, 1),
-            sum_function(f"{kind}_damping", "pair", damping_terms, 1),
-            f"def {kind}_derivatives(pair, parameters):\n"
-            f"    return {kind}_slope(pair, parameters), {kind}_damping(pair, parameters)\n",
+            sum_function(f"{kind}_force", "pair", sums, 1),
+            sum_function(f"{kind}_derivatives", "pair", derivatives, 2),
         ]
 
 
-def write_outline_law(source, forces):
-    """The pressure between two outlines at a point of one."""
+def write_sum(source, forces, law, view):
+    """The pressure between two outlines at a point of one, or the energy of two bodies as they are
+    turned."""
     terms = []
     for force in forces:
-        call = source.call(force, force.kernel_in(source.fluid), "point")
-        terms.append((f"point.gap < {source.value(reach_of(force))}", call))
+        call = source.call(force, force.kernel_in(source.fluid), view)
+        terms.append((f"{view}.gap < {source.value(reach_of(force))}", call))
     if terms:
-        source.functions.append(sum_function("outline_pressure", "point", terms, 1))
-
-
-def write_oriented_law(source, forces):
-    """The energy of two bodies as they are turned."""
-    terms = []
-    for force in forces:
-        call = source.call(force, force.kernel, "pair")
-        terms.append((f"pair.gap < {source.value(reach_of(force))}", call))
-    if terms:
-        source.functions.append(sum_function("oriented_energy", "pair", terms, 1))
+        source.functions.append(sum_function(law, view, terms, 1))
 
 
 def write_contact_laws(source, forces):
@@ -301,32 +258,27 @@ def write_contact_laws(source, forces):
     terms, limits, events = [], [], []
     for force in forces:
         view = "contact" if force.goes_on_apart else "pressed_contact(contact)"
-        terms.append(("", source.call(force, force.kernel, view)))
+        terms.append(("", source.call(force, force.kernel_in(source.fluid), view)))
         if force.slides:
             limits.append(source.call(force, force.slip_limit, view))
         if force.has_events:
             call = source.call(force, force.events, view)
-            events.append((event_count(force, source.fluid), call))
+            events += [f"{call}[{k}]" for k in range(event_count(force, source.fluid))]
     if terms:
         source.functions.append(sum_function("contact_force", "contact", terms, 2))
+        fields = ("overlap", "overlap_rate", "slip", "slip_rate")
+        source.functions.append(change_text(ContactView, fields))
         law = "contact_derivatives", "contact_force"
         source.functions.append(differences_text(*law, "contact", 2, range(4), keep=True))
     if limits:
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
         source.functions.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
     if events:
-        source.functions.append(event_text(events))
-    return sum(count for count, _ in events)
-
-
-def event_text(events):
-    """Source of the function that gives the event of a number, those of all forces in a row."""
-    lines, first = ["def contact_event(contact, parameters, which):"], 0
-    for count, call in events:
-        for each in range(count):
-            lines += [f"    if which == {first + each}:", f"        return {call}[{each}]"]
-        first += count
-    return "\n".join([*lines, "    return 1.0"]) + "\n"
+        lines = ["def contact_event(contact, parameters, which):"]
+        for number, event in enumerate(events):
+            lines += [f"    if which == {number}:", f"        return {event}"]
+        source.functions.append("\n".join([*lines, "    return 1.0"]) + "\n")
+    return len(events)
 
 
 def sort_forces(pieces, forces, fluid):
@@ -342,11 +294,13 @@ def sort_forces(pieces, forces, fluid):
         if force.absent:
             pieces.left_out[name] = force.absent
             continue
-        if isinstance(force, PairResistance):
-            pieces.used[name] = force
-            continue
-        check_named(force, fluid, name)
         pieces.used[name] = force
+        if isinstance(force, PairResistance):
+            continue
+        try:
+            check_kernel(force, fluid)
+        except KernelError as error:  # which knows it by its class alone
+            raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
         if isinstance(force, BodyForce):
             kinds["body"].append(force)
         elif isinstance(force, ContactForce):
@@ -361,14 +315,6 @@ def sort_forces(pieces, forces, fluid):
     return kinds
 
 
-def check_named(force, fluid, name):
-    """KernelError, which names the force, where its kernel cannot be used."""
-    try:
-        check_kernel(force, fluid)
-    except KernelError as error:
-        raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
-
-
 def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ()) -> Pieces:
     """The Pieces of a scene with these forces in this fluid, between bodies of these shapes:
     without any, double layers along outlines are as thin as between plates."""
@@ -379,7 +325,7 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
     write_pair_laws(sources["centre"], kinds["centre"], "centre")
     write_pair_laws(sources["surface"], kinds["surface"], "surface")
     pieces.events = write_contact_laws(sources["contact"], kinds["contact"])
-    write_oriented_law(sources["oriented"], kinds["oriented"])
+    write_sum(sources["oriented"], kinds["oriented"], "oriented_energy", "pair")
     if of_centres := [*kinds["centre"], *kinds["oriented"]]:
         pieces.centre_reach = max(map(reach_of, of_centres))
     if kinds["surface"]:
@@ -389,7 +335,7 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
         pieces.smoothness = smoothness([*kinds["surface"], *water], fluid)
     layer = layer_along(kinds["outline"], shapes)
     pressures = pressures_of(kinds["outline"], layer)
-    write_outline_law(sources["outline"], pressures)
+    write_sum(sources["outline"], pressures, "outline_pressure", "point")
     pieces.outlines = outlines_of_forces(kinds["outline"], pressures, fluid)
     pieces.layer = layer_numbers(layer)
     for source in sources.values():

@@ -1,15 +1,27 @@
-"""Drag: of Stokes, and of Schiller and Naumann where the flow around a body is not slow."""
+"""Drag: of Stokes, of Schiller and Naumann where the flow around a body is not slow, and of a
+body's own shape, whose resistance is computed once and kept on the disk."""
 
+import functools
+import hashlib
+import inspect
 import math
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import attrs
+import numpy as np
 
-from flocsim.body import Fluid
-from flocsim.errors import RangeError
+from flocsim.arrays import RESISTANCE_COLUMNS
+from flocsim.body import Body, Fluid
+from flocsim.compiler.disk_cache import kept
+from flocsim.compiler.processor import cpu_kind, versions
+from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, quantity
 from flocsim.forces.base import BodyForce, Force
-from flocsim.hydrodynamics.permeable import drag_factor, turning_factor
+from flocsim.geometry.shapes import cores
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.hydrodynamics import lone_body
+from flocsim.hydrodynamics.lone_body import drag_factor, turning_factor
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
@@ -43,11 +55,6 @@ def reynolds_number(speed: float, radius: float, viscosity: float, density: floa
     return 2.0 * radius * density * speed / viscosity
 
 
-def inertial_factor(reynolds):
-    """1 + 0.15 Re^0.687: how many times Stokes's drag a sphere has (Schiller and Naumann)."""
-    return 1.0 + 0.15 * reynolds**0.687
-
-
 def resisted(body, c, s, vx, vy, spin):
     """R (v − u, ω − Ω) in the frame of a shape that has turned by an angle of this cosine and sine,
     over the viscosity."""
@@ -65,10 +72,10 @@ def shielded_by(body, x, y):
     return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
 
 
-def sphere_load(body, x, y, spin, numbers):
+def sphere_load(body, x, y, spin, viscosity, density, options):
     """Force and torque on the equivalent sphere that moves and turns so against the flow;
-    ``numbers``: viscosity, density, rotational, with_inertia, permeability."""
-    viscosity, density, rotational, with_inertia, permeability = numbers
+    ``options``: rotational, with_inertia, permeability."""
+    rotational, with_inertia, permeability = options
     translation = 6.0 * math.pi * viscosity * body.radius
     rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
     if permeability > 0.0:
@@ -76,7 +83,7 @@ def sphere_load(body, x, y, spin, numbers):
         rotation *= turning_factor(body.radius, permeability)
     if with_inertia:
         reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
-        translation *= inertial_factor(reynolds)
+        translation *= 1.0 + 0.15 * reynolds**0.687
     return -translation * x, -translation * y, -rotation * spin
 
 
@@ -129,7 +136,7 @@ class StokesDrag(BodyForce):
 
     ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the
     equivalent sphere, 2β²(1 − tanh β/β)/(2β² + 3(1 − tanh β/β)) with β = r_eq/√k, its torque by
-    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.permeable); 0 is impermeable.
+    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.lone_body); 0 is impermeable.
 
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
@@ -196,9 +203,10 @@ class StokesDrag(BodyForce):
         return self.kernel if moves else self.still
 
     @property
-    def with_inertia(self) -> bool:
-        """Whether its force is more than Stokes's."""
-        return self.law == "schiller_naumann"
+    def options(self) -> tuple[bool, bool, float]:
+        """What its kernels on spheres are given: ``rotational``, whether the force is more than
+        Stokes's, ``permeability``."""
+        return self.rotational, self.law == "schiller_naumann", self.permeability
 
     def remarks(self, fluid: Fluid) -> list[str]:
         """Whether it follows shapes, the flow's strain and clusters."""
@@ -213,43 +221,40 @@ class StokesDrag(BodyForce):
         return [words, *others]
 
     @staticmethod
-    def kernel(body, viscosity, density, flow, rotational, with_inertia, permeability):
+    def kernel(body, viscosity, density, flow, options):
         """Force and torque on the equivalent sphere in the flow."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        numbers = viscosity, density, rotational, with_inertia, permeability
-        return sphere_load(body, body.vx - u, body.vy - v, body.spin - turning, numbers)
+        return sphere_load(
+            body, body.vx - u, body.vy - v, body.spin - turning, viscosity, density, options
+        )
 
     @staticmethod
-    def strained(body, viscosity, density, flow, rotational, with_inertia, permeability):
+    def strained(body, viscosity, density, flow, options):
         """The same, with the torque of the flow's strain on the shape."""
         u, v, turning = flow_at(flow, body.x, body.y)
         spin = body.spin - turning - strained_spin(body, flow)
-        numbers = viscosity, density, rotational, with_inertia, permeability
-        return sphere_load(body, body.vx - u, body.vy - v, spin, numbers)
+        return sphere_load(body, body.vx - u, body.vy - v, spin, viscosity, density, options)
 
     @staticmethod
-    def still(body, viscosity, density, rotational, with_inertia, permeability):
+    def still(body, viscosity, density, options):
         """Force and torque on the equivalent sphere in still water."""
-        numbers = viscosity, density, rotational, with_inertia, permeability
-        return sphere_load(body, body.vx, body.vy, body.spin, numbers)
+        return sphere_load(body, body.vx, body.vy, body.spin, viscosity, density, options)
 
     @staticmethod
-    def shielded(body, viscosity, density, flow, rotational, with_inertia, strain, permeability):
+    def shielded(body, viscosity, density, flow, strain, options):
         """Force and torque on the equivalent sphere in a cluster, which strain may turn."""
         u, v, turning = flow_at(flow, body.x, body.y)
         spin = body.spin - turning - strain * strained_spin(body, flow)
         x, y = shielded_by(body, body.vx - u, body.vy - v)
-        numbers = viscosity, density, rotational, with_inertia, permeability
-        fx, fy, torque = sphere_load(body, x, y, spin, numbers)
+        fx, fy, torque = sphere_load(body, x, y, spin, viscosity, density, options)
         fx, fy = shielded_by(body, fx, fy)
         return fx, fy, torque
 
     @staticmethod
-    def shielded_still(body, viscosity, density, rotational, with_inertia, permeability):
+    def shielded_still(body, viscosity, density, options):
         """The same in still water."""
         x, y = shielded_by(body, body.vx, body.vy)
-        numbers = viscosity, density, rotational, with_inertia, permeability
-        fx, fy, torque = sphere_load(body, x, y, body.spin, numbers)
+        fx, fy, torque = sphere_load(body, x, y, body.spin, viscosity, density, options)
         fx, fy = shielded_by(body, fx, fy)
         return fx, fy, torque
 
@@ -297,3 +302,93 @@ def solid_radius(radius: float, forces: Iterable[Force]) -> float:
 def is_permeable(forces: Iterable[Force]) -> bool:
     """Whether a drag among the forces is that of bodies which water passes through."""
     return any(isinstance(force, StokesDrag) and force.permeability > 0.0 for force in forces)
+
+
+DIGITS = 7
+"""Of an outline over r_eq, and of the depth: shapes that differ by less are one."""
+
+SPHERE = (6.0 * math.pi, 0.0, 6.0 * math.pi, 0.0, 0.0, 8.0 * math.pi) + (0.0,) * 6
+"""The numbers of a sphere of radius 1: R, and no load by a strain."""
+
+POWERS = (1, 1, 1, 2, 2, 3, 2, 2, 3, 2, 2, 3)
+"""By which power of the size each number grows."""
+
+
+def follows_shape(forces: Iterable[Force]) -> bool:
+    """Whether a drag among the forces is that of shapes."""
+    return any(isinstance(force, StokesDrag) and force.law == "shape" for force in forces)
+
+
+def resistance_numbers(forces: Iterable[Force], body: Body) -> tuple[float, ...]:
+    """Those of BodyView, from ``resistance_xx`` on: zeros unless a drag follows shapes."""
+    return body_resistance(body) if follows_shape(forces) else (0.0,) * RESISTANCE_COLUMNS
+
+
+def body_resistance(body: Body) -> tuple[float, ...]:
+    """The six numbers of R and six of Γ of a body over the viscosity, in the order of BodyView.
+
+    Of the prism of its outline with the body's depth [m]; where that is "sphere" a shape of one
+    core point is a sphere, and another 4/3 r_eq deep.
+    """
+    shape, radius = body.shape, body.shape.equivalent_radius
+    if isinstance(body.depth, str) and len(shape.vertices) == 1:
+        unit: Any = SPHERE
+    else:
+        height = 4.0 / 3.0 if isinstance(body.depth, str) else body.depth / radius
+        unit = unit_resistance(outline_text(shape), round(height, DIGITS))
+    return tuple(number * radius**power for number, power in zip(unit, POWERS, strict=True))
+
+
+def drag_radius(forces: Iterable[Force], body: Body) -> float:
+    """Of the sphere that is as hard to move as a body in the mean of all directions of its plane,
+    free to turn [m]: r_eq unless a drag follows shapes, or is of bodies that water passes
+    through."""
+    radius = body.shape.equivalent_radius
+    if not follows_shape(forces):
+        return solid_radius(radius, forces)
+    free = np.linalg.inv(resistance_matrices(body_resistance(body))[0])
+    return float(1.0 / (3.0 * math.pi * (free[0, 0] + free[1, 1])))
+
+
+def resistance_matrices(numbers: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
+    """(R (3, 3), Γ (3, 2)) of such numbers."""
+    xx, xy, yy, xs, ys, ss, *strain = numbers
+    resistance = np.array([[xx, xy, xs], [xy, yy, ys], [xs, ys, ss]])
+    return resistance, np.reshape(strain, (2, 3)).T
+
+
+def outline_text(shape: Shape) -> tuple[bytes, ...]:
+    """The rings of an outline over r_eq, so that shapes alike at any size have the same."""
+    radius = shape.equivalent_radius
+    # Adding zero leaves no −0, which has other bytes.
+    return tuple((np.round(ring / radius, DIGITS) + 0.0).tobytes() for ring in shape.outline())
+
+
+@functools.lru_cache(maxsize=4096)
+def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, ...]:
+    """The numbers of an outline of r_eq = 1, kept on the disk."""
+
+    def made() -> bytes:
+        rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
+        found = lone_body.prism_drag(rings, height)
+        r = found.resistance
+        if not np.linalg.eigvalsh(r)[0] > 0.0:
+            raise UsageError(
+                f"the drag of an outline {height:.3g} r_eq deep cannot be computed: its resistance "
+                'is not positive; give the drag the law "stokes", or the shape fewer thin parts'
+            )
+        numbers = [r[0, 0], r[0, 1], r[1, 1], r[0, 2], r[1, 2], r[2, 2], *found.strain.T.ravel()]
+        return np.array(numbers, dtype=float).tobytes()
+
+    told = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
+    data = kept("flocsim_drag", f"{told} {height} {facts_of(lone_body, cores)}", made)
+    return tuple(np.frombuffer(data).tolist())
+
+
+@functools.cache
+def facts_of(*modules: Any) -> str:
+    """What is computed once follows from beside its input: code of modules, versions, processor."""
+    code = hashlib.blake2b(digest_size=16)
+    for module in modules:
+        code.update(inspect.getsource(module).encode())
+    return f"{code.hexdigest()} {versions()} {cpu_kind()}"

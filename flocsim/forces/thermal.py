@@ -12,8 +12,7 @@ from flocsim.constants import BOLTZMANN, MINIMUM_GAP
 from flocsim.errors import UsageError
 from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import BodyForce, Force
-from flocsim.forces.drag import is_permeable, shields_clusters
-from flocsim.forces.shape_drag import follows_shape
+from flocsim.forces.drag import follows_shape, is_permeable, shields_clusters
 
 FAR_SHARE = 0.1
 """Share of the smallest radius by which a kick of automatic length moves two bodies against each

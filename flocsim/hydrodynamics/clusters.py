@@ -13,13 +13,11 @@ spheres P. J. Zuk et al. (2014), J. Fluid Mech. 741, R5; of two that touch D. J.
 Y. Onishi (1984), J. Fluid Mech. 139, 261.
 """
 
-import functools
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled
 
 FEW = 100
 """Bodies of a cluster of which all pairs count by themselves."""
@@ -158,12 +156,6 @@ def cluster_mobilities(cells, starts, grid, places, radii, own, scratch, moved, 
                 found[c, k] += shares[i] * moved[k, i]
 
 
-@functools.cache
-def compiled() -> Callable:
-    """The compiled function."""
-    return compose(cluster_mobilities, {}, what="the drag of clusters")
-
-
 def mobilities(
     label: np.ndarray, places: np.ndarray, radii: np.ndarray, own: np.ndarray
 ) -> np.ndarray:
@@ -190,7 +182,7 @@ def mobilities(
     weight = np.add.reduceat(radii, starts)
     middle = np.add.reduceat(radii[:, None] * places, starts, axis=0) / weight[:, None]
     found = np.zeros((len(count), 3))
-    compiled()(
+    compiled(cluster_mobilities, what="the drag of clusters")(
         np.searchsorted(known[starts, 0], np.arange(len(count) + 1)).astype(np.int64),
         np.append(starts, len(label)), np.hstack([known[starts, 1:], middle]), places, radii,
         own[order].T.copy(), *np.zeros((2, 3, len(label))), np.zeros((4, len(starts))), found,

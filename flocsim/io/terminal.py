@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, TextIO
 
-from flocsim.compiler import waiting
+from flocsim.compiler import units
 from flocsim.errors import visible
 
 LINE_SECONDS = 5.0
@@ -77,7 +77,7 @@ def counting_seconds(text: str) -> Iterator[None]:
 def plain_warnings(silent: bool = False) -> None:
     """From now on a warning is one line on stderr, without the place in the code, and so is what is
     compiled; or both are nothing."""
-    waiting.show_by(waiting.silent if silent else counting_seconds)
+    units.show_by(units.silent if silent else counting_seconds)
 
     def show(message, category, filename, lineno, file=None, line=None):
         if not silent:

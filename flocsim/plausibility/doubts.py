@@ -15,13 +15,11 @@ from flocsim.body import Body, Fluid
 from flocsim.errors import UsageError
 from flocsim.forces.base import ContactForce, told_apart
 from flocsim.forces.contact import Contact
-from flocsim.forces.double_layer import DoubleLayer
-from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, reynolds_number
+from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
+from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, follows_shape, reynolds_number
 from flocsim.forces.gravity import Gravity
 from flocsim.forces.pair_resistance import Lubrication
-from flocsim.forces.shape_drag import follows_shape
 from flocsim.forces.thermal import Thermal, thermal_in
-from flocsim.forces.van_der_waals import VanDerWaals
 from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
 CHECK = "check the number and its unit"

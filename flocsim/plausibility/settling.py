@@ -7,9 +7,9 @@ import numpy as np
 
 from flocsim.arrays import BodyView
 from flocsim.body import Body
-from flocsim.compiler.reads import where
+from flocsim.compiler.linker import where
 from flocsim.errors import UsageError
-from flocsim.forces import shape_drag
+from flocsim.forces import drag
 from flocsim.forces.codegen import laws_of
 
 ITERATIONS = 50
@@ -33,7 +33,7 @@ def lone_view(system, body):
     return BodyView(
         0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
         body.inertia, shape.equivalent_radius, shape.elongation, shape.long_axis, 0.0, 0.0, 0.0,
-        *shape_drag.resistance_numbers(system.forces, body),
+        *drag.resistance_numbers(system.forces, body),
     )  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> 
     """
     if not mobility > 0.0:
         return mobility
-    if shape_drag.follows_shape(system.forces):
+    if drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
     at_rest = resistance(system, body, 0.0, NEARLY_AT_REST * speed + 1e-9)
     return max(mobility, 1.0 / at_rest) if at_rest * mobility > VANISHING else mobility
@@ -103,7 +103,7 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
     shape that of the direction in which it resists most, held at its angle."""
     if not mobility > 0.0:
         return mobility
-    if shape_drag.follows_shape(system.forces):
+    if drag.follows_shape(system.forces):
         return held_mobility(system, body)
     there = resistance(system, body, speed)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
@@ -111,13 +111,13 @@ def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> fl
 
 def held_mobility(system: Any, body: Body) -> float:
     """The least mobility [s/kg] of a body whose drag follows its shape, held from turning."""
-    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
+    resistance, _ = drag.resistance_matrices(drag.body_resistance(body))
     return float(1.0 / (system.fluid.viscosity * np.linalg.eigvalsh(resistance[:2, :2])[-1]))
 
 
 def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
     """(least, largest) [s/kg] by direction of a body free to turn, whose drag follows its shape."""
-    resistance, _ = shape_drag.resistance_matrices(shape_drag.body_resistance(body))
+    resistance, _ = drag.resistance_matrices(drag.body_resistance(body))
     mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
     least, largest = np.linalg.eigvalsh(mobility).tolist()
     return least, largest
@@ -148,7 +148,7 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     known = (force, lone_view(system, body), pieces.parameters)
-    velocity = np.zeros(3 if shape_drag.follows_shape(system.forces) else 2)
+    velocity = np.zeros(3 if drag.follows_shape(system.forces) else 2)
     for _ in range(ITERATIONS):
         slope = derivative(*known, velocity)
         if not np.isfinite(slope).all():

@@ -6,7 +6,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.arrays import Scene
-from flocsim.geometry.contact.sweep import DISC_COLUMNS
+from flocsim.geometry.contact.body_pairs import DISC_COLUMNS
 
 ERROR_COLUMNS = 6
 """Columns of ``errors``: from ERROR_PLACE to DOUBT_SPEED of a run."""

@@ -34,7 +34,7 @@ from flocsim.bonds.certificate import (
 from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
-from flocsim.forces.shape_drag import follows_shape
+from flocsim.forces.drag import follows_shape
 from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body

@@ -17,11 +17,19 @@ import math
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.arrays import all_counting
-from flocsim.geometry.contact.body_pairs import watches_all
+from flocsim.geometry.contact.body_pairs import (
+    MOVES,
+    PLACE_X,
+    PLACE_Y,
+    REACH,
+    WAY_X,
+    WAY_Y,
+    near_pairs,
+    watches_all,
+)
 from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.separation import nearest_way
 from flocsim.geometry.contact.slip_transfer import keep_slips
-from flocsim.geometry.contact.sweep import MOVES, PLACE_X, PLACE_Y, REACH, WAY_X, WAY_Y, near_pairs
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
 from flocsim.integrators.radau.contact_frames import unite

@@ -20,7 +20,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.body import Body
 from flocsim.forces.base import Force
-from flocsim.forces.shape_drag import drag_radius, follows_shape
+from flocsim.forces.drag import drag_radius, follows_shape
 from flocsim.hydrodynamics.clusters import mobilities
 from flocsim.swarms.clusters import Gauge, placed_together
 

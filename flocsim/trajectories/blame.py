@@ -13,7 +13,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.arrays import copy_of, counts_as_pair
 from flocsim.compiler.composer import compose
-from flocsim.compiler.reads import where
+from flocsim.compiler.linker import where
 from flocsim.forces.check import asked_at
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.geometry.contact.candidates import list_candidates

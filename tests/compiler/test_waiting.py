@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from flocsim.compiler import waiting
+from flocsim.compiler import units
 from flocsim.compiler.composer import compose
 from flocsim.io import terminal
 
@@ -30,8 +30,8 @@ def cold(tmp_path, monkeypatch):
     """Nothing is compiled yet, and all compiling is worth a line."""
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr("flocsim.compiler.composer._composed", {})
-    monkeypatch.setattr(waiting, "WORTH_SAYING", 0.0)
-    monkeypatch.setattr(waiting, "shown", waiting.one_line)
+    monkeypatch.setattr(units, "WORTH_SAYING", 0.0)
+    monkeypatch.setattr(units, "shown", units.one_line)
 
 
 def test_the_first_run_says_what_is_compiled_and_the_next_nothing(cold, capsys, monkeypatch):
@@ -44,14 +44,14 @@ def test_the_first_run_says_what_is_compiled_and_the_next_nothing(cold, capsys, 
 
 @pytest.mark.parametrize("functions, seconds", [(60, 5), (215, 10), (430, 15), (600, 20)])
 def test_the_time_grows_with_the_number_of_functions(cold, capsys, functions, seconds):
-    with waiting.compiling("it", functions):
+    with units.compiling("it", functions):
         pass
     assert f"about {seconds} s" in capsys.readouterr().err
 
 
 def test_short_work_is_not_worth_a_line(capsys, monkeypatch):
-    monkeypatch.setattr(waiting, "WORTH_SAYING", 2.0)
-    with waiting.compiling("it", 40):
+    monkeypatch.setattr(units, "WORTH_SAYING", 2.0)
+    with units.compiling("it", 40):
         pass
     assert capsys.readouterr() == ("", "")
 
@@ -72,6 +72,6 @@ def test_a_terminal_counts_the_seconds_and_ends_with_a_whole_line(monkeypatch):
 def test_quiet_commands_and_other_ranks_say_nothing(cold, capsys):
     for silent, said in ((True, 0), (False, 1)):
         terminal.plain_warnings(silent)
-        with waiting.compiling("it", 100):
+        with units.compiling("it", 100):
             pass
         assert capsys.readouterr().err.count("\n") == said

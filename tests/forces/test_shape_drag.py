@@ -9,16 +9,15 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, Swarm, System
 from flocsim.errors import RangeError, UsageError
-from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, shape_drag
+from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.shape_drag import (
-    NO_RESISTANCE,
+from flocsim.forces.drag import (
     body_resistance,
     resistance_matrices,
     resistance_numbers,
 )
-from flocsim.hydrodynamics import prism_drag
+from flocsim.hydrodynamics import lone_body, prism_drag
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.plausibility.doubts import all_settled
 from flocsim.plausibility.settling import free_mobilities, held_mobility, terminal_motion
@@ -85,7 +84,7 @@ def test_a_resistance_that_is_not_positive_is_refused(monkeypatch):
     def upside_down(rings, height):
         return attrs.evolve(prism_drag(rings, height), resistance=-np.eye(3))
 
-    monkeypatch.setattr(shape_drag, "prism_drag", upside_down)
+    monkeypatch.setattr(lone_body, "prism_drag", upside_down)
     with pytest.raises(UsageError, match="cannot be computed: its resistance"):
         body_resistance(body_of(TWO_TO_ONE, depth=1.77 * TWO_TO_ONE.equivalent_radius))
 
@@ -210,7 +209,7 @@ def test_all_methods_let_a_hook_fall_and_turn_alike():
 
 def test_the_file_columns_are_nothing_without_it():
     body = body_of(HOOK)
-    assert resistance_numbers([Gravity(), StokesDrag()], body) == NO_RESISTANCE
+    assert resistance_numbers([Gravity(), StokesDrag()], body) == (0.0,) * 12
     scene = system_of(body, drag=StokesDrag()).scene(jit=False)
     own = slice(at.RESISTANCE, at.SHIELDING)
     assert not scene.bodies[:, own].any() and scene.bodies.flags.c_contiguous

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.hydrodynamics import SpherePair, clusters, prism
+from flocsim.hydrodynamics import SpherePair, clusters, lone_body
 from flocsim.hydrodynamics.clusters import LESS_ACROSS, LESS_ALONG, mobilities, push
 from tests.helpers.tiers import rest_slow
 
@@ -33,11 +33,11 @@ def mobility(places, radii=None):
 def by_multiblobs(places, count=80):
     """(the same of disc prisms, and the radius of the sphere with the drag of one of them)."""
     spacing = np.sqrt((0.5 * 4.0 / 3.0 * 2.0 * np.pi + np.pi) / count)
-    one = prism.surface([DISC], 4.0 / 3.0, spacing)
+    one = lone_body.surface([DISC], 4.0 / 3.0, spacing)
     middle = np.mean(places, axis=0)
     whole = np.concatenate([one + [*(np.array(place) - middle), 0.0] for place in places])
     several, alone = (
-        np.linalg.inv(prism.loads(each, prism.RADIUS * spacing)[:, :3])[:2, :2] / ALONE
+        np.linalg.inv(lone_body.loads(each, lone_body.RADIUS * spacing)[:, :3])[:2, :2] / ALONE
         for each in (whole, one)
     )
     return several, 2.0 / np.trace(alone)

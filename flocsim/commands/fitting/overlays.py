@@ -5,7 +5,7 @@ from pathlib import Path
 from flocsim.commands.fitting.pictures import distinct, report, some_of, titles_of
 from flocsim.errors import ImageError, UsageError
 from flocsim.io.images.reading import SUFFIXES, read_grey
-from flocsim.io.plots.overlay import draw_overlay, single_fit
+from flocsim.io.plots.shapes import draw_overlay, single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.shapes.fit_report import plural
 

@@ -17,10 +17,9 @@ from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import MASK_SUFFIXES, is_mask, read_masks, segment_mask
-from flocsim.io.images.pictures import Segmentation, segment
+from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
 from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
-from flocsim.io.images.selection import check_names, corrected, weighed
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress

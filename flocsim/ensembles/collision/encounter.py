@@ -25,8 +25,8 @@ from flocsim.ensembles.collision.thermal import (
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
+from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
-from flocsim.forces.shape_drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend

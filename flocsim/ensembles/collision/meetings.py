@@ -29,7 +29,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
-from flocsim.forces.shape_drag import follows_shape
+from flocsim.forces.drag import follows_shape
 from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5

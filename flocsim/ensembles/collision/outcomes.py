@@ -31,8 +31,7 @@ from flocsim.bonds.certificate import (
     way_between,
 )
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
-from flocsim.geometry.contact.circle_tree import core_distance
-from flocsim.geometry.contact.near_pairs import gap_between, pose_of
+from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
 from flocsim.laws import (

@@ -12,8 +12,8 @@ import numpy as np
 
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
-from flocsim.geometry.contact.circle_tree import core_distance
-from flocsim.geometry.contact.outlines import outlines_of
+from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.contact.near_pairs import core_distance
 from flocsim.geometry.shapes.shape import Shape
 
 MOST_ADVANCES = 1000

@@ -25,8 +25,7 @@ from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
-from flocsim.geometry.contact.compounds import point_columns
-from flocsim.geometry.contact.outlines import outlines_of
+from flocsim.geometry.contact.compounds import outlines_of, point_columns
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance

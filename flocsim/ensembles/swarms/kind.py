@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.compiler.refused import refuse_interpreter
 from flocsim.ensembles.chunks import Condition, is_chunk
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import Kind

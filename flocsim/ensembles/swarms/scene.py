@@ -15,7 +15,7 @@ from flocsim.ensembles.config.pair_scene import (
 from flocsim.ensembles.config.values import list_of, number, read_by, vector, whole_field
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, flag, number_range, quantity, word_or_quantity
-from flocsim.forces.double_layer import unlike
+from flocsim.forces.dlvo import unlike
 
 MOST_BODIES = 100_000
 SNAPSHOTS = 10

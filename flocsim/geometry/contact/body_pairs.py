@@ -2,28 +2,30 @@
 
 A pair counts where one of its bodies is free: fixed ones do not act on each other, however many
 there are, and may overlap. Of few bodies all such pairs are watched; of many, those whose bounding
-circles are near (sweep.py). A pair that counts and is not listed lies further apart than what acts
-on it reaches, and than two bodies may go until the next listing.
+circles are near. A pair that counts and is not listed lies further apart than what acts on it
+reaches, and than two bodies may go until the next listing.
+
+Which of many discs come near each other while each goes straight on is found by a sweep along x:
+discs lie in the order of their left ends, and each is compared with those that begin before it
+ends; that order is kept from one time to the next, so that sorting it anew costs next to nothing.
+Where space repeats itself, the sweep goes on round the seam.
 """
 
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.separation import length_of
-from flocsim.geometry.contact.sweep import (
-    MOVES,
-    PLACE_X,
-    PLACE_Y,
-    REACH,
-    WAY_X,
-    WAY_Y,
-    near_pairs,
-)
+from flocsim.geometry.contact.separation import length_of, nearest_way
 from flocsim.hooks import hook
 
 WANDER = 0.25
 """How far a body may go against the mean of all, in mean bounding radii, until pairs are listed
 anew."""
+
+
+PLACE_X, PLACE_Y, WAY_X, WAY_Y, REACH, MOVES, LEFT, RIGHT, DISC_COLUMNS = range(9)
+"""Columns of ``discs``: where a disc begins, the way that it goes [m], its radius [m]; 1 where it
+moves, 0 where it is fixed: no two fixed ones are near; its left end, inside the box, and its right
+end."""
 
 
 def watches_all(work):
@@ -104,3 +106,106 @@ def list_pairs(scene, work, cut):
     if watches_all(work):
         return True
     return list_near(scene, work, cut + 2.0 * wander_of(scene))
+
+
+def place_ends(discs, width):
+    """Fill in where every disc begins and ends along x, all of its way."""
+    for disc in range(discs.shape[0]):
+        way, reach = discs[disc, WAY_X], discs[disc, REACH]
+        left = discs[disc, PLACE_X] + min(way, 0.0) - reach
+        length = abs(way) + 2.0 * reach
+        if width < math.inf:
+            left -= width * math.floor(left / width)
+        discs[disc, LEFT], discs[disc, RIGHT] = left, left + length
+
+
+def sort_discs(discs, order):
+    """Sort the discs by their left ends, equal ones by their numbers, by insertion: their order
+    has hardly changed."""
+    for place in range(1, order.shape[0]):
+        disc, free = order[place], place
+        left = discs[disc, LEFT]
+        while free > 0:
+            other = order[free - 1]
+            if discs[other, LEFT] < left or (discs[other, LEFT] == left and other < disc):
+                break
+            order[free] = other
+            free -= 1
+        order[free] = disc
+
+
+def come_near(discs, a, b, width, height):
+    """Whether two discs touch at any time of their ways."""
+    if discs[a, MOVES] + discs[b, MOVES] == 0.0:
+        return False
+    way_x, way_y = discs[a, WAY_X] - discs[b, WAY_X], discs[a, WAY_Y] - discs[b, WAY_Y]
+    # By the image that is nearest half way.
+    x = nearest_way(discs[a, PLACE_X] - discs[b, PLACE_X] + 0.5 * way_x, width) - 0.5 * way_x
+    y = nearest_way(discs[a, PLACE_Y] - discs[b, PLACE_Y] + 0.5 * way_y, height) - 0.5 * way_y
+    length2, share = way_x * way_x + way_y * way_y, 0.0
+    if length2 > 0.0:
+        share = min(max(-(x * way_x + y * way_y) / length2, 0.0), 1.0)
+    x, y = x + share * way_x, y + share * way_y
+    reach = discs[a, REACH] + discs[b, REACH]
+    return x * x + y * y < reach * reach
+
+
+def sweep(discs, order, width, height, starts, pairs, fill):
+    """Count the near ones among the discs before every disc, in ``starts``; or, where ``fill``,
+    write (later, earlier) of every near pair to ``pairs``, from the later one's start on."""
+    n = order.shape[0]
+    for place in range(n):
+        a = order[place]
+        for step in range(1, n):
+            there, shift = place + step, 0.0
+            if there >= n:
+                if width == math.inf:
+                    break
+                there, shift = there - n, width
+            b = order[there]
+            if discs[b, LEFT] + shift > discs[a, RIGHT]:
+                break
+            # Round the box, two long discs find each other twice: the shorter way counts.
+            longer = width < math.inf and (2 * step > n or (2 * step == n and a > b))
+            if longer and discs[a, LEFT] + width - shift <= discs[b, RIGHT]:
+                continue
+            if come_near(discs, a, b, width, height):
+                later = max(a, b)
+                if fill:
+                    pairs[starts[later], 0], pairs[starts[later], 1] = later, min(a, b)
+                starts[later] += 1
+
+
+def sort_rows(pairs, first, end):
+    """Sort one disc's pairs by the other one."""
+    for row in range(first + 1, end):
+        other, free = pairs[row, 1], row
+        while free > first and pairs[free - 1, 1] > other:
+            pairs[free, 1] = pairs[free - 1, 1]
+            free -= 1
+        pairs[free, 1] = other
+
+
+def near_pairs(discs, order, width, height, starts, pairs):
+    """Write all (later, earlier) that come near each other, sorted; how many there are, more than
+    ``pairs`` has room for where they are not all written."""
+    n = discs.shape[0]
+    place_ends(discs, width)
+    sort_discs(discs, order)
+    for disc in range(n):
+        starts[disc] = 0
+    sweep(discs, order, width, height, starts, pairs, False)
+    total = 0
+    for disc in range(n):
+        count = starts[disc]
+        starts[disc] = total
+        total += count
+    if total > pairs.shape[0]:
+        return total
+    sweep(discs, order, width, height, starts, pairs, True)
+    # Every start has come to the next one's by now.
+    first = 0
+    for disc in range(n):
+        sort_rows(pairs, first, starts[disc])
+        first = starts[disc]
+    return total

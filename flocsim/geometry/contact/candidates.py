@@ -106,11 +106,6 @@ def list_pair(scene, work, pair, ahead):
     return skin
 
 
-def since_listing(work, state, body, axis):
-    """How much one coordinate of a body has changed since the listing."""
-    return work.motion[state, body, axis] - work.bodies[body, at.LISTED + axis]
-
-
 def core_radius(scene, body):
     """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
     return scene.bodies[body, at.BOUNDING_RADIUS] - scene.bodies[body, at.RADIUS]
@@ -136,8 +131,8 @@ def moved(scene, work, state, a, b, enough):
     oy = work.bodies[a, at.LISTED + at.Y] - work.bodies[b, at.LISTED + at.Y]
     ox += dx - (work.motion[state, a, at.X] - work.motion[state, b, at.X])
     oy += dy - (work.motion[state, a, at.Y] - work.motion[state, b, at.Y])
-    turn_a = since_listing(work, state, a, at.ANGLE)
-    turn_b = since_listing(work, state, b, at.ANGLE)
+    turn_a = work.motion[state, a, at.ANGLE] - work.bodies[a, at.LISTED + at.ANGLE]
+    turn_b = work.motion[state, b, at.ANGLE] - work.bodies[b, at.LISTED + at.ANGLE]
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
     plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
     if plain < enough:

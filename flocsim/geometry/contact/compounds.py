@@ -1,5 +1,5 @@
-"""What replaces the polygon code in a scene with cores of several rings: holes, and parts of
-several radii.
+"""The cores of bodies as arrays, with their trees of circles, and what replaces the polygon code in
+a scene with cores of several rings: holes, and parts of several radii.
 
 Rows of core points have more columns then: by how much the point's disk is wider than the narrowest
 of its body (SWELL), which is the body's spheroradius; how far behind it the point lies at which its
@@ -12,16 +12,24 @@ of the later body being its vertex.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.geometry.contact import circle_tree, near_pairs, slip_transfer
+from flocsim.geometry.contact import near_pairs, slip_transfer
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.circle_tree import ROUNDING, leaves_of, posed, run_of
-from flocsim.geometry.contact.near_pairs import add_pair
-from flocsim.geometry.shapes.cores import segment_distance2
+from flocsim.geometry.contact.near_pairs import (
+    ROUNDING,
+    add_pair,
+    edge_distance2,
+    leaves_of,
+    posed,
+    run_of,
+    tree_of,
+)
 from flocsim.geometry.shapes.shape import Shape
 
 SWELL, ONWARD, BEGINS, POINT_COLUMNS = range(2, 6)
@@ -54,7 +62,7 @@ def ring_columns(ring: np.ndarray, swell: float) -> np.ndarray:
 
 
 def compound_tree(shape: Shape) -> np.ndarray:
-    """The tree (2N, 3) of circle_tree.tree_of over the swollen core points of a shape."""
+    """The tree (2N, 3) of near_pairs.tree_of over the swollen core points of a shape."""
     rows = point_columns(shape)
     points = len(rows)
     tree = np.zeros((2 * points, 3))
@@ -75,6 +83,37 @@ def compound_tree(shape: Shape) -> np.ndarray:
     return tree
 
 
+class Outlines(NamedTuple):
+    """The cores of some bodies, as the kernels here read them; a Scene has the same fields.
+
+    Core points of body b are rows ``first[b]`` to ``first[b + 1]`` of ``vertices``, its circles the
+    rows from ``2 * first[b]`` on of ``tree``. Where a body has a core of several rings, every row
+    of ``vertices`` has more columns behind x and y.
+    """
+
+    first: np.ndarray
+    vertices: np.ndarray
+    tree: np.ndarray
+
+
+@lru_cache(maxsize=256)
+def tree_of_shape(shape):
+    return compound_tree(shape) if shape.is_compound else tree_of(shape.vertices)
+
+
+def outlines_of(shapes: Sequence[Shape]) -> Outlines:
+    """The Outlines of some shapes, one body each."""
+    sizes = [len(shape.vertices) for shape in shapes]
+    compound = any(shape.is_compound for shape in shapes)
+    rows = [point_columns(shape) if compound else shape.vertices for shape in shapes]
+    return Outlines(
+        first=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+        # C order whatever the shapes have: another order would be compiled anew.
+        vertices=np.ascontiguousarray(np.concatenate(rows)),
+        tree=np.concatenate([tree_of_shape(shape) for shape in shapes]),
+    )
+
+
 def begins_pair(vertices, point, start, is_later):
     """Whether a core point and what begins at one of the other body make a pair of features."""
     begins = vertices[start, BEGINS]
@@ -86,10 +125,7 @@ def begins_pair(vertices, point, start, is_later):
 def feature_distance2(vertices, pose, point, start):
     """Squared distance of the cores of a point and of what begins at another body's point [m²]."""
     x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
-    end = start + int(vertices[start, ONWARD])
-    return segment_distance2(
-        x, y, vertices[start, at.X], vertices[start, at.Y], vertices[end, at.X], vertices[end, at.Y]
-    )
+    return edge_distance2(vertices, x, y, start, start + int(vertices[start, ONWARD]))
 
 
 def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
@@ -109,7 +145,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 
 
 def swollen_run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """circle_tree.run_distance of points and edges swept by the SWELL of their points."""
+    """near_pairs.run_distance of points and edges swept by the SWELL of their points."""
     start_a, end_a = run_of(side_a, leaf_a)
     start_b, end_b = run_of(side_b, leaf_b)
     for point in range(start_a, end_a):
@@ -139,7 +175,7 @@ def same_corner(scene, body, point, other):
 
 FILLINGS: dict[Callable, Callable] = {
     near_pairs.list_one_way: list_one_way,
-    circle_tree.run_distance: swollen_run_distance,
+    near_pairs.run_distance: swollen_run_distance,
     contacts.row_radii: swollen_radii,
     slip_transfer.same_corner: same_corner,
 }

@@ -6,12 +6,6 @@ import flocsim.arrays as at
 from flocsim.hooks import hook
 
 
-def is_kept(work, row, mode):
-    """Whether there is anything to be known of a pair besides where its bodies are."""
-    known = work.slip[at.NOW, row] != 0.0 or work.slip[at.GAP_OFFSET, row] != 0.0
-    return known or work.slip[at.FLIGHTS, row] != 0.0 or mode == at.GRAZES
-
-
 def keep_slips(work):
     """Set aside the tangential displacements, and the grazing, of the listed pairs; how many there
     are.
@@ -23,12 +17,12 @@ def keep_slips(work):
     count = 0
     for row in range(work.tally[at.CANDIDATES]):
         mode = work.candidates[row, at.CLOSED]
-        if is_kept(work, row, mode):
+        # Whether there is anything to be known of a pair besides where its bodies are.
+        known = work.slip[at.NOW, row] != 0.0 or work.slip[at.GAP_OFFSET, row] != 0.0
+        if known or work.slip[at.FLIGHTS, row] != 0.0 or mode == at.GRAZES:
             a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-            work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = (
-                max(a, b),
-                min(a, b),
-            )
+            work.kept[count, at.KEPT_LATER] = max(a, b)
+            work.kept[count, at.KEPT_EARLIER] = min(a, b)
             work.kept[count, at.KEPT_VERTEX] = work.candidates[row, at.VERTEX]
             work.kept[count, at.KEPT_EDGE] = work.candidates[row, at.EDGE_START]
             work.kept[count, at.KEPT_MODE] = mode
@@ -54,9 +48,8 @@ def restore_slips(work, count):
     their bodies."""
     first = 0
     for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.NOW, row] = work.slip[at.SLIP_OFFSET, row] = work.slip[at.GAP_OFFSET, row] = (
-            0.0
-        )
+        work.slip[at.NOW, row] = work.slip[at.SLIP_OFFSET, row] = 0.0
+        work.slip[at.GAP_OFFSET, row] = 0.0
         work.slip[at.FLIGHT, row] = work.slip[at.FLIGHTS, row] = 0.0
         a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
         later, earlier = max(a, b), min(a, b)
@@ -78,13 +71,6 @@ def restore_slips(work, count):
     work.tally[at.KEPT] = 0
 
 
-def first_of_pair(work, row):
-    """The first row of the two bodies of a row: their rows follow one another."""
-    while row > 0 and work.candidates[row - 1, at.PAIR] == work.candidates[row, at.PAIR]:
-        row -= 1
-    return row
-
-
 @hook
 def same_corner(scene, body, point, other):
     """Whether two core points of a body are the same one or follow each other."""
@@ -97,11 +83,8 @@ def rolls_on_to(scene, work, row, other):
     """Whether a pair of features of the same two bodies neighbours another, either way round."""
     pairs = work.candidates
     point, start, end = pairs[row, at.VERTEX], pairs[row, at.EDGE_START], pairs[row, at.EDGE_END]
-    on, first, last = (
-        pairs[other, at.VERTEX],
-        pairs[other, at.EDGE_START],
-        pairs[other, at.EDGE_END],
-    )
+    on = pairs[other, at.VERTEX]
+    first, last = pairs[other, at.EDGE_START], pairs[other, at.EDGE_END]
     if pairs[row, at.VERTEX_BODY] == pairs[other, at.VERTEX_BODY]:
         near = same_corner(scene, pairs[row, at.VERTEX_BODY], point, on)
         return near and (start in (first, last) or end in (first, last))
@@ -120,8 +103,11 @@ def heir_of(scene, work, row):
     high = max(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
     near = scene.bodies[low, at.RADIUS] + scene.bodies[high, at.RADIUS]
     x, y = contact_point(work, row, low)
-    for other in range(first_of_pair(work, row), work.tally[at.CANDIDATES]):
-        if work.candidates[other, at.PAIR] != work.candidates[row, at.PAIR]:
+    pair, first = work.candidates[row, at.PAIR], row
+    while first > 0 and work.candidates[first - 1, at.PAIR] == pair:
+        first -= 1  # the rows of two bodies follow one another
+    for other in range(first, work.tally[at.CANDIDATES]):
+        if work.candidates[other, at.PAIR] != pair:
             break
         if work.geometry[at.NOW, other, at.GAP] < 0.0:
             ox, oy = contact_point(work, other, low)
@@ -151,12 +137,9 @@ def hand_over(scene, work):
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally[at.CANDIDATES]):
+        opened = work.geometry[at.NOW, row, at.GAP] >= 0.0
         grazes = work.candidates[row, at.CLOSED] == at.GRAZES
-        if (
-            work.slip[at.NOW, row] != 0.0
-            and work.geometry[at.NOW, row, at.GAP] >= 0.0
-            and not grazes
-        ):
+        if work.slip[at.NOW, row] != 0.0 and opened and not grazes:
             heir = heir_of(scene, work, row)
             if heir >= 0:
                 own, given = work.slip[at.NOW, heir], work.slip[at.NOW, row]

@@ -15,14 +15,12 @@ import numpy as np
 from flocsim.geometry.fit.coverage import compiled
 from flocsim.geometry.fit.edge_errors import (
     BARRED,
-    copy,
     edge_sum,
     leaves_room,
     outward_bisector,
     point,
     set_bisectors,
     set_edge_sums,
-    total_of,
 )
 from flocsim.geometry.fit.simple import edge_is_open
 
@@ -109,8 +107,8 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
     edges = np.empty(count, np.int64)
     set_bisectors(vertices, out, 0, last)
     set_edge_sums(sums, radius, vertices, out, edges, 0, last)
-    least = total_of(edges)
-    copy(vertices, best)
+    least = edges.sum()
+    best[:] = vertices
     heat = heats[0]
     cooling, shrinking = (heats[1] / heat) ** (1.0 / moves), (steps[1] / steps[0]) ** (1.0 / moves)
     step = steps[0]
@@ -146,7 +144,7 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
         # Kept with the probability exp(−added/heat).
         if added > heat * draws[move, 3]:
             continue
-        copy(vertices, kept)
+        kept[:] = vertices
         if jump:
             place = put_into_edge(vertices, k, edge, x, y)
             # What was the vertex before k begins the edge that closes the gap.
@@ -165,16 +163,16 @@ def annealed(sums, vertices, best, radius, pixels, draws, heats, steps):
             set_bisectors(vertices, out, first, final)
             sound = set_edge_sums(sums, radius, vertices, out, edges, first - 1, final) < BARRED
             if not sound:
-                copy(kept, vertices)
+                vertices[:] = kept
                 set_bisectors(vertices, out, first, final)
                 set_edge_sums(sums, radius, vertices, out, edges, first - 1, final)
         if not sound:
-            copy(kept, vertices)
+            vertices[:] = kept
             continue
-        now = total_of(edges)
+        now = edges.sum()
         if now < least:
             least = now
-            copy(vertices, best)
+            best[:] = vertices
             if least <= -pixels:
                 break
     return least

@@ -7,20 +7,16 @@ counts are kept per pixel, so that a moved vertex needs only its two edges recou
 Kernels are plain Python on scalars and arrays; ``compiled`` makes them fast.
 """
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any
+import functools
+from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.compiler.composer import compose
+from flocsim.compiler import composer
 from flocsim.geometry.shapes.cores import is_near
 
-
-@cache
-def compiled(kernel: Callable[..., Any]) -> Callable[..., Any]:
-    """A kernel of a fit, compiled on first use and kept on disk."""
-    return compose(kernel, {}, allocates=True)
+compiled = functools.partial(composer.compiled, allocates=True)
+"""A kernel of a fit, compiled on first use and kept on disk."""
 
 
 def crossing(ax, ay, bx, by, y):
@@ -57,20 +53,14 @@ def count_edges(vertices, radius, odd, near):
         for row in range(rows):
             for column in range(first_pixel(crossing(ax, ay, bx, by, row), columns)):
                 odd[row, column] = not odd[row, column]
-        add_edge(near, ax, ay, bx, by, radius)
-
-
-def add_edge(near, ax, ay, bx, by, radius):
-    rows, columns = near.shape
-    for row in range(
-        first_pixel(min(ay, by) - radius, rows), first_pixel(max(ay, by) + radius + 1.0, rows)
-    ):
-        for column in range(
-            first_pixel(min(ax, bx) - radius, columns),
-            first_pixel(max(ax, bx) + radius + 1.0, columns),
-        ):
-            if is_near(column, row, ax, ay, bx, by, radius * radius):
-                near[row, column] += 1
+        top = first_pixel(min(ay, by) - radius, rows)
+        bottom = first_pixel(max(ay, by) + radius + 1.0, rows)
+        left = first_pixel(min(ax, bx) - radius, columns)
+        right = first_pixel(max(ax, bx) + radius + 1.0, columns)
+        for row in range(top, bottom):
+            for column in range(left, right):
+                if is_near(column, row, ax, ay, bx, by, radius * radius):
+                    near[row, column] += 1
 
 
 def count_wrong(mask, odd, near):
@@ -95,10 +85,20 @@ def crossed_and_near(
     return odd, near > 0
 
 
-def covered(shape: tuple[int, int], vertices: np.ndarray, radius: float) -> np.ndarray:
-    """The pixels (h, w) bool whose centres the swept polygon covers."""
-    odd, near = crossed_and_near(shape, vertices, radius)
-    return odd | near
+def wrong_pixels(mask: np.ndarray, rings: Sequence[np.ndarray], radius: float) -> tuple[int, int]:
+    """(V, pixels covered outside of the mask) of a shape of several rings [px], y up, on an array
+    that all of it fits in."""
+    points = np.concatenate(rings) * (1.0, -1.0)
+    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
+    margin = max(0, int(np.ceil(beyond.max() + radius))) + 2
+    around = np.pad(mask, margin)
+    inside, close = np.zeros(around.shape, bool), np.zeros(around.shape, bool)
+    for ring in rings:
+        odd, near = crossed_and_near(around.shape, ring * (1.0, -1.0) + margin, radius)
+        inside ^= odd
+        close |= near
+    solid = inside | close
+    return int(np.count_nonzero(solid != around)), int(np.count_nonzero(solid & ~around))
 
 
 def padded(mask: np.ndarray, count: int, radius: float) -> tuple[np.ndarray, int]:

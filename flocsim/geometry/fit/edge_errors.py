@@ -159,18 +159,6 @@ def point(points, k):
     return points[k, 0], points[k, 1]
 
 
-def total_of(edges):
-    total = 0
-    for each in edges:
-        total += each
-    return total
-
-
-def copy(vertices, into):
-    for k in range(len(vertices)):
-        into[k, 0], into[k, 1] = vertices[k, 0], vertices[k, 1]
-
-
 def set_bisectors(vertices, out, first, last):
     """outward_bisector of the vertices first … last, counted around the polygon, into ``out``."""
     count = len(vertices)

@@ -1,6 +1,12 @@
-"""Pixel masks → spheropolygons: the fit of the paper's section 2.3."""
+"""Pixel masks → spheropolygons: the fit of the paper's section 2.3, and of holes.
+
+A hole is a ring of the core, and what the disk leaves of it: the ring reaches into the floc by the
+spheroradius. It is searched like the outline, on the pixels around it, but with what lies outside
+of it covered.
+"""
 
 import warnings
+from collections.abc import Sequence
 
 import attrs
 import numpy as np
@@ -8,19 +14,20 @@ from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.fields import is_number
-from flocsim.geometry.fit.coverage import compiled, covered, padded
-from flocsim.geometry.fit.holes import find_holes, hole_ring, wrong_with_holes
-from flocsim.geometry.fit.paper import paper_fit
+from flocsim.geometry.fit.coverage import compiled, crossed_and_near, padded, wrong_pixels
 from flocsim.geometry.fit.search import (
     AREA,
+    COARSE,
+    FINE,
     INSCRIBED,
     INSIDE,
     PLAIN,
-    count_errors,
+    paper_fit,
     pattern_fit,
+    searched,
 )
-from flocsim.geometry.fit.simple import simple_inset
-from flocsim.geometry.fit.starts import even_start
+from flocsim.geometry.fit.simple import is_simple, simple_inset
+from flocsim.geometry.fit.starts import even_start, telling_points, trace_outline
 from flocsim.geometry.shapes.outline import simplicity_fault
 from flocsim.geometry.shapes.parts import Part, Parts
 from flocsim.geometry.shapes.shape import Shape, Sphere
@@ -30,6 +37,19 @@ METHODS = ("pattern", "paper", "even")
 
 SLACK = 0.01
 """Share of the mask's area by which the swept area may be off before the outline is settled."""
+
+
+FEWEST_PIXELS = 9
+"""A hole of fewer pixels is noise."""
+
+FEWEST_VERTICES = 3
+"""Corners of a hole."""
+
+OUTLINE_SHARE = 0.5
+"""Holes are kept as long as this share of the vertices is left for the outline."""
+
+REACHES = (1.0, 0.5, 0.0)
+"""Spheroradii by which a ring is tried to reach into the floc, where walls are thin."""
 
 
 @attrs.frozen(eq=False)
@@ -153,16 +173,10 @@ def _check_options(vertices, radius, method):
 
 def _equal_area_circle(mask):
     rows, columns = np.nonzero(mask)
-    x, y = columns.mean(), rows.mean()
     radius = float(np.sqrt(mask.sum() / np.pi))
-    # Room for the parts of the circle that leave a long floc's box.
-    margin = int(radius) + 2
-    padded = np.pad(mask, margin)
-    row, column = np.ogrid[: padded.shape[0], : padded.shape[1]]
-    inside = (column - margin - x) ** 2 + (row - margin - y) ** 2 <= radius**2
-    wrong = int(np.count_nonzero(inside != padded))
-    error = 100.0 * wrong / float(mask.sum())
-    return Fit(Sphere(radius), np.array([[x, -y]]), radius, wrong, error)
+    vertices = np.array([[columns.mean(), -rows.mean()]])
+    wrong, _ = wrong_pixels(mask, [vertices], radius)
+    return Fit(Sphere(radius), vertices, radius, wrong, 100.0 * wrong / float(mask.sum()))
 
 
 def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
@@ -170,31 +184,17 @@ def _fit_polygon(mask, count, radius, method, preserve_area, inscribed):
     # Points are x and y-down here [px], as the pixels are.
     if method == "pattern":
         weights = INSCRIBED if inscribed else AREA if preserve_area else PLAIN
-        points = pattern_fit(room, count, radius, weights) - margin
+        points = pattern_fit(room, count, radius, weights)
     else:
-        start = even_start(room, count, radius)
-        points = (paper_fit(room, start, radius) if method == "paper" else start) - margin
-    found, shape = points, SpheroPolygon(points * (1.0, -1.0), radius)
-    if inscribed:
-        edge = _margin(mask, points, radius)
-        around = np.pad(mask, edge)
-        outside = np.count_nonzero(covered(around.shape, points + edge, radius) & ~around)
-        if outside:
-            raise ShapeError(
-                f"no shape of {len(points)} vertices and spheroradius {radius:g} px was found that "
-                f"lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
-            )
-    elif preserve_area:
-        factor = parts_factor([Part((shape.vertices,), radius)], float(mask.sum()))
-        points = points * factor + (1.0 - factor) * shape.centroid * (1.0, -1.0)
-    elif method == "pattern" and abs(shape.area - mask.sum()) > SLACK * mask.sum():
-        points = _settled(mask, points, radius, shape.area)
-    vertices = points * (1.0, -1.0)
-    if points is not found:
-        shape = SpheroPolygon(vertices, radius)
-    wrong = _wrong_pixels(mask, points, radius)
-    error = 100.0 * wrong / float(mask.sum())
-    return Fit(shape, vertices, radius, wrong, error)
+        points = even_start(room, count, radius)
+        points = paper_fit(room, points, radius) if method == "paper" else points
+    vertices = (points - margin) * (1.0, -1.0)
+    shape = SpheroPolygon(vertices, radius)
+    off = shape.area - mask.sum()
+    if method == "pattern" and not (inscribed or preserve_area) and abs(off) > SLACK * mask.sum():
+        vertices, before = _settled(mask, vertices, radius, off), vertices
+        shape = shape if vertices is before else SpheroPolygon(vertices, radius)
+    return _fit_of(mask, [vertices], shape, radius, preserve_area, inscribed)
 
 
 def _fit_with_holes(mask, holes, count, radius, method, preserve_area, inscribed):
@@ -218,42 +218,109 @@ def _fit_with_holes(mask, holes, count, radius, method, preserve_area, inscribed
         if simplicity_fault(outer.vertices, rings[1:]) is None:
             rings[0] = outer.vertices
     shape = SpheroPolygon(rings[0], radius, holes=rings[1:])
+    return _fit_of(mask, rings, shape, radius, preserve_area, inscribed)
+
+
+def _fit_of(mask, rings, shape, radius, preserve_area, inscribed):
+    """The Fit of a shape of an outline and holes, of the mask's area if that is asked for."""
     if preserve_area:
         factor = parts_factor(shape.parts, float(mask.sum()))
         rings = [ring * factor + (1.0 - factor) * shape.centroid for ring in rings]
         shape = SpheroPolygon(rings[0], radius, holes=rings[1:])
-    wrong, outside = wrong_with_holes(mask, rings, radius)
+    vertices = np.concatenate(rings)
+    wrong, outside = wrong_pixels(mask, rings, radius)
     if inscribed and outside:
+        with_holes = " with holes" if len(rings) > 1 else ""
         raise ShapeError(
-            f"no shape of {count} vertices and spheroradius {radius:g} px with holes was found "
-            f"that lies inside the floc ({outside} pixels outside); use a smaller spheroradius"
+            f"no shape of {len(vertices)} vertices and spheroradius {radius:g} px{with_holes} was "
+            f"found that lies inside the floc ({outside} pixels outside); use a smaller "
+            "spheroradius"
         )
-    sizes = tuple(len(ring) for ring in rings[1:])
     error = 100.0 * wrong / float(mask.sum())
-    return Fit(shape, np.concatenate(rings), radius, wrong, error, sizes)
+    return Fit(shape, vertices, radius, wrong, error, tuple(len(ring) for ring in rings[1:]))
 
 
-def _settled(mask, points, radius, area):
-    """The outline moved towards the mask's area as far as V does not rise.
+def _settled(mask, vertices, radius, excess):
+    """The outline moved towards the mask's area, of which it has an ``excess`` [px²], as far as V
+    does not rise.
 
     Pixel centres leave an outline about half a pixel of play; V does not say where in it to be.
     """
-    wrong = _wrong_pixels(mask, points, radius)
+    points = vertices * (1.0, -1.0)
+    wrong, _ = wrong_pixels(mask, [vertices], radius)
     perimeter = np.hypot(*(np.roll(points, -1, axis=0) - points).T).sum() + 2.0 * np.pi * radius
     for share in (1.0, 0.5, 0.25):
         moved = np.array(points)
-        simple = compiled(simple_inset)(moved, float(share * (area - mask.sum()) / perimeter))
-        if simple and _wrong_pixels(mask, moved, radius) <= wrong:
-            return moved
-    return points
+        simple = compiled(simple_inset)(moved, float(share * excess / perimeter))
+        if simple and wrong_pixels(mask, [moved * (1.0, -1.0)], radius)[0] <= wrong:
+            return moved * (1.0, -1.0)
+    return vertices
 
 
-def _wrong_pixels(mask, points, radius):
-    """V, counted on an array that the whole shape fits in."""
-    margin = _margin(mask, points, radius)
-    return count_errors(np.pad(mask, margin), points + margin, radius)
+@attrs.frozen(eq=False)
+class Hole:
+    """A hole of a mask: its pixels (h, w) bool, and the vertices that it gets."""
+
+    mask: np.ndarray
+    vertices: int
 
 
-def _margin(mask, points, radius):
-    beyond = np.maximum(-points.min(axis=0), points.max(axis=0) - mask.shape[::-1])
-    return max(0, int(np.ceil(beyond.max() + radius))) + 2
+def find_holes(mask: np.ndarray, count: int) -> list[Hole]:
+    """The holes of a mask that are kept by a fit of ``count`` vertices, the largest first; each has
+    vertices in proportion to its outline."""
+    from scipy.ndimage import label
+
+    # A floc is 8-connected, what is around it and in it 4-connected.
+    around, many = label(np.pad(~mask, 1, constant_values=True))
+    sizes = np.bincount(around.ravel(), minlength=many + 1)
+    names = [k for k in range(1, many + 1) if k != around[0, 0] and sizes[k] >= FEWEST_PIXELS]
+    names.sort(key=lambda k: (-sizes[k], k))
+    masks = [around == k for k in names]
+    lengths = [len(trace_outline(each)) for each in masks]
+    total = len(trace_outline(np.pad(mask, 1))) + sum(lengths)
+    found, left = [], int(count * (1.0 - OUTLINE_SHARE))
+    for each, length in zip(masks, lengths, strict=True):
+        own = max(FEWEST_VERTICES, round(count * length / total))
+        if own <= left:
+            found.append(Hole(each[1:-1, 1:-1], own))
+            left -= own
+    return found
+
+
+def hole_ring(
+    hole: Hole, radius: float, weights: tuple[int, int], search: bool,
+    rings: Sequence[np.ndarray],
+) -> np.ndarray | None:  # fmt: skip
+    """The ring (k, 2) [px], y up, of a hole, beside the outline and other ``rings``; None where
+    none makes V less: the disk would close it, or walls are too thin for it."""
+    margin = int(np.ceil(2.0 * radius)) + 8
+    inside = np.pad(hole.mask, margin)
+    open_pixels = int(hole.mask.sum())
+    best, least = None, open_pixels
+    for reach in REACHES:
+        ring = ring_around(inside, hole.vertices, reach * radius)
+        if not is_simple(ring):
+            continue
+        trials = [ring]
+        if search:
+            steps = np.append(COARSE[2:], FINE[1:])
+            trials.insert(0, searched(~inside, ring, radius, steps, weights, hole=True)[0])
+        for trial in trials:
+            placed = (trial - margin) * (1.0, -1.0)
+            if simplicity_fault(rings[0], [*rings[1:], placed]) is not None:
+                continue
+            crossed, near = crossed_and_near(inside.shape, trial, radius)
+            solid = ~crossed | near
+            wrong, outside = int(np.count_nonzero(solid == inside)), np.any(solid & inside)
+            if wrong < least and not (weights[1] and outside):
+                best, least = placed, wrong
+        if best is not None:
+            break
+    return best
+
+
+def ring_around(inside: np.ndarray, count: int, reach: float) -> np.ndarray:
+    """``count`` points that tell most of what lies within a reach [px] of a hole's pixels."""
+    from scipy.ndimage import distance_transform_edt
+
+    return telling_points(trace_outline(distance_transform_edt(~inside) <= reach), count)

@@ -11,6 +11,12 @@ The starts are among those, so that V never ends above that of even spacing.
 A search lowers V + balance·|excess| + outside·(V + excess): V the wrong pixels, excess those
 covered less those of the mask, so that V + excess is twice the pixels covered outside of the mask.
 Sums over edges have no balance, which is left to the last search.
+
+The paper's own optimiser (section 2.3; Dobrohotoff et al. 2012): vertices as damped particles that
+obey ẍ = −H ∇V − c ẋ, ∇V by central differences of the pixel error over ±h.  The printed equation
+has the signs that would raise V.  The paper gives H and c but neither h, the time step, the start
+nor the end; those are set here: a pixel, a step in which nothing moves by much more than a fraction
+of a pixel, even spacing, and no lower V for a while.
 """
 
 import numpy as np
@@ -72,62 +78,43 @@ def weighed(wrong, excess, weights):
     return wrong + balance * abs(excess) + outside * (wrong + excess)
 
 
-def stepped(vertices, k, directions, direction, step):
-    x, y = vertices[k]
-    across, down = directions[direction]
-    return x + step * across, y + step * down
-
-
 def step_vertex(mask, odd, near, vertices, k, radius, directions, step, excess, weights):
     """Take the step of vertex k that lowers the objective the most, if any does.
 
     Returns (change of the objective, growth of the cover).
     """
     before, here, after = neighbours(vertices, k)
-    best, least, grown = -1, 0, 0
+    best, least, grown = here, 0, 0
     for direction in range(len(directions)):
-        new = stepped(vertices, k, directions, direction, step)
-        if not leaves_room(mask.shape, new, radius + 1.0):
+        x, y = here[0] + step * directions[direction, 0], here[1] + step * directions[direction, 1]
+        if not leaves_room(mask.shape, (x, y), radius + 1.0):
             continue
-        change, growth = move_vertex(mask, odd, near, before, here, after, new, radius, False)
+        change, growth = move_vertex(mask, odd, near, before, here, after, (x, y), radius, False)
         change = weighed(change, excess + growth, weights) - weighed(0, excess, weights)
-        x, y = new
         if change < least and stays_simple(vertices, k, x, y):
-            best, least, grown = direction, change, growth
-    if best >= 0:
-        new = stepped(vertices, k, directions, best, step)
-        move_vertex(mask, odd, near, before, here, after, new, radius, True)
-        vertices[k, 0], vertices[k, 1] = new
+            best, least, grown = (x, y), change, growth
+    if least < 0:
+        move_vertex(mask, odd, near, before, here, after, best, radius, True)
+        vertices[k, 0], vertices[k, 1] = best
     return least, grown
 
 
-def pattern_search(mask, vertices, radius, directions, steps, active, weights):
+def pattern_search(mask, vertices, radius, directions, steps, weights, hole):
     """Move vertices along `directions` (k, 2) by shrinking `steps` [px] while that lowers.
 
-    mask: (h, w) bool; vertices: (N, 2), simple, changed in place; active: (N,) bool, the vertices
-    to begin with, and those that came in reach at the end.  A vertex whose steps all failed rests
-    until one nearby moves.  Returns the objective, V for PLAIN weights.
+    mask: (h, w) bool; vertices: (N, 2), simple, changed in place; hole: whether they go around a
+    hole, what lies outside of it being covered.  A vertex whose steps all failed rests until one
+    nearby moves.  Returns the objective, V for PLAIN weights.
     """
     odd, near = cover(vertices, radius, mask.shape)
-    return search_from(mask, odd, near, vertices, radius, directions, steps, active, weights)
-
-
-def hole_search(mask, vertices, radius, directions, steps, active, weights):
-    """pattern_search of a polygon around a hole: what lies outside of it is covered."""
-    odd, near = cover(vertices, radius, mask.shape)
-    odd = ~odd
-    return search_from(mask, odd, near, vertices, radius, directions, steps, active, weights)
-
-
-def search_from(mask, odd, near, vertices, radius, directions, steps, active, weights):
-    """pattern_search with the counts per pixel of the polygon as it is."""
+    if hole:
+        odd = ~odd
     wrong, excess = count_wrong(mask, odd, near)
     objective = weighed(wrong, excess, weights)
     count = len(vertices)
     waiting = np.empty(count, np.bool_)
     for step in steps:
-        for k in range(count):
-            waiting[k] = active[k]
+        waiting[:] = True
         k, rested = 0, 0
         while rested < count:
             change = 0
@@ -140,7 +127,7 @@ def search_from(mask, odd, near, vertices, radius, directions, steps, active, we
                 objective += change
                 excess += growth
                 for near_by in range(k - 2, k + 3):
-                    waiting[near_by % count] = active[near_by % count] = True
+                    waiting[near_by % count] = True
             rested = 0 if change < 0 else rested + 1
             k = (k + 1) % count
     return objective
@@ -152,18 +139,12 @@ def searched(
     radius: float,
     steps: np.ndarray,
     weights: tuple[int, int] = PLAIN,
-    active: np.ndarray | None = None,
+    hole: bool = False,
 ) -> tuple[np.ndarray, int]:
     """pattern_search of a start, which is left as it is: (vertices, objective)."""
     vertices = np.array(start)
-    active = np.ones(len(vertices), bool) if active is None else active
     search = compiled(pattern_search)
-    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, active, weights))
-
-
-def count_errors(mask: np.ndarray, vertices: np.ndarray, radius: float) -> int:
-    """V of the swept polygon against the mask: a search without steps."""
-    return searched(mask, vertices, radius, NO_STEPS)[1]
+    return vertices, int(search(mask, vertices, radius, DIRECTIONS, steps, weights, hole))
 
 
 def pattern_fit(
@@ -207,16 +188,12 @@ def _starts(mask, sums, count, radius):
     split = split_outline(sums, outline, count, radius) if count > 2 else None
     starts = [] if split is None else [inset(split, mask, 0.0)]
     starts += [
-        inset(p, mask, radius) for p in (_telling(outline, count), even_points(outline, count))
+        inset(p, mask, radius)
+        for p in (telling_points(outline, count), even_points(outline, count))
     ]
     if CRAMPED * count * radius > len(outline):
         starts += [_split_coarser(mask, outline, count, radius), ring_inside(mask, count)]
     return [start for start in starts if is_simple(start)]
-
-
-def _telling(outline, count):
-    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
-    return telling_points(points, count)
 
 
 def _split_coarser(mask, outline, count, radius):
@@ -226,7 +203,7 @@ def _split_coarser(mask, outline, count, radius):
     """
     half = max(2, (count + 1) // 2)
     if half < FEW:
-        start = inset(_telling(outline, half), mask, radius)
+        start = inset(telling_points(outline, half), mask, radius)
     else:
         start = inset(_split_coarser(mask, outline, half, radius), mask, 0.0)
     vertices = searched(mask, start, radius, np.append(COARSE, FINE[1:]))[0]
@@ -236,3 +213,77 @@ def _split_coarser(mask, outline, count, radius):
         middle = vertices[longest] + 0.5 * edges[longest]
         vertices = np.insert(vertices, longest + 1, middle, axis=0)
     return vertices
+
+
+FORCE = 0.5
+"""H, the paper's force factor."""
+
+DAMPING = 2.0
+"""c, the paper's damping factor."""
+
+SPACING = 1.0
+"""h [px]: V is a whole number and flat below the size of a pixel."""
+
+TIME_STEP = 0.1
+"""Short against the relaxation time 1/c."""
+
+PATIENCE = 200
+"""Steps without a lower V after which it counts as the minimum: forty relaxation times."""
+
+
+def gradient(mask, odd, near, vertices, k, radius, spacing):
+    """∇V [pixels/px] of vertex k by central differences."""
+    before, here, after = neighbours(vertices, k)
+    x, y = here
+    right, _ = move_vertex(mask, odd, near, before, here, after, (x + spacing, y), radius, False)
+    left, _ = move_vertex(mask, odd, near, before, here, after, (x - spacing, y), radius, False)
+    down, _ = move_vertex(mask, odd, near, before, here, after, (x, y + spacing), radius, False)
+    up, _ = move_vertex(mask, odd, near, before, here, after, (x, y - spacing), radius, False)
+    return 0.5 * (right - left) / spacing, 0.5 * (down - up) / spacing
+
+
+def advance(mask, odd, near, vertices, velocities, k, radius, step):
+    """Move vertex k by its velocity, or stop it where the polygon would not stay simple.
+
+    Returns the change of V.
+    """
+    before, here, after = neighbours(vertices, k)
+    x = vertices[k, 0] + step * velocities[k, 0]
+    y = vertices[k, 1] + step * velocities[k, 1]
+    room = leaves_room(mask.shape, (x, y), radius + SPACING + 1.0)
+    if not (room and stays_simple(vertices, k, x, y)):
+        velocities[k] = 0.0
+        return 0
+    vertices[k, 0], vertices[k, 1] = x, y
+    change, _ = move_vertex(mask, odd, near, before, here, after, (x, y), radius, True)
+    return change
+
+
+def damped_descent(mask, vertices, best, radius, force, damping, spacing, step, patience):
+    """The vertices (N, 2) of the least V on the way of the damped motion into ``best``; the steps
+    taken."""
+    odd, near = cover(vertices, radius, mask.shape)
+    wrong = least = count_wrong(mask, odd, near)[0]
+    best[:] = vertices
+    velocities = np.zeros_like(vertices)
+    steps = waited = 0
+    while waited < patience and least > 0:
+        for k in range(len(vertices)):
+            across, down = gradient(mask, odd, near, vertices, k, radius, spacing)
+            velocities[k, 0] -= step * (force * across + damping * velocities[k, 0])
+            velocities[k, 1] -= step * (force * down + damping * velocities[k, 1])
+        for k in range(len(vertices)):
+            wrong += advance(mask, odd, near, vertices, velocities, k, radius, step)
+        steps, waited = steps + 1, waited + 1
+        if wrong < least:
+            best[:], least, waited = vertices, wrong, 0
+    return steps
+
+
+def paper_fit(mask: np.ndarray, start: np.ndarray, radius: float) -> np.ndarray:
+    """The vertices (N, 2) that the paper's motion leads to from a start, which it leaves alone."""
+    vertices, best = np.array(start), np.empty_like(start)
+    compiled(damped_descent)(
+        mask, vertices, best, radius, FORCE, DAMPING, SPACING, TIME_STEP, PATIENCE
+    )
+    return best

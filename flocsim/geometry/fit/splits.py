@@ -13,13 +13,11 @@ from flocsim.geometry.fit.coverage import compiled
 from flocsim.geometry.fit.edge_errors import (
     BARRED,
     POSSIBLE,
-    copy,
     edge_sum,
     leaves_room,
     point,
     set_bisectors,
     set_edge_sums,
-    total_of,
 )
 from flocsim.geometry.fit.simple import is_open
 
@@ -126,7 +124,7 @@ def descend(sums, vertices, radius, directions, steps):
                         points[k, i, axis] = vertices[k, axis] + step * directions[i - 1, axis]
             edge_costs(sums, radius, points, out, costs)
             # With the directions of what was found, its own sum can be a little higher.
-            lowest = min(lowest, total_of(edges))
+            lowest = min(lowest, edges.sum())
             found = best_ring(costs, 0, 0, places, picks)
             if found >= lowest:
                 break
@@ -136,7 +134,7 @@ def descend(sums, vertices, radius, directions, steps):
             if not is_open(moved, 2.0 * radius):
                 break
             lowest = found
-            copy(moved, vertices)
+            vertices[:] = moved
 
 
 def chosen(sums, points, out, radius, longest, spread, start, rounds, vertices):

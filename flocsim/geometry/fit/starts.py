@@ -26,29 +26,21 @@ def trace_outline(mask: np.ndarray) -> np.ndarray:
         down, right = HEADINGS[heading]
         middles.append((column - 0.5 + 0.5 * right, row - 0.5 + 0.5 * down))
         row, column = row + down, column + right
-        heading = _turn(inside, row, column, heading)
+        # The pixels ahead of the upper left corner of this one, on the left and on the right.
+        on_left, on_right = (
+            inside[row + (down + hand * right - 1) // 2][column + (right - hand * down - 1) // 2]
+            for hand in (-1, 1)
+        )
+        heading = (heading + (-1 if on_left else 0 if on_right else 1)) % 4
         if (row, column) == start and heading == 0:
             return np.array(middles)
 
 
-def _turn(inside, row, column, heading):
-    """The heading after the upper left corner of pixel (row, column), the region on the right."""
-    down, right = HEADINGS[heading]
-
-    def ahead(hand):
-        """Whether the pixel ahead, to the left (−1) or the right (1), is the region's."""
-        return inside[row + (down + hand * right - 1) // 2][column + (right - hand * down - 1) // 2]
-
-    if ahead(-1):
-        return (heading - 1) % 4
-    return heading if ahead(1) else (heading + 1) % 4
-
-
-def even_points(outline: np.ndarray, count: int, shift: float = 0.0) -> np.ndarray:
-    """`count` points evenly spaced along the closed outline; `shift` in spacings moves them on."""
+def even_points(outline: np.ndarray, count: int) -> np.ndarray:
+    """`count` points evenly spaced along the closed outline."""
     closed = np.vstack([outline, outline[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
-    places = (np.arange(count) + shift) / count * along[-1]
+    places = np.arange(count) / count * along[-1]
     return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
 
 
@@ -87,11 +79,13 @@ def triangle(points, before, k, after):
     return abs(ux * wy - uy * wx)
 
 
-def telling_points(points: np.ndarray, count: int) -> np.ndarray:
-    """The `count` points that tell most of a closed outline (Visvalingam and Whyatt 1993).
+def telling_points(outline: np.ndarray, count: int) -> np.ndarray:
+    """The `count` points that tell most of a closed outline (Visvalingam and Whyatt 1993): of its
+    own, or of twice as many even ones where it has fewer.
 
     The point that spans the smallest triangle with its neighbours is left out, again and again.
     """
+    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
     areas = np.empty(len(points))
     compiled(leave_out)(points, count, areas)
     return points[np.isfinite(areas)]

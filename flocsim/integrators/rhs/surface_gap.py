@@ -9,7 +9,7 @@ the forces change:
     s_k = ∂g̃/∂g_k = ℓ(g̃)/ℓ(g_k) exp(u(g̃) − u(g_k)) acts through pair k:
 
 force and torque of the one potential W(g̃), W' = −F. With one ℓ for all gaps that is
-g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIAS (forces/smoothing.py).
+g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIAS (forces/outline.py).
 """
 
 import math

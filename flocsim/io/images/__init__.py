@@ -2,5 +2,5 @@
 
 ``reading``: files → grey; ``background``: noise and light; ``outlines``: contrast → where flocs
 end, by ``focus``; ``regions``: outlines → flocs, those that touch parted; ``masks``: flocs that are
-given without a picture; ``selection``: which of them count, and for how many.
+given without a picture; ``pictures``, too: which of them count, and for how many.
 """

@@ -104,8 +104,8 @@ def strips(picture: np.ndarray) -> list[slice]:
 
 
 def smooth_surface(grey: np.ndarray, degree: int, logarithmic: bool = False) -> np.ndarray:
-    """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`,
-    or of its logarithm.
+    """The light without flocs: a polynomial surface, fitted robustly, of the same shape as `grey`;
+    for light that falls off by a factor it is fitted to the logarithm.
 
     Least squares over products of Legendre polynomials of total degree ≤ `degree`, reweighted
     w = 1/(1 + (residual/1.5σ)²)² so that pixels of flocs lose their say; σ is the robust deviation.
@@ -119,27 +119,18 @@ def smooth_surface(grey: np.ndarray, degree: int, logarithmic: bool = False) -> 
     basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
     orders = np.add.outer(np.arange(degree + 1), np.arange(degree + 1))
     coefficients = np.zeros(orders.shape)
+    rim = np.ones(values.shape, bool)
+    down, across = (max(1, round(RIM * n)) for n in values.shape)
+    rim[down : values.shape[0] - down, across : values.shape[1] - across] = False
     coefficients[orders <= degree] = _surface_fit(
         basis[..., orders <= degree].reshape(values.size, -1), values.ravel(),
-        orders[orders <= degree], _rim_of(values.shape).ravel(),
+        orders[orders <= degree], rim.ravel(),
     )  # fmt: skip
-    return rows @ coefficients @ columns.T
-
-
-def light_surface(grey: np.ndarray, degree: int) -> np.ndarray:
-    """As smooth_surface, for light that falls off by a factor: fitted to the logarithm of grey."""
-    surface = smooth_surface(grey, degree, logarithmic=True)
-    np.exp(surface, out=surface)
-    surface -= DARKEST
+    surface = rows @ coefficients @ columns.T
+    if logarithmic:
+        np.exp(surface, out=surface)
+        surface -= DARKEST
     return surface
-
-
-def _rim_of(shape):
-    """The samples near a side of the picture."""
-    inner = np.zeros(shape, bool)
-    down, across = (max(1, round(RIM * n)) for n in shape)
-    inner[down : shape[0] - down, across : shape[1] - across] = True
-    return ~inner
 
 
 def _surface_fit(basis, values, orders, rim):

@@ -10,13 +10,11 @@ of some thousands of specks in a picture each has a few hundred pixels, for whic
 more than what they do.
 """
 
-from collections.abc import Callable
-from functools import cache, lru_cache
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled
 
 STEPS = np.array([2.0, 3.0, 4.5, 6.0])
 """Blur that is added to tell softness [px]: of these the least above STEP r_eq."""
@@ -105,10 +103,6 @@ class Focus:
             ratio = np.median(clean / np.maximum(self.slopes(more, mask, box), 1e-12))
             return float(np.interp(-ratio, -left_by_blur(float(radius), blur, more), SPREADS))
         return float("inf")
-
-
-compiled: Callable[..., Any] = cache(lambda kernel: compose(kernel, {}))
-"""A kernel, compiled on first use and kept on disk."""
 
 
 def along(picture: np.ndarray, mask: np.ndarray, corner: tuple[int, int], reach: int) -> np.ndarray:

@@ -10,25 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.errors import ImageError
+from flocsim.io.images import reading
 from flocsim.io.images.outlines import EIGHT, Outline, filled, pieces
 from flocsim.io.images.pictures import Segmentation
-from flocsim.io.images.reading import (
-    MOST_LABELS,
-    MOST_PIXELS,
-    SUFFIXES,
-    check_array,
-    check_entries,
-    check_file,
-    check_shape,
-    check_spread,
-    read_array,
-    read_pixels,
-)
 from flocsim.io.images.regions import NAN, Filters, sorted_out
 
 ARRAYS = (".npy", ".npz")
-MOST_BYTES = 8 * MOST_PIXELS
+MOST_BYTES = 8 * reading.MOST_PIXELS
 """Of all masks of a file."""
+
+MOST_LABELS = 100_000
 
 PLAIN_INSIDE = (1, 255, 65535)
 """What alone beside 0 means "inside", not one floc of that number."""
@@ -36,7 +27,7 @@ PLAIN_INSIDE = (1, 255, 65535)
 LARGEST_KEPT = 2**31 - 1
 """Labels above this number are numbered anew."""
 
-MASK_SUFFIXES = (*SUFFIXES, *ARRAYS)
+MASK_SUFFIXES = (*reading.SUFFIXES, *ARRAYS)
 """Endings that are taken for masks when a folder is given."""
 
 AGREEING = 0.75
@@ -68,7 +59,7 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     if path.suffix.lower() in ARRAYS:
         return [(f"{path.name}:{key}" if key else path.name, _mask(array, f"{path} {key}"))
                 for key, array in _arrays(path)]  # fmt: skip
-    pixels = read_pixels(path)
+    pixels = reading.read_pixels(path)
     flat = pixels if pixels.ndim == 2 else pixels[..., :3].max(axis=2)
     if path.suffix.lower() in (".jpg", ".jpeg"):
         check_halves(path, flat)
@@ -78,32 +69,29 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
 
 def _arrays(path):
     """[(key, array)] of an .npy or .npz file."""
-    check_file(path, "file of masks")
+    reading.check_file(path, "file of masks")
     try:
         if path.suffix.lower() == ".npy":
             with open(path, "rb") as file:
-                return [("", read_array(file, path.stat().st_size, str(path)))]
+                return [("", reading.read_array(file, path.stat().st_size, str(path)))]
+        arrays, left = {}, MOST_BYTES
         with zipfile.ZipFile(path) as archive:
-            check_entries(path, archive.infolist())
-            arrays = dict(_members(path, archive))
+            reading.check_entries(path, archive.infolist())
+            for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
+                left -= entry.file_size
+                if left < 0:
+                    raise ImageError(
+                        f"{path}: would be more than {MOST_BYTES} bytes after decompression"
+                    )
+                key = entry.filename.removesuffix(".npy")
+                with archive.open(entry) as file:
+                    arrays[key] = reading.read_array(file, entry.file_size, f"{path} {key}")
         return _unpacked(path, arrays) if "shapes" in arrays else list(arrays.items())
     except ImageError:
         raise
     except Exception as problem:
-        reason = " ".join(str(problem).split())[:120] or type(problem).__name__
+        reason = reading.one_line(problem)
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
-
-
-def _members(path, archive):
-    """(key, array) of each file of an open archive, in the order of their names."""
-    left = MOST_BYTES
-    for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
-        left -= entry.file_size
-        if left < 0:
-            raise ImageError(f"{path}: would be more than {MOST_BYTES} bytes after decompression")
-        key = entry.filename.removesuffix(".npy")
-        with archive.open(entry) as file:
-            yield key, read_array(file, entry.file_size, f"{path} {key}")
 
 
 def _unpacked(path, arrays):
@@ -130,8 +118,8 @@ def _mask(array, name):
 
     if array.ndim != 2 or array.size == 0:
         raise ImageError(f"{name}: a mask is an (h, w) array, found shape {array.shape}")
-    check_shape(name, array.shape)
-    check_array(name, array)
+    reading.check_shape(name, array.shape)
+    reading.check_array(name, array)
     if array.dtype == bool:
         return array.astype(np.int64)
     values = np.unique(array)
@@ -154,7 +142,7 @@ def _mask(array, name):
             f"{name}: is a photograph, not a mask: {len(values)} grey levels, and only "
             f"{100 * share:.0f} % of neighbouring pixels agree; {WAY}"
         )
-    check_spread(name, array.shape, find_objects(labels))
+    reading.check_spread(name, array.shape, find_objects(labels))
     return labels.astype(np.int64) if values[-1] > LARGEST_KEPT else array.astype(np.int64)
 
 

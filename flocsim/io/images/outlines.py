@@ -101,11 +101,6 @@ class Outline:
     contrast: float
     parted: float = float("nan")
 
-    @property
-    def excess(self) -> float:
-        """What it adds to the contrast around it, summed over its pixels."""
-        return float(self.contrast * self.mask.sum())
-
 
 def pieces(mask: np.ndarray, box: Box) -> Iterator[tuple[np.ndarray, Box]]:
     """The 8-connected parts of a mask, each with its box in the picture."""
@@ -158,7 +153,13 @@ def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[f
     fine: the deviation that white noise would leave; grain, which is coarser, is told by what goes
     with a little more blur.
     """
-    noise = max(fine, robust_deviation(sampled(contrast) - sampled_blur(contrast, scale + 2.0)))
+    from scipy.ndimage import gaussian_filter1d
+
+    stride = stride_of(contrast.shape)
+    across = [gaussian_filter1d(contrast[rows], scale + 2.0, axis=1)[:, ::stride]
+              for rows in strips(contrast)]  # fmt: skip
+    blurred = gaussian_filter1d(np.concatenate(across), scale + 2.0, axis=0)[::stride]
+    noise = max(fine, robust_deviation(sampled(contrast) - blurred))
     if min(contrast.shape) < 2:
         return noise, 0.0
     squares = []
@@ -172,16 +173,6 @@ def background_noise(contrast: np.ndarray, fine: float, scale: float) -> tuple[f
     # The square of two normal numbers of deviation s has the median 2 ln 2 s².
     middle = np.median(square, overwrite_input=True) if square.size else 0.0
     return noise, float(middle / np.log(2.0))
-
-
-def sampled_blur(contrast, blur):
-    """`sampled` of a contrast that is blurred by so many pixels."""
-    from scipy.ndimage import gaussian_filter1d
-
-    stride = stride_of(contrast.shape)
-    across = [gaussian_filter1d(contrast[rows], blur, axis=1)[:, ::stride]
-              for rows in strips(contrast)]  # fmt: skip
-    return gaussian_filter1d(np.concatenate(across), blur, axis=0)[::stride]
 
 
 def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndarray, float]:
@@ -212,7 +203,8 @@ class Search:
         self.area, self.max_blur, self.saturated = np.pi * min_radius**2, max_blur, saturated
 
     def outlines(self) -> list[Outline]:
-        """All regions, in focus or not, that are not fainter than a share of the typical one."""
+        """All regions, in focus or not, of no less than FAINT of the typical contrast: its median,
+        weighted by what each takes from the light, over those that are in focus, or all."""
         from scipy.ndimage import find_objects, label
 
         above = self.contrast > self.floor
@@ -225,7 +217,13 @@ class Search:
         for number in np.flatnonzero(large & (highest >= 2.0 * self.floor)).tolist():
             box = boxes[number - 1]
             found += self.island(labels[box] == number, box)
-        return without_faint(found, self.in_focus)
+        told = [each for each in found if self.in_focus(each)] or found
+        if not told:
+            return []
+        order = sorted(told, key=lambda each: each.contrast)
+        sums = np.cumsum([each.contrast * each.mask.sum() for each in order])
+        typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
+        return [each for each in found if each.contrast >= FAINT * typical]
 
     def in_focus(self, outline: Outline, sharp: float = SHARP) -> bool:
         """Whether an outline is no softer than its size, or `sharp` [px], allows."""
@@ -278,11 +276,11 @@ class Search:
         parts = self.cut(focus, mask, box, level)
         found = []
         if len(parts) > 1:  # each has a level of its own
-            parts = [
-                each
-                for part in parts
-                for each in self.cut_alone(focus, mask, box, base, part, parts)
-            ]
+            own, cut = np.zeros((2, *focus.contrast.shape), bool)
+            own[box] = mask
+            for part, place, _ in parts:
+                cut[place] |= part
+            parts = [each for part in parts for each in self.cut_alone(focus, own, cut, base, part)]
         for part, place, level in parts:
             whole, wide = widened(filled(part), place, 1, focus.contrast.shape)
             softness = focus.softness(whole, wide)
@@ -303,27 +301,22 @@ class Search:
             if part.sum() >= least
         ]
 
-    def cut_alone(self, focus, mask, box, base, part, parts):
-        """One of several parts of a mask as it is cut at a level of its own."""
-        zone, place = widened(part[0], part[1], AROUND, focus.contrast.shape)
+    def cut_alone(self, focus, own, cut, base, part):
+        """One of several parts of a mask as it is cut at a level of its own; ``own``: the mask in
+        all of the island, ``cut``: all of its parts."""
         from scipy.ndimage import binary_dilation
 
-        zone = binary_dilation(zone, EIGHT, AROUND)
-        for other, where, _ in parts:
-            if where is not part[1]:
-                here, there = overlap(place, where)
-                zone[here] &= ~other[there]
-        here, there = overlap(place, box)
-        own = np.zeros_like(zone)
-        own[here] = mask[there]
-        beyond = binary_dilation(own & ~zone, EIGHT)
-        zone &= own
+        zone, place = widened(part[0], part[1], AROUND, focus.contrast.shape)
+        others = cut[place] & ~zone
+        zone = binary_dilation(zone, EIGHT, AROUND) & ~others
+        beyond = binary_dilation(own[place] & ~zone, EIGHT)
+        zone &= own[place]
         level = max(self.level(focus, zone, place, base), self.floor)
         alone = self.cut(focus, zone, place, level)
         for each, where, _ in alone:
-            here, there = overlap(where, place)
             edge = rim(each)
-            if (edge[here] & beyond[there]).sum() > CUT_OFF * edge.sum():
+            within = moved(where, -place[0].start, -place[1].start)
+            if (edge & beyond[within]).sum() > CUT_OFF * edge.sum():
                 return [part]  # its zone would be its outline
         return alone or [part]
 
@@ -353,8 +346,9 @@ class Search:
         place, size = np.searchsorted(edges, values), len(edges) + 1
         pixels = np.bincount(place, minlength=size)[1:-1]
         squares = np.bincount(place, square_slopes, minlength=size)[1:-1]
-        few = np.array([1.0, 2.0, 3.0, 2.0, 1.0])
-        mean = smoothed(squares, few) / np.maximum(smoothed(pixels, few), 1.0)
+        few = np.array([1.0, 2.0, 3.0, 2.0, 1.0])  # weights of levels beside each other
+        summed = [np.convolve(each, few)[2 : 2 + len(each)] for each in (squares, pixels)]
+        mean = summed[0] / np.maximum(summed[1], 1.0)
         steep = np.sqrt(np.maximum(mean - focus.noise, 0.0))
         above = np.cumsum(pixels[::-1])[::-1]
         middles = np.sqrt(edges[1:] * edges[:-1])
@@ -389,34 +383,6 @@ def edge_of(steep, told):
     before, behind = np.flatnonzero(~at_edge[:peak]), np.flatnonzero(~at_edge[peak:])
     first = int(before[-1]) + 1 if before.size else 0
     return first, peak + int(behind[0]) - 1 if behind.size else len(steep) - 1
-
-
-def overlap(box, other):
-    """The places, in each of two boxes, of what they share."""
-    shared = [(max(a.start, b.start), min(a.stop, b.stop)) for a, b in zip(box, other, strict=True)]
-    return tuple(
-        tuple(slice(start - s.start, max(stop, start) - s.start)
-              for (start, stop), s in zip(shared, within, strict=True))
-        for within in (box, other)
-    )  # fmt: skip
-
-
-def smoothed(values, weights):
-    """Weighted sums over neighbours, of the length of `values`."""
-    reach = len(weights) // 2
-    return np.convolve(values, weights)[reach : reach + len(values)]
-
-
-def without_faint(found, in_focus):
-    """The outlines of no less than FAINT of the typical contrast: its median, weighted by what each
-    takes from the light, over those that are in focus, or all."""
-    told = [each for each in found if in_focus(each)] or found
-    if not told:
-        return []
-    order = sorted(told, key=lambda each: each.contrast)
-    sums = np.cumsum([each.excess for each in order])
-    typical = order[int(np.searchsorted(sums, 0.5 * sums[-1]))].contrast
-    return [each for each in found if each.contrast >= FAINT * typical]
 
 
 def filled(foreground: np.ndarray) -> np.ndarray:

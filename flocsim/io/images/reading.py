@@ -39,7 +39,6 @@ PIXELS_PER_BYTE = 10_000
 """More than any packing makes of a byte of the file: the pixels are not there."""
 
 LARGEST_FILE = 2**32
-MOST_LABELS = 100_000
 MOST_SPREAD = 20
 """Times the picture's pixels that the boxes around all labels may cover."""
 
@@ -60,7 +59,36 @@ def read_grey(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
 
 def grey_of(pixels: np.ndarray, path: str | Path) -> np.ndarray:
     """What read_grey gives for a file's pixels as they are stored; path: for messages."""
-    return _luminance(_to_unit_range(pixels, path), path)
+    pixels = _to_unit_range(pixels, path)
+    if pixels.ndim == 2:
+        return pixels
+    if pixels.ndim != 3 or pixels.shape[2] > 4:
+        raise ImageError(
+            f"{path}: an array of shape {pixels.shape} is not a single grey or colour picture; "
+            "save the picture that you want as a file of its own"
+        )
+    has_alpha = pixels.shape[2] in (2, 4)
+    colours = pixels[..., :-1] if has_alpha else pixels
+    grey = colours[..., 0] if colours.shape[2] == 1 else colours @ LUMINANCE
+    if not has_alpha:
+        return grey
+    alpha = pixels[..., -1]
+    opaque = grey[alpha > 0.5]
+    backdrop = np.median(opaque) if opaque.size else 0.0
+    return alpha * grey + (1.0 - alpha) * backdrop
+
+
+def _to_unit_range(pixels, path):
+    if pixels.dtype == bool:
+        return pixels.astype(float)
+    low, high = float(pixels.min()), float(pixels.max())
+    if low < 0:
+        raise ImageError(f"{path}: holds negative values (least {low:g}); grey starts at 0")
+    if np.issubdtype(pixels.dtype, np.floating):
+        return pixels.astype(float) / max(high, 1.0)
+    # 16-bit files may arrive in a 32-bit array: the smallest usual range that holds them counts.
+    full = 255.0 if pixels.dtype.itemsize == 1 else 65535.0
+    return pixels.astype(float) / max(full, high)
 
 
 def read_pixels(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
@@ -119,7 +147,7 @@ def _decode(path, frame):
         if path.suffix.lower() in (".tif", ".tiff"):
             return _decode_with_tifffile(path, frame)
         raise ImageError(
-            f"{path}: cannot be read as a picture ({_one_line(problem)}); "
+            f"{path}: cannot be read as a picture ({one_line(problem)}); "
             "give an undamaged PNG, JPEG, TIFF or BMP"
         ) from problem
 
@@ -146,84 +174,51 @@ def _decode_with_pillow(path, frame):
 
 
 def _decode_with_tifffile(path, frame):
+    """The pixels of a page; ImageError for one that is too large, or unpacks to more than these."""
     import tifffile
 
     try:
         with tifffile.TiffFile(path) as tiff:
-            page = check_tiff(path, tiff, frame)
+            if frame >= len(tiff.pages):
+                raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
+            page = tiff.pages[frame]
+            check_shape(path, page.shape)
+            check_promise(path, int(np.prod(page.shape[:2])))
+            check_shape(path, (page.imagelength, page.imagewidth))
+            if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
+                raise ImageError(
+                    f"{path}: its packing {page.compression!s:.40} is unknown; save it "
+                    "uncompressed, or as PNG"
+                )
+            rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
+            wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
+            if wanted > 64 * MOST_PIXELS:
+                raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
+            for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
+                if page.compression in DEFLATED:
+                    tiff.filehandle.seek(offset)
+                    packed = tiff.filehandle.read(length)
+                    if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
+                        raise ImageError(
+                            f"{path}: a part of it decompresses to more than {wanted} bytes"
+                        )
             return np.asarray(page.asarray())
     except ImageError:
         raise
     except Exception as problem:
         raise ImageError(
-            f"{path}: cannot be read as a TIFF ({_one_line(problem)}); "
+            f"{path}: cannot be read as a TIFF ({one_line(problem)}); "
             "save it uncompressed, or as PNG"
         ) from problem
 
 
-def check_tiff(path, tiff, frame=0):
-    """The page of a TIFF; ImageError for one that is too large, or unpacks to more than its
-    pixels."""
-    if frame >= len(tiff.pages):
-        raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
-    page = tiff.pages[frame]
-    check_shape(path, page.shape)
-    check_promise(path, int(np.prod(page.shape[:2])))
-    check_shape(path, (page.imagelength, page.imagewidth))
-    if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
-        raise ImageError(
-            f"{path}: its packing {page.compression!s:.40} is unknown; save it uncompressed, or as "
-            "PNG"
-        )
-    rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
-    wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
-    if wanted > 64 * MOST_PIXELS:
-        raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
-    places = zip(page.dataoffsets, page.databytecounts, strict=True)
-    if page.compression in DEFLATED:
-        pieces = ((offset, length, wanted) for offset, length in places)
-        check_deflated(path, tiff.filehandle, pieces)
-    return page
-
-
-def _one_line(problem):
+def one_line(problem: Exception) -> str:
+    """What an exception of a decoder says, shortened."""
     if type(problem).__name__ == "UnidentifiedImageError":
         return "its content has no known picture format"
     if isinstance(problem, MemoryError):
         return "out of memory"
     return " ".join(str(problem).split())[:120] or type(problem).__name__
-
-
-def _to_unit_range(pixels, path):
-    if pixels.dtype == bool:
-        return pixels.astype(float)
-    low, high = float(pixels.min()), float(pixels.max())
-    if low < 0:
-        raise ImageError(f"{path}: holds negative values (least {low:g}); grey starts at 0")
-    if np.issubdtype(pixels.dtype, np.floating):
-        return pixels.astype(float) / max(high, 1.0)
-    # 16-bit files may arrive in a 32-bit array: the smallest usual range that holds them counts.
-    full = 255.0 if pixels.dtype.itemsize == 1 else 65535.0
-    return pixels.astype(float) / max(full, high)
-
-
-def _luminance(pixels, path):
-    if pixels.ndim == 2:
-        return pixels
-    if pixels.ndim != 3 or pixels.shape[2] > 4:
-        raise ImageError(
-            f"{path}: an array of shape {pixels.shape} is not a single grey or colour picture; "
-            "save the picture that you want as a file of its own"
-        )
-    has_alpha = pixels.shape[2] in (2, 4)
-    colours = pixels[..., :-1] if has_alpha else pixels
-    grey = colours[..., 0] if colours.shape[2] == 1 else colours @ LUMINANCE
-    if not has_alpha:
-        return grey
-    alpha = pixels[..., -1]
-    opaque = grey[alpha > 0.5]
-    backdrop = np.median(opaque) if opaque.size else 0.0
-    return alpha * grey + (1.0 - alpha) * backdrop
 
 
 def check_file(path: Path, what: str) -> None:
@@ -311,27 +306,11 @@ def check_entries(path: Path, entries: Iterable[Any]) -> None:
 
 
 def check_spread(name: object, shape: Sequence[int], boxes: Iterable[Any]) -> None:
-    """ImageError for labels so many, or in boxes so large, that sorting them would take for ever.
-
-    ``boxes``: of each label a pair of slices, or None.
-    """
-    count = spread = 0
-    for box in boxes:
-        if box is not None:
-            count += 1
-            spread += math.prod(side.stop - side.start for side in box)
-    if count > MOST_LABELS:
-        raise ImageError(f"{name}: holds {count} labels, more than {MOST_LABELS}")
-    if spread > MOST_SPREAD * math.prod(shape) + 2**20:
+    """ImageError for labels in boxes, pairs of slices, so large that sorting them would take for
+    ever."""
+    sizes = [math.prod(side.stop - side.start for side in box) for box in boxes if box is not None]
+    if sum(sizes) > MOST_SPREAD * math.prod(shape) + 2**20:
         raise ImageError(
-            f"{name}: its {count} labels are scattered over the image; give each floc its own label"
+            f"{name}: its {len(sizes)} labels are scattered over the image; give each floc its own "
+            "label"
         )
-
-
-def check_deflated(name: object, file: Any, places: Iterable[tuple[int, int, int]]) -> None:
-    """ImageError for deflated pieces (offset, length, bytes that it should have) that have more."""
-    for offset, length, wanted in places:
-        file.seek(offset)
-        unpacked = zlib.decompressobj().decompress(file.read(length), wanted + 1)
-        if len(unpacked) > wanted:
-            raise ImageError(f"{name}: a part of it decompresses to more than {wanted} bytes")

@@ -46,7 +46,7 @@ class Region:
     mask that came without a picture; parted: the confidence that it is a floc apart from one that
     it touched, NaN for all others; band: masks as it would have been cut at a higher and at a lower
     level, in the bbox widened by the same on every side, None where it is not known; weight: for
-    how many flocs it stands, of which the filters kept it alone (selection.weighed); reason: why it
+    how many flocs it stands, of which the filters kept it alone (pictures.weighed); reason: why it
     is left out, "" for a floc. The labels of what is left out count on from those of the flocs.
     """
 
@@ -98,8 +98,14 @@ def find_regions(outlines, contrast, filters):
     if filters.neck != 0:
         closed, whole = split_touching(closed, filters.neck, filters.min_radius)
     closed.sort(key=lambda each: (each.box[0].start, each.box[1].start))
-    regions, rejected = sorted_out(closed, contrast.shape, filters)
-    return *with_bands(regions, rejected, contrast), whole
+    found = sorted_out(closed, contrast.shape, filters)
+    # Of what is left out, too, which may yet be added: a band reaches into no other region.
+    taken = np.zeros(contrast.shape, bool)
+    for each in (*found[0], *found[1]):
+        top, left, bottom, right = each.bbox
+        taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
+    regions, rejected = (tuple(with_band(each, taken, contrast) for each in some) for some in found)
+    return regions, rejected, whole
 
 
 def sorted_out(outlines, shape, filters, numbers=None):
@@ -136,22 +142,11 @@ def reason_to_reject(box, shape, radius, blur, filters):
     return "out of focus" if blur > max(SHARP, filters.max_blur * radius) else ""
 
 
-def with_bands(regions, rejected, contrast):
-    """Flocs and regions left out, which may yet be added, with bands that reach into no other.
-
-    A level is uncertain by BAND of the step at the edge, and by what it changes over PIXEL.
-    """
-    taken = np.zeros(contrast.shape, bool)
-    for each in (*regions, *rejected):
-        top, left, bottom, right = each.bbox
-        taken[top:bottom, left:right] |= each.mask[1:-1, 1:-1]
-    return tuple(
-        tuple(with_band(each, taken, contrast) for each in some) for some in (regions, rejected)
-    )
-
-
 def with_band(region, taken, contrast):
-    """The Region with its band."""
+    """The Region with its band: a level is uncertain by BAND of the step at the edge, and by what
+    it changes over PIXEL."""
+    from scipy.ndimage import distance_transform_edt
+
     top, left, bottom, right = region.bbox
     box = slice(top, bottom), slice(left, right)
     mask = region.mask[1:-1, 1:-1]
@@ -161,18 +156,11 @@ def with_band(region, taken, contrast):
     slope = float(np.median(along(near.astype(np.float32), wide, (0, 0), 0)))
     change = np.hypot(BAND * (region.level - region.base), PIXEL * slope)
     inner = largest_piece(filled(wide & (near > region.level + change)), wide)
-    around = within(wide, reach) & ~(taken[place] & ~wide)
+    around = (distance_transform_edt(~wide) <= reach) & ~(taken[place] & ~wide)
     outer = largest_piece(filled(wide | (around & (near > region.level - change))), wide)
     # What the picture's edge has cut off is given back, so that the margin is the same all around.
     whole = beyond(box, reach)
     return attrs.evolve(region, band=(placed(inner, place, whole), placed(outer, place, whole)))
-
-
-def within(mask, reach):
-    """The pixels no farther than `reach` from a mask's."""
-    from scipy.ndimage import distance_transform_edt
-
-    return distance_transform_edt(~mask) <= reach
 
 
 def largest_piece(mask, otherwise):

@@ -11,16 +11,8 @@ import numpy as np
 
 from flocsim.io.files import Rule
 from flocsim.io.outputs import redrawn
-from flocsim.io.plots.style import (
-    BODY_COLOURS,
-    CONTACT_COLOUR,
-    Figure,
-    drawing,
-    frame_of,
-    keep_titles_whole,
-    plain,
-    save_gif,
-)
+from flocsim.io.plots import style
+from flocsim.io.plots.style import CONTACT_COLOUR, Figure, drawing, plain
 
 MICRO = 1e6
 INSIDE_COLOUR = "#DCEBF5"
@@ -42,7 +34,7 @@ DECADES = 8
 FEMTO = 1e15
 ENERGY_DECADES = 4
 """Decades of an axis of energies on either side of 0."""
-FORCE_COLOURS = (*BODY_COLOURS, "0.5", CONTACT_COLOUR)
+FORCE_COLOURS = (*style.BODY_COLOURS, "0.5", CONTACT_COLOUR)
 
 MILLISECONDS = 80
 """Of every frame of an animation."""
@@ -93,7 +85,7 @@ def draw_strip(frames: Frames, title: str = "", zone_distance: float = math.nan)
         figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
         figure.legend(handles=strip_keys(names), loc="outside lower left",
                       ncols=len(names) + 2 if count > 3 else 2)  # fmt: skip
-        keep_titles_whole(figure)
+        style.keep_titles_whole(figure)
         return figure
 
 
@@ -103,7 +95,7 @@ def name_bodies(axes, frame, names):
 
     halo = [withStroke(linewidth=3.0, foreground="white")]
     for number, (body, name) in enumerate(zip(frame, names, strict=True)):
-        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
+        colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         axes.text(*deepest_inside(max(body, key=len)), name, ha="center", va="center", fontsize=9,
                   color=colour, weight="bold", zorder=7, path_effects=halo)  # fmt: skip
 
@@ -131,9 +123,9 @@ def strip_keys(names):
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    shown = list(enumerate(names))[: len(BODY_COLOURS)]
+    shown = list(enumerate(names))[: len(style.BODY_COLOURS)]
     keys = [
-        Patch(facecolor=(BODY_COLOURS[number], 0.3), edgecolor=BODY_COLOURS[number],
+        Patch(facecolor=(style.BODY_COLOURS[number], 0.3), edgecolor=style.BODY_COLOURS[number],
               label=f"body {name}")
         for number, name in shown
     ]  # fmt: skip
@@ -154,7 +146,7 @@ def over_time(
         axes = figure.subplots()
         axes.set(xlabel=f"time [{unit}]", ylabel=label, title=title)
         yield axes, np.asarray(times) * factor, factor
-        keep_titles_whole(figure)
+        style.keep_titles_whole(figure)
 
 
 def draw_distance(
@@ -166,7 +158,7 @@ def draw_distance(
     ``times`` (k,) [s], ``centre_distance`` (k,) [m], ``zone_distance`` [m], NaN for none.
     """
     with over_time(times, "centre distance $d_c$ [µm]", title, 3.6, 2.3) as (axes, time, _):
-        axes.plot(time, np.asarray(centre_distance) * MICRO, color=BODY_COLOURS[0])
+        axes.plot(time, np.asarray(centre_distance) * MICRO, color=style.BODY_COLOURS[0])
         axes.margins(x=0.02, y=0.12)
         draw_zone(axes, zone_distance)
     return axes.figure
@@ -184,10 +176,10 @@ def draw_forces(
     curves = {plain(name): np.asarray(force) * NANO for name, force in forces.items()}
     label = "force on the line of centres [nN]"
     with over_time(times, label, title, 5.4, 2.6) as (axes, time, factor):
-        for name, force, style in styled(curves):
-            axes.plot(time, np.where(force > 0.0, force, np.nan), label=name, **style)
+        for name, force, look in styled(curves):
+            axes.plot(time, np.where(force > 0.0, force, np.nan), label=name, **look)
             pull = np.where(force < 0.0, -force, np.nan)
-            axes.plot(time, pull, linestyle=(0, (3, 1.5)), **style)
+            axes.plot(time, pull, linestyle=(0, (3, 1.5)), **look)
         if np.isfinite(collision):
             axes.axvline(collision * factor, color="0.6", linewidth=0.7, linestyle=":",
                          label="first touch")  # fmt: skip
@@ -212,8 +204,8 @@ def draw_energies(
     curves = {f"work of {plain(name)}": np.asarray(each) * FEMTO for name, each in work.items()}
     curves["kinetic energy"] = np.asarray(kinetic) * FEMTO
     with over_time(times, "energy [fJ]", title, 5.4, 2.6) as (axes, time, _):
-        for name, each, style in styled(curves):
-            axes.plot(time, each, label=name, **style)
+        for name, each, look in styled(curves):
+            axes.plot(time, each, label=name, **look)
         axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
         if (largest := largest_of(curves)) > 0.0:
             least = math.ceil(math.log10(largest)) - ENERGY_DECADES
@@ -223,7 +215,7 @@ def draw_energies(
 
 
 def styled(curves):
-    """(name, values, style) of curves: what lies under another is seen on both sides of it, as drag
+    """(name, values, look) of curves: what lies under another is seen on both sides of it, as drag
     does, which balances weight."""
     for place, (name, values) in enumerate(curves.items()):
         colour = FORCE_COLOURS[place % len(FORCE_COLOURS)]
@@ -245,29 +237,25 @@ def write_animation(
     ``motion``: times (k,) [s] and centre distances (k,) [m] of the whole run; ``zone_distance``
     D_0 [m]; ``rule`` as in `save`. FileError if it cannot be written.
     """
-    pictures = [picture_of(frames, place, motion, zone_distance, title)
-                for place in range(len(frames.times))]  # fmt: skip
-    save_gif(path, pictures, MILLISECONDS, rule)
-
-
-def picture_of(frames, place, motion, zone_distance, title):
-    """One frame, beside the centre distance, as a Pillow image of 64 colours."""
     unit, factor = time_unit(motion[0])
     centres, half = windows(frames.outlines)
-    with drawing(6.4, 3.0) as figure:
-        bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-        draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
-        frame_axes(bodies, centres[place], half)
-        draw_scale_bar(bodies, centres[place], half)
-        bodies.set_title(f"{frames.times[place] * factor:.4g} {unit}", loc="center")
-        graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
-        now = frames.times[place] * factor, frames.centre_distance[place] * MICRO
-        graph.plot(*now, "o", color=BODY_COLOURS[0])
-        graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
-        draw_zone(graph, zone_distance)
-        figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
-        keep_titles_whole(figure)  # which draws it
-        return frame_of(figure)
+    pictures = []
+    for place, time in enumerate(frames.times * factor):
+        with drawing(6.4, 3.0) as figure:
+            bodies, graph = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
+            draw_frame(bodies, frames.paths, frames.outlines[place], frames.contacts[place])
+            frame_axes(bodies, centres[place], half)
+            draw_scale_bar(bodies, centres[place], half)
+            bodies.set_title(f"{time:.4g} {unit}", loc="center")
+            graph.plot(np.asarray(motion[0]) * factor, np.asarray(motion[1]) * MICRO, color="0.7")
+            distance = frames.centre_distance[place] * MICRO
+            graph.plot(time, distance, "o", color=style.BODY_COLOURS[0])
+            graph.set(xlabel=f"time [{unit}]", ylabel="centre distance $d_c$ [µm]")
+            draw_zone(graph, zone_distance)
+            figure.suptitle(title, x=0.01, ha="left", fontsize=9) if title else None
+            style.keep_titles_whole(figure)  # which draws it
+            pictures.append(style.frame_of(figure))
+    style.save_gif(path, pictures, MILLISECONDS, rule)
 
 
 def draw_zone(axes, zone_distance):
@@ -281,7 +269,10 @@ def draw_zone(axes, zone_distance):
     axes.set_ylim(low, high)
     axes.axhspan(low, level, color=INSIDE_COLOUR, zorder=0)
     axes.axhline(level, color="0.35", linestyle=(0, (4, 2)), linewidth=0.9)
-    side = free_side(axes, level, level + margin)
+    # Where fewer points of the panel's first line lie above the zone's.
+    x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
+    crowded = x[(y >= level) & (y <= level + margin)]
+    side = "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
     axes.annotate(
         f"$D_0$ = {level:.4g} µm",
         (0.0 if side == "left" else 1.0, level),
@@ -292,13 +283,6 @@ def draw_zone(axes, zone_distance):
         color="0.25",
         bbox=PALE,
     )
-
-
-def free_side(axes, low, high):
-    """ "left" or "right": where fewer points of the panel's first line lie between two heights."""
-    x, y = (np.asarray(values, dtype=float) for values in axes.lines[0].get_data())
-    crowded = x[(y >= low) & (y <= high)]
-    return "left" if np.sum(crowded > x.mean()) > np.sum(crowded <= x.mean()) else "right"
 
 
 def windows(outlines_per_frame):
@@ -325,15 +309,15 @@ def draw_frame(axes, paths, frame, contacts):
     from matplotlib.patches import PathPatch, Polygon
 
     for number, path in enumerate(map(np.asarray, paths)):
-        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
+        colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
         axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.8, linestyle=(0, (3, 1.5)))
     for number, body in enumerate(frame):
-        colour = BODY_COLOURS[number % len(BODY_COLOURS)]
-        style = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
+        colour = style.BODY_COLOURS[number % len(style.BODY_COLOURS)]
+        look = {"facecolor": (colour, 0.3), "edgecolor": colour, "lw": 0.9}
         if len(body) == 1:
-            axes.add_patch(Polygon(body[0], **style))
+            axes.add_patch(Polygon(body[0], **look))
         else:
-            axes.add_patch(PathPatch(rings_path(body), **style))
+            axes.add_patch(PathPatch(rings_path(body), **look))
     points = np.asarray(contacts, dtype=float).reshape(-1, 2)
     axes.plot(points[:, 0], points[:, 1], zorder=5, **RING)
 
@@ -342,14 +326,8 @@ def rings_path(rings):
     """The rings of a body as one path, in which those of holes stay open."""
     from matplotlib.path import Path as Outline
 
-    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in closed(rings)))
-
-
-def closed(rings):
-    """The rings, each with its first point again at its end."""
-    for ring in rings:
-        ring = np.asarray(ring)
-        yield ring if np.array_equal(ring[0], ring[-1]) else np.concatenate([ring, ring[:1]])
+    ends = [ring if np.array_equal(ring[0], ring[-1]) else [*ring, ring[0]] for ring in rings]
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in ends))
 
 
 def frame_axes(axes, centre, half):

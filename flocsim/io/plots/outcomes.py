@@ -10,18 +10,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
-from flocsim.io.plots.style import (
-    BOND_COLOURS,
-    CLASS_COLOURS,
-    CROWDED,
-    MARKERS,
-    dodge,
-    graded_colours,
-    note,
-    set_probability_axis,
-    set_vertex_axis,
-    vertex_positions,
-)
+from flocsim.io.plots import style
 from flocsim.io.results.events import NOT_COLLIDED, ends_of, events, events_of
 
 COLOURS = {
@@ -45,10 +34,10 @@ NO_EVENTS = {
 }
 
 SHARES = {
-    "classes": ("n_class", CLASS_COLOURS),
-    "bonds": ("n_bond", BOND_COLOURS),
+    "classes": ("pr_class", style.CLASS_COLOURS),
+    "bonds": ("pr_bond", style.BOND_COLOURS),
 }
-"""What is drawn as shares of a whole: its counts, its colours."""
+"""What is drawn as shares of a whole: its probabilities, its colours."""
 
 INSIDE, OUTSIDE = "all inside", "all outside"
 LETTERS = {
@@ -129,10 +118,10 @@ def draw_probability(axes, results, number, name):
     """The lines of a type, for each delta; the causes of what has no value."""
     causes, marked = causes_of(results.probabilities, name)[number], set()
     bands = [band[number] for band in bands_of(results, name)]
-    set_vertex_axis(axes, results.vertices)
-    set_probability_axis(axes)
+    style.set_vertex_axis(axes, results.vertices)
+    style.set_probability_axis(axes)
     count, few = results.delta.size, trials_of(results, name)[number] < FEW
-    for index, colour in enumerate(graded_colours(count)[:count]):
+    for index, colour in enumerate(style.graded_colours(count)[:count]):
         line = [band[:, index] for band in bands]
         marked |= draw_line(axes, results.vertices, line, index, count, colour, few[:, index],
                             causes[:, index])  # fmt: skip
@@ -148,8 +137,8 @@ def trials_of(results, name):
 def draw_shares(axes, results, number, name):
     """The classes or kinds of bond of one type, counts pooled over delta."""
     bands = share_bands(results, number, name)
-    set_vertex_axis(axes, results.vertices)
-    set_probability_axis(axes)
+    style.set_vertex_axis(axes, results.vertices)
+    style.set_probability_axis(axes)
     colours = SHARES[name][-1].values()
     for index, colour in enumerate(colours):
         line = [band[:, index] for band in bands]
@@ -160,7 +149,7 @@ def draw_shares(axes, results, number, name):
 def share_bands(results, number, name):
     """(share, low, high, least and most change by numerics) (vertices, class or bond) of one
     type."""
-    table, share = results.probabilities, f"pr_{SHARES[name][0].removeprefix('n_')}"
+    table, share = results.probabilities, SHARES[name][0]
     errors = over_delta(table, share, table[f"{share}_numerical"])[number]
     changes = [-errors, errors]
     for side, end in enumerate(ENDS[1:3]) if results.outlines else ():
@@ -198,7 +187,7 @@ def over_delta(table, share, errors):
 
 def shares_of(results, number, name):
     """(share, low, high) (vertices, class or bond) of one type; Wilson's without the replicates."""
-    share = f"pr_{SHARES[name][0].removeprefix('n_')}"
+    share = SHARES[name][0]
     if results.replicates is None:
         counts = {
             name: values[number].sum(axis=1)
@@ -223,7 +212,7 @@ def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None
     points are hollow where there are ``few`` trials, ``causes`` say why there are none.
     """
     order = np.argsort(vertices)
-    places = vertex_positions(vertices)[order] + dodge(index, count)
+    places = style.vertex_positions(vertices)[order] + style.dodge(index, count)
     few = None if few is None else few[order]
     draw_bars(axes, places, [np.asarray(band)[order] for band in bands], index, colour, few)
     return set() if causes is None else mark_causes(axes, places, causes[order], colour)
@@ -238,13 +227,13 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
     """
     value, low, high, lowers, raises = bands
     reach = np.clip([value - low, high - value], 0.0, None)
-    size, width = (2.2, 0.8) if len(places) > CROWDED else (4.0, 1.2)
+    size, width = (2.2, 0.8) if len(places) > style.CROWDED else (4.0, 1.2)
     where = shifted(axes, shift)
     axes.errorbar(places, value, reach, capsize=0, clip_on=False, color=colour,
-                  marker=MARKERS[index % len(MARKERS)], ms=size, lw=width,
+                  marker=style.marker(index), ms=size, lw=width,
                   elinewidth=0.6 * width, transform=where)  # fmt: skip
     if few is not None and few.any():
-        axes.plot(places[few], value[few], linestyle="", marker=MARKERS[index % len(MARKERS)],
+        axes.plot(places[few], value[few], linestyle="", marker=style.marker(index),
                   ms=size, color=colour, mfc="white", clip_on=False, zorder=3,
                   transform=where)  # fmt: skip
     alone = ~np.isfinite(value) & np.isfinite(high)
@@ -262,4 +251,4 @@ def draw_bars(axes, places, bands, index, colour, few=None, shift=0.0):
 
 def note_if_empty(axes, values, text):
     if not np.any(np.isfinite(values)):
-        note(axes, text)
+        style.note(axes, text)

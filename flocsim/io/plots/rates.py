@@ -10,17 +10,16 @@ import numpy as np
 
 from flocsim.io.plots.results import panel_grid
 from flocsim.io.plots.style import (
-    MARKERS,
     Figure,
     add_line_legend,
     drawing,
     graded_colours,
+    marker,
     note,
     plain,
     set_log_axis,
     type_titles,
 )
-from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.schema import Results
 from flocsim.io.results.strength_file import STATUS, Strengths
 
@@ -32,29 +31,26 @@ WATER_WORDS = "with hydrodynamic interaction"
 FAILED = STATUS.index("failed")
 
 
-def kernel_of(results: Results) -> Kernel:
-    """The rates of results that are known to have some."""
-    assert results.kernel is not None, "a figure of a kernel study"
-    return results.kernel
-
-
 def kernels(results: Results) -> Figure:
     """Kernels over those of equivalent spheres, against size: panels by mechanism, lines by N."""
-    return by_ratio(
-        kernel_of(results), "efficiency3", "β₃ of shapes over that\nof equivalent spheres"
-    )
+    return by_ratio(results, "efficiency3", "β₃ of shapes over that\nof equivalent spheres")
 
 
 def efficiency(results: Results) -> Figure:
     """Efficiencies: encounters that aggregate of those that touch, against size."""
-    return by_ratio(kernel_of(results), "alpha", "efficiency α")
+    return by_ratio(results, "alpha", "efficiency α")
 
 
-def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
+def by_ratio(results: Results, name: str, label: str) -> Figure:
     """An estimate of all pairs against r_i/r_j, the larger one's size in colours, N by markers."""
+    kernel = results.kernel
+    assert kernel is not None, "a figure of a kernel study"
     with drawing(2.6 * len(kernel.mechanisms) + 1.6, 2.9) as figure:
         panels = figure.subplots(1, len(kernel.mechanisms), squeeze=False, sharey=True)[0]
-        chosen = chosen_sizes(len(kernel.labels))
+        # Places of the larger classes whose lines are drawn: no more than can be told apart.
+        count = len(kernel.labels)
+        places = np.linspace(min(1, count - 1), count - 1, min(MOST_LINES, count))
+        chosen = np.unique(places.round().astype(int)).tolist()
         colours = dict(zip(chosen, graded_colours(len(chosen)), strict=True))
         for m, (axes, mechanism) in enumerate(zip(panels, kernel.mechanisms, strict=True)):
             for v in range(len(kernel.vertices)):
@@ -70,14 +66,6 @@ def by_ratio(kernel: Kernel, name: str, label: str) -> Figure:
         return figure
 
 
-def chosen_sizes(count: int) -> list[int]:
-    """Places of the larger classes whose lines are drawn: no more than can be told apart."""
-    first = min(1, count - 1)
-    return np.unique(
-        np.linspace(first, count - 1, min(MOST_LINES, count)).round().astype(int)
-    ).tolist()
-
-
 def draw_line(axes, kernel, name, place, colour):
     """One larger class against all that are not above it."""
     m, v, larger = place
@@ -89,7 +77,7 @@ def draw_line(axes, kernel, name, place, colour):
     known = np.isfinite(value)
     left_open = ~known & np.isfinite(high)
     axes.vlines(ratio[left_open], low[left_open], high[left_open], color=colour, linestyle=":")
-    style = {"color": colour, "marker": MARKERS[v % len(MARKERS)]}
+    style = {"color": colour, "marker": marker(v)}
     if kernel.vertices[v] == 1:
         style |= {"linestyle": ":", "markerfacecolor": "white"}
     axes.errorbar(
@@ -106,7 +94,7 @@ def legend(axes, kernel, colours):
     for v, count in enumerate(kernel.vertices):
         word = "spheres" if count == 1 else f"N = {count}"
         hollow = {"linestyle": ":", "markerfacecolor": "white"} if count == 1 else {}
-        axes.plot([], [], color="0.3", marker=MARKERS[v % len(MARKERS)], label=word, **hollow)
+        axes.plot([], [], color="0.3", marker=marker(v), label=word, **hollow)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
@@ -143,7 +131,7 @@ def over_rate(found: Strengths) -> Figure:
                 any_opened += len(rates)
                 if len(rates):
                     axes.plot(rates, shares, drawstyle="steps-post", color=colours[place],
-                              marker=MARKERS[place % len(MARKERS)], markersize=3)  # fmt: skip
+                              marker=marker(place), markersize=3)  # fmt: skip
             axes.set(ylim=(0.0, 1.04), xscale="log")
             if not any_opened:
                 note(axes, "no bond opened")

@@ -11,42 +11,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flocsim.io.plots.outcomes import (
-    FEW,
-    NO_EVENTS,
-    SHARES,
-    bands_in,
-    bands_of,
-    causes_of,
-    draw_bars,
-    draw_ends,
-    draw_line,
-    draw_probability,
-    draw_shares,
-    end_handles,
-    mark_causes,
-    note_if_empty,
-    trials_of,
-    words_of,
-)
+from flocsim.io.plots import outcomes as ends
+from flocsim.io.plots import style
 from flocsim.io.plots.shape_effects import shape_effects
-from flocsim.io.plots.style import (
-    CLASS_COLOURS,
-    CLASS_WORDS,
-    Figure,
-    add_line_legend,
-    dodge,
-    drawing,
-    graded_colours,
-    note,
-    place_legend,
-    plain,
-    set_probability_axis,
-    set_share_axis,
-    set_vertex_axis,
-    type_titles,
-    vertex_positions,
-)
+from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.efficiency import efficiency
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.schema import Results
@@ -101,10 +69,11 @@ def figure_6(results: Results) -> Figure:
 
 def probability_figure(results, name):
     """One panel per type, one line per delta, against N, with bars for both errors."""
-    with panel_grid(type_titles(results.types), LABELS[name], 1.35) as (figure, panels, last):
+    titles = style.type_titles(results.types)
+    with panel_grid(titles, LABELS[name], 1.35) as (figure, panels, last):
         marked = set()
         for number, axes in enumerate(panels):
-            marked |= draw_probability(axes, results, number, name)
+            marked |= ends.draw_probability(axes, results, number, name)
         add_delta_legend(last, results, marked)
         return figure
 
@@ -124,84 +93,86 @@ def bonds(results: Results) -> Figure:
 
 def shares_figure(results, name, legend_width):
     """One panel per type, one line for each class or kind of bond, against N."""
-    titles = type_titles(results.types)
+    titles = style.type_titles(results.types)
     with panel_grid(titles, LABELS[name], legend_width) as (figure, panels, last):
         for number, axes in enumerate(panels):
-            draw_shares(axes, results, number, name)
+            ends.draw_shares(axes, results, number, name)
         add_shares_legend(last, name, results)
         return figure
 
 
 def overview(results: Results) -> Figure:
     """Pr[C inside], Pr[A], the classes and the bonds in one picture, a column for each type."""
-    rows = ("pr_inside", "pr_a", *SHARES)
+    rows = ("pr_inside", "pr_a", *ends.SHARES)
     count, marked = len(results.types), set()
     with drawing(2.1 * count + 2.2, 7.1) as figure:
         grid = figure.subplots(len(rows), count, sharex=True, sharey=True, squeeze=False)
         for number in range(count):
             for axes, name in zip(grid[:2, number], rows[:2], strict=True):
-                marked |= draw_probability(axes, results, number, name)
-            for axes, name in zip(grid[2:, number], SHARES, strict=True):
-                draw_shares(axes, results, number, name)
-            grid[0, number].set_title(type_titles(results.types)[number])
+                marked |= ends.draw_probability(axes, results, number, name)
+            for axes, name in zip(grid[2:, number], ends.SHARES, strict=True):
+                ends.draw_shares(axes, results, number, name)
+            grid[0, number].set_title(style.type_titles(results.types)[number])
             grid[-1, number].set_xlabel("vertices $N$")
         for axes, name in zip(grid[:, 0], rows, strict=True):
             axes.set_ylabel(LABELS[name])
         add_delta_legend(grid[0, -1], results, marked)
-        for axes, name in zip(grid[2:, -1], SHARES, strict=True):
+        for axes, name in zip(grid[2:, -1], ends.SHARES, strict=True):
             add_shares_legend(axes, name, results)
         return figure
 
 
 def against_delta(results: Results) -> Figure:
     """Pr[A] against delta: a panel for each type, a line for each number of vertices."""
-    titles = type_titles(results.types)
+    titles = style.type_titles(results.types)
     with panel_grid(titles, LABELS["pr_a"], 1.35, DELTA_LABEL) as (figure, panels, last):
-        colours = graded_colours(len(results.vertices))
+        colours = style.graded_colours(len(results.vertices))
         order, marked = np.argsort(results.delta), set()
         places = results.delta[order]
-        causes = causes_of(results.probabilities, "pr_a")
+        causes = ends.causes_of(results.probabilities, "pr_a")
         for number, axes in enumerate(panels):
-            set_probability_axis(axes)
+            style.set_probability_axis(axes)
             axes.set_xlim(-0.05, 1.05)
             if places[-1] == 1.0:
                 axes.axvline(1.0, color="0.85", zorder=0)
                 axes.text(1.0, 1.02, "grazes", color="0.4", fontsize=6.5, ha="right")
             for index, colour in enumerate(colours[: len(results.vertices)]):
-                bands = [band[number, index][order] for band in bands_of(results, "pr_a")]
-                shift = POINTS * dodge(index, len(results.vertices))
-                few = trials_of(results, "pr_a")[number, index][order] < FEW
-                draw_bars(axes, places, bands, index, colour, few, shift)
-                marked |= mark_causes(axes, places, causes[number, index][order], colour, shift)
-            note_if_empty(axes, results.probabilities["pr_a"][number], NO_EVENTS["pr_a"])
+                bands = [band[number, index][order] for band in ends.bands_of(results, "pr_a")]
+                shift = POINTS * style.dodge(index, len(results.vertices))
+                few = ends.trials_of(results, "pr_a")[number, index][order] < ends.FEW
+                ends.draw_bars(axes, places, bands, index, colour, few, shift)
+                why = causes[number, index][order]
+                marked |= ends.mark_causes(axes, places, why, colour, shift)
+            known = results.probabilities["pr_a"][number]
+            ends.note_if_empty(axes, known, ends.NO_EVENTS["pr_a"])
         words = ["sphere" if count == 1 else str(count) for count in results.vertices]
-        title = "vertices $N$" + bars_of(results) + HOLLOW + words_of(marked)
-        add_line_legend(last, words, colours, title)
+        title = "vertices $N$" + bars_of(results) + HOLLOW + ends.words_of(marked)
+        style.add_line_legend(last, words, colours, title)
         return figure
 
 
 def outcomes(results: Results) -> Figure:
     """What becomes of replicates, stacked to 1: panels by type, N on the axis, a bar each delta."""
-    titles = type_titles(results.types)
+    titles = style.type_titles(results.types)
     with panel_grid(titles, "share of replicates", 1.35) as (figure, panels, last):
         count = results.delta.size
         order = np.argsort(results.vertices)
-        places = vertex_positions(results.vertices)[order]
+        places = style.vertex_positions(results.vertices)[order]
         slot = 72.0 * PANEL_SIZE[0] * ROOM / len(places)
         for number, axes in enumerate(panels):
-            set_vertex_axis(axes, results.vertices)
-            set_share_axis(axes)
+            style.set_vertex_axis(axes, results.vertices)
+            style.set_share_axis(axes)
             for index, place in enumerate(np.argsort(results.delta)):
                 counts = {name: values[number, order, place]
                           for name, values in results.probabilities.items()
                           if name in ENDS_COUNTED}  # fmt: skip
                 shift = slot * 0.8 * ((index + 0.5) / count - 0.5)
-                draw_ends(axes, places, counts, 0.68 * slot / count, shift)
+                ends.draw_ends(axes, places, counts, 0.68 * slot / count, shift)
         shares = ", ".join(f"{share:g}" for share in np.sort(results.delta))
         told = "\n".join(textwrap.wrap(shares, LETTERS_WIDE)[:MOST_LINES])
         graze = "\n1: grazes" if 1.0 in results.delta else ""
         title = "bars from left:\n" + r"$\delta\,/\,\delta_{\max}$ = " + f"\n{told}{graze}"
-        place_legend(last, end_handles(), title)
+        style.place_legend(last, ends.end_handles(), title)
         return figure
 
 
@@ -210,22 +181,23 @@ def efficiencies(results: Results) -> Figure:
 
     docs/results.md has the formula; bars: the sums of the 95 % bounds at each delta.
     """
-    with panel_grid(type_titles(results.types), "efficiency $E$", 1.9) as (figure, panels, last):
+    titles = style.type_titles(results.types)
+    with panel_grid(titles, "efficiency $E$", 1.9) as (figure, panels, last):
         words = [
             r"plane, $\int_0^1 P\,d\delta$", r"axial, $\int_0^1 P\,2\delta\,d\delta$"
         ]  # fmt: skip
-        colours = [CLASS_COLOURS["A"], CLASS_COLOURS["C"]]
+        colours = [style.CLASS_COLOURS["A"], style.CLASS_COLOURS["C"]]
         for number, axes in enumerate(panels):
-            set_vertex_axis(axes, results.vertices)
-            set_probability_axis(axes)
+            style.set_vertex_axis(axes, results.vertices)
+            style.set_probability_axis(axes)
             for index, axial in enumerate((False, True)):
                 found = efficiency(results.probabilities, results.delta, axial)
                 if found is None:
-                    note(axes, "delta does not\nspan 0 to 1")
+                    style.note(axes, "delta does not\nspan 0 to 1")
                     break
                 bands = [*(each[number] for each in found), *np.zeros((2, len(results.vertices)))]
-                draw_line(axes, results.vertices, bands, index, 2, colours[index])
-        add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
+                ends.draw_line(axes, results.vertices, bands, index, 2, colours[index])
+        style.add_line_legend(last, words, colours, "aggregations per approach\n(bars: 95 %)")
         return figure
 
 
@@ -249,19 +221,19 @@ def against_size(results: Results) -> Figure:
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
         missing = "sizes unknown" if results.pooled else "not yet pooled"
         for number, axes in enumerate(panels):
-            set_probability_axis(axes)
+            style.set_probability_axis(axes)
             axes.set(xscale="log", xlim=room_for(r_j[known]))
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.minorticks_off()
             if not (known.any() and results.pooled):
-                note(axes, missing)
+                style.note(axes, missing)
                 continue
             for index, receiver in enumerate(receivers):
                 rows = np.flatnonzero(known & (r_i.round(9) == receiver))
                 rows = rows[np.argsort(r_j[rows])]
-                bands = [band[rows, number] for band in bands_in(results.pooled, "pr_a")]
-                draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
+                bands = [band[rows, number] for band in ends.bands_in(results.pooled, "pr_a")]
+                ends.draw_bars(axes, r_j[rows], bands, index, shade.to_rgba(receiver))
         if known.any() and results.pooled:
             bar = figure.colorbar(shade, ax=panels, label="receiving $r_i$ [µm]", shrink=0.9)
             bar.minorticks_off()
@@ -303,8 +275,8 @@ def panel_grid(titles, y_label, legend_width=LEGEND_WIDTH, x_label="vertices $N$
 
 def add_delta_legend(axes, results, marked=frozenset()):
     words = [f"{share:g}" + (" (grazes)" if share == 1.0 else "") for share in results.delta]
-    title = r"$\delta\,/\,\delta_{\max}$" + bars_of(results) + HOLLOW + words_of(marked)
-    add_line_legend(axes, words, graded_colours(len(words)), title)
+    title = r"$\delta\,/\,\delta_{\max}$" + bars_of(results) + HOLLOW + ends.words_of(marked)
+    style.add_line_legend(axes, words, style.graded_colours(len(words)), title)
 
 
 def bars_of(results):
@@ -313,10 +285,10 @@ def bars_of(results):
 
 
 def add_shares_legend(axes, name, results):
-    words, title = (CLASS_WORDS, "class") if name == "classes" else (BOND_WORDS, "bond")
-    colours = SHARES[name][-1]
+    words, title = (style.CLASS_WORDS, "class") if name == "classes" else (BOND_WORDS, "bond")
+    colours = ends.SHARES[name][-1]
     told = [plain(words[each]) for each in colours]
-    add_line_legend(axes, told, colours.values(), title + bars_of(results))
+    style.add_line_legend(axes, told, colours.values(), title + bars_of(results))
 
 
 FIGURES: dict[str, Callable[[Results], Figure]] = {

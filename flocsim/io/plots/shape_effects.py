@@ -7,18 +7,8 @@ import attrs
 import numpy as np
 
 from flocsim.io.confidence import bounded_sums, clustered_proportion, explained_share
-from flocsim.io.plots.style import (
-    CLASS_COLOURS,
-    CLASS_WORDS,
-    MARKERS,
-    Figure,
-    add_line_legend,
-    drawing,
-    note,
-    plain,
-    set_probability_axis,
-    type_titles,
-)
+from flocsim.io.plots import style
+from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import events
 from flocsim.io.results.schema import Results
 
@@ -121,12 +111,12 @@ def shape_effects(results: Results) -> Figure:
     count = len(results.types)
     with drawing(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5) as figure:
         grid = figure.subplots(count, len(PAIR_MEASURES), sharey=True, sharex="col", squeeze=False)
-        for t, (row, title) in enumerate(zip(grid, type_titles(results.types), strict=True)):
+        for t, (row, title) in enumerate(zip(grid, style.type_titles(results.types), strict=True)):
             row[0].set_ylabel(f"{title}\nprobability")
             for axes in row:
-                set_probability_axis(axes)
+                style.set_probability_axis(axes)
             if results.replicates is None:
-                note(row[0], "only for finished studies")
+                style.note(row[0], "only for finished studies")
                 continue
             rows = {name: each[t, number] for name, each in results.replicates.items()}
             effects = {name: shape_effect(rows, name) for name in PAIR_MEASURES}
@@ -137,24 +127,25 @@ def shape_effects(results: Results) -> Figure:
             row[-1].text(1.04, 0.0, of_pairs, fontsize=7.5, transform=row[-1].transAxes)
         for axes, label in zip(grid[-1], PAIR_MEASURES.values(), strict=True):
             axes.set_xlabel(label)
-        words = [r"$\Pr[A]$", *(plain(CLASS_WORDS[name]) for name in CLASS_COLOURS)]
+        words = [r"$\Pr[A]$", *(plain(style.CLASS_WORDS[name]) for name in style.CLASS_COLOURS)]
         title = f"$N$ = {results.vertices[number]}\n(bars: 95 %)"
-        add_line_legend(grid[0, -1], words, [ALL_COLOUR, *CLASS_COLOURS.values()], title)
+        colours = [ALL_COLOUR, *style.CLASS_COLOURS.values()]
+        style.add_line_legend(grid[0, -1], words, colours, title)
         return figure
 
 
 def draw_effect(axes, effect):
     """Pr[A] with its intervals, and the classes, against a measure."""
-    for index, (name, colour) in enumerate(CLASS_COLOURS.items()):
+    for index, (name, colour) in enumerate(style.CLASS_COLOURS.items()):
         if effect.measure.size:
             axes.plot(effect.measure, effect.pr_class[0, index], color=colour, linewidth=0.9,
-                      marker=MARKERS[1 + index], ms=2.5, label=name)  # fmt: skip
+                      marker=style.MARKERS[1 + index], ms=2.5, label=name)  # fmt: skip
     value, low, high = effect.pr_a if effect.measure.size else np.empty((3, 0))
     reach = np.clip([value - low, high - value], 0.0, None)
-    axes.errorbar(effect.measure, value, reach, color=ALL_COLOUR, marker=MARKERS[0], ms=3.5,
+    axes.errorbar(effect.measure, value, reach, color=ALL_COLOUR, marker=style.MARKERS[0], ms=3.5,
                   elinewidth=0.8, clip_on=False)  # fmt: skip
     if not np.isfinite(value).any():
-        note(axes, "no decided collision\nof known shapes")
+        style.note(axes, "no decided collision\nof known shapes")
 
 
 def share_words(subject, share):

@@ -260,7 +260,7 @@ def add_line_legend(axes, words, colours, title):
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=colour, marker=MARKERS[index % len(MARKERS)], label=word)
+        Line2D([], [], color=colour, marker=marker(index), label=word)
         for index, (word, colour) in enumerate(zip(words, colours, strict=False))
     ]
     place_legend(axes, handles, title)
@@ -282,6 +282,11 @@ def place_legend(axes, handles, title):
     more = legend.get_window_extent().width / figure.dpi - LEGEND_ROOM
     if more > 0.0:
         figure.set_figwidth(figure.get_figwidth() + min(more, MOST_GROWTH))
+
+
+def marker(index):
+    """That of a line of so many."""
+    return MARKERS[index % len(MARKERS)]
 
 
 def dodge(number, count):

@@ -115,7 +115,8 @@ def sizes(results: SwarmResults) -> Figure:
     with drawing(4.4, 2.6) as figure:
         axes = figure.subplots()
         for colour, place in zip(graded_colours(len(chosen)), chosen, strict=True):
-            found = np.concatenate([sizes_of(each) for each in labels[:, place]])
+            inside = [each[each >= 0] for each in labels[:, place]]
+            found = np.concatenate([np.bincount(own)[own] for own in inside])
             values, number = np.unique(found, return_counts=True)
             share = np.cumsum(number) / number.sum()
             axes.step(np.append(values, values[-1] * 1.3), np.append(share, 1.0), where="post",
@@ -178,12 +179,6 @@ def last_known(results: SwarmResults) -> int:
     snapshots = results.groups["snapshots"]
     known = np.isfinite(snapshots["position"][0, :, :, 0]) | (snapshots["cluster"][0] == GONE)
     return int(np.flatnonzero(known.all(axis=1))[-1])
-
-
-def sizes_of(labels: np.ndarray) -> np.ndarray:
-    """The size of every body's cluster."""
-    own = labels[labels >= 0]
-    return np.bincount(own)[own] if len(own) else np.zeros(0, dtype=int)
 
 
 def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:

@@ -5,31 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.plots.outcomes import (
-    ENDS,
-    bands_in,
-    causes_of,
-    draw_bars,
-    draw_ends,
-    end_handles,
-    mark_causes,
-    note_if_empty,
-    words_of,
-)
+from flocsim.io.plots import outcomes, style
 from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM
-from flocsim.io.plots.style import (
-    MARKERS,
-    Figure,
-    add_line_legend,
-    dodge,
-    drawing,
-    graded_colours,
-    place_legend,
-    plain,
-    set_probability_axis,
-    set_share_axis,
-    type_titles,
-)
+from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.swarm_file import mean
 from flocsim.io.results.sweep_file import SweepResults
@@ -65,36 +43,37 @@ def against_key(results: SweepResults) -> Figure:
     order = np.argsort(where)
     columns = {
         name: lines_of(table.columns[name].values, names.index("type"))[:, :, order]
-        for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in ENDS)]
+        for name in [*ENDS_COUNTED, *EVENT_COUNTS, *(f"pr_a{end}" for end in outcomes.ENDS)]
     }
     count = len(types)
     with drawing(2.35 * count + 2.0, 4.4) as figure:
         grid = figure.subplots(2, count, sharex=True, sharey="row", squeeze=False)
         step = set_key_axis(grid[0, 0], first, where[order].astype(float))
         step = min(WIDEST, step / len(words))
-        colours, marked = graded_colours(len(words)), set()
-        causes = causes_of(columns, "pr_a")
-        for number, title in enumerate(type_titles(types)):
+        colours, marked = style.graded_colours(len(words)), set()
+        causes = outcomes.causes_of(columns, "pr_a")
+        for number, title in enumerate(style.type_titles(types)):
             above, below = grid[:, number]
             above.set_title(title)
-            set_share_axis(above)
-            set_probability_axis(below)
+            style.set_share_axis(above)
+            style.set_probability_axis(below)
             below.set_xlabel(key_label(first))
             for index in range(len(words)):
                 shift = step * (index - 0.5 * (len(words) - 1))
                 mine = {name: values[number, index] for name, values in columns.items()}
-                draw_ends(above, where[order], mine, 0.85 * step, shift)
-                line = bands_in(mine, "pr_a")
-                draw_bars(below, where[order], line, index, colours[index], shift=shift)
-                marked |= mark_causes(
+                outcomes.draw_ends(above, where[order], mine, 0.85 * step, shift)
+                line = outcomes.bands_in(mine, "pr_a")
+                outcomes.draw_bars(below, where[order], line, index, colours[index], shift=shift)
+                marked |= outcomes.mark_causes(
                     below, where[order], causes[number, index], colours[index], shift
                 )
-            note_if_empty(below, columns["pr_a"][number], "no decided collision")
+            outcomes.note_if_empty(below, columns["pr_a"][number], "no decided collision")
         grid[0, 0].set_ylabel("share of replicates")
         grid[1, 0].set_ylabel(LABELS["pr_a"])
-        place_legend(grid[0, -1], end_handles(), "bars from left:\nas lines below")
-        title = ",\n".join(line_title(name, results) for name in others) + BARS + words_of(marked)
-        add_line_legend(grid[1, -1], words, colours, title)
+        style.place_legend(grid[0, -1], outcomes.end_handles(), "bars from left:\nas lines below")
+        title = ",\n".join(line_title(name, results) for name in others)
+        title += BARS + outcomes.words_of(marked)
+        style.add_line_legend(grid[1, -1], words, colours, title)
         return figure
 
 
@@ -165,7 +144,7 @@ def over_time(results: SweepResults) -> Figure:
     table, names = results.labelled("counts"), list(results.swept)
     times = table.axes["time"].values
     words = line_words([(name, table.axes[name].values.tolist()) for name in names])
-    colours = graded_colours(len(words))
+    colours = style.graded_colours(len(words))
     with drawing(9.2, 2.6) as figure:
         panels = figure.subplots(1, len(SHOWN))
         for axes, (name, factor, label) in zip(panels, SHOWN, strict=True):
@@ -178,7 +157,7 @@ def over_time(results: SweepResults) -> Figure:
             axes.set_xlabel("time [s]")
             axes.set_title(label, fontsize=8.0)
         title = ",\n".join(line_title(name, results) for name in names)
-        place_legend(panels[-1], drawn, title)
+        style.place_legend(panels[-1], drawn, title)
         return figure
 
 
@@ -201,17 +180,17 @@ def elasticities(found: Any) -> Figure:
     with drawing(2.2 * count + 3.4, height) as figure:
         panels = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
         rows = np.arange(len(found.keys), dtype=float)[::-1]
-        colours = graded_colours(len(conditions))
-        for t, (axes, title) in enumerate(zip(panels, type_titles(found.types), strict=True)):
+        colours = style.graded_colours(len(conditions))
+        for t, (axes, title) in enumerate(zip(panels, style.type_titles(found.types), strict=True)):
             axes.axvline(0.0, color="0.75", linewidth=0.8)
             for index, (v, d) in enumerate(conditions):
-                colour, marker = colours[index], MARKERS[index % len(MARKERS)]
+                colour, marker = colours[index], style.marker(index)
                 for k, row in enumerate(rows):
                     place = (k, t, v, d)
                     value, low, high = found.value[place], found.low[place], found.high[place]
                     if np.isnan(value):
                         continue
-                    at = row - dodge(index, len(conditions))
+                    at = row - style.dodge(index, len(conditions))
                     axes.plot([low, high], [at, at], color=colour, linewidth=1.0)
                     down, up = np.nan_to_num([found.change_low[place], found.change_high[place]])
                     axes.plot([low + down, high + up], [at, at], color=colour, linewidth=0.4)
@@ -223,7 +202,7 @@ def elasticities(found: Any) -> Figure:
         panels[0].set_ylim(-0.6, len(rows) - 0.4)
         for index, (v, d) in enumerate(conditions):
             word = f"N = {found.vertices[v]}, δ = {found.delta[d]:g}"
-            panels[-1].plot([], [], color=colours[index], marker=MARKERS[index % len(MARKERS)],
+            panels[-1].plot([], [], color=colours[index], marker=style.marker(index),
                             label=word)  # fmt: skip
         title = "bars: 95 %, paired; thin:\nplus numerics; hollow: may be 0"
         panels[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title=title)

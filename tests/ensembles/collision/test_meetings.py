@@ -13,7 +13,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.forces import BodyForce, Gravity, StokesDrag, VanDerWaals
-from flocsim.forces.shape_drag import body_resistance, resistance_matrices
+from flocsim.forces.drag import body_resistance, resistance_matrices
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.results.schema import OUTCOMES

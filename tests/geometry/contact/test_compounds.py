@@ -14,15 +14,16 @@ from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
-from flocsim.geometry.contact.circle_tree import (
+from flocsim.geometry.contact.near_pairs import (
     CIRCLE_RADIUS,
     CIRCLE_X,
     CIRCLE_Y,
     core_distance,
+    list_polygons,
+    pose_of,
     run_of,
     side_of,
 )
-from flocsim.geometry.contact.near_pairs import list_polygons, pose_of
 from flocsim.geometry.contact.overlap import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, cross, drawn, framed

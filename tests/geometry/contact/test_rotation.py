@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim.geometry.contact import rotation
-from flocsim.geometry.contact.rotation import cosine_and_sine
+from flocsim.geometry.contact import points
+from flocsim.geometry.contact.points import cosine_and_sine
 
 
 def new_work():
@@ -48,7 +48,7 @@ def test_no_turn_is_exact():
 
 def test_the_library_is_asked_once_for_angles_near_one_another(monkeypatch):
     asked = []
-    monkeypatch.setattr(rotation, "math", SimpleNamespace(
+    monkeypatch.setattr(points, "math", SimpleNamespace(
         cos=lambda angle: asked.append(angle) or math.cos(angle), sin=math.sin, floor=math.floor
     ))  # fmt: skip
     work = new_work()

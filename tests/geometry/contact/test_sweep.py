@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.geometry.contact.sweep import (
+from flocsim.geometry.contact.body_pairs import (
     DISC_COLUMNS,
     MOVES,
     PLACE_X,

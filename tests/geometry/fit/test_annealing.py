@@ -13,10 +13,9 @@ from flocsim.geometry.fit.annealing import (
     random_moves,
 )
 from flocsim.geometry.fit.edge_errors import running_sums
-from flocsim.geometry.fit.search import count_errors
 from flocsim.geometry.fit.simple import is_open
 from flocsim.geometry.fit.starts import even_start
-from tests.geometry.fit.test_fit import blob
+from tests.geometry.fit.test_fit import blob, count_errors
 
 
 @pytest.mark.parametrize("count", [3, 6, 20])

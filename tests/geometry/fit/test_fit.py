@@ -8,8 +8,14 @@ import pytest
 
 from flocsim.errors import ShapeError, UsageError
 from flocsim.geometry.fit import fit_mask
+from flocsim.geometry.fit.search import NO_STEPS, searched
 from flocsim.geometry.shapes.outline import simplicity_fault
 from tests.helpers.tiers import rest_slow
+
+
+def count_errors(mask, vertices, radius):
+    """V of the swept polygon against the mask: a search without steps."""
+    return searched(mask, vertices, radius, NO_STEPS)[1]
 
 
 def blob(seed, size=41, radius=13.0):

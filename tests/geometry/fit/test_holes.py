@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.fit.fit import fit_mask
-from flocsim.geometry.fit.holes import FEWEST_PIXELS, find_holes, wrong_with_holes
+from flocsim.geometry.fit.coverage import wrong_pixels
+from flocsim.geometry.fit.fit import FEWEST_PIXELS, find_holes, fit_mask
 
 Y, X = np.mgrid[0:90, 0:100]
 OUTER = (X - 50) ** 2 / 1.3 + (Y - 45) ** 2 < 38**2
@@ -36,7 +36,7 @@ def test_the_error_is_a_count_of_pixels():
     inside = shapely.contains_xy(cover, X, -Y)
     assert abs(np.count_nonzero(inside != MASK) - found.wrong_pixels) <= 2
     assert found.relative_error == pytest.approx(100.0 * found.wrong_pixels / MASK.sum())
-    wrong, _ = wrong_with_holes(MASK, found.parts[0].rings, 1.5)
+    wrong, _ = wrong_pixels(MASK, found.parts[0].rings, 1.5)
     assert wrong == found.wrong_pixels
 
 
@@ -56,7 +56,7 @@ def test_area_is_that_of_the_floc_without_its_holes():
 
 def test_an_inscribed_shape_covers_nothing_of_the_holes():
     found = fit_mask(MASK, vertices=32, radius=1.5, holes=True, inscribed=True)
-    _, outside = wrong_with_holes(MASK, found.parts[0].rings, 1.5)
+    _, outside = wrong_pixels(MASK, found.parts[0].rings, 1.5)
     assert outside == 0 and len(found.hole_sizes) >= 2
 
 

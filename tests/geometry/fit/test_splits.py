@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from flocsim.geometry.fit.edge_errors import BARRED, POSSIBLE, running_sums
-from flocsim.geometry.fit.search import DIRECTIONS, count_errors
+from flocsim.geometry.fit.search import DIRECTIONS
 from flocsim.geometry.fit.simple import is_open
 from flocsim.geometry.fit.splits import best_ring, descend, split_outline
 from flocsim.geometry.fit.starts import even_start, trace_outline
-from tests.geometry.fit.test_fit import blob
+from tests.geometry.fit.test_fit import blob, count_errors
 
 
 def cost_of(costs, places, picks):

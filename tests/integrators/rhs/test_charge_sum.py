@@ -14,7 +14,7 @@ from flocsim.compiler.composer import compose
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
-from flocsim.forces.check import sample_points
+from flocsim.forces.check import samples_of
 from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
 from flocsim.integrators.rhs.charge_sum import between_corners, cubics, grid_of, put_charge
 from flocsim.integrators.rhs.outline_sum import between_outlines
@@ -127,7 +127,7 @@ PLATES = {
 def test_energies_of_plates(boundary):
     """Over ε κ φ², at gaps of 0.3 and 1 Debye lengths, from their pressures."""
     force = layer(boundary=boundary, d_min=1e-12)
-    view, unit = sample_points(force)[0], PERMITTIVITY * 15e-3**2 / DEBYE
+    view, unit = samples_of(force)[0], PERMITTIVITY * 15e-3**2 / DEBYE
     for gap, energy in zip((0.3, 1.0), PLATES[boundary], strict=True):
 
         def pressure(x):
@@ -142,7 +142,7 @@ def test_unlike_plates(boundary):
     """Hogg, Healy and Fuerstenau's energies at h = 1/κ; where one has no potential as well."""
     for given in ((15e-3, -40e-3), (15e-3, 0.0)):
         force = DoubleLayer(given, DEBYE, law="outline", boundary=boundary, d_min=1e-12)
-        view, unit = sample_points(force)[0], 0.5 * PERMITTIVITY / DEBYE
+        view, unit = samples_of(force)[0], 0.5 * PERMITTIVITY / DEBYE
 
         def pressure(x, force=force, view=view, unit=unit):
             seen = view._replace(parted_gap=x * DEBYE)
@@ -165,7 +165,7 @@ def test_a_face_of_five_micrometres(boundary, debye, allowed):
     pair = Pair(plate, plate, (0.0, y, 0.0), force)
     assert pair.system.reached["charges"] == (debye > 1e-8)
     pressure = force.pressure(
-        sample_points(force)[0]._replace(parted_gap=gap), force.parts, force.kappa, force.closest
+        samples_of(force)[0]._replace(parted_gap=gap), force.parts, force.kappa, force.closest
     )
     assert pair.loads(0.0, y, 0.0)[1] == pytest.approx(pressure * 25e-12, rel=allowed)
 

@@ -4,8 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.io.images.pictures import segment
-from flocsim.io.images.selection import border_weight, focus_weights, weighed
+from flocsim.io.images.pictures import border_weight, focus_weights, segment, weighed
 
 
 def mean(values, weights):

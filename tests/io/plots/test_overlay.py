@@ -7,7 +7,7 @@ from flocsim.geometry.fit import fit_mask
 from flocsim.geometry.fit.fit import Fit
 from flocsim.geometry.shapes.synthetic import synthetic_floc
 from flocsim.io.images.pictures import segment
-from flocsim.io.plots.overlay import (
+from flocsim.io.plots.shapes import (
     FLOC_COLOUR,
     REASON_COLOURS,
     covered_by,

@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Body, Sphere, System
 from flocsim.compiler.composer import compile_law, compose
-from flocsim.compiler.interpreter_calls import refuse_interpreter
+from flocsim.compiler.refused import refuse_interpreter
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import KernelError
@@ -86,7 +86,7 @@ def test_a_call_of_python_is_refused_by_file_and_line(function, line, name):
 )
 def test_what_the_names_do_not_tell_the_compiled_code_does(function):
     line = function.__code__.co_firstlineno
-    where = rf"test_interpreter_calls\.py:{line}: it calls Python while it runs"
+    where = rf"test_refused\.py:{line}: it calls Python while it runs"
     with pytest.raises(KernelError, match=where):
         compose(calling_of(function), {}, allocates=True)(1.0)
 

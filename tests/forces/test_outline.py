@@ -9,7 +9,7 @@ import pytest
 from flocsim import Fluid, Sphere, SpheroPolygon
 from flocsim.constants import LARGEST_BIAS
 from flocsim.forces import DoubleLayer, SurfaceForce, VanDerWaals
-from flocsim.forces.smoothing import change_lengths, smoothing_of, smoothness
+from flocsim.forces.outline import change_lengths, smoothing_of, smoothness
 
 GAPS = np.geomspace(1e-11, 1e-3, 160)
 

@@ -12,22 +12,24 @@ from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
-from flocsim.geometry.contact.circle_tree import (
+from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.contact.near_pairs import (
     START,
     at_leaves,
     core_distance,
     descended,
+    gap_between,
     leaves_of,
     level_runs,
+    list_polygons,
     passed,
     plan_of,
+    pose_of,
     reversed_pose,
     run_of,
     side_of,
     tree_of,
 )
-from flocsim.geometry.contact.near_pairs import gap_between, list_polygons, pose_of
-from flocsim.geometry.contact.outlines import outlines_of
 from flocsim.geometry.shapes.cores import edges_of, from_edges
 from tests.helpers.tiers import given_often
 
