@@ -15,13 +15,6 @@ from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision.start import largest_displacement, orientations, place_pair
-from flocsim.ensembles.collision.thermal import (
-    caged_between,
-    ends_of,
-    refuse_release,
-    start_apart,
-    watch_kicked_pair,
-)
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
@@ -49,7 +42,7 @@ OBSERVER: dict[Callable, Callable] = {
 }
 """What a binary collision puts into the driver."""
 
-KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: watch_kicked_pair}
+KICKED: dict[Callable, Callable] = OBSERVER | {hooks.observe: outcomes.watch_kicked_pair}
 """The same for one under thermal motion."""
 
 LEAST_ROOM = 256
@@ -92,7 +85,7 @@ class Encounter:
         motions = [terminal_motion(self.system, body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
         if self.meeting == BROWNIAN:
-            refuse_release(self.options, self.shapes, self.diffusion)
+            meetings.refuse_release(self.options, self.shapes, self.diffusion)
         if self.meeting != SETTLING:
             names = [type(force).__name__ for force in self.system.forces]
             if follows_shape(self.system.forces):
@@ -160,7 +153,7 @@ class Encounter:
     @functools.cached_property
     def ends(self) -> tuple[float, float]:
         """Distances of the centres [m] at which a brownian meeting begins, and is missed."""
-        return ends_of(self.options, self.shapes)
+        return meetings.ends_of(self.options, self.shapes)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -345,7 +338,7 @@ class Encounter:
             return 0.0, 0.0
         mobility = sum(each for _, each in self.yielding)
         load, barrier = SAFETY * self.largest_load, BARRIER * self.kick_energy
-        return caged_between(self.pull, mobility, load, barrier)
+        return meetings.caged_between(self.pull, mobility, load, barrier)
 
     def time_limit(self, share: float = 1.0) -> float:
         """Simulated time [s] after which a replicate at δ = share · δ_max is undecided."""
@@ -366,7 +359,7 @@ class Encounter:
         In a brownian meeting ``share`` is the direction of j, over a full turn.
         """
         if self.meeting == BROWNIAN:
-            place = start_apart(angles, share, self.ends[0])
+            place = meetings.start_apart(angles, share, self.ends[0])
             return self.work_at(place, np.zeros((2, 3)))
         if self.rate is not None:
             return self.start_in_flow(angles, share)

@@ -12,8 +12,7 @@ Neither has a way that comes back: a pair that the flow carries apart does not m
 that turn faster than they strain have closed ways alone, no pair in them comes from afar, and
 none are offered here.
 
-In thermal motion alone weight is left out, too; where j is let go then, and what kicks make of the
-end of a meeting, is in the folder thermal.
+In thermal motion alone weight is left out, too; j is let go at a stated distance, in any direction.
 """
 
 import math
@@ -24,12 +23,13 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR
-from flocsim.errors import UsageError
+from flocsim.ensembles.config.pair_scene import BROWNIAN, EXTENSION, SETTLING, SHEAR, PairScene
+from flocsim.errors import ConfigError, UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
 from flocsim.forces.drag import follows_shape
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5
@@ -291,3 +291,65 @@ def refuse_drift(drift: np.ndarray, speed: float, names: Sequence[str]) -> None:
             f"{1e3 * math.hypot(*drift):.3g} mm/s by other forces ({', '.join(names)}): leave "
             'these out, or give scene.meeting = "settling"'
         )
+
+
+def caged_between(
+    speeds: np.ndarray, mobility: float, load: float, barrier: float
+) -> tuple[float, float]:  # fmt: skip
+    """Between which gaps [m] more than the energy ``barrier`` [J] lies on either side of a pair
+    that has not touched, a ``load`` [N] helping it out, or in; (0, 0) for no such place.
+
+    ``speeds`` as of `speeds_of`, which took this ``mobility``; of several such places the one of
+    the highest barriers.
+    """
+    repulsion = speeds[1] / mobility
+    rises = -0.5 * (repulsion[1:] + repulsion[:-1]) * np.diff(GAPS)
+    potential = np.append(0.0, np.cumsum(rises))
+    outwards, inwards = potential - load * GAPS, potential + load * GAPS
+    above = np.maximum.accumulate(outwards[::-1])[::-1] - outwards
+    below = np.maximum.accumulate(inwards) - inwards
+    least = np.minimum(above, below)
+    best = int(np.argmax(least))
+    if not least[best] > barrier:
+        return 0.0, 0.0
+    outside = np.flatnonzero(~(least > barrier))
+    first = int(outside[outside < best].max(initial=-1)) + 1
+    last = int(outside[outside > best].min(initial=len(GAPS))) - 1
+    return float(GAPS[first]), float(GAPS[last])
+
+
+def ends_of(options: PairScene, shapes: Sequence[Shape]) -> tuple[float, float]:
+    """Distances of the centres [m] at which two bodies are let go, and at which they have missed
+    each other."""
+    size = sum(shape.equivalent_radius for shape in shapes)
+    return options.release * size, options.escape * size
+
+
+def refuse_release(
+    options: PairScene, shapes: Sequence[Shape], diffusion: float = math.inf
+) -> None:
+    """ConfigError where two bodies do not diffuse, or their outlines may touch as they are let go.
+
+    ``diffusion``: D of the two against each other [m²/s].
+    """
+    if not diffusion > 0.0:
+        raise ConfigError(
+            "two bodies that do not diffuse never meet: add [forces.thermal], of a temperature "
+            "above 0 K"
+        )
+    size = sum(shape.equivalent_radius for shape in shapes)
+    outer = sum(shape.bounding_radius for shape in shapes)
+    if not outer < ends_of(options, shapes)[0]:
+        raise ConfigError(
+            f"scene.release = {options.release:g} (r_i + r_j) lets outlines touch that reach "
+            f"{outer / size:.3g} (r_i + r_j): give a larger one, and scene.escape above it"
+        )
+
+
+def start_apart(angles: Sequence[float], direction: float, far: float) -> np.ndarray:
+    """Places (2, 3) [m, m, rad] of i at the origin and j at a distance ``far``, in a direction that
+    is a share of a full turn."""
+    turn = 2.0 * math.pi * direction
+    return np.array(
+        [[0.0, 0.0, angles[0]], [far * math.cos(turn), far * math.sin(turn), angles[1]]]
+    )

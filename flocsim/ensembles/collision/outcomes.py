@@ -15,6 +15,22 @@ in extension it does so for ever then.
 Of a bond the observer knows the load, and how long the pair has kept its pose. The proofs are those
 of flocsim.bonds. In a flow the load comes from everywhere, as the doublet turns round in it, and
 the rest time is that of a whole turn.
+
+Where random forces kick the pair the observer is `watch_kicked_pair`. No proof that follows from
+drifts and loads alone holds there, so that each is held against k_B T:
+
+- Parted: against a relative drift v that carries them apart, bodies that diffuse with D against
+  each other come back over a way a with a probability of exp(−v a/D) at most, exactly that of a
+  line, as a half-plane has to be crossed on the way. They have parted for good where that is below
+  RETURN_SHARE. The way is the farther half of what lies between their bounding circles along the
+  drift; v the least there, less what attraction makes of it at the near end. Where they meet by
+  thermal motion alone there is no drift, and they have parted where the study says so: once their
+  centres are the stated distance apart.
+- Certificate, rest and hook: by BARRIER k_B T besides what they need without kicks (flocsim.bonds).
+- Held: by BARRIER k_B T on either side of a secondary minimum of spheres, or of surface forces
+  (`meetings.caged_between`).
+
+What is none of these goes on until it is, or is undecided at the end.
 """
 
 import math
@@ -24,15 +40,18 @@ from flocsim.bonds.certificate import (
     CERTIFICATE,
     NO_BOND,
     Load,
+    are_spheres,
     bond_between,
     doublet_pose,
     is_certain,
     is_certain_in_kicks,
+    radii_of,
     way_between,
 )
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
+from flocsim.integrators.rhs.climb import repulsion_at
 from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
 from flocsim.laws import (
     CENTRE_FORCE,
@@ -117,11 +136,20 @@ CLEARANCE = 0.25
 """The outlines must stay further apart on the way than this share of the escape gap."""
 
 
+def apart(work, column):
+    """By how much j has more of a column than i."""
+    return work.motion[at.NOW, BODY_J, column] - work.motion[at.NOW, BODY_I, column]
+
+
+def outer_of(scene):
+    """R_i + R_j [m]."""
+    return scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+
+
 def is_parting(scene, work, observed, time, nx, ny):
     """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
-    motion = work.motion
-    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
-    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
+    rate = nx * apart(work, at.VX)
+    rate += ny * apart(work, at.VY)
     drift = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y]
     if has(scene, CENTRE_FORCE):
         repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
@@ -147,11 +175,11 @@ def is_away(scene, work, observed, distance, gap):
 
 def left_over(scene, work, observed):
     """How far j may still be carried off the drift against i by its present velocity [m]."""
-    v, drift_time = work.motion, 0.0
+    drift_time = 0.0
     for body, mobility in ((BODY_I, observed[MOBILITY_I]), (BODY_J, observed[MOBILITY_J])):
         drift_time = max(drift_time, scene.bodies[body, at.MASS] * mobility)
-    x = v[at.NOW, BODY_J, at.VX] - v[at.NOW, BODY_I, at.VX] - observed[DRIFT_X]
-    y = v[at.NOW, BODY_J, at.VY] - v[at.NOW, BODY_I, at.VY] - observed[DRIFT_Y]
+    x = apart(work, at.VX) - observed[DRIFT_X]
+    y = apart(work, at.VY) - observed[DRIFT_Y]
     return drift_time * math.hypot(x, y)
 
 
@@ -175,10 +203,9 @@ def can_meet_again(scene, work, observed, time):
     """Whether the outlines may come together along the drift that is left."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
-    x = work.motion[at.NOW, BODY_J, at.X] - work.motion[at.NOW, BODY_I, at.X]
-    y = work.motion[at.NOW, BODY_J, at.Y] - work.motion[at.NOW, BODY_I, at.Y]
+    x, y = apart(work, at.X), apart(work, at.Y)
     along, aside = x * ux + y * uy, abs(x * uy - y * ux)
-    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    outer = outer_of(scene)
     clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
     if (math.hypot(x, y) if along >= 0.0 else aside) >= outer + clear:
         return False
@@ -207,7 +234,7 @@ def can_meet_again(scene, work, observed, time):
 def is_carried_away(scene, work, observed, time, nx, ny, distance):
     """Whether a flow alone draws the bodies apart, beyond where their outlines reach and faster
     than attraction draws them together."""
-    outer = scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    outer = outer_of(scene)
     if distance < outer + observed[ESCAPE]:
         return False
     stretch = nx * (observed[FLOW_XX] * nx + observed[FLOW_XY] * ny)
@@ -216,9 +243,8 @@ def is_carried_away(scene, work, observed, time, nx, ny, distance):
     if has(scene, CENTRE_FORCE):
         repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
         speed += min(repulsion, 0.0) * (observed[MOBILITY_I] + observed[MOBILITY_J])
-    motion = work.motion
-    rate = nx * (motion[at.NOW, BODY_J, at.VX] - motion[at.NOW, BODY_I, at.VX])
-    rate += ny * (motion[at.NOW, BODY_J, at.VY] - motion[at.NOW, BODY_I, at.VY])
+    rate = nx * apart(work, at.VX)
+    rate += ny * apart(work, at.VY)
     return speed > 0.0 and rate > 0.0
 
 
@@ -287,3 +313,76 @@ def bond_in_kicks(scene, work, observed, time):
     bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
     certain = is_certain_in_kicks(scene, work, time, bond, load)
     return kind_of_bond(scene, work, observed, time, bond, load, certain)
+
+
+RETURN_SHARE = 1e-4
+"""Of the pairs that are said to have parted, so many may come back at most."""
+
+
+def drift_from(work, observed, outer):
+    """(how far j is beyond i along the drift [m], the least drift at half of what is more than
+    ``outer`` of that [m/s], the speed of j besides the drift)."""
+    x, y, ux, uy = apart(work, at.X), apart(work, at.Y), apart(work, at.VX), apart(work, at.VY)
+    if observed[IN_FLOW] != 0.0:
+        # An extension draws out along x.
+        ux -= observed[FLOW_XX] * x + observed[FLOW_XY] * y
+        uy -= observed[FLOW_YX] * x + observed[FLOW_YY] * y
+        return abs(x), observed[FLOW_XX] * 0.5 * (abs(x) + outer), math.hypot(ux, uy)
+    drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
+    along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
+    return (
+        along,
+        drift,
+        math.hypot(ux - observed[DRIFT_X], uy - observed[DRIFT_Y]),
+    )
+
+
+def return_bound(scene, work, observed, time):
+    """A bound of the probability that the two ever come back against the drift."""
+    outer = outer_of(scene)
+    along, drift, besides = drift_from(work, observed, outer)
+    if along - outer <= observed[ESCAPE]:
+        return 1.0
+    half = 0.5 * (along - outer)
+    mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
+    drift += mobility * min(
+        repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half),
+        0.0,
+    )
+    relaxation = max(
+        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
+        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
+    )
+    way = half - relaxation * besides
+    if drift <= 0.0 or way <= 0.0:
+        return 1.0
+    return math.exp(-drift * way / (observed[KICK_ENERGY] * mobility))
+
+
+def have_parted(scene, work, observed, time, distance):
+    """Whether the two count as apart for good."""
+    if observed[BROWNIAN] != 0.0:
+        return distance >= observed[ESCAPE]
+    return return_bound(scene, work, observed, time) <= RETURN_SHARE
+
+
+def is_caged(scene, work, observed, time):
+    """Whether two that never touched lie in a secondary minimum out of which kicks do not come."""
+    if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
+        return False
+    bond = bond_between(scene, work, time, BODY_I, BODY_J)
+    between = bond.surface_gap
+    if are_spheres(scene, bond):
+        between = bond.distance - radii_of(scene, bond)
+    return observed[CAGE_LOW] < between < observed[CAGE_HIGH]
+
+
+def watch_kicked_pair(scene, work, observed, time):
+    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
+    _, _, distance, _ = look_at_pair(scene, work, observed, time)
+    if have_parted(scene, work, observed, time, distance):
+        return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
+    if observed[COLLIDED] == 0.0:
+        return HELD if is_caged(scene, work, observed, time) else 0
+    observed[BOND] = bond_in_kicks(scene, work, observed, time)
+    return 0 if observed[BOND] == NO_BOND else BOUND

@@ -12,15 +12,22 @@ from flocsim.bonds.certificate import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.encounter import KICKED, OBSERVER, make_encounter
-from flocsim.ensembles.collision.meetings import GAPS, speeds_of
-from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED, bond_in_kicks
-from flocsim.ensembles.collision.thermal import (
-    RETURN_SHARE,
+from flocsim.ensembles.collision.meetings import (
+    GAPS,
     caged_between,
     ends_of,
     refuse_release,
-    return_bound,
+    speeds_of,
     start_apart,
+)
+from flocsim.ensembles.collision.outcomes import (
+    BOUND,
+    DEPARTED,
+    HELD,
+    MISSED,
+    RETURN_SHARE,
+    bond_in_kicks,
+    return_bound,
     watch_kicked_pair,
 )
 from flocsim.ensembles.config.pair_scene import BrownianScene
