@@ -152,11 +152,9 @@ def made_up_results(reader):
 
     _, conditions, _, count = reader.shape
     sums = sums_of(Reader(reader.store, (1, conditions, 1, 0)).codes, conditions, 0, 0)
-    probabilities, pooled, differences = tables_of(sums)
     results = Results(
-        ("I",), np.arange(1, conditions + 1), np.zeros(1), None, probabilities,
-        pooled=pooled, differences=differences, count=count,
-    )  # fmt: skip
+        ("I",), np.arange(1, conditions + 1), np.zeros(1), None, count=count, **tables_of(sums)
+    )
     return results, sums
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.ensembles.estimates.numerical import count_changes
-from flocsim.ensembles.estimates.statistics import checked_codes, count
+from flocsim.ensembles.estimates.statistics import count
 from flocsim.ensembles.estimates.summary import table_from
 from flocsim.io.results.schema import NOT_APPLICABLE
 
@@ -21,10 +21,9 @@ def tabulate(
     (type, vertices, delta, replicate). Returns a dict of arrays (…), (…, 4) for the classes A–D and
     (…, 3) for the kinds of bond: the counts ``n_*`` (see `count`, `count_changes`), the
     probabilities of `probabilities` and their `numerical_errors`. ``checked_…``, ``third_…``:
-    those of second and third runs, none by default. Raises UsageError for unknown codes, and where
-    they contradict each other.
+    those of second and third runs, none by default.
     """
-    first = checked_codes(outcome, inside, bond)
+    first = tuple(map(np.asarray, (outcome, inside, bond)))
     again, third = (
         tuple(np.broadcast_to(np.asarray(codes), first[0].shape) for codes in run)
         for run in (

@@ -12,12 +12,10 @@ from collections.abc import Mapping, Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import ArrayLike
 
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.paired import sums_of_scrambles
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.errors import UsageError
 from flocsim.io.confidence import (
     bounded_sums,
     clustered_proportion,
@@ -25,17 +23,7 @@ from flocsim.io.confidence import (
     scrambled_proportion,
 )
 from flocsim.io.results.checks import FURTHER_RUNS
-from flocsim.io.results.events import (
-    AGGREGATED,
-    HELD,
-    INSIDE_CLASSES,
-    MISSED,
-    OUTSIDE_CLASSES,
-    UNDECIDED,
-    Events,
-    events,
-    events_of,
-)
+from flocsim.io.results.events import HELD, MISSED, UNDECIDED, Events, events, events_of
 from flocsim.io.results.schema import (
     BONDS,
     CLASSES,
@@ -105,31 +93,6 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     return table
 
 
-def checked_codes(
-    outcome: ArrayLike, inside: ArrayLike, bond: ArrayLike
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The arrays; UsageError where what they say of a replicate contradicts itself."""
-    outcome, inside, bond = np.asarray(outcome), np.asarray(inside), np.asarray(bond)
-    if not outcome.shape == inside.shape == bond.shape or outcome.ndim == 0:
-        raise UsageError(
-            "outcome, inside and bond must have the same shape, found "
-            f"{outcome.shape}, {inside.shape} and {bond.shape}"
-        )
-    touched_inside = (inside == 1) & np.isin(outcome, [*INSIDE_CLASSES, UNDECIDED, FAILED])
-    touched_outside = (inside == 0) & np.isin(outcome, [*OUTSIDE_CLASSES, UNDECIDED, FAILED])
-    apart = (inside == NOT_APPLICABLE) & np.isin(outcome, [MISSED, HELD, UNDECIDED, FAILED])
-    known = (bond >= 1) & (bond <= len(BONDS))
-    held = np.where(np.isin(outcome, AGGREGATED), known, bond == NOT_APPLICABLE)
-    wrong = np.argwhere(~((touched_inside | touched_outside | apart) & held))
-    if len(wrong):
-        place = tuple(int(number) for number in wrong[0])
-        raise UsageError(
-            f"outcome {outcome[place]} with inside {inside[place]} at {place} is impossible "
-            f"({len(wrong)} such replicates): check how the outcomes were recorded"
-        )
-    return outcome, inside, bond
-
-
 def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
     """{estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is a
     cluster. Codes are (type, vertices, delta, replicate)."""
@@ -155,7 +118,7 @@ OF_SCRAMBLES = " of scrambles"
 
 
 def scrambled_sums(
-    codes: tuple[np.ndarray, np.ndarray, np.ndarray], first: int, scrambles: int
+    codes: Sequence[np.ndarray], first: int, scrambles: int
 ) -> dict[str, np.ndarray]:
     """{"pr_a of scrambles": whole numbers (3, type, …, scramble)} of trials, successes and unknown.
 

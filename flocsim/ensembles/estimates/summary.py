@@ -7,6 +7,7 @@ reaches from the lower 95 % bound of the one change to the upper bound of the ot
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -29,7 +30,6 @@ from flocsim.ensembles.estimates.statistics import (
     COUNTED,
     OF_SCRAMBLES,
     by_runs,
-    checked_codes,
     count,
     pooled_probabilities,
     pooled_sums,
@@ -149,16 +149,14 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        columns = codes(start, min(start + step, stop))
-        first_codes, again, third, *ends = by_runs(columns)
-        outcome, inside, bond = checked_codes(*first_codes)
+        own, again, third, *ends = by_runs(codes(start, min(start + step, stop)))
         found = {
-            **count(outcome, inside, bond),
-            **count_changes((outcome, inside, bond), again, third),
-            **pooled_sums(outcome, inside, bond),
-            JOINT: joint_counts(outcome, inside, start, scrambles),
-            **scrambled_sums((outcome, inside, bond), start, scrambles),
-            **outline_sums((outcome, inside, bond), ends),
+            **count(*own),
+            **count_changes(own, again, third),
+            **pooled_sums(*own),
+            JOINT: joint_counts(own[0], own[1], start, scrambles),
+            **scrambled_sums(own, start, scrambles),
+            **outline_sums(own, ends),
         }
         sums = added(sums, found)
     return sums
@@ -170,22 +168,11 @@ def added(sums: Sums, more: Sums) -> Sums:
     return {name: both.get(name, values) for name, values in {**more, **sums}.items()}
 
 
-@attrs.frozen
-class AllTables:
-    """The arrays of the groups of a results file that follow from Sums."""
-
-    probabilities: dict[str, np.ndarray]
-    pooled: dict[str, np.ndarray]
-    differences: dict[str, np.ndarray]
-    numerics: dict[str, np.ndarray]
-    outlines: dict[str, np.ndarray]
-
-
 POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
 
 
-def tables_of(sums: Sums) -> AllTables:
-    """AllTables from the Sums of a whole study."""
+def tables_of(sums: Sums) -> dict[str, Any]:
+    """The arrays of the groups of a results file that follow from the Sums of a whole study."""
     pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
     of_scrambles = {name: values for name, values in sums.items() if name.endswith(OF_SCRAMBLES)}
     of_outlines = {name: values for name, values in sums.items() if name.endswith(OF_OUTLINES)}
@@ -194,15 +181,14 @@ def tables_of(sums: Sums) -> AllTables:
     together = numerical_errors(over_displacements(counted))
     changes = change_intervals(counted)
     table = table_from(counted, changes) | scrambled_probabilities(of_scrambles)
-    return AllTables(
-        table,
-        pooled_probabilities(pooled)
-        | scrambled_probabilities(of_scrambles, pooled=True)
-        | {name: values for name, values in together.items() if name in POOLED},
-        paired_differences(sums[JOINT], bool(of_scrambles)),
-        change_columns(changes),
-        outline_changes(of_outlines, table),
-    )
+    pooled_table = pooled_probabilities(pooled) | scrambled_probabilities(of_scrambles, pooled=True)
+    return {
+        "probabilities": table,
+        "pooled": pooled_table | {k: each for k, each in together.items() if k in POOLED},
+        "differences": paired_differences(sums[JOINT], bool(of_scrambles)),
+        "numerics": change_columns(changes),
+        "outlines": outline_changes(of_outlines, table),
+    }
 
 
 def table_from(

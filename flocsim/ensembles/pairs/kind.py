@@ -57,7 +57,7 @@ from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
 from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
-from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.errors import FlocsimError
 from flocsim.interruption import WITHHELD
 from flocsim.io.groups import run_of
 from flocsim.io.json_text import matches
@@ -114,25 +114,21 @@ def results_of(
     kernel: Kernel | None = None,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates of each condition from their Sums."""
-    config = study.config
-    tables = tables_of(sums)
+    config, tables = study.config, tables_of(sums)
+    if study.is_banded and not tables["outlines"]:  # a draft without any replicate has its place
+        tables["outlines"] = blank(OUTLINES, study.shape[:3])
     return Results(
         types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=replicates,
-        probabilities=tables.probabilities,
         run=run,
         failures=FAILURES,
         flocs=tuple(floc.name for floc in study.flocs),
-        pooled=tables.pooled,
-        differences=tables.differences,
-        numerics=tables.numerics,
-        # A draft without any replicate has its place.
-        outlines=tables.outlines or (blank(OUTLINES, study.shape[:3]) if study.is_banded else {}),
         count=count,
         radii=study.radii,
         kernel=kernel,
+        **tables,
     )
 
 
@@ -224,10 +220,7 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
 
     runs, known = store.intervals(place), store.known(place)
     begins = [0, *accumulate(stop - first for first, stop in runs)][:-1]
-    try:
-        sums = sums_of(codes, 1, 0, total(runs))
-    except UsageError as error:
-        raise FileError(f"{store.journal.path} has no readable rows: {error}") from error
+    sums = sums_of(codes, 1, 0, total(runs))
     return {
         name: values for name, values in sums.items()
         if name not in (*POOLED_NAMES, JOINT) and not name.endswith(OF_OUTLINES)

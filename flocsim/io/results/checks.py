@@ -20,6 +20,7 @@ ROUNDING = 1e-9
 
 BOUND_CLASSES = [schema.CLASSES.index(name) for name in schema.AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
+APART = [schema.OUTCOMES.index(name) for name in ("missed", "held")]
 
 
 def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = schema.GROUPS) -> None:
@@ -136,6 +137,7 @@ def check_rows(
     decided = outcome < len(schema.CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
+    refuse_row(np.isin(outcome, APART) & (inside != schema.NOT_APPLICABLE), "inside")
     bound = np.isin(outcome, BOUND_CLASSES)
     bond = column("bond")
     held = (bond >= 1) & (bond <= len(schema.BONDS))

@@ -302,11 +302,11 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
         sums = added(sums, sums_of(codes, 60, first, stop))
     tables = tables_of(sums)
     whole = tabulate(*columns[: len(EXACT_RUNS)])
-    assert set(tables.probabilities) == set(whole)
+    assert set(tables["probabilities"]) == set(whole)
     for name in whole:
-        np.testing.assert_array_equal(tables.probabilities[name], whole[name])
+        np.testing.assert_array_equal(tables["probabilities"][name], whole[name])
     for name in PROBABILITIES:
-        ends = (tables.numerics[f"{name}_change{end}"] for end in ("_low", "_high"))
+        ends = (tables["numerics"][f"{name}_change{end}"] for end in ("_low", "_high"))
         np.testing.assert_array_equal(np.maximum(*map(np.abs, ends)), whole[f"{name}_numerical"])
     counted = count(*columns[:3]) | count_changes(*by_runs(columns)[:3])
     for name, values in numerical_errors(over_displacements(counted)).items():

@@ -240,25 +240,6 @@ def test_inside_equals_a_plus_b_when_all_collisions_are_decided():
     np.testing.assert_allclose(table["pr_class"].sum(axis=-1), 1.0)
 
 
-@pytest.mark.parametrize(
-    ("outcome", "inside"), [(0, 0), (1, 255), (2, 1), (3, 255), (4, 0), (4, 1), (7, 1), (5, 2)]
-)
-def test_contradictions_are_refused_with_their_place(outcome, inside):
-    with pytest.raises(UsageError, match=r"at \(0, 1\) is impossible \(1 such"):
-        tabulate([[0, outcome]], [[1, inside]], [[1, bonds_of(outcome)]])
-
-
-@pytest.mark.parametrize(("outcome", "bond"), [(0, 255), (0, 0), (0, 4), (1, 1), (5, 3)])
-def test_a_bond_that_does_not_go_with_the_outcome_is_refused(outcome, bond):
-    with pytest.raises(UsageError, match=r"at \(0, 1\) is impossible \(1 such"):
-        tabulate([[0, outcome]], [[1, 1]], [[1, bond]])
-
-
-def test_shapes_must_agree():
-    with pytest.raises(UsageError, match="the same shape"):
-        tabulate([[0, 1]], [[1]], [[1, 255]])
-
-
 @pytest.mark.parametrize("count", [0, 9, 60, 99_999])
 def test_table_is_aligned_and_narrow(count):
     results = make_results(count=60)

@@ -104,6 +104,6 @@ def test_sums_of_blocks_add_up():
     first_two = added(sums_of(read, 1, 0, 10), sums_of(read, 1, 10, 23))
     parts = added(first_two, sums_of(read, 1, 23, 40))
     assert whole.keys() == parts.keys()
-    found = tables_of(parts).outlines
-    for name, values in tables_of(whole).outlines.items():
+    found = tables_of(parts)["outlines"]
+    for name, values in tables_of(whole)["outlines"].items():
         np.testing.assert_array_equal(values, found[name])
