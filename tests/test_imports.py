@@ -91,7 +91,7 @@ INNER_ROWS = {
     "io": [
         ["plots"],
         ["shapes", "trajectory"],
-        ["images", "results", "journal", "exchange"],
+        ["images", "results", "journal"],
         ["outputs", "groups", "records"],
         ["files", "hdf5", "json_text", "labelled", "confidence", "terminal"],
         ["seals"],
@@ -110,7 +110,7 @@ HEAVYWEIGHTS = {
     "matplotlib": ["io/plots/*.py"],
     "shapely": ["geometry/shapes/outline.py"],
     "pint": ["*"],
-    "gsd": ["io/exchange.py"],
+    "gsd": ["io/trajectory.py"],
     "xarray": ["io/labelled.py"],
     "pandas": ["io/labelled.py"],
 }

@@ -25,7 +25,7 @@ from flocsim.ensembles.estimates.statistics import (
 )
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.runner import run
-from flocsim.io.results.efficiency import efficiency
+from flocsim.io.confidence import efficiency
 from flocsim.io.results.kernel_group import ESTIMATES
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, POOLED_PROBABILITIES, PROBABILITIES
 from tests.helpers.tabulate import tabulate

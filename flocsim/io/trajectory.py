@@ -1,7 +1,11 @@
-"""Trajectory files: one replicate's motion in HDF5."""
+"""Motions in files: one replicate's in HDF5, which is read back, with moving outlines for ParaView;
+GSD, for OVITO and HOOMD's tools. Outlines are found once and then moved.
+"""
 
 import io
+import json
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,10 +13,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
+from flocsim.errors import UsageError
+from flocsim.geometry.shapes.parts import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.exchange import add_vtkhdf, write_gsd
 from flocsim.io.files import Rule, keep, write_file
 from flocsim.io.groups import opened_file, write_labelled
 from flocsim.io.labelled import Column, Labelled, about_of
@@ -92,6 +96,177 @@ def write_trajectory(
         write_labelled(file, Labelled(coordinates, columns))
         add_vtkhdf(file, times, position, shapes)
     write_file(path, seal(buffer.getvalue()), rule)
+
+
+MOST_FRAMES = 400
+"""Instants that are drawn; a file's own arrays have all of them."""
+
+
+def frames_of(count: int) -> np.ndarray:
+    """The rows of a motion of so many instants that are drawn: all, or 400 spread evenly."""
+    return np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).round().astype(int))
+
+
+def rings_of(shape: Shape) -> list[np.ndarray]:
+    """The rings (k, 2) [m] of an outline about its centroid, outer ones first, then holes.
+
+    Open (the first point is not said twice), outer ones counter-clockwise, holes clockwise. Most
+    outlines have one outer ring; parts that touch in a point have several.
+    """
+    rings = [np.asarray(ring, dtype=float) for ring in shape.outline(0.0, 0.0, 0.0)]
+    rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
+    if not shape.is_compound:
+        outer, *holes = sorted(rings, key=lambda ring: -abs(area_of(ring)))
+        return [oriented(outer, 1.0), *(oriented(hole, -1.0) for hole in holes)]
+    # shapely's outer rings go round in one sense, those of holes in the other.
+    sense = 1.0 if area_of(rings[0]) > 0.0 else -1.0
+    return [ring if sense > 0.0 else ring[::-1] for ring in rings]
+
+
+def oriented(ring: np.ndarray, sense: float) -> np.ndarray:
+    """A ring that goes round counter-clockwise for a sense above 0, else clockwise."""
+    return ring if area_of(ring) * sense > 0.0 else ring[::-1]
+
+
+def is_hole(ring: np.ndarray) -> bool:
+    """Whether a ring of `rings_of` is that of a hole, where it is not the first."""
+    return area_of(ring) <= 0.0
+
+
+def area_of(ring: np.ndarray) -> float:
+    """The area [m²] that a ring encloses, above 0 where it goes round counter-clockwise."""
+    x, y = ring.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+
+
+def placed(points: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Points (p, 2) of a body about its centroid at its places (f, 3): (f, p, 2)."""
+    cos, sin = np.cos(places[:, 2, None]), np.sin(places[:, 2, None])
+    x, y = points.T
+    turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=2)
+    return turned + places[:, None, :2]
+
+
+MICRO = 1e6
+ROOM = 1.05
+
+
+def write_gsd(
+    path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
+    shapes: Sequence[Shape], rule: Rule = keep,
+) -> None:  # fmt: skip
+    """Write a motion, ``times`` (k,) [s], ``position`` and ``velocity`` (k, n, 3), as GSD.
+
+    A frame for each instant, its time in ``log/time`` [s], spins in ``log/particles/spin`` [rad/s];
+    a type for each body. UsageError where gsd is not installed, FileError where the file cannot be
+    written.
+    """
+    try:
+        import gsd.hoomd
+    except ImportError:
+        raise UsageError("gsd is not installed: pip install 'flocsim[formats]'") from None
+
+    # A box about the origin that all bodies stay inside of.
+    reach = np.array([shape.bounding_radius for shape in shapes])[:, np.newaxis]
+    width = 2.0 * ROOM * MICRO * float((np.abs(position[:, :, :2]) + reach).max())
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "motion.gsd"
+        with gsd.hoomd.open(made, "w") as file:
+            for step, time in enumerate(times):
+                frame = gsd.hoomd.Frame()
+                frame.configuration.step, frame.configuration.dimensions = step, 2
+                frame.configuration.box = [width, width, 0, 0, 0, 0]
+                bodies = frame.particles
+                bodies.N = len(shapes)
+                bodies.types = [f"body {n}" for n in range(len(shapes))]
+                bodies.typeid = list(range(len(shapes)))
+                bodies.type_shapes = [shape_of(shape) for shape in shapes]
+                flat = (each[step, :, :2] for each in (position, velocity))
+                in_space = (np.pad(MICRO * each, ((0, 0), (0, 1))) for each in flat)
+                bodies.position, bodies.velocity = in_space
+                half = 0.5 * position[step, :, 2]
+                turn = np.zeros((len(shapes), 4))
+                turn[:, 0], turn[:, 3] = np.cos(half), np.sin(half)
+                bodies.orientation = turn
+                bodies.diameter = [2.0 * MICRO * shape.equivalent_radius for shape in shapes]
+                frame.log["time"] = np.array([time])
+                frame.log["particles/spin"] = np.array(velocity[step, :, 2])
+                file.append(frame)
+        data = made.read_bytes()
+    write_file(path, data, rule)
+
+
+def outer_ring(shape: Shape) -> np.ndarray:
+    """The outer ring of an outline (k, 2) [m]. GSD has one for each body: disks of parts that touch
+    in a point only are drawn a little wider."""
+    for wider in WIDER:
+        parts = [Part(part.rings, part.radius * wider) for part in shape.parts]
+        known = shape if wider == 1.0 else shape_of_parts(parts)
+        rings = rings_of(known)
+        if len(rings) == 1 or is_hole(rings[1]):
+            break
+    return rings[0] + known.centroid * (known is not shape)
+
+
+WIDER = (1.0, 1.01, 1.03, 1.1, 1.3)
+"""Factors of radii that are tried until there is one outer ring."""
+
+
+def shape_of(shape: Shape) -> dict:
+    """What GSD says of a shape: a sphere, or the outer ring of the outline as a polygon."""
+    if len(shape.vertices) == 1:
+        return {"type": "Sphere", "diameter": 2.0 * MICRO * shape.radius}
+    ring = (MICRO * outer_ring(shape)).tolist()
+    # As numbers of JSON, which is how the file holds them.
+    return json.loads(json.dumps({"type": "Polygon", "rounding_radius": 0, "vertices": ring}))
+
+
+KINDS = ("Vertices", "Lines", "Polygons", "Strips")
+"""Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
+
+
+def add_vtkhdf(file: Any, times: np.ndarray, position: np.ndarray, shapes: Sequence[Shape]) -> None:
+    """Write the group into an open h5py file: ``times`` (k,) [s], ``position`` (k, n, 3).
+
+    A polygon for every ring: its cell data are ``body``, the number, and ``hole``, 1 for the rings
+    of holes. Points are in m.
+    """
+    rows = frames_of(len(times))
+    rings = [rings_of(shape) for shape in shapes]
+    points = np.concatenate(
+        [placed(np.concatenate(each), position[rows, n]) for n, each in enumerate(rings)], axis=1
+    )
+    frames, count = points.shape[:2]
+    lengths = [len(ring) for each in rings for ring in each]
+    owners = [n for n, each in enumerate(rings) for _ in each]
+    holes = [int(place > 0 and is_hole(ring)) for each in rings for place, ring in enumerate(each)]
+
+    group = file.create_group("VTKHDF")
+    group.attrs["Version"] = np.array([2, 0], "i8")
+    group.attrs["Type"] = np.bytes_("PolyData")
+    group["NumberOfPoints"] = np.array([count], "i8")
+    flat = np.zeros((frames * count, 3), "f8")
+    flat[:, :2] = points.reshape(-1, 2)
+    group["Points"] = flat
+    for kind in KINDS:
+        own = lengths if kind == "Polygons" else []
+        cells = group.create_group(kind)
+        cells["NumberOfCells"] = np.array([len(own)], "i8")
+        cells["NumberOfConnectivityIds"] = np.array([sum(own)], "i8")
+        cells["Offsets"] = np.concatenate([[0], np.cumsum(own)]).astype("i8")
+        cells["Connectivity"] = np.arange(sum(own), dtype="i8")
+    data = group.create_group("CellData")
+    data["body"], data["hole"] = np.array(owners, "i4"), np.array(holes, "i4")
+
+    steps = group.create_group("Steps")
+    steps.attrs["NSteps"] = np.int64(frames)
+    steps["Values"] = np.asarray(times, "f8")[rows]
+    steps["PointOffsets"] = count * np.arange(frames, dtype="i8")
+    steps["NumberOfParts"] = np.ones(frames, "i8")
+    for name in ("PartOffsets", "CellDataOffsets/body", "CellDataOffsets/hole"):
+        steps[name] = np.zeros(frames, "i8")
+    for name in ("CellOffsets", "ConnectivityIdOffsets"):
+        steps[name] = np.zeros((frames, len(KINDS)), "i8")
 
 
 def write_vtkhdf(

@@ -8,17 +8,19 @@ import shapely
 from flocsim import Composite, Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import UsageError
-from flocsim.io.exchange import (
+from flocsim.io.trajectory import (
     MOST_FRAMES,
     area_of,
     frames_of,
     is_hole,
     outer_ring,
     placed,
+    read_trajectory,
     rings_of,
     write_gsd,
+    write_trajectory,
+    write_vtkhdf,
 )
-from flocsim.io.trajectory import read_trajectory, write_trajectory, write_vtkhdf
 from tests.helpers.compound_shapes import beads, framed
 
 SHAPES = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.io.results.efficiency import efficiency, weights
+from flocsim.io.confidence import efficiency, weights
 
 DELTA = np.array([1.0, 0.0, 0.2, 0.7])
 
