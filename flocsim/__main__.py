@@ -1,7 +1,6 @@
 """The command `flocsim`, also `python -m flocsim`: one subcommand for each thing to do."""
 
 import argparse
-import importlib
 import sys
 from collections.abc import Sequence
 
@@ -16,7 +15,7 @@ if {"ensemble", "kernel", "swarm", "strength"}.intersection(sys.argv[1:2]):
 if is_limited():
     check_memory()
 
-from flocsim.commands import SUMMARIES, file_of
+from flocsim.commands import SUMMARIES, add_command
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError
@@ -39,15 +38,11 @@ def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"flocsim {__version__}")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    wanted = {file_of(each) for each in (SUMMARIES if words is None else words[:1])}
-    loaded = set()
     for command, summary in SUMMARIES.items():
-        file = file_of(command)
-        if file not in wanted:
+        if words is None or command in words[:1]:
+            add_command(subparsers, command)
+        else:
             subparsers.add_parser(command, help=summary)
-        elif file not in loaded:
-            loaded.add(file)
-            importlib.import_module(file).add_parser(subparsers)
     return parser
 
 

@@ -1,8 +1,11 @@
 """The subcommands of ``flocsim``; ``fitting`` is the work behind ``fit``.
 
-A file has ``add_parser(subparsers)``, by which its subcommands set ``run(arguments)``, the exit
-code; each has a line in SUMMARIES, and one in FILES where its file has another name.
+The file of a command has ``add_arguments(parser)``, ``run(arguments)``, which gives the exit code,
+and a DESCRIPTION; each has a line in SUMMARIES, and one in FILES where its file has another name.
 """
+
+import importlib
+from typing import Any
 
 SUMMARIES = {
     "init": "write an example config file",
@@ -35,10 +38,15 @@ FOLDER_HELP = (
 ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""
 
-FILES = {"compare": "plot"} | dict.fromkeys(ENSEMBLES, "sweep")
-"""{command: the file that it shares}."""
+FILES = {"compare": ("commands.plot", "_compare")} | dict.fromkeys(ENSEMBLES, ("ensembles.cli", ""))
+"""{command: (the module that it shares, how the names of its functions end)}."""
 
 
-def file_of(command: str) -> str:
-    """The module of a command."""
-    return f"flocsim.commands.{FILES.get(command, command).replace('-', '_')}"
+def add_command(subparsers: Any, command: str) -> None:
+    """Add the parser of a command."""
+    name, end = FILES.get(command, (f"commands.{command.replace('-', '_')}", ""))
+    module, summary = importlib.import_module(f"flocsim.{name}"), SUMMARIES[command]
+    about = getattr(module, "DESCRIPTION", summary)
+    parser = subparsers.add_parser(command, help=summary, description=about)
+    getattr(module, f"add_arguments{end}")(parser)
+    parser.set_defaults(run=getattr(module, f"run{end}"))

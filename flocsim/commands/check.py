@@ -7,13 +7,12 @@ tighter a tolerance than the tightest. Nothing is written.
 
 import itertools
 import math
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
 
-from flocsim.commands import SUMMARIES
 from flocsim.commands.judged import (
     HEADER,
     RIGHT,
@@ -47,15 +46,15 @@ TIGHTEST = 1e-14
 """Tolerance [m] of references at the least: beyond lies rounding."""
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "check",
-        help=SUMMARIES["check"],
-        description="Run some replicates of a study at the extremes of its sizes, numbers of "
-        "vertices, contact stiffness and tolerance, compare them with runs at a much tighter "
-        "tolerance, and print each result. Exit code 0 if all are right or within their "
-        "stated error, 1 otherwise.",
-    )
+DESCRIPTION = (
+    "Run some replicates of a study at the extremes of its sizes, numbers of "
+    "vertices, contact stiffness and tolerance, compare them with runs at a much tighter "
+    "tolerance, and print each result. Exit code 0 if all are right or within their "
+    "stated error, 1 otherwise."
+)
+
+
+def add_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add("--stiffness", nargs=2, metavar=("LOW", "HIGH"),
@@ -73,7 +72,6 @@ def add_parser(subparsers: Any) -> None:
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
         help="override any value of the config, as in flocsim ensemble; may be "
         "repeated")  # fmt: skip
-    parser.set_defaults(run=run)
 
 
 def ends(option: str, given: list[str] | None, unit: str) -> tuple[float, float] | None:

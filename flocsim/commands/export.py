@@ -3,11 +3,9 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from flocsim.commands import SUMMARIES
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
 from flocsim.io.files import write_file
@@ -28,16 +26,16 @@ from flocsim.io.trajectory import WRITERS
 SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS} | {"csv": ".csv", "matrix": ".csv"}
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "export",
-        help=SUMMARIES["export"],
-        description="gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or "
-        "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um; "
-        "vtkhdf: the same as outlines for ParaView, in m. For results of a kernel study, csv: a "
-        "table of all pairs of size classes; matrix: a square matrix for each mechanism and "
-        "N, whose header says what it multiplies.",
-    )
+DESCRIPTION = (
+    "gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or "
+    "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um; "
+    "vtkhdf: the same as outlines for ParaView, in m. For results of a kernel study, csv: a "
+    "table of all pairs of size classes; matrix: a square matrix for each mechanism and "
+    "N, whose header says what it multiplies."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("format", choices=tuple(SUFFIXES))
     add("source", help="file written by flocsim trajectory --save, swarm or kernel")
@@ -55,7 +53,6 @@ def add_parser(subparsers: Any) -> None:
         "second or two for each pair; others: formulas from the literature. Not known for "
         "flocs (default: none, an upper bound)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,9 +3,7 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
-from flocsim.commands import SUMMARIES
 from flocsim.commands.fitting.overlays import (
     draw,
     draw_fits,
@@ -49,14 +47,8 @@ beside the library lists every region, with the reason for those left out.
   flocsim plot shapes.h5          # sizes, and errors against N: the paper's Figs 2 and 3"""
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "fit",
-        help=SUMMARIES["fit"],
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.set_defaults(run=run)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     add = parser.add_argument
     add("images", nargs="+", metavar="IMAGE", help="picture, or folder of pictures")
     add("--pixel-size", metavar="LENGTH",

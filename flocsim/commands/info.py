@@ -1,25 +1,22 @@
 """`flocsim info`: what a file holds, for a person to read."""
 
 import sys
-from argparse import Namespace
-from typing import Any
+from argparse import ArgumentParser, Namespace
 
-from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
 from flocsim.errors import FileError, visible
 from flocsim.io.journal import journal_of
 from flocsim.io.seals import held
 
+DESCRIPTION = (
+    "Print the contents of a file: conditions, counts, probabilities with 95 % "
+    "intervals, and its origin; of a study that is running or was interrupted, the replicates "
+    "so far, without touching it."
+)
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "info",
-        help=SUMMARIES["info"],
-        description="Print the contents of a file: conditions, counts, probabilities with 95 % "
-        "intervals, and its origin; of a study that is running or was interrupted, the replicates "
-        "so far, without touching it.",
-    )
+
+def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("results", help="file written, or being written, by flocsim")
     parser.add_argument(
         "--config", action="store_true", help="print only the config that it was run with"
@@ -34,7 +31,6 @@ def add_parser(subparsers: Any) -> None:
         "with and without the water that they push at each other (a second or two for each pair); "
         "of a shape library, how fast its flocs settle and turn",
     )  # fmt: skip
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:

@@ -1,11 +1,9 @@
 """`flocsim init`: write a commented example of a config file, for each kind of study."""
 
 import re
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
-from flocsim.commands import SUMMARIES
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 
@@ -32,13 +30,11 @@ COMMANDS = {"swarm": "swarm", "kernel": "kernel"}
 """What runs it, where that is not `flocsim ensemble`."""
 
 
-def add_parser(subparsers: Any) -> None:
+DESCRIPTION = "Write a commented example of a config file, ready to run."
+
+
+def add_arguments(parser: ArgumentParser) -> None:
     kinds = "; ".join(f"{name}: {words}" for name, words in KINDS.items())
-    parser = subparsers.add_parser(
-        "init",
-        help=SUMMARIES["init"],
-        description="Write a commented example of a config file, ready to run.",
-    )
     parser.add_argument(
         "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
     )
@@ -46,7 +42,6 @@ def add_parser(subparsers: Any) -> None:
         "--kind", choices=KINDS, default="study", help=f"{kinds} (default: %(default)s)"
     )
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.set_defaults(run=run)
 
 
 def run(args: Namespace) -> int:

@@ -6,7 +6,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.kinds import FILES, contents_of
 from flocsim.ensembles.contents import file_kind, studies
 from flocsim.errors import UsageError
@@ -29,20 +28,16 @@ def drawn() -> dict[str, Any]:
     return {words: figures for name in FILES for words, figures in contents_of(name).drawn.items()}
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "plot",
-        help=SUMMARIES["plot"],
-        description="\n".join(
-            [
-                "Draw the figures of a file, each to its own file.",
-                *(f"Of {kind}:\n{listed(figures)}" for kind, figures in drawn().items()),
-                "Of a running study, the figures of the replicates so far are drawn, marked as "
-                "unfinished.",
-                "Figures are numbered as in Tang et al. (2014).",
-            ]
-        ),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.description = "\n".join(
+        [
+            "Draw the figures of a file, each to its own file.",
+            *(f"Of {kind}:\n{listed(figures)}" for kind, figures in drawn().items()),
+            "Of a running study, the figures of the replicates so far are drawn, marked as "
+            "unfinished.",
+            "Figures are numbered as in Tang et al. (2014).",
+        ]
     )
     parser.add_argument("results", help="file written by flocsim ensemble or flocsim fit")
     parser.add_argument("--output-dir", default=".", metavar="DIR",
@@ -53,8 +48,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--animation", metavar="FILE.gif",
         help="for a swarm study: also write its first swarm as an animation")  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.set_defaults(run=run)
-    add_compare(subparsers)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -127,14 +120,11 @@ def figure_names(text):
     return names
 
 
-def add_compare(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "compare",
-        help=SUMMARIES["compare"],
-        description="Print the differences between two results files, at every condition, or time, "
-        "that both have, with 95 % intervals: of paired replicates where both have drawn the same "
-        "ones (the same seed), otherwise of independent samples. What the studies differ in is "
-        "printed first.",
+def add_arguments_compare(parser: argparse.ArgumentParser) -> None:
+    parser.description = (
+        "Print the differences between two results files, at every condition, or time, that both "
+        "have, with 95 % intervals: of paired replicates where both have drawn the same ones (the "
+        "same seed), otherwise of independent samples. What the studies differ in is printed first."
     )
     parser.add_argument("first", help="results file written by flocsim ensemble")
     parser.add_argument("second", help="results file to compare with it")
@@ -147,7 +137,6 @@ def add_compare(subparsers: Any) -> None:
         "--quantity", "--probability", metavar="NAME",
         help=f"what to compare: {known} (default: the first)",
     )  # fmt: skip
-    parser.set_defaults(run=run_compare)
 
 
 def run_compare(args: argparse.Namespace) -> int:

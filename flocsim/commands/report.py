@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands import FOLDER_HELP, SUMMARIES
+from flocsim.commands import FOLDER_HELP
 from flocsim.commands.motion import SCRIPT, motion_of, text
 from flocsim.ensembles.contents import Contents, Example, Table, overview_of, summary_of
 from flocsim.errors import UsageError
@@ -142,8 +142,7 @@ def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:
     )
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser("report", help=SUMMARIES["report"], description=DESCRIPTION)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("results", help="file that flocsim wrote")
     add("-o", "--output", metavar="FILE.html",
@@ -155,7 +154,6 @@ def add_parser(subparsers: Any) -> None:
     )
     add("--folder", metavar="DIR", help=FOLDER_HELP)
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,11 +3,9 @@
 import argparse
 import fnmatch
 from pathlib import Path
-from typing import Any
 
 import attrs
 
-from flocsim.commands import SUMMARIES
 from flocsim.commands.fit import number
 from flocsim.errors import UsageError, visible
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
@@ -36,21 +34,15 @@ MICRO = 1e6
 MEASURES = ("perim um", "Feret um", "least um", "aspect", "circular", "solidity")
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "shapes",
-        help=SUMMARIES["shapes"],
-        description=DESCRIPTION,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     listed = actions.add_parser("list", help="print sizes, shape measures and errors of every floc")
     chosen = actions.add_parser("select", help="write the selected flocs to a library")
     merged = actions.add_parser("merge", help="merge several libraries into one")
-    for action, run in ((listed, run_list), (chosen, run_write), (merged, run_write)):
+    for action in (listed, chosen, merged):
         action.add_argument("libraries", nargs="+", metavar="LIBRARY",
             help="shape library written by flocsim fit")  # fmt: skip
-        action.set_defaults(run=run)
     for action in (listed, chosen):
         add = action.add_argument
         add("--keep", metavar="LIST", help="these flocs only, by name, separated by commas")
@@ -63,6 +55,11 @@ def add_parser(subparsers: Any) -> None:
         add = action.add_argument
         add("-o", "--output", required=True, metavar="FILE", help="shape library to write")
         add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+
+
+def run(args: argparse.Namespace) -> int:
+    """List, select or merge; returns the exit code."""
+    return run_list(args) if args.action == "list" else run_write(args)
 
 
 def run_list(args: argparse.Namespace) -> int:

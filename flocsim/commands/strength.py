@@ -1,11 +1,11 @@
 """`flocsim strength results.h5 --flow shear`: the rate at which a flow opens bonds of a study."""
 
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
-from flocsim.commands import FOLDER_HELP, SUMMARIES
-from flocsim.ensembles.cli import run_command
+from flocsim.commands import FOLDER_HELP
+from flocsim.ensembles.cli import run as run_command
 from flocsim.ensembles.parallel.communicator import launched_rank
 from flocsim.ensembles.parallel.heartbeat import SECONDS
 from flocsim.errors import UsageError
@@ -20,8 +20,7 @@ to one HDF5 file, with a figure beside it. Runs on ranks and processes, stops an
 does."""
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser("strength", help=SUMMARIES["strength"], description=DESCRIPTION)
+def add_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("results", help="results file of flocsim ensemble")
     add("--flow", default="shear", metavar="FLOW",
@@ -43,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--quiet", action="store_true", help="print warnings and errors only")
     parser.set_defaults(
-        run=run, read=read_survey, heartbeat=SECONDS, dry_run=False, pilot=False, parent=None,
+        read=read_survey, heartbeat=SECONDS, dry_run=False, pilot=False, parent=None,
         plan=None,
     )  # fmt: skip
 

@@ -1,18 +1,14 @@
-"""`flocsim ensemble s.toml`: a study, the same as `python -m flocsim.ensemble s.toml`, by another
-name, `flocsim swarm` and `flocsim kernel`, of that kind of scene; `flocsim sweep s.toml --over
-KEY=1,2,3`: one study at several values of its keys, in one file."""
+"""`flocsim sweep s.toml --over KEY=1,2,3`: one study at several values of its keys, in one file."""
 
 import os
 import re
 import signal
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from shlex import quote
 from types import FrameType
 from typing import Any
 
-from flocsim.commands import ENSEMBLES, SUMMARIES
-from flocsim.ensembles.cli import add_arguments, run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
@@ -29,8 +25,7 @@ COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
 """Commas outside quotes and brackets."""
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser("sweep", help=SUMMARIES["sweep"], description=DESCRIPTION)
+def add_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add(
@@ -50,11 +45,6 @@ def add_parser(subparsers: Any) -> None:
     add("--resume", action="store_true", help="continue a sweep, extend it, or join its parts")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--dry-run", action="store_true", help="print a command for each value, and stop")
-    parser.set_defaults(run=run)
-    for name in ENSEMBLES:
-        words = SUMMARIES[name]
-        parser = subparsers.add_parser(name, help=words, description=words)
-        add_arguments(parser).set_defaults(run=run_command)
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:

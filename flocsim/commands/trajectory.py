@@ -2,9 +2,7 @@
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import Any
 
-from flocsim.commands import SUMMARIES
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pairs.replicates import chosen, one_count_study, replicate_of
@@ -18,9 +16,7 @@ from flocsim.trajectories.figures import animated, drawn
 ANIMATION_FRAMES = 60
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser("trajectory", help=SUMMARIES["trajectory"])
-    parser.set_defaults(run=run)
+def add_arguments(parser: ArgumentParser) -> None:
     add_replicate(parser)
     add = parser.add_argument
     add("--scene", metavar="TYPE,N,F",

@@ -6,14 +6,13 @@ With `--replicate 17`, error against run time of one collision.
 """
 
 import math
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.commands import SUMMARIES
 from flocsim.commands.judged import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.checking import MORE_STEPS
@@ -59,16 +58,16 @@ LADDER_HEADER = (
 )
 
 
-def add_parser(subparsers: Any) -> None:
-    parser = subparsers.add_parser(
-        "work-precision",
-        help=SUMMARIES["work-precision"],
-        description="Run some replicates of a study by every method and tolerance that "
-        'accuracy = "auto" may choose, and print how many outcomes flip, the error of d_c, and '
-        "the CPU time. With "
-        "--replicate: run one replicate by every integrator over six decades of tolerance, and "
-        "print its error against the reference at the time when the first of the two is decided.",
-    )
+DESCRIPTION = (
+    "Run some replicates of a study by every method and tolerance that "
+    'accuracy = "auto" may choose, and print how many outcomes flip, the error of d_c, and '
+    "the CPU time. With "
+    "--replicate: run one replicate by every integrator over six decades of tolerance, and "
+    "print its error against the reference at the time when the first of the two is decided."
+)
+
+
+def add_arguments(parser: ArgumentParser) -> None:
     add_replicate(parser)
     add = parser.add_argument
     add("--count", type=int, metavar="K",
@@ -76,8 +75,7 @@ def add_parser(subparsers: Any) -> None:
     add("-o", "--output", nargs="+", default=[], metavar="FILE",
         help="without --replicate: also draw it, as .png, .pdf or .svg")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.set_defaults(run=run, frames=2, replicate=None)
-    return parser
+    parser.set_defaults(frames=2, replicate=None)
 
 
 def methods(duration: float) -> list[Integrator]:

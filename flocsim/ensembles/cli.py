@@ -27,7 +27,7 @@ UNSHARED = ("quiet", "run", "read", "command")
 """Arguments in which ranks may differ: the others say what is run."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "config",
         help="config file (TOML), - for standard input; `flocsim init` writes an example",
@@ -75,7 +75,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
     # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
     parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--plan", help=argparse.SUPPRESS)
-    return parser
 
 
 def overrides(arguments: argparse.Namespace) -> dict:
@@ -265,7 +264,7 @@ def on_process(comm, arguments):
     return guarded(comm, arguments)
 
 
-def run_command(arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     if arguments.parent is not None:
         end_with_parent(arguments.parent)
     comm: Communicator = Communicator()
@@ -341,9 +340,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
     )
+    add_arguments(parser)
     with plain_streams():
-        arguments = parse_on_all_ranks(add_arguments(parser), argv)
-        code = run_command(arguments)
+        arguments = parse_on_all_ranks(parser, argv)
+        code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:
             tell(f"flocsim: {problem}", sys.stderr)

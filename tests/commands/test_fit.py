@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import fit, info, plot, shapes
+from flocsim.commands import add_command
 from flocsim.commands.fitting import pictures as fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shapes.library import read_library, read_settings
@@ -17,7 +17,7 @@ from tests.helpers.real_images import real_image
 def run(*arguments):
     """The exit code of `flocsim fit` with the arguments."""
     parser = argparse.ArgumentParser(prog="flocsim")
-    fit.add_parser(parser.add_subparsers(required=True))
+    add_command(parser.add_subparsers(required=True), "fit")
     args = parser.parse_args(["fit", *map(str, arguments)])
     return args.run(args)
 
@@ -155,10 +155,9 @@ def test_several_spheroradii_go_to_one_library(tmp_path, frame, capsys):
 
 def test_the_library_is_drawn_and_described(tmp_path, frame, capsys):
     run(frame, "--pixel-size", "1e-6", "--vertices", "4,8", "-o", tmp_path / "s.h5")
-    for command, words in ((plot, ["--output-dir", tmp_path]), (info, [])):
+    for name, words in (("plot", ["--output-dir", tmp_path]), ("info", [])):
         parser = argparse.ArgumentParser()
-        command.add_parser(parser.add_subparsers())
-        name = command.__name__.split(".")[-1]
+        add_command(parser.add_subparsers(), name)
         args = parser.parse_args([name, str(tmp_path / "s.h5"), *map(str, words)])
         assert args.run(args) == 0
     printed = capsys.readouterr().out
@@ -313,7 +312,7 @@ def test_holes_are_kept_on_request(tmp_path, capsys):
         assert read_settings(kept)["holes"] and "holes" not in read_settings(plain)
     capsys.readouterr()
     shapes_parser = argparse.ArgumentParser(prog="flocsim")
-    shapes.add_parser(shapes_parser.add_subparsers(required=True))
+    add_command(shapes_parser.add_subparsers(required=True), "shapes")
     args = shapes_parser.parse_args(["shapes", "select", str(kept), "-o", str(tmp_path / "s.h5")])
     assert args.run(args) == 0
     [again] = read_library(tmp_path / "s.h5")

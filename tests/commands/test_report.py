@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import flocsim
-from flocsim.commands import report
+from flocsim.commands import add_command
 from flocsim.ensembles.pairs import contents
 from flocsim.ensembles.report import efficiency_rows
 from flocsim.ensembles.studies.study import Study
@@ -32,7 +32,7 @@ HOSTILE = "<script>document.title='taken'</script><img src=x onerror=alert(1)>'\
 def call(*words):
     """Parse the words as the `flocsim` command does, and run."""
     parser = argparse.ArgumentParser(prog="flocsim")
-    report.add_parser(parser.add_subparsers())
+    add_command(parser.add_subparsers(), "report")
     args = parser.parse_args(["report", *map(str, words)])
     return args.run(args)
 

@@ -8,7 +8,7 @@ import attrs
 import pytest
 
 from flocsim.body import Body
-from flocsim.commands import init
+from flocsim.commands import add_command, init
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.pair_scene import TYPES, BrownianScene, FlowScene, SettlingScene
@@ -179,7 +179,7 @@ def test_every_preset_runs_by_itself_and_can_be_overridden(load_preset, name):
 
 def parse_init(*arguments):
     parser = argparse.ArgumentParser()
-    init.add_parser(parser.add_subparsers())
+    add_command(parser.add_subparsers(), "init")
     return parser.parse_args(["init", *arguments])
 
 
