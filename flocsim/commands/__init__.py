@@ -1,4 +1,5 @@
-"""The subcommands of ``flocsim``; ``fitting`` is the work behind ``fit``.
+"""The subcommands of ``flocsim``; ``fit_pictures`` and ``processes`` are the work behind ``fit``,
+``judged`` that behind ``check``; ``contents`` is what files hold that are of no study.
 
 The file of a command has ``add_arguments(parser)``, ``run(arguments)``, which gives the exit code,
 and a DESCRIPTION; each has a line in SUMMARIES, and one in FILES where its file has another name.
@@ -38,7 +39,9 @@ FOLDER_HELP = (
 ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""
 
-FILES = {"compare": ("commands.plot", "_compare")} | dict.fromkeys(ENSEMBLES, ("ensembles.cli", ""))
+FILES = {
+    "compare": ("commands.plot", "_compare"), "strength": ("commands.sweep", "_strength"),
+} | dict.fromkeys(ENSEMBLES, ("ensembles.cli", ""))  # fmt: skip
 """{command: (the module that it shares, how the names of its functions end)}."""
 
 

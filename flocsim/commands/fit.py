@@ -4,19 +4,17 @@ import argparse
 import sys
 from pathlib import Path
 
-from flocsim.commands.fitting.overlays import (
+from flocsim.commands.fit_pictures import (
+    LOST,
+    distinct,
     draw,
     draw_fits,
     expected_overlays,
-    pictures_beneath,
-    stem_of,
-)
-from flocsim.commands.fitting.pictures import (
-    LOST,
-    distinct,
     fit_pictures,
     list_pictures,
+    pictures_beneath,
     report,
+    stem_of,
     titles_of,
 )
 from flocsim.errors import UsageError

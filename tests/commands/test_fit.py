@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flocsim.commands import add_command
-from flocsim.commands.fitting import pictures as fit_pictures
+from flocsim.commands import add_command, fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.real_images import real_image

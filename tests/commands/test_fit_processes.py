@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 from flocsim.__main__ import main
-from flocsim.commands.fitting import pictures as fit_pictures
-from flocsim.commands.fitting import processes as fit_processes
-from flocsim.commands.fitting.processes import Lost, workers
+from flocsim.commands import fit_pictures
+from flocsim.commands import processes as fit_processes
+from flocsim.commands.processes import Lost, workers
 from flocsim.errors import UsageError
 from flocsim.io.shapes.library import read_library
 from tests.helpers.small_study import ROOT
@@ -201,7 +201,7 @@ def interrupted(*_, **__):
 def test_processes_end_with_their_parent(tmp_path):
     code = (
         "import os, time\n"
-        "from flocsim.commands.fitting.processes import workers\n"
+        "from flocsim.commands.processes import workers\n"
         "def where(number):\n"
         "    if number < 2:\n"
         "        os.write(1, b'%d\\n' % os.getpid())  # at once, unlike print\n"

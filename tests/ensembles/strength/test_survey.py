@@ -11,7 +11,7 @@ import pytest
 
 from flocsim import __main__ as program
 from flocsim.commands import plot
-from flocsim.commands.strength import places
+from flocsim.commands.sweep import places
 from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, table_of
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run, run_to_file
