@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from flocsim import hydrodynamics as hydrodynamics
     from flocsim import integrators as integrators
     from flocsim.body import Body, Fluid
-    from flocsim.ensembles.comparison import compare
+    from flocsim.ensembles.contents import compare
     from flocsim.ensembles.contents import open_any as open
     from flocsim.ensembles.pairs.comparison import Comparison
     from flocsim.ensembles.pairs.opened import StudyResults
@@ -53,7 +53,7 @@ HOMES = {
     "SweepResults": "io.results.sweep_file",
     "System": "system",
     "Trajectory": "trajectories.trajectory",
-    "compare": "ensembles.comparison",
+    "compare": "ensembles.contents",
     "curvilinear_factor": "io.results.kernel_tables",
     "floor": "swarms.placement",
     "open": "ensembles.contents:open_any",

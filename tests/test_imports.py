@@ -75,7 +75,7 @@ INNER_ROWS = {
         ["cli", "studies"],
         ["runner"],
         [folder.name for folder in STUDIES.values()],
-        ["comparison", "dry_run", "report"],
+        ["dry_run", "report"],
         ["parallel"],
         ["pilot"],
         ["estimates"],

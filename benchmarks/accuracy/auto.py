@@ -28,8 +28,15 @@ from flocsim.ensembles.pilot.choice import (
     first_methods,
     sampling_error,
 )
-from flocsim.ensembles.pilot.ladder import DECADES, at_rung, scene_length
-from flocsim.ensembles.pilot.trials import Job, is_flip, sample_of, try_out
+from flocsim.ensembles.pilot.ladder import (
+    DECADES,
+    Job,
+    at_rung,
+    is_flip,
+    sample_of,
+    scene_length,
+    try_out,
+)
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from flocsim.io.confidence import wilson

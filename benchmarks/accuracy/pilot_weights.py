@@ -16,7 +16,7 @@ import numpy as np
 import flocsim.arrays as at
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.pilot.trials import WEIGHTS
+from flocsim.ensembles.pilot.ladder import WEIGHTS
 from flocsim.ensembles.study import Study
 
 CONFIG = 'preset = "tang2014"\nseed = 3\n[scene]\ntypes = ["I", "II"]\n[shapes]\n'

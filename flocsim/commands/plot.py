@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.ensembles.config.kinds import FILES, contents_of
-from flocsim.ensembles.contents import file_kind, studies
+from flocsim.ensembles.contents import compare, file_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_of
@@ -141,8 +141,6 @@ def add_arguments_compare(parser: argparse.ArgumentParser) -> None:
 
 def run_compare(args: argparse.Namespace) -> int:
     """Print the comparison; the exit code."""
-    from flocsim.ensembles.comparison import compare
-
     both = [file_kind(source := held(path), "compare").opened(source)
             for path in (args.first, args.second)]  # fmt: skip
     comparison = compare(*both)

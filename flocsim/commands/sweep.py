@@ -108,7 +108,7 @@ def run_sweep(args, study, how):
 
 def run_elasticities(args, study, how):
     """Run both values of each key, print the table and write the figure."""
-    from flocsim.ensembles.studies.elasticity import RATIO, elasticities
+    from flocsim.ensembles.studies.sweep import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
     from flocsim.io.plots.style import checked_format, save
     from flocsim.io.plots.sweep import elasticities as figure_of

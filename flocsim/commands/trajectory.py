@@ -5,7 +5,7 @@ from pathlib import Path
 
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.pairs.replicates import chosen, one_count_study, replicate_of
+from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
@@ -68,12 +68,7 @@ def select(config: Config, args: Namespace) -> tuple[int, int, float]:
         raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
     if not 2 <= args.frames <= 50:
         raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
-    names = list(config.scene.names)
-    condition = chosen(args.type, names, "--type", 0)
-    vertices = config.shapes.vertices
-    vertex_count = vertices[chosen(args.vertices, vertices, "--vertices", -1)]
-    delta = config.scene.delta
-    return condition, vertex_count, delta[chosen(args.delta, delta, "--delta", 0)]
+    return place_of(config, args.type, args.vertices, args.delta, "--")
 
 
 def outcome_line(config, place, replicate, row):

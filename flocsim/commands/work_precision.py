@@ -19,10 +19,19 @@ from flocsim.ensembles.collision.checking import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels import study_of
-from flocsim.ensembles.pairs.replicates import one_count_study, with_one_count
+from flocsim.ensembles.pairs.opened import one_count_study, with_one_count
 from flocsim.ensembles.pilot.choice import ALLOWED, first_methods, sampling_error, settled
-from flocsim.ensembles.pilot.ladder import DECADES, REFERENCE, Ladder, at_rung, scene_length
-from flocsim.ensembles.pilot.trials import Job, Trial, sample_of, try_out
+from flocsim.ensembles.pilot.ladder import (
+    DECADES,
+    REFERENCE,
+    Job,
+    Ladder,
+    Trial,
+    at_rung,
+    sample_of,
+    scene_length,
+    try_out,
+)
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError

@@ -22,8 +22,8 @@ from flocsim.ensembles.pilot.forecast import (
     time_replicates,
     timed,
 )
+from flocsim.ensembles.pilot.ladder import LADDER, pilot_size
 from flocsim.ensembles.pilot.needless import find, words_of
-from flocsim.ensembles.pilot.trials import LADDER, pilot_size
 from flocsim.ensembles.preflight import (
     IMPLIED,
     kinds,

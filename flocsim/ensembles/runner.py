@@ -39,7 +39,7 @@ from flocsim.ensembles.pilot.choice import (
     first_methods,
     recorded_choice,
 )
-from flocsim.ensembles.pilot.trials import Job, try_out
+from flocsim.ensembles.pilot.ladder import Job, try_out
 from flocsim.ensembles.preflight import said_doubts
 from flocsim.ensembles.storage.identity import arithmetic_digest, short
 from flocsim.ensembles.storage.plan import refuse_other_part

@@ -6,7 +6,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.commands import work_precision
 from flocsim.ensembles.pilot.choice import first_methods
-from flocsim.ensembles.pilot.trials import Job, Task, sample_of
+from flocsim.ensembles.pilot.ladder import Job, Task, sample_of
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit
 from tests.helpers.small_study import small_config, small_study, write_small

@@ -6,7 +6,7 @@ import pytest
 from flocsim import run
 from flocsim.ensembles.collision.draw import FAILED, FAILURES, Draw
 from flocsim.ensembles.collision.start import draws
-from flocsim.ensembles.pairs.replicates import replicate_of
+from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim import Sphere
-from flocsim.ensembles.pairs.replicates import replicate_of
+from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.trajectories.figures import frames_at, frames_of, instants_along, travelled
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.chunks import ORDER
-from flocsim.ensembles.comparison import Differences, changes_between, common, labelled_of, starred
+from flocsim.ensembles.contents import Differences, changes_between, common, labelled_of, starred
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
 from flocsim.ensembles.estimates.paired import (
     between,

@@ -1,9 +1,10 @@
-"""StudyResults: a results file with its arrays, tables and figures, and its replicates anew; one of
-each class.
+"""StudyResults: a results file with its arrays, tables and figures; replicates of it, or of any
+study, run again, their motions kept as Trajectories.
 """
 
 import functools
 import os
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,24 +12,19 @@ from typing import Any
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.config.sources import Consent, Sources, read_sources
-from flocsim.ensembles.contents import Example, file_kind
+from flocsim.ensembles.contents import Example, file_kind, stored_in
 from flocsim.ensembles.equivalent_spheres import water_facts
-from flocsim.ensembles.pairs.replicates import (
-    Place,
-    chosen,
-    one_count_study,
-    place_of,
-    recorded_methods,
-    replicate_of,
-    row_in_words,
-)
+from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import Place
+from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
-from flocsim.ensembles.storage.stored_json import stored
-from flocsim.ensembles.study import Study, methods_of
+from flocsim.ensembles.study import Study, methods_of, says_outcome
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
@@ -38,9 +34,98 @@ from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import first_of_each, read_results, read_row
 from flocsim.io.results.layout import FORMAT
-from flocsim.io.results.schema import CLASSES, GROUPS, Results
+from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
 from flocsim.io.seals import held
+from flocsim.run import Run
+from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
+
+
+def place_of(
+    config: Config, type: str | None, vertices: int | None, delta: float | None, dashes: str = ""
+) -> Place:
+    """The condition with these values: by default the first type, the last N, the first δ.
+    ``dashes``: before the names of the options, for messages."""
+    counts, shares = config.shapes.vertices, config.scene.delta
+    return (
+        chosen(type, config.scene.names, f"{dashes}type", 0),
+        counts[chosen(vertices, counts, f"{dashes}vertices", -1)],
+        shares[chosen(delta, shares, f"{dashes}delta", 0)],
+    )
+
+
+def chosen(value: Any, known: Sequence, option: str, default: int) -> int:
+    """The place of a value among those that there are; UsageError where it is none of them."""
+    known = list(known)
+    if value is None:
+        value = known[default]
+    if value not in known:
+        raise UsageError(f"{option} must be one of {', '.join(map(str, known))}, found {value}")
+    return known.index(value)
+
+
+def with_one_count(config: Config, vertex_count: int) -> Config:
+    """The config with one number of vertices: the flocs need no fits at the others."""
+    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
+
+
+def one_count_study(
+    config: Config, vertex_count: int, methods: dict[str, Integrator] | None = None
+) -> Study:
+    """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
+    one, methods = with_one_count(config, vertex_count), methods or final_methods(config)
+    return study_of(one, methods=methods)
+
+
+def recorded_methods(record: dict) -> dict[str, Integrator] | None:
+    """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record.
+    UsageError for methods that are none."""
+    for each in record.get("types", []):
+        chosen(each["method"], tuple(METHODS), "the method chosen by a pilot", 0)
+    return {
+        each["name"]: METHODS[each["method"]](each["tolerance"]) for each in record.get("types", [])
+    } or None
+
+
+def replicate_of(replicate: int, place: Place, study: Study, most: int | None = None) -> Trajectory:
+    """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words.
+
+    ``most`` steps, where they are less than the config's.
+    """
+    if not is_whole(replicate) or not replicate >= 0:
+        raise UsageError(f"replicate must be a whole number of at least 0, found {replicate!r}")
+    began, draw = time.perf_counter(), study.draw(*place, int(replicate))
+    driver, system = study.driver(draw.encounter), draw.encounter.system
+
+    def attempt(steps: int, method: Integrator | None = None) -> tuple[dict, Trajectory]:
+        steps = steps if most is None else min(most, steps)
+
+        def fresh(record: bool = False) -> Run:
+            return draw.begin(driver, steps, integrator=method, record=record)
+
+        run = fresh(record=True)
+        status = run.to_end()
+        row = draw.row(run, status)
+        origin = Origin(
+            system.bodies, system.forces, system.fluid, method or system.integrator, fresh, run,
+            ((run.steps, float(run.clock[at.UNTIL])),),
+        )  # fmt: skip
+        lasted = time.perf_counter() - began
+        return row, Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)
+
+    row, found = attempt(study.config.integrator.max_steps)
+    if again := study.second_attempt(place[0], row):
+        row, second = attempt(*again)
+        return second if says_outcome(row) else found
+    return found
+
+
+def row_in_words(row: dict) -> dict:
+    """A row of the table of replicates with the words of its codes."""
+    words = {name: dict(zip(*flags, strict=True)) for name, flags in FLAGS.items()}
+    found = {name: words[name][value] if name in words else value for name, value in row.items()}
+    return found | {"failure": FAILURES[row["failure"]]}
+
 
 STEPS_MORE = 1000
 """Steps beyond twice those of its row after which a replicate is given up as another one."""
@@ -115,10 +200,7 @@ class StudyResults(Tables):
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
-        try:
-            return stored(self.run, name)
-        except ValueError as error:
-            raise FileError(f"{self.path} has no readable results: {error}") from error
+        return stored_in(self, name)
 
     def table(self) -> str:
         """Counts and probabilities of every condition as the command prints them, as text."""

@@ -26,20 +26,18 @@ from flocsim.ensembles.pilot.ladder import (
     DECADES,
     REFERENCE,
     RUNGS,
+    WEIGHTS,
     Belief,
+    Job,
     Ladder,
+    Trial,
     at_rung,
     beliefs,
+    expected_replicates,
     mean,
+    sample_of,
     sampling_half_width,
     scene_length,
-)
-from flocsim.ensembles.pilot.trials import (
-    WEIGHTS,
-    Job,
-    Trial,
-    expected_replicates,
-    sample_of,
     try_out,
 )
 from flocsim.ensembles.preflight import sphere_pairs

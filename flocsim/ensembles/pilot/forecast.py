@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.pilot.trials import (
+from flocsim.ensembles.pilot.ladder import (
     MOST,
     Job,
     Task,

@@ -15,7 +15,7 @@ from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.pilot.forecast import Timed
-from flocsim.ensembles.pilot.trials import Job, is_flip, try_out
+from flocsim.ensembles.pilot.ladder import Job, is_flip, try_out
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError

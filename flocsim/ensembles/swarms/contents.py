@@ -6,16 +6,20 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.comparison import Differences, changes_between, common, labelled_of, starred
 from flocsim.ensembles.contents import (
     Contents,
+    Differences,
     Facts,
     Figures,
     Joined,
     Summary,
     Table,
+    changes_between,
+    common,
     in_words,
+    labelled_of,
     origin,
+    starred,
 )
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import UsageError, visible

@@ -13,8 +13,14 @@ from flocsim.ensembles.pilot.choice import (
     first_methods,
     recorded_choice,
 )
-from flocsim.ensembles.pilot.ladder import RUNGS, falls, sampling_half_width, scene_length
-from flocsim.ensembles.pilot.trials import WEIGHTS, Trial
+from flocsim.ensembles.pilot.ladder import (
+    RUNGS,
+    WEIGHTS,
+    Trial,
+    falls,
+    sampling_half_width,
+    scene_length,
+)
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.study import Study

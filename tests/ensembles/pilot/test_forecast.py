@@ -22,7 +22,7 @@ from flocsim.ensembles.pilot.forecast import (
     time_replicates,
     timed,
 )
-from flocsim.ensembles.pilot.trials import Trial
+from flocsim.ensembles.pilot.ladder import Trial
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.study import Study
 from flocsim.io.results.events import CERTIFICATE, HOOK

@@ -6,6 +6,7 @@ import pytest
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot import needless
 from flocsim.ensembles.pilot.forecast import Timed, in_turn, time_replicates
+from flocsim.ensembles.pilot.ladder import Task, Trial
 from flocsim.ensembles.pilot.needless import (
     ENOUGH,
     INERTIA,
@@ -19,7 +20,6 @@ from flocsim.ensembles.pilot.needless import (
     without_force,
     words_of,
 )
-from flocsim.ensembles.pilot.trials import Task, Trial
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.small_study import small_study

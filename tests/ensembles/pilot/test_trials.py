@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from flocsim.ensembles.pilot.trials import (
+from flocsim.ensembles.pilot.ladder import (
     LADDER,
     LEAST,
     MOST,

@@ -189,7 +189,7 @@ def test_a_replicate_that_comes_out_otherwise_is_refused(study):
     path = study / "r.h5"
     found = read_results(path)
     found.replicates["steps"][:] = 0
-    found.replicates["outcome"][0, 0, 0, 0], found.replicates["bond"][0, 0, 0, 0] = 4, 255
+    found.replicates["outcome"][0, 0, 0, 0], found.replicates["bond"][0, 0, 0, 0] = 5, 255
     path.unlink()
     write_results(path, found)
     with pytest.raises(UsageError, match="cannot be reproduced: outcome is"):
