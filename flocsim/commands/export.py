@@ -10,16 +10,7 @@ from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.results.kernel_tables import (
-    CORRECTIONS,
-    MODELS,
-    OF_MODELS,
-    QUANTITIES,
-    REFERENCES,
-    SPHERES,
-    kernel_csv,
-    kernel_matrix,
-)
+from flocsim.io.results import kernel_tables
 from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
@@ -42,12 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", metavar="FILE",
         help="file to write (default: run.gsd for run.h5, in the current folder); for matrices, "
         "the start of their names")  # fmt: skip
-    add("--what", choices=QUANTITIES, default="efficiency",
+    add("--what", choices=kernel_tables.QUANTITIES, default="efficiency",
         help="for matrices: the quantity to write (default: %(default)s)")  # fmt: skip
-    add("--model", choices=MODELS, default="spheres",
+    add("--model", choices=kernel_tables.MODELS, default="spheres",
         help="for matrices of efficiencies: the model whose kernels they multiply (default: "
         "%(default)s); flocmod's settling kernel lacks Stokes's 1/18")  # fmt: skip
-    add("--curvilinear", choices=(SPHERES, *CORRECTIONS),
+    add("--curvilinear", choices=(kernel_tables.SPHERES, *kernel_tables.CORRECTIONS),
         help="for matrices of efficiencies: multiply by this factor of solid spheres, for the "
         "water that they push aside. spheres: computed for the study's spheres and forces, a "
         "second or two for each pair; others: formulas from the literature. Not known for "
@@ -70,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.source])
     if args.format == "csv":
-        write_file(path, kernel_csv(kernel_in(args.source)).encode(), rule)
+        write_file(path, kernel_tables.kernel_csv(kernel_in(args.source)).encode(), rule)
     else:
         kind = file_kind(source := held(args.source), "motion")
         t, position, velocity, shapes = kind.motion(kind.read(source))
@@ -112,21 +103,23 @@ def run_matrices(args):
     kernel, rule = kernel_in(args.source), data_rule(args.overwrite)
     start = Path(args.output or Path(args.source).stem)
     start = start.with_suffix("") if start.suffix.lower() == ".csv" else start
-    ending = (args.model, args.curvilinear) if args.what in OF_MODELS else ()
+    ending = (args.model, args.curvilinear) if args.what in kernel_tables.OF_MODELS else ()
     texts, without = {}, []
-    wanted = args.curvilinear == SPHERES and args.what in OF_MODELS
+    wanted = args.curvilinear == kernel_tables.SPHERES and args.what in kernel_tables.OF_MODELS
     exact = water_factors(args.source) if wanted else {}
     for mechanism in kernel.mechanisms:
-        if args.what in OF_MODELS and args.model not in REFERENCES.get(mechanism, {}):
+        if args.what in kernel_tables.OF_MODELS and args.model not in kernel_tables.REFERENCES.get(
+            mechanism, {}
+        ):
             continue
-        formulas = CORRECTIONS.get(args.curvilinear)
+        formulas = kernel_tables.CORRECTIONS.get(args.curvilinear)
         if formulas is not None and mechanism not in formulas:
             without.append(mechanism)
             continue
         for count in kernel.vertices.tolist():
             parts = (mechanism, f"N{count}", args.what, *ending)
             name = f"{start.name}-{'-'.join(filter(None, parts))}.csv"
-            texts[start.with_name(name)] = kernel_matrix(
+            texts[start.with_name(name)] = kernel_tables.kernel_matrix(
                 kernel, mechanism, count, args.what, args.model, args.curvilinear,
                 exact.get(mechanism),
             )  # fmt: skip

@@ -6,28 +6,7 @@ from typing import Any, ClassVar
 
 import attrs
 
-from flocsim.ensembles.config.pair_scene import (
-    CLASSES,
-    FLOWS,
-    LARGEST_LENGTH,
-    MEASURED,
-    MECHANISMS,
-    MOST_CLASSES,
-    SETTLING,
-    WEIGHT,
-    DrivenScene,
-    FlowScene,
-    Problem,
-    micrometres,
-    uneven_points,
-)
-from flocsim.ensembles.config.values import (
-    list_of,
-    number,
-    one_of,
-    read_by,
-    whole_field,
-)
+from flocsim.ensembles.config import pair_scene, values
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
 from flocsim.forces.thermal import thermal_in
@@ -37,8 +16,8 @@ MOST_SCRAMBLES = 64
 KERNEL_REPLICATES = 4096
 """Of every condition of a kernel study where nothing is said."""
 
-read_meetings = list_of(
-    one_of(MECHANISMS), "one of, or a list of, 'settling', 'shear', 'extension'"
+read_meetings = values.list_of(
+    values.one_of(pair_scene.MECHANISMS), "one of, or a list of, 'settling', 'shear', 'extension'"
 )
 
 
@@ -48,7 +27,7 @@ def as_tuple(value: Any) -> tuple[str, ...]:
 
 
 @attrs.frozen
-class KernelScene(DrivenScene):
+class KernelScene(pair_scene.DrivenScene):
     """With `kind = "kernel"`: the sizes of the bodies, what brings them together, how their
     orientations and offsets are sampled, and how their meetings begin and end."""
 
@@ -56,7 +35,7 @@ class KernelScene(DrivenScene):
 
     kind: str = choice("kernel", default="kernel", help="rates of encounters")
     meeting: tuple[str, ...] = attrs.field(
-        default=(SETTLING,),
+        default=(pair_scene.SETTLING,),
         converter=as_tuple,
         metadata={
             "read": lambda value: read_meetings([value] if isinstance(value, str) else value),
@@ -69,9 +48,9 @@ class KernelScene(DrivenScene):
     rate: float | None = quantity(
         "1/s", above=0.0, default=None, help="G or s of the flow in which they meet"
     )
-    sizes: tuple[float, ...] | None = read_by(
-        list_of(
-            number("m", *number_range(above=0.0, at_most=LARGEST_LENGTH)),
+    sizes: tuple[float, ...] | None = values.read_by(
+        values.list_of(
+            values.number("m", *number_range(above=0.0, at_most=pair_scene.LARGEST_LENGTH)),
             "a list of radii such as ['5 um', '10 um']",
         ),
         "a list of ascending radii, each above 0 and at most 0.01",
@@ -80,12 +59,12 @@ class KernelScene(DrivenScene):
         help='equivalent radii of the size classes; without it, pairs = "measured"',
     )
     pairs: str | None = choice(
-        MEASURED,
+        pair_scene.MEASURED,
         default=None,
         help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
     )
-    weight: str | None = WEIGHT
-    classes: int | tuple[float, ...] | None = CLASSES
+    weight: str | None = pair_scene.WEIGHT
+    classes: int | tuple[float, ...] | None = pair_scene.CLASSES
     types: None = attrs.field(init=False, default=None)
     delta: tuple[float, ...] = attrs.field(init=False, default=(1.0,))
     delta_max: str = attrs.field(init=False, default="radius")
@@ -93,7 +72,7 @@ class KernelScene(DrivenScene):
         "auto",
         "m",
         above=0.0,
-        at_most=LARGEST_LENGTH,
+        at_most=pair_scene.LARGEST_LENGTH,
         default="auto",
         help="distance of the outlines at the start; auto: where the forces between them have "
         "fallen to `far`",
@@ -106,7 +85,7 @@ class KernelScene(DrivenScene):
         help="speed that the forces between two bodies may cause at an automatic start, as a share "
         "of the speed at which the bodies approach each other",
     )
-    scrambles: int = whole_field(
+    scrambles: int = values.whole_field(
         2,
         MOST_SCRAMBLES,
         default=8,
@@ -114,7 +93,7 @@ class KernelScene(DrivenScene):
         "from whose scatter the intervals follow; replicates = scrambles times a power of 2",
     )
 
-    flow_in_fluid = FlowScene.flow_in_fluid
+    flow_in_fluid = pair_scene.FlowScene.flow_in_fluid
 
     def __attrs_post_init__(self):
         if (self.sizes is None) == (self.pairs is None):
@@ -124,14 +103,16 @@ class KernelScene(DrivenScene):
             )
         if list(self.sizes or ()) != sorted(self.sizes or ()):
             raise ConfigError("sizes must be ascending radii")
-        if len(self.sizes or ()) > MOST_CLASSES:
-            raise ConfigError(f"there may be at most {MOST_CLASSES} sizes, found {len(self.sizes)}")
-        if self.sizes and len(self.sizes) == 1 and SETTLING in self.meeting:
+        if len(self.sizes or ()) > pair_scene.MOST_CLASSES:
+            raise ConfigError(
+                f"there may be at most {pair_scene.MOST_CLASSES} sizes, found {len(self.sizes)}"
+            )
+        if self.sizes and len(self.sizes) == 1 and pair_scene.SETTLING in self.meeting:
             raise ConfigError(
                 "bodies of one size settle equally fast and never meet: give several sizes, or "
                 "a meeting in shear or extension"
             )
-        if any(each in FLOWS for each in self.meeting) != (self.rate is not None):
+        if any(each in pair_scene.FLOWS for each in self.meeting) != (self.rate is not None):
             raise ConfigError(
                 'rate belongs to a flow: meeting = "shear" or "extension" needs it, as in '
                 'rate = "10 1/s", and "settling" alone has none'
@@ -143,7 +124,7 @@ class KernelScene(DrivenScene):
         """The names of the size classes, the smallest first."""
         if self.sizes is None:
             return self.class_labels
-        return tuple(f"{micrometres(each)}um" for each in self.sizes)
+        return tuple(f"{pair_scene.micrometres(each)}um" for each in self.sizes)
 
     @property
     def conditions(self) -> tuple[tuple[int, int, int], ...]:
@@ -156,7 +137,7 @@ class KernelScene(DrivenScene):
             (place, i, j)
             for place, meeting in enumerate(self.meeting)
             for i, j in itertools.combinations_with_replacement(places, 2)
-            if i != j or meeting != SETTLING or self.is_measured
+            if i != j or meeting != pair_scene.SETTLING or self.is_measured
         )
 
     def meeting_of(self, place: int) -> str:
@@ -186,7 +167,7 @@ class KernelScene(DrivenScene):
         """The scene as it is: its classes stay together."""
         return self
 
-    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+    def problems(self, parts: Mapping[str, Any]) -> Iterator[pair_scene.Problem]:
         """What does not go together with the other tables of a config, by their names."""
         yield from super().problems(parts)
         if thermal_in(parts["forces"]):
@@ -197,4 +178,6 @@ class KernelScene(DrivenScene):
             )
             yield ("forces", "thermal"), text
         given = {"replicates": KERNEL_REPLICATES, **parts}
-        yield from uneven_points(given, self.scrambles, f"scene.scrambles = {self.scrambles}")
+        yield from pair_scene.uneven_points(
+            given, self.scrambles, f"scene.scrambles = {self.scrambles}"
+        )

@@ -11,6 +11,7 @@ from typing import Any
 import attrs
 
 from flocsim.body import Fluid, FractalDensity
+from flocsim.ensembles.config import toml_text
 from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.pair_scene import (
     MEASURED,
@@ -40,13 +41,6 @@ from flocsim.ensembles.config.schema import (
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import (
-    DEEPEST_TABLE,
-    MOST_PARTS,
-    STANDARD_INPUT,
-    parse,
-    text_problem,
-)
 from flocsim.ensembles.config.values import (
     Misfit,
     Problems,
@@ -72,7 +66,7 @@ def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict
     merged = {key: value for key, value in below.items() if key not in gone}
     merged = merged if path else without_following(merged, given)
     for key, value in given.items():
-        if isinstance(value, dict) and len(path) < DEEPEST_TABLE:
+        if isinstance(value, dict) and len(path) < toml_text.DEEPEST_TABLE:
             under = merged.get(key)
             value = lay_over(under if isinstance(under, dict) else {}, value, (*path, key))
         merged[key] = value
@@ -172,9 +166,9 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     if not equals or not all(keys):
         raise ConfigError(f"--set {text!r}: write KEY=VALUE, e.g. --set scene.delta='[0.0, 0.5]'")
     value = value.strip()
-    beyond = text_problem(value)
-    if beyond is not None or len(keys) > MOST_PARTS:
-        what = beyond[1] if beyond else f"a key of more than {MOST_PARTS} parts"
+    beyond = toml_text.text_problem(value)
+    if beyond is not None or len(keys) > toml_text.MOST_PARTS:
+        what = beyond[1] if beyond else f"a key of more than {toml_text.MOST_PARTS} parts"
         raise ConfigError(f"--set {text[:40]!r}…: {what}: a config never needs that")
     try:
         table = tomllib.loads(f"value = {value}\n")
@@ -231,7 +225,7 @@ def load_any_config(
     text = sources.text(path)
     overrides, folder = overrides or {}, Path(path).parent
     problems = Problems(file=str(path), text=text, overrides=overrides)
-    table = lay_over(parse(path, text), overrides)
+    table = lay_over(toml_text.parse(path, text), overrides)
     given, preset = table.keys(), table.get("preset")
     if isinstance(preset, str):
         table = lay_over(PRESETS.get(preset, {}), table)
@@ -245,7 +239,7 @@ def load_any_config(
     parts = reader.config_parts(table)
     problems.raise_if_any()
     if "file" not in table.get("output", {}):
-        stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
+        stem = "study" if str(path) == toml_text.STANDARD_INPUT else Path(path).stem
         parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
     return Config(
         text=text, folder=folder, overrides=overrides, modules=dict(sources.modules), **parts

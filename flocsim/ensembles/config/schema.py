@@ -19,24 +19,9 @@ from typing import Any
 import attrs
 
 from flocsim.body import Fluid, FractalDensity
+from flocsim.ensembles.config import own_classes, pair_scene
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.kinds import scenes
-from flocsim.ensembles.config.own_classes import (
-    INTEGRATOR,
-    SHAPE,
-    check_integrator,
-    check_shape,
-    full_name,
-    named_class,
-)
-from flocsim.ensembles.config.pair_scene import (
-    LARGEST_LENGTH,
-    PAIR_SCENES,
-    SOBOL,
-    SOBOL_SCRAMBLES,
-    PairScene,
-    SettlingScene,
-)
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.values import (
     list_of,
@@ -148,8 +133,8 @@ class ShapesConfig:
     own: Shape | None = attrs.field(
         default=None,
         kw_only=True,
-        metadata=named_class(
-            SHAPE,
+        metadata=own_classes.named_class(
+            own_classes.SHAPE,
             "a shape of your own instead of a `source`, the same for both bodies, scaled to "
             "their sizes; its parameters are further keys, and of the keys here only `vertices` "
             "can be given with it",
@@ -183,7 +168,7 @@ class ShapesConfig:
     radius: float = quantity(
         "m",
         above=0.0,
-        at_most=LARGEST_LENGTH,
+        at_most=pair_scene.LARGEST_LENGTH,
         default=1e-6,
         help="spheroradius r of the flocs after resizing",
     )
@@ -242,13 +227,13 @@ class ShapesConfig:
 
     def __attrs_post_init__(self):
         if self.own is not None:
-            check_shape(self.own)
+            own_classes.check_shape(self.own)
             known = (1, len(self.own.vertices))
             for count in self.vertices:
                 if count not in known:
                     raise ConfigError(
                         f"vertices may be 1, the equivalent sphere, and {known[1]}, the core "
-                        f"points of {full_name(self.own)}, found {count}"
+                        f"points of {own_classes.full_name(self.own)}, found {count}"
                     )
         if self.source == "library" and self.file is None:
             raise ConfigError(
@@ -258,7 +243,7 @@ class ShapesConfig:
     @property
     def label(self) -> str:
         """The source, or the name of the user's own class."""
-        return self.source or full_name(self.own)
+        return self.source or own_classes.full_name(self.own)
 
 
 FRACTAL = (
@@ -336,8 +321,8 @@ class IntegratorConfig:
     own: Integrator | None = attrs.field(
         default=None,
         kw_only=True,
-        metadata=named_class(
-            INTEGRATOR,
+        metadata=own_classes.named_class(
+            own_classes.INTEGRATOR,
             "an integrator of your own instead of a `name`; its parameters are further keys, and "
             "of the keys here only `max_steps` and `check_share` can be given with it",
         ),
@@ -392,7 +377,7 @@ class IntegratorConfig:
 
     def __attrs_post_init__(self):
         if self.own is not None:
-            check_integrator(self.own)
+            own_classes.check_integrator(self.own)
         if self.name == "velocity_verlet" and self.step is None:
             raise ConfigError(
                 'name = "velocity_verlet" needs integrator.step, the fixed step in seconds'
@@ -401,7 +386,7 @@ class IntegratorConfig:
     @property
     def label(self) -> str:
         """The name, or that of the user's own class."""
-        return self.name or full_name(self.own)
+        return self.name or own_classes.full_name(self.own)
 
     @property
     def is_chosen(self) -> bool:
@@ -450,13 +435,13 @@ class Config:
     )
     sampling: str = choice(
         "random",
-        SOBOL,
+        pair_scene.SOBOL,
         default="random",
         help="how orientations and flocs of two bodies are drawn: independently, or evenly, by the "
-        f"points of {SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the intervals "
-        "follow (studies of rates always use Sobol sequences)",
+        f"points of {pair_scene.SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the "
+        "intervals follow (studies of rates always use Sobol sequences)",
     )
-    scene: PairScene = attrs.Factory(SettlingScene)
+    scene: pair_scene.PairScene = attrs.Factory(pair_scene.SettlingScene)
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)
     fluid: Fluid = attrs.Factory(Fluid)
@@ -475,7 +460,11 @@ class Config:
     def scrambles(self) -> int:
         """Of how many scrambles of a Sobol sequence the replicates of two bodies are points; 0
         where they are drawn independently."""
-        return SOBOL_SCRAMBLES if self.sampling == SOBOL and self.scene.kind == "binary" else 0
+        return (
+            pair_scene.SOBOL_SCRAMBLES
+            if self.sampling == pair_scene.SOBOL and self.scene.kind == "binary"
+            else 0
+        )
 
     @property
     def is_kernel(self) -> bool:
@@ -509,7 +498,7 @@ TABLES = {
 STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" in field.metadata}
 """The keys above all tables."""
 
-SCENES: dict[str, type] = PAIR_SCENES | {"kernel": KernelScene} | scenes()
+SCENES: dict[str, type] = pair_scene.PAIR_SCENES | {"kernel": KernelScene} | scenes()
 """`[scene] meeting` of binary encounters, or `[scene] kind` of others → class of the table."""
 
 TOP_KEYS = (*STUDY_KEYS, *TABLES, "forces")

@@ -16,22 +16,10 @@ import numpy as np
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.paired import sums_of_scrambles
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.confidence import (
-    bounded_sums,
-    clustered_proportion,
-    proportion,
-    scrambled_proportion,
-)
+from flocsim.io import confidence
+from flocsim.io.results import schema
 from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import HELD, MISSED, UNDECIDED, Events, events, events_of
-from flocsim.io.results.schema import (
-    BONDS,
-    CLASSES,
-    FAILED,
-    NOT_APPLICABLE,
-    POOLED_PROBABILITIES,
-    last_axis,
-)
 
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""
@@ -58,15 +46,15 @@ def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str
     failed still happened inside or outside the zone, and is in n_collided and n_inside. Σ n_bond is
     the number of aggregated ones, A + C.
     """
-    classes = [np.sum(outcome == code, axis=-1) for code in range(len(CLASSES))]
-    bonds = [np.sum(bond == 1 + place, axis=-1) for place in range(len(BONDS))]
+    classes = [np.sum(outcome == code, axis=-1) for code in range(len(schema.CLASSES))]
+    bonds = [np.sum(bond == 1 + place, axis=-1) for place in range(len(schema.BONDS))]
     return {
         "n_total": np.sum(np.ones(outcome.shape, dtype=np.int64), axis=-1),
         "n_missed": np.sum(outcome == MISSED, axis=-1),
         "n_held": np.sum(outcome == HELD, axis=-1),
         "n_undecided": np.sum(outcome == UNDECIDED, axis=-1),
-        "n_failed": np.sum(outcome == FAILED, axis=-1),
-        "n_collided": np.sum(inside != NOT_APPLICABLE, axis=-1),
+        "n_failed": np.sum(outcome == schema.FAILED, axis=-1),
+        "n_collided": np.sum(inside != schema.NOT_APPLICABLE, axis=-1),
         "n_inside": np.sum(inside == 1, axis=-1),
         "n_class": np.stack(classes, axis=-1),
         "n_bond": np.stack(bonds, axis=-1),
@@ -88,7 +76,7 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """
     table: dict[str, np.ndarray] = {}
     for name, (trials, successes, unknown) in events_of(counts).items():
-        values = proportion(successes, trials, unknown=unknown)
+        values = confidence.proportion(successes, trials, unknown=unknown)
         table |= zip((name, f"{name}_low", f"{name}_high"), values, strict=True)
     return table
 
@@ -97,9 +85,9 @@ def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> di
     """{estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is a
     cluster. Codes are (type, vertices, delta, replicate)."""
     sums, counted = {}, events(outcome, inside, bond)
-    for name in POOLED_PROBABILITIES:
+    for name in schema.POOLED_PROBABILITIES:
         each = Events(*(flags.sum(axis=2, dtype=np.int64) for flags in counted[name]))
-        sums[name] = bounded_sums(each.successes, each.trials, each.unknown)
+        sums[name] = confidence.bounded_sums(each.successes, each.trials, each.unknown)
     return sums
 
 
@@ -107,7 +95,7 @@ def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     """The arrays of POOLED; NaN where there was no event."""
     table: dict[str, np.ndarray] = {}
     for name, each in sums.items():
-        share, low, high, effective = clustered_proportion(each)
+        share, low, high, effective = confidence.clustered_proportion(each)
         table |= {name: share, f"{name}_low": low, f"{name}_high": high}
         table[f"n_effective_{name}"] = effective
     return table
@@ -130,7 +118,7 @@ def scrambled_sums(
     found = {}
     for name, each in events(*codes).items():
         sums = sums_of_scrambles(np.stack(each), first, scrambles)
-        found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if last_axis(name) else sums
+        found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if schema.last_axis(name) else sums
     return found
 
 
@@ -143,10 +131,10 @@ def scrambled_probabilities(
     table: dict[str, np.ndarray] = {}
     for key, each in sums.items():
         name = key.removesuffix(OF_SCRAMBLES)
-        if pooled and name not in POOLED_PROBABILITIES:
+        if pooled and name not in schema.POOLED_PROBABILITIES:
             continue
         trials, successes, unknown = each.sum(axis=3) if pooled else each
-        low, high, effective = scrambled_proportion(successes, trials, unknown)
+        low, high, effective = confidence.scrambled_proportion(successes, trials, unknown)
         table |= {f"{name}_low": low, f"{name}_high": high}
         if pooled:
             table[f"n_effective_{name}"] = effective

@@ -12,40 +12,10 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.estimates.numerical import (
-    change_columns,
-    change_intervals,
-    count_changes,
-    numerical_errors,
-    numerical_of,
-    over_displacements,
-)
-from flocsim.ensembles.estimates.paired import (
-    bounded_cells,
-    bounded_difference,
-    joint_counts,
-    paired_differences,
-)
-from flocsim.ensembles.estimates.statistics import (
-    COUNTED,
-    OF_SCRAMBLES,
-    by_runs,
-    count,
-    pooled_probabilities,
-    pooled_sums,
-    probabilities,
-    scrambled_probabilities,
-    scrambled_sums,
-)
+from flocsim.ensembles.estimates import numerical, paired, statistics
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.io.results import schema
 from flocsim.io.results.events import events
-from flocsim.io.results.schema import (
-    BAND_ENDS,
-    NOT_APPLICABLE,
-    POOLED,
-    POOLED_PROBABILITIES,
-    last_axis,
-)
 
 OF_OUTLINES = " of outlines"
 """Behind the name of a probability: what is summed of it for either end."""
@@ -59,20 +29,20 @@ def outline_sums(
 
     ``first``, ``ends``: outcome, inside and bond, codes (type, vertices, delta, replicate).
     """
-    if all(np.all(outcome == NOT_APPLICABLE) for outcome, _, _ in ends):
+    if all(np.all(outcome == schema.NOT_APPLICABLE) for outcome, _, _ in ends):
         return {}
     as_cut = events(*first)
     found: dict[str, list[np.ndarray]] = {name: [] for name in as_cut}
     for codes in ends:
-        run = codes[0] != NOT_APPLICABLE
+        run = codes[0] != schema.NOT_APPLICABLE
         for name, here in events(*codes).items():
             there = as_cut[name]
-            cells = bounded_cells(
+            cells = paired.bounded_cells(
                 type(here)(*(run & flags for flags in here)),
                 type(there)(*(run & flags for flags in there)),
             )
             # (3, class or bond, type, …, 4) → the class or bond before the cells.
-            found[name].append(np.moveaxis(cells, 1, -2) if last_axis(name) else cells)
+            found[name].append(np.moveaxis(cells, 1, -2) if schema.last_axis(name) else cells)
     return {name + OF_OUTLINES: np.stack(cells) for name, cells in found.items()}
 
 
@@ -87,10 +57,10 @@ def outline_changes(
     for key, cells in sums.items():
         name = key.removesuffix(OF_OUTLINES)
         differences, lows, highs = zip(
-            *(bounded_difference(each, scrambled=False) for each in cells), strict=True
+            *(paired.bounded_difference(each, scrambled=False) for each in cells), strict=True
         )
         found |= {f"{name}_{end}": change
-                  for end, change in zip(BAND_ENDS, differences, strict=True)}  # fmt: skip
+                  for end, change in zip(schema.BAND_ENDS, differences, strict=True)}  # fmt: skip
         low, high = np.minimum(*lows), np.maximum(*highs)
         found[f"{name}_shape_low"] = np.clip(low, -table[name], 0.0)
         found[f"{name}_shape_high"] = np.clip(high, 0.0, 1.0 - table[name])
@@ -130,7 +100,7 @@ class Reader:
 
     def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
         """COUNTED of replicates [first, stop) of all conditions: Codes."""
-        return tuple(self.block(name, first, stop) for name in COUNTED)
+        return tuple(self.block(name, first, stop) for name in statistics.COUNTED)
 
     def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
         """{name: array (type, vertices, delta, replicate)}, in memory."""
@@ -149,13 +119,13 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
-        own, again, third, *ends = by_runs(codes(start, min(start + step, stop)))
+        own, again, third, *ends = statistics.by_runs(codes(start, min(start + step, stop)))
         found = {
-            **count(*own),
-            **count_changes(own, again, third),
-            **pooled_sums(*own),
-            JOINT: joint_counts(own[0], own[1], start, scrambles),
-            **scrambled_sums(own, start, scrambles),
+            **statistics.count(*own),
+            **numerical.count_changes(own, again, third),
+            **statistics.pooled_sums(*own),
+            JOINT: paired.joint_counts(own[0], own[1], start, scrambles),
+            **statistics.scrambled_sums(own, start, scrambles),
             **outline_sums(own, ends),
         }
         sums = added(sums, found)
@@ -168,25 +138,29 @@ def added(sums: Sums, more: Sums) -> Sums:
     return {name: both.get(name, values) for name, values in {**more, **sums}.items()}
 
 
-POOLED_NAMES = frozenset(POOLED_PROBABILITIES)
+POOLED_NAMES = frozenset(schema.POOLED_PROBABILITIES)
 
 
 def tables_of(sums: Sums) -> dict[str, Any]:
     """The arrays of the groups of a results file that follow from the Sums of a whole study."""
     pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
-    of_scrambles = {name: values for name, values in sums.items() if name.endswith(OF_SCRAMBLES)}
+    of_scrambles = {
+        name: values for name, values in sums.items() if name.endswith(statistics.OF_SCRAMBLES)
+    }
     of_outlines = {name: values for name, values in sums.items() if name.endswith(OF_OUTLINES)}
     apart = {JOINT, *pooled, *of_scrambles, *of_outlines}
     counted = {name: values for name, values in sums.items() if name not in apart}
-    together = numerical_errors(over_displacements(counted))
-    changes = change_intervals(counted)
-    table = table_from(counted, changes) | scrambled_probabilities(of_scrambles)
-    pooled_table = pooled_probabilities(pooled) | scrambled_probabilities(of_scrambles, pooled=True)
+    together = numerical.numerical_errors(numerical.over_displacements(counted))
+    changes = numerical.change_intervals(counted)
+    table = table_from(counted, changes) | statistics.scrambled_probabilities(of_scrambles)
+    pooled_table = statistics.pooled_probabilities(pooled) | statistics.scrambled_probabilities(
+        of_scrambles, pooled=True
+    )
     return {
         "probabilities": table,
-        "pooled": pooled_table | {k: each for k, each in together.items() if k in POOLED},
-        "differences": paired_differences(sums[JOINT], bool(of_scrambles)),
-        "numerics": change_columns(changes),
+        "pooled": pooled_table | {k: each for k, each in together.items() if k in schema.POOLED},
+        "differences": paired.paired_differences(sums[JOINT], bool(of_scrambles)),
+        "numerics": numerical.change_columns(changes),
         "outlines": outline_changes(of_outlines, table),
     }
 
@@ -197,5 +171,5 @@ def table_from(
     """The table of probabilities from what is counted of conditions; ``changes``: its
     change_intervals, where they are there."""
     counts = {name: values for name, values in counted.items() if name.startswith("n_")}
-    changes = change_intervals(counted) if changes is None else changes
-    return counts | probabilities(counts) | numerical_of(changes)
+    changes = numerical.change_intervals(counted) if changes is None else changes
+    return counts | statistics.probabilities(counts) | numerical.numerical_of(changes)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.ensembles import report
 from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.contents import (
     Contents,
@@ -21,45 +22,14 @@ from flocsim.ensembles.contents import (
     later,
     origin,
 )
-from flocsim.ensembles.report import (
-    EFFICIENCY,
-    MOST_UNDECIDED,
-    change_lines,
-    checked_line,
-    efficiency_lines,
-    efficiency_rows,
-    format_table,
-    graze_lines,
-    kernel_lines,
-    touch_lines,
-    undecided_line,
-)
 from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, visible
 from flocsim.io.plots.rates import KERNEL_FIGURES
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.sweep import SWEEP_FIGURES
+from flocsim.io.results import run_group, schema
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import Overview, read_overview, read_results, with_rows
-from flocsim.io.results.run_group import (
-    choice_lines,
-    class_words,
-    describe_note,
-    sphere_words,
-    water_words,
-)
-from flocsim.io.results.schema import (
-    BONDS,
-    CLASSES,
-    COMPARED,
-    GROUPS,
-    LAST_AXES,
-    OUTCOMES,
-    POOLED_PROBABILITIES,
-    PROBABILITIES,
-    RADII,
-    Results,
-)
 
 SHOWN = {
     "pr_inside": "Pr[inside]", "pr_a": "Pr[A]", "pr_sticks": "Pr[A, sticks]",
@@ -67,7 +37,7 @@ SHOWN = {
 }  # fmt: skip
 """The probabilities of a condition that have columns of their own, and their headings."""
 
-SAID_APART = (MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
+SAID_APART = (report.MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
 """Facts of the group ``run`` that the summary has in its own words."""
 
 ERRORS_TEXT = (
@@ -79,30 +49,30 @@ ERRORS_TEXT = (
 )
 
 
-def tables_of(results: Results) -> list[Table | str]:
+def tables_of(results: schema.Results) -> list[Table | str]:
     """The probabilities of every condition, and those pooled over displacements."""
     table = results.probabilities
-    heads = ["type", "N", "δ/δ_max", "n", "collided", "inside", *SHOWN.values(), *CLASSES,
+    heads = ["type", "N", "δ/δ_max", "n", "collided", "inside", *SHOWN.values(), *schema.CLASSES,
              "missed", "held", "undecided", "failed", "run again", "flipped"]  # fmt: skip
     places = list(np.ndindex(*results.shape))
     rows = [condition_row(results, table, place) for place in places]
     firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
-    said = [ERRORS_TEXT, *graze_lines(results.delta)]
+    said = [ERRORS_TEXT, *report.graze_lines(results.delta)]
     found: list[Table | str] = []
     if results.kernel is not None:
-        found.append("\n".join(kernel_lines(results.kernel)))
+        found.append("\n".join(report.kernel_lines(results.kernel)))
     found.append(Table("Probabilities", heads, rows, said, firsts))
     if results.pooled:
-        heads = ["type", "N", *(PROBABILITIES[name] for name in POOLED_PROBABILITIES)]
+        heads = ["type", "N", *(schema.PROBABILITIES[name] for name in schema.POOLED_PROBABILITIES)]
         rows = [
             [results.types[t], int(results.vertices[v]),
-             *(with_errors(results.pooled, name, (t, v)) for name in POOLED_PROBABILITIES)]
+             *(with_errors(results.pooled, name, (t, v)) for name in schema.POOLED_PROBABILITIES)]
             for t, v in np.ndindex(*results.shape[:2])
         ]  # fmt: skip
         found.append(Table("All displacements pooled", heads, rows))
-    if efficiencies := efficiency_rows(results):
+    if efficiencies := report.efficiency_rows(results):
         heads = ["type", "N", "in the plane", "axially"]
-        found.append(Table("Efficiency", heads, efficiencies, [EFFICIENCY]))
+        found.append(Table("Efficiency", heads, efficiencies, [report.EFFICIENCY]))
     return found
 
 
@@ -146,41 +116,53 @@ def summary(results: Overview) -> Summary:
     """What a results file says of its study; ValueError where that cannot be read."""
     run = results.run
     facts = conditions(results) + sizes(results) + outcomes(results)
-    facts += [("numerical error", checked_line(results) or "unknown: no replicate was run again")]
-    facts += [("", line) for line in change_lines(results)]
+    facts += [
+        ("numerical error", report.checked_line(results) or "unknown: no replicate was run again")
+    ]
+    facts += [("", line) for line in report.change_lines(results)]
     if choice := stored(run, "accuracy"):
-        facts += [("accuracy", line) for line in choice_lines(choice)]
+        facts += [("accuracy", line) for line in run_group.choice_lines(choice)]
     warnings = [str(line) for line in stored(run, "warnings")]
-    warnings += filter(None, [undecided_line(results)])
-    failed = [describe_note(note) for note in stored(run, "failed")]
+    warnings += filter(None, [report.undecided_line(results)])
+    failed = [run_group.describe_note(note) for note in stored(run, "failed")]
     facts += settling(run) + thermal(run)
-    facts += [("touched", line) for line in touch_lines(results)]
+    facts += [("touched", line) for line in report.touch_lines(results)]
     return Summary(facts, origin(run, SAID_APART), warnings, failed)
 
 
-def table(results: Results) -> str:
+def table(results: schema.Results) -> str:
     """Counts and probabilities, behind the efficiencies if there are any; or the rates."""
     if results.kernel is not None:
-        return "\n".join(kernel_lines(results.kernel))
-    efficiencies = efficiency_lines(results)
+        return "\n".join(report.kernel_lines(results.kernel))
+    efficiencies = report.efficiency_lines(results)
     axes = results.types, results.vertices, results.delta
-    counts = format_table(*axes, results.probabilities, results.outlines)
+    counts = report.format_table(*axes, results.probabilities, results.outlines)
     return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
 
 
-def told(found: Results) -> str:
+def told(found: schema.Results) -> str:
     """What is printed of a study that has been run."""
     if found.kernel is not None:
-        lines = kernel_lines(found.kernel)
+        lines = report.kernel_lines(found.kernel)
     else:
         axes = found.types, found.vertices, found.delta
-        lines = [format_table(*axes, found.probabilities, found.outlines)]
+        lines = [report.format_table(*axes, found.probabilities, found.outlines)]
     return "\n".join(
-        [*lines, *filter(None, [*touch_lines(found), checked_line(found), *change_lines(found)])]
+        [
+            *lines,
+            *filter(
+                None,
+                [
+                    *report.touch_lines(found),
+                    report.checked_line(found),
+                    *report.change_lines(found),
+                ],
+            ),
+        ]
     )
 
 
-def conditions(results: Results) -> Facts:
+def conditions(results: schema.Results) -> Facts:
     """What was simulated."""
     over = stored(results.run, "overrides")
     return [
@@ -191,7 +173,7 @@ def conditions(results: Results) -> Facts:
     ]
 
 
-def axes_of(results: Results) -> Facts:
+def axes_of(results: schema.Results) -> Facts:
     """The conditions."""
     return [
         ("types", ", ".join(results.types)),
@@ -210,7 +192,7 @@ def sizes(results: Overview) -> Facts:
         if i > 0.0 and j > 0.0
     ]
     facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
-    if classes := class_words(stored(results.run, "size_classes")):
+    if classes := run_group.class_words(stored(results.run, "size_classes")):
         facts.insert(0, ("size classes", classes.partition(": ")[2]))
     units = {"r_i": 1e6, "r_j": 1e6, "D_0": 1e6, "d_c_over_D_0": 1.0}
     words = {name: f"{name} [um]" for name in units} | {"d_c_over_D_0": "d_c/D_0 at touch"}
@@ -233,10 +215,12 @@ def preset(run):
 def outcomes(results: Overview) -> Facts:
     """(name, value) of what came out, all conditions together."""
     totals = results.totals
-    found = zip(OUTCOMES, totals.outcomes, strict=True)
+    found = zip(schema.OUTCOMES, totals.outcomes, strict=True)
     rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
     bonds = zip(
-        BONDS, results.probabilities["n_bond"].reshape(-1, len(BONDS)).sum(axis=0), strict=True
+        schema.BONDS,
+        results.probabilities["n_bond"].reshape(-1, len(schema.BONDS)).sum(axis=0),
+        strict=True,
     )
     rows.append(("bonds", ", ".join(f"{n} {word}" for word, n in bonds)))
     named = list(zip(results.failures, totals.failures, strict=True))[1:]
@@ -262,7 +246,7 @@ def thermal(run):
     """[(name, value)] of what integrals say of equivalent spheres, for each type of a brownian
     study."""
     found = stored(run, "equivalent_spheres")
-    return [("thermal", f"{each['type']}: {sphere_words(each)}") for each in found]
+    return [("thermal", f"{each['type']}: {run_group.sphere_words(each)}") for each in found]
 
 
 def so_far(found: Any) -> Facts:
@@ -274,7 +258,8 @@ def so_far(found: Any) -> Facts:
         *axes_of(results),
         ("replicates", f"{counts.min()} to {counts.max()} in each of {counts.size} conditions"
          f"{planned}"),
-        ("numerical error", checked_line(results) or "unknown: no replicate was run again yet"),
+        ("numerical error",
+         report.checked_line(results) or "unknown: no replicate was run again yet"),
     ]  # fmt: skip
 
 
@@ -295,7 +280,7 @@ def sweep_rows(found: Any) -> list[tuple[str, ...]]:
     return rows
 
 
-def figures(results: Results) -> Figures:
+def figures(results: schema.Results) -> Figures:
     """The figures of pairs, or of rates."""
     return FIGURES if results.kernel is None else KERNEL_FIGURES
 
@@ -319,12 +304,13 @@ CONTENTS = Contents(
         "a kernel study": KERNEL_FIGURES,
     },
     with_rows=with_rows, rows_drawn=OF_ROWS, so_far=so_far, run=lambda found: found.run,
-    opened=OPENED, compare=later("ensembles.pairs.comparison", "compare"), compared=COMPARED,
+    opened=OPENED, compare=later("ensembles.pairs.comparison", "compare"), compared=schema.COMPARED,
     joined=Joined(
-        {name: GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows, SWEEP_FIGURES,
-        asked, {axis: len(words) for axis, words in LAST_AXES.items()}, tuple(RADII),
-        lambda swept: graze_lines(swept.labelled("probabilities").axes["delta"].values),
+        {name: schema.GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows,
+        SWEEP_FIGURES, asked, {axis: len(words) for axis, words in schema.LAST_AXES.items()},
+        tuple(schema.RADII),
+        lambda swept: report.graze_lines(swept.labelled("probabilities").axes["delta"].values),
     ),
     rates=lambda found: found.kernel,
-    water=lambda path: [water_words(each) for each in OPENED(path).in_water()],
+    water=lambda path: [run_group.water_words(each) for each in OPENED(path).in_water()],
 )  # fmt: skip

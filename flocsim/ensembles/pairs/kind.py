@@ -10,47 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.chunks import (
-    COLUMNS,
-    ORDER,
-    ROW,
-    Condition,
-    condition_of,
-    fits,
-    places_in,
-    total,
-)
+from flocsim.ensembles import chunks, report
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.dry_run import dry_run
 from flocsim.ensembles.equivalent_spheres import sphere_facts
+from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
 from flocsim.ensembles.estimates.statistics import COUNTED, StopRule
-from flocsim.ensembles.estimates.summary import (
-    BLOCK_ROWS,
-    JOINT,
-    OF_OUTLINES,
-    POOLED_NAMES,
-    Reader,
-    Sums,
-    sums_of,
-    table_from,
-    tables_of,
-)
 from flocsim.ensembles.kernels import KernelStudy, study_of
 from flocsim.ensembles.kind import Kind
 from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
-from flocsim.ensembles.report import (
-    MOST_UNDECIDED,
-    SCRAMBLES,
-    too_many_undecided,
-    undecided_line,
-)
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
@@ -78,7 +53,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
         raise ValueError(apart)
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
-    places = places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
+    places = chunks.places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
     run = run_of(file)
     return OldTable(rows, places, len(rows["replicate"]), run)
 
@@ -88,16 +63,18 @@ def results(
     output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates; written to ``output``, if any, by all ranks."""
-    reader = Reader(start.store, (*study.shape[:3], count), study.scrambles)
+    reader = summary.Reader(start.store, (*study.shape[:3], count), study.scrambles)
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     if output is None:
-        sums = sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
-        rows = reader.arrays(COLUMNS) if in_memory else None
+        sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
+        rows = reader.arrays(chunks.COLUMNS) if in_memory else None
         return results_of(study, count, sums, run, rows, kernel)
     # Where the rows go follows from the places of all tables. Of a large study these have no values
     # yet; few rows are counted at once, so that the tables need not be made twice.
-    few = count * len(study.conditions) <= BLOCK_ROWS
-    first = sums_of(reader.codes, len(study.conditions), 0, count if few else 0, study.scrambles)
+    few = count * len(study.conditions) <= summary.BLOCK_ROWS
+    first = summary.sums_of(
+        reader.codes, len(study.conditions), 0, count if few else 0, study.scrambles
+    )
     draft = results_of(study, count, first, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:
         sums, digests = assemble(reader, file, comm, warn)
@@ -110,11 +87,11 @@ def results(
 
 
 def results_of(
-    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
+    study: Study, count: int, sums: summary.Sums, run: dict, replicates: dict | None = None,
     kernel: Kernel | None = None,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates of each condition from their Sums."""
-    config, tables = study.config, tables_of(sums)
+    config, tables = study.config, summary.tables_of(sums)
     if study.is_banded and not tables["outlines"]:  # a draft without any replicate has its place
         tables["outlines"] = blank(OUTLINES, study.shape[:3])
     return Results(
@@ -136,8 +113,8 @@ def facts(study: Study) -> dict[str, Any]:
     """What the results say of a study besides their tables."""
     given = study.config, study.flocs
     return {
-        MOST_UNDECIDED: study.config.stop.undecided,
-        SCRAMBLES: study.scrambles,
+        report.MOST_UNDECIDED: study.config.stop.undecided,
+        report.SCRAMBLES: study.scrambles,
         "size_classes": json.dumps(class_facts(study.pairings)),
         "settling": json.dumps(settling_facts(*given)),
         "equivalent_spheres": json.dumps(sphere_facts(*given)),
@@ -147,25 +124,25 @@ def facts(study: Study) -> dict[str, Any]:
 def verdict(found: Results) -> tuple[int, str]:
     """0, or the code of an error where not one replicate has come to an outcome, or where more are
     undecided than may be; and what to say of those that have none."""
-    line = undecided_line(found)
+    line = report.undecided_line(found)
     if not line:
         return 0, ""
     counts = found.probabilities
     if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
         return FlocsimError.exit_code, line
-    return (WITHHELD if too_many_undecided(found) else 0), f"warning: {line}"
+    return (WITHHELD if report.too_many_undecided(found) else 0), f"warning: {line}"
 
 
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     """What a journal has of pairs: their counts and probabilities."""
     axes = axes_of(sessions[-1], [
-        condition_of(each.description) for each in found
-        if each.kind == CHUNK and fits(each.description, each.length)
+        chunks.condition_of(each.description) for each in found
+        if each.kind == CHUNK and chunks.fits(each.description, each.length)
     ])  # fmt: skip
     checked = partial(check_rows, failures=len(FAILURES), flocs=2**31)
     with ReadOnlyJournal(str(path)) as journal:
-        store, notes, unread = store_of(journal, sessions, found, axes, ROW, checked)
-        table = tables(store, tuple(len(axes[name]) for name in ORDER))
+        store, notes, unread = store_of(journal, sessions, found, axes, chunks.ROW, checked)
+        table = tables(store, tuple(len(axes[name]) for name in chunks.ORDER))
     made = Results(
         types=axes["types"], vertices=axes["vertices"], delta=axes["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
@@ -174,7 +151,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     return Unfinished(path, FORMAT, made, store.there(), asked, notes, sessions, unread)
 
 
-def axes_of(session: dict, found: list[Condition]) -> dict[str, Any]:
+def axes_of(session: dict, found: list[chunks.Condition]) -> dict[str, Any]:
     """ASKED of a session; of one that does not say it, what was found, and 0 replicates."""
     asked = session.get("asked")
     if matches(asked, ASKED):
@@ -200,7 +177,7 @@ def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
         for place, found in known.items():
             every[(slice(None),) * axis + (place,)] = found[name].reshape((*before, *behind))
         counts[name] = every.reshape(*before, *shape, *behind)
-    return table_from(counts)
+    return summary.table_from(counts)
 
 
 def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
@@ -220,10 +197,11 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
 
     runs, known = store.intervals(place), store.known(place)
     begins = [0, *accumulate(stop - first for first, stop in runs)][:-1]
-    sums = sums_of(codes, 1, 0, total(runs))
+    sums = summary.sums_of(codes, 1, 0, chunks.total(runs))
     return {
         name: values for name, values in sums.items()
-        if name not in (*POOLED_NAMES, JOINT) and not name.endswith(OF_OUTLINES)
+        if name not in (*summary.POOLED_NAMES, summary.JOINT)
+        and not name.endswith(summary.OF_OUTLINES)
     }  # fmt: skip
 
 

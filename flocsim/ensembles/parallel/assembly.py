@@ -21,14 +21,7 @@ from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
 from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
-from flocsim.ensembles.storage.row_store import (
-    OldColumns,
-    ReadOnlyJournal,
-    RowStore,
-    longest,
-    near,
-    old_columns,
-)
+from flocsim.ensembles.storage import row_store
 from flocsim.errors import FileError, FlocsimError
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.layout import ROWS, Plan, RowFile, shared_row_file
@@ -80,11 +73,11 @@ class Share:
     blocks: Interval
     known: dict[int, np.ndarray]
     journal: str
-    old: OldColumns | None
+    old: row_store.OldColumns | None
 
     def work(self, study: Any, comm: Communicator) -> Answer:
-        with ReadOnlyJournal(self.journal) as journal, self.place.opened() as file:
-            store = RowStore(journal, study.conditions)
+        with row_store.ReadOnlyJournal(self.journal) as journal, self.place.opened() as file:
+            store = row_store.RowStore(journal, study.conditions)
             for place, entries in self.known.items():
                 store.entries[place], store.counts[place] = entries, len(entries)
             if self.old is not None:
@@ -225,7 +218,7 @@ def known_in(blocks: Interval, reader: Reader, lengths: Sequence[int]) -> dict[i
     total = replicates * len(reader.known)
     start, stop = (min(block * ROWS, total) for block in blocks)
     return {
-        place: near(reader.known[place], first, end, lengths[place])
+        place: row_store.near(reader.known[place], first, end, lengths[place])
         for place, first, end in runs(start, stop, replicates)
     }
 
@@ -263,11 +256,11 @@ class Assembly:
     def write(self) -> bool:
         """Have all rows written; False where some ranks were of no use."""
         store = self.reader.store
-        old = old_columns(store.old) if store.old is not None else None
+        old = row_store.old_columns(store.old) if store.old is not None else None
         alone = store.old is not None and old is None
         blocks = self.file.plan.blocks
         parts = parts_of(blocks, max(min(1 if alone else self.comm.size, blocks), 1))
-        lengths = [longest(known) for known in self.reader.known]
+        lengths = [row_store.longest(known) for known in self.reader.known]
         journal = os.fspath(Path(store.journal.path).resolve())
         orders: dict[int, Share | Review] = {
             rank: Share(self.place, part, known_in(part, self.reader, lengths), journal, old)

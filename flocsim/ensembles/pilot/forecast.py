@@ -29,19 +29,9 @@ from flocsim.ensembles.pilot.ladder import (
     try_out,
 )
 from flocsim.ensembles.study import Study
+from flocsim.io.results import schema
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.layout import frame_of, plan_of
-from flocsim.io.results.schema import (
-    BAND_ENDS,
-    DIFFERENCES,
-    EVENTS,
-    NUMERICS,
-    OUTLINES,
-    POOLED,
-    TABLE,
-    Results,
-    blank,
-)
 from flocsim.io.seals import seal_size
 
 SECONDS = 5.0
@@ -123,7 +113,7 @@ def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
     name, steps = study.config.scene.names[task.condition], study.config.integrator.max_steps
     first, _ = try_out(study, Job(task, study.methods[name], steps))
-    for end in BAND_ENDS if study.is_banded else ():
+    for end in schema.BAND_ENDS if study.is_banded else ():
         job = Job(task, study.methods[name], MORE_STEPS * steps)
 
         def otherwise(_: Draw, end: str = end) -> Draw:
@@ -264,17 +254,17 @@ def file_size(study: Study, count: int) -> float:
     """Bytes of the results file with so many replicates of each condition."""
     config = study.config
     shape = study.shape[:3]
-    draft = Results(
+    draft = schema.Results(
         types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
         replicates=None,
-        probabilities=blank(TABLE, shape),
+        probabilities=schema.blank(schema.TABLE, shape),
         flocs=tuple(floc.name for floc in study.flocs),
-        pooled=blank(POOLED, shape[:2]),
-        differences=blank(DIFFERENCES, (3, len(EVENTS), *shape)),
-        numerics=blank(NUMERICS, shape),
-        outlines=blank(OUTLINES, shape) if study.is_banded else {},
+        pooled=schema.blank(schema.POOLED, shape[:2]),
+        differences=schema.blank(schema.DIFFERENCES, (3, len(schema.EVENTS), *shape)),
+        numerics=schema.blank(schema.NUMERICS, shape),
+        outlines=schema.blank(schema.OUTLINES, shape) if study.is_banded else {},
         count=count,
     )
     plan = plan_of(frame_of(draft), math.prod(shape) * count)

@@ -15,16 +15,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.chunks import (
-    KEPT,
-    Condition,
-    Interval,
-    condition_of,
-    fits,
-    layout,
-    named,
-    rows_of,
-)
+from flocsim.ensembles import chunks
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
@@ -75,7 +66,7 @@ class Beginning:
     notes: list[dict] = attrs.Factory(list)
     history: list[dict] = attrs.Factory(list)
     rule: list | None = None
-    unasked: list[Condition] = attrs.Factory(list)
+    unasked: list[chunks.Condition] = attrs.Factory(list)
     farthest: int = 0
     at_least: int = 0
     accuracy: dict = attrs.Factory(dict)
@@ -99,7 +90,7 @@ class Beginning:
             and all(condition in old.places for condition in self.store.conditions)
         )
 
-    def found(self, count: int) -> list[list[Interval]]:
+    def found(self, count: int) -> list[list[chunks.Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""
         whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
         return [
@@ -167,7 +158,7 @@ def begin(
         take_place(start, output, mode, overwrite, take_rows)
         refuse_fewer(start, output, study.config.replicates)
         session = {
-            "identity": identity, "short": short(identity), "layout": layout(study.row),
+            "identity": identity, "short": short(identity), "layout": chunks.layout(study.row),
             "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
             "rule": start.rule, "accuracy": start.accuracy, "asked": study.asked(),
         }  # fmt: skip
@@ -239,7 +230,7 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
     start.history += [{key: each[key] for key in HISTORY} for each in sessions]
     for description in sessions:
         refuse_other(start, journal.path, description["identity"])
-        if description["layout"] != layout(study.row):
+        if description["layout"] != chunks.layout(study.row):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
     known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
     places = {condition: place for place, condition in enumerate(start.store.conditions)}
@@ -249,16 +240,17 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
             session = record.description
         elif record.kind == SNAPSHOT:
             take_part(start, study, record, known, places)
-        elif record.kind == CHUNK and fits(record.description, record.length, study.row):
+        elif record.kind == CHUNK and chunks.fits(record.description, record.length, study.row):
             take_chunk(start, study, record, known, places, session)
         elif record.kind == CHUNK:
             start.remarks.append(
-                f"{journal.path}: {named(record.description)}: its form is unknown: computed again"
+                f"{journal.path}: {chunks.named(record.description)}: its form is unknown: "
+                "computed again"
             )
     for each in journal.damage:
         start.remarks.append(
             f"{journal.path}: damaged from byte {each.start} to {each.stop} "
-            f"({named(each.description)}); what is missing is computed again"
+            f"({chunks.named(each.description)}); what is missing is computed again"
         )
 
 
@@ -266,9 +258,9 @@ def take_part(start, study, record, known, places):
     """Note what was kept of an unfinished replicate, if it can be of this study."""
     about = record.description
     try:
-        if not matches(about, KEPT) or about["identity"] not in known:
+        if not matches(about, chunks.KEPT) or about["identity"] not in known:
             raise ValueError("what was kept of a replicate cannot be verified")
-        place = places.get(condition_of(about))
+        place = places.get(chunks.condition_of(about))
         study.check_part(about, start.journal.read(record.offset, record.length))
     except ValueError as error:
         start.remarks.append(f"{start.journal.path}: {error}: it is left out")
@@ -299,22 +291,24 @@ def take_chunk(start, study, record, known, places, session):
     about = record.description
     if about["identity"] not in known:
         start.remarks.append(
-            f"{start.journal.path}: {named(about)} cannot be verified: computed again"
+            f"{start.journal.path}: {chunks.named(about)} cannot be verified: computed again"
         )
         return
-    place = places.get(condition_of(about))
+    place = places.get(chunks.condition_of(about))
     if place is None:
-        start.unasked.append(condition_of(about))
+        start.unasked.append(chunks.condition_of(about))
         return
     rows, first = (
-        rows_of(start.journal.read(record.offset, record.length), study.row),
+        chunks.rows_of(start.journal.read(record.offset, record.length), study.row),
         about["first"],
     )
     try:
         study.check_rows(rows.__getitem__)
         study.check_whole(rows, start.store.parts.get((place, first), []))
     except ValueError as error:
-        start.remarks.append(f"{start.journal.path}: {named(about)}: {error}: computed again")
+        start.remarks.append(
+            f"{start.journal.path}: {chunks.named(about)}: {error}: computed again"
+        )
         return
     start.store.add(place, first, first + about["count"], record.offset, record.digest)
     start.notes += about.get("notes", [])

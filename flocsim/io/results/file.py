@@ -19,15 +19,7 @@ import numpy as np
 
 from flocsim.errors import FileError
 from flocsim.io.groups import opened_file, text_of
-from flocsim.io.results import older
-from flocsim.io.results.checks import (
-    CODED,
-    check_codes,
-    check_coordinates,
-    check_rows,
-    check_structure,
-    check_tables,
-)
+from flocsim.io.results import checks, older
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
 from flocsim.io.results.schema import GROUPS, OUTCOMES, REPLICATES, Results
@@ -70,9 +62,9 @@ def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -
 def results_in(file, replicates):
     """The Results in an open file."""
     results = older.results_of(file, {**GROUPS, "kernel": KERNEL_GROUP}, replicates)
-    check_tables(results)
+    checks.check_tables(results)
     if results.replicates is not None:
-        check_rows(
+        checks.check_rows(
             results.replicates.__getitem__, len(results.failures), len(results.flocs),
             lacking_in(file),
         )  # fmt: skip
@@ -91,7 +83,7 @@ def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[
         rows = file["replicates"]
         found = {name: rows[name][place] for name in REPLICATES}
         reasons = len(rows["failure"].attrs["flag_meanings"].split())
-        check_rows(lambda name: np.asarray(found[name]), reasons, 0, lacking_in(file))
+        checks.check_rows(lambda name: np.asarray(found[name]), reasons, 0, lacking_in(file))
         return found
 
 
@@ -123,8 +115,8 @@ def totals_in(rows, reasons):
     """The Totals of an open table of replicates with so many reasons of failure."""
     found = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
     for part in parts_of(rows["outcome"].shape):
-        columns = {name: rows[name][part] for name in CODED}
-        check_codes(columns, reasons)
+        columns = {name: rows[name][part] for name in checks.CODED}
+        checks.check_codes(columns, reasons)
         outcome, failure, steps, rejected = columns.values()
         found.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
         found.failures += np.bincount(failure, minlength=reasons)
@@ -201,8 +193,8 @@ def opened(path: str | os.PathLike) -> Iterator[Any]:
             raise ValueError(
                 f"it has an attribute {older.WRITTEN_AS}, which no file of flocsim has"
             )
-        check_structure(nodes)
-        check_coordinates(file)
+        checks.check_structure(nodes)
+        checks.check_coordinates(file)
         yield file
 
 

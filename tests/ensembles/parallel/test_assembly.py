@@ -19,6 +19,7 @@ from flocsim.ensembles.estimates.summary import Reader, sums_of
 from flocsim.ensembles.pairs.kind import results_of
 from flocsim.ensembles.parallel import assembly
 from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
+from flocsim.ensembles.storage import row_store
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError
@@ -270,7 +271,7 @@ def test_nothing_is_counted_that_is_not_what_was_written(
 @pytest.mark.slow
 def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path, monkeypatch):
     folder = copied(folders["extended file"], tmp_path)
-    found = assembly.old_columns
+    found = row_store.old_columns
 
     def other(table):
         columns = found(table)
@@ -278,7 +279,7 @@ def test_an_older_file_that_is_another_one_by_now_is_not_read(folders, tmp_path,
         (folder / "other").replace(folder / "study.h5")
         return columns
 
-    monkeypatch.setattr(assembly, "old_columns", other)
+    monkeypatch.setattr(row_store, "old_columns", other)
     made, [line], _ = assemble(folder, 2)
     assert "study.h5 is a different file here" in line
     assert made.exists()

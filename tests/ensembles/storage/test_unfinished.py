@@ -5,8 +5,8 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
+from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS
-from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
 from flocsim.io.journal import Journal, journal_of
@@ -124,9 +124,9 @@ def test_what_is_read_grows_with_the_rows_and_not_with_their_numbers(tmp_path, m
     journal.append(chunk_record(Condition("III", 1, 0.0), 2**40 - 4, rows, "k"))
     journal.file.close()
     ends = []
-    original = pairs.sums_of
+    original = summary.sums_of
     monkeypatch.setattr(
-        pairs, "sums_of", lambda *words: (ends.append(words[3]), original(*words))[1]
+        summary, "sums_of", lambda *words: (ends.append(words[3]), original(*words))[1]
     )
     found = read_unfinished(tmp_path / "r.h5.journal")
     assert found.results.probabilities["n_total"][1].tolist() == [[4, 0], [15, 0]]
