@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.schema import SOBOL, SOBOL_SCRAMBLES
+from flocsim.ensembles.config.pair_scene import SOBOL, SOBOL_SCRAMBLES
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.study import Study
 from flocsim.io.confidence import scrambled_proportion

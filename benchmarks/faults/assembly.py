@@ -37,8 +37,8 @@ from flocsim.io.journal import journal_path
 from flocsim.io.records import SESSION, encode
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import NOT_APPLICABLE
-from flocsim.io.seals import read_sealed
 from tests.helpers.results_files import same_data
+from tests.helpers.sealed import read_sealed
 
 SHARE_OLD = 0.2
 """Of the replicates of an extended study, how many its older results file has."""

@@ -151,12 +151,6 @@ def seal(data: bytes) -> bytes:
     return data + seal_of(digest_of(data))
 
 
-def read_sealed(path: str | os.PathLike) -> bytes:
-    """The HDF5 bytes of a sealed file; FileError if it is absent, of another kind or damaged."""
-    with checked_sealed(path) as (file, size):
-        return file.read(size)
-
-
 @contextlib.contextmanager
 def checked_sealed(path: str | os.PathLike) -> Iterator[tuple[BinaryIO, int]]:
     """(open file, size of its HDF5 data), once its checksum has been found right.

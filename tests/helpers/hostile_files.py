@@ -22,10 +22,11 @@ from flocsim.geometry.shapes.parts import table_of
 from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
+from tests.helpers.sealed import read_sealed
 from tests.helpers.small_rates import mixed, some_kernel
 from tests.helpers.small_study import VALID, write_star_library
 from tests.helpers.swarm_study import make_swarm_results

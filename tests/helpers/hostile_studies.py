@@ -23,7 +23,7 @@ import h5py
 import flocsim
 from flocsim.__main__ import main
 from flocsim.io.records import Record, scan
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from tests.helpers.config_mutations import tables_of, toml
 from tests.helpers.hostile_files import (
     ODD_TEXTS,
@@ -34,6 +34,7 @@ from tests.helpers.hostile_files import (
 )
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.own_force import OWN
+from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import write_star_library
 from tests.helpers.swarm_study import SWARM
 

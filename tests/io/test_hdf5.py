@@ -11,9 +11,10 @@ import pytest
 from flocsim.errors import FileError
 from flocsim.io.hdf5 import Unfit, structure_of
 from flocsim.io.results.file import read_overview, read_results
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from flocsim.io.shapes.library import read_library, read_settings
 from tests.helpers.results_files import write_results
+from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import write_star_library
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow

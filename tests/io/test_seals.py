@@ -14,12 +14,12 @@ from flocsim.io.seals import (
     checked_sealed,
     digest_of,
     is_in_pieces,
-    read_sealed,
     seal,
     seal_of_pieces,
     seal_size,
     size_of_pieces,
 )
+from tests.helpers.sealed import read_sealed
 
 LENGTHS = (8, 3000, 1, 17, 2_000_000)
 

@@ -10,9 +10,10 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.groups import kind_of
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from flocsim.io.trajectory import DATASETS, KIND, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
+from tests.helpers.sealed import read_sealed
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 

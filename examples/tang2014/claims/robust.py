@@ -4,8 +4,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from flocsim.ensembles.estimates.statistics import FAILED, UNDECIDED
-from flocsim.io.results.schema import CLASSES
+from flocsim.io.results.events import UNDECIDED
+from flocsim.io.results.schema import CLASSES, FAILED
 
 from .trends import mean_polygons
 from .verdicts import (

@@ -17,22 +17,16 @@ LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
 
 
-def attraction_ratio(
-    hamaker: float, potential: float | tuple[float, float], debye_length: float, permittivity: float
-) -> float:
+def attraction_ratio(attraction: VanDerWaals, layer: DoubleLayer) -> float:
     """S = H_A κ/(24π ε0 ε_r φ_i φ_j) [-]; inf without repulsion."""
-    layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
     if layer.strength <= 0.0:
         return math.inf
-    return hamaker / (6.0 * layer.strength * debye_length**2)
+    return attraction.hamaker / (6.0 * layer.strength * layer.debye_length**2)
 
 
-def neutral_distance(
-    hamaker: float, potential: float | tuple[float, float], debye_length: float,
-    permittivity: float, root: str,
-) -> float:  # fmt: skip
+def neutral_distance(attraction: VanDerWaals, layer: DoubleLayer, root: str) -> float:
     """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
-    ratio = attraction_ratio(hamaker, potential, debye_length, permittivity)
+    ratio = attraction_ratio(attraction, layer)
     if ratio > LARGEST_RATIO:
         raise ZoneError(
             f"no attraction zone: van der Waals attraction exceeds double-layer repulsion at every "
@@ -45,7 +39,7 @@ def neutral_distance(
             "no attraction zone: without attraction F_A = F_R has no root; raise "
             "forces.van_der_waals.hamaker, or give zone.distance or zone.centre"
         )
-    return balance(ratio, root) * debye_length
+    return balance(ratio, root) * layer.debye_length
 
 
 def balance(ratio: float, root: str) -> float:
@@ -81,9 +75,5 @@ def zone_distance(
         return zone.centre
     if zone.distance is not None:
         return radius_i + radius_j + zone.distance
-    attraction, layer = only_one(forces, VanDerWaals), only_one(forces, DoubleLayer)
-    distance = neutral_distance(
-        attraction.hamaker, layer.potential, layer.debye_length, layer.permittivity,
-        zone.root or "outer",
-    )  # fmt: skip
-    return radius_i + radius_j + distance
+    both = only_one(forces, VanDerWaals), only_one(forces, DoubleLayer)
+    return radius_i + radius_j + neutral_distance(*both, zone.root or "outer")

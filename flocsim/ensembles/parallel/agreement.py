@@ -119,7 +119,7 @@ def stored_rows(study: StudyKind, store: RowStore) -> Rows:
     found: dict[Code, dict | None] = {}
     for code in study.kinds:
         condition, replicate = study.first_of(code)
-        place = store.conditions.index(condition)
+        place = store.places[condition]
         if any(first <= replicate < stop for first, stop in store.intervals(place)):
             found[code] = {name: store.read(place, name, replicate, replicate + 1)[0]
                            for name in study.compared}  # fmt: skip

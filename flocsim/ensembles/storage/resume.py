@@ -233,15 +233,14 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
         if description["layout"] != chunks.layout(study.row):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
     known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
-    places = {condition: place for place, condition in enumerate(start.store.conditions)}
     session: dict = {}
     for record in journal.records:
         if record.kind == SESSION:
             session = record.description
         elif record.kind == SNAPSHOT:
-            take_part(start, study, record, known, places)
+            take_part(start, study, record, known)
         elif record.kind == CHUNK and chunks.fits(record.description, record.length, study.row):
-            take_chunk(start, study, record, known, places, session)
+            take_chunk(start, study, record, known, session)
         elif record.kind == CHUNK:
             start.remarks.append(
                 f"{journal.path}: {chunks.named(record.description)}: its form is unknown: "
@@ -254,13 +253,13 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
         )
 
 
-def take_part(start, study, record, known, places):
+def take_part(start, study, record, known):
     """Note what was kept of an unfinished replicate, if it can be of this study."""
     about = record.description
     try:
         if not matches(about, chunks.KEPT) or about["identity"] not in known:
             raise ValueError("what was kept of a replicate cannot be verified")
-        place = places.get(chunks.condition_of(about))
+        place = start.store.places.get(chunks.condition_of(about))
         study.check_part(about, start.journal.read(record.offset, record.length))
     except ValueError as error:
         start.remarks.append(f"{start.journal.path}: {error}: it is left out")
@@ -283,7 +282,7 @@ def refuse_other(start, path, stored, remedy=REMEDY):
         raise UsageError(f"{path} belongs to another study: {shown}{more}; {remedy}")
 
 
-def take_chunk(start, study, record, known, places, session):
+def take_chunk(start, study, record, known, session):
     """Note where a chunk's rows lie, if they are of a condition of this study.
 
     ``session``: the description of the run that wrote it.
@@ -294,28 +293,27 @@ def take_chunk(start, study, record, known, places, session):
             f"{start.journal.path}: {chunks.named(about)} cannot be verified: computed again"
         )
         return
-    place = places.get(chunks.condition_of(about))
+    place = start.store.places.get(chunks.condition_of(about))
     if place is None:
         start.unasked.append(chunks.condition_of(about))
         return
-    rows, first = (
-        chunks.rows_of(start.journal.read(record.offset, record.length), study.row),
-        about["first"],
-    )
-    try:
+
+    def check(rows):
         study.check_rows(rows.__getitem__)
-        study.check_whole(rows, start.store.parts.get((place, first), []))
+        study.check_whole(rows, start.store.parts.get((place, about["first"]), []))
+
+    try:
+        start.store.add_chunk(record, place, check)
     except ValueError as error:
         start.remarks.append(
             f"{start.journal.path}: {chunks.named(about)}: {error}: computed again"
         )
         return
-    start.store.add(place, first, first + about["count"], record.offset, record.digest)
     start.notes += about.get("notes", [])
     start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])
     # What is computed beyond the end that a rule has set is nobody's: so it is on any machine.
     if start.rule is None or session.get("rule") != start.rule:
-        start.farthest = max(start.farthest, first + about["count"])
+        start.farthest = max(start.farthest, about["first"] + about["count"])
 
 
 def take_results(start, study, output, old_rows):

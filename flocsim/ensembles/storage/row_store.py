@@ -24,6 +24,7 @@ from flocsim.ensembles.chunks import (
     Interval,
     merged,
     missing,
+    rows_of,
     starts,
     total,
 )
@@ -96,6 +97,7 @@ class RowStore:
     old: OldTable | None = None
     parts: dict[tuple[int, int], list[Record]] = attrs.Factory(lambda: defaultdict(list))
     starts: dict[str, int] = attrs.field(init=False)
+    places: dict[Condition, int] = attrs.field(init=False)
     entries: list[np.ndarray] = attrs.field(init=False)
     counts: list[int] = attrs.field(init=False)
     held: "OrderedDict[int, bytes]" = attrs.field(init=False, factory=OrderedDict)
@@ -104,6 +106,7 @@ class RowStore:
 
     def __attrs_post_init__(self):
         self.starts = starts(self.row)
+        self.places = {condition: place for place, condition in enumerate(self.conditions)}
         self.entries = [np.empty(4, ENTRY) for _ in self.conditions]
         self.counts = [0] * len(self.conditions)
 
@@ -114,6 +117,15 @@ class RowStore:
             self.entries[place] = np.concatenate([self.entries[place]] * 2)
         self.entries[place][count] = (first, stop, offset, digest)
         self.counts[place] = count + 1
+
+    def add_chunk(
+        self, record: Record, place: int, check: Callable[[dict[str, np.ndarray]], object]
+    ) -> None:
+        """Note where the rows of a chunk in the journal lie, which ``check`` may refuse."""
+        about, data = record.description, self.journal.read(record.offset, record.length)
+        check(rows_of(data, self.row))
+        first = about["first"]
+        self.add(place, first, first + about["count"], record.offset, record.digest)
 
     def known(self, place: int) -> np.ndarray:
         """The entries of a condition, in order of the replicates."""

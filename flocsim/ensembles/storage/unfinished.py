@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ORDER, Condition, condition_of, fits, layout, rows_of
+from flocsim.ensembles.chunks import ORDER, Condition, condition_of, fits, layout
 from flocsim.ensembles.kind import kinds
 from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
@@ -66,22 +66,19 @@ def store_of(
     if any(len(set(axes[name])) < len(axes[name]) for name in ORDER):
         raise FileError(f"{journal.path} has the same condition twice")
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
-    places = {condition: place for place, condition in enumerate(conditions)}
     store, notes, unread = RowStore(journal, conditions, row), [], 0
     current = any(each["layout"] == layout(row) for each in sessions)
     for each in found if current else ():
         about = each.description
         if each.kind != CHUNK or not fits(about, each.length, row):
             continue
-        if (place := places.get(condition_of(about))) is None:
+        if (place := store.places.get(condition_of(about))) is None:
             continue
         try:
-            check(rows_of(journal.read(each.offset, each.length), row).__getitem__)
+            store.add_chunk(each, place, lambda rows: check(rows.__getitem__))
         except ValueError:
             unread += each.length
             continue
-        first = about["first"]
-        store.add(place, first, first + about["count"], each.offset, each.digest)
         notes += about.get("notes", [])
     if not store.there():
         raise FileError(f"{journal.path} has no finished replicate yet: try again later")

@@ -33,27 +33,32 @@ ROOTS = [
 """(H_A, φ, 1/κ, ε_r), inner and outer root [m], relative accuracy of the printed digits."""
 
 
+def pair_forces(hamaker, potential, debye_length, permittivity):
+    """Attraction and double layer of such numbers."""
+    layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
+    return VanDerWaals(hamaker=hamaker), layer
+
+
 def net_force(numbers, gap, radius_i, radius_j):
     """(repulsion, attraction) [N] that the package's own kernels give."""
-    hamaker, potential, debye_length, permittivity = numbers
-    layer = DoubleLayer(potential=potential, debye_length=debye_length, permittivity=permittivity)
+    _, layer = pair_forces(*numbers)
     reduced = radius_i * radius_j / (radius_i + radius_j)
     pair = PairView(0.0, gap, 0.0, 0.0, radius_i, radius_j, reduced, 1.0)
-    attraction = -VanDerWaals.kernel(pair, hamaker, 1e-12)
-    return DoubleLayer.kernel(pair, layer.strength, 1.0 / debye_length), attraction
+    attraction = -VanDerWaals.kernel(pair, numbers[0], 1e-12)
+    return DoubleLayer.kernel(pair, layer.strength, 1.0 / numbers[2]), attraction
 
 
 @pytest.mark.parametrize(("numbers", "inner", "outer", "digits"), ROOTS)
 def test_roots_are_the_known_ones(numbers, inner, outer, digits):
-    assert neutral_distance(*numbers, "inner") == pytest.approx(inner, rel=digits)
-    assert neutral_distance(*numbers, "outer") == pytest.approx(outer, rel=digits)
+    assert neutral_distance(*pair_forces(*numbers), "inner") == pytest.approx(inner, rel=digits)
+    assert neutral_distance(*pair_forces(*numbers), "outer") == pytest.approx(outer, rel=digits)
 
 
 @pytest.mark.parametrize("numbers", [row[0] for row in ROOTS])
 @pytest.mark.parametrize("radii", [RADII, (4.62e-6, 4.95e-6), (1e-7, 1e-3)])
 @pytest.mark.parametrize("root", ["inner", "outer"])
 def test_the_two_forces_balance_at_a_root_for_bodies_of_any_size(numbers, radii, root):
-    distance = neutral_distance(*numbers, root)
+    distance = neutral_distance(*pair_forces(*numbers), root)
     repulsion, attraction = net_force(numbers, distance, *radii)
     assert repulsion == pytest.approx(attraction, rel=1e-9)
     # Between the roots repulsion wins, beyond them attraction.
@@ -62,15 +67,17 @@ def test_the_two_forces_balance_at_a_root_for_bodies_of_any_size(numbers, radii,
 
 
 def test_the_ratio_of_the_paper_and_of_its_printed_length():
-    assert attraction_ratio(*PAPER) == pytest.approx(0.086541, abs=5e-7)
-    assert attraction_ratio(1e-18, 15e-3, 0.98e-9, 78.5) == pytest.approx(86.5, abs=0.05)
+    assert attraction_ratio(*pair_forces(*PAPER)) == pytest.approx(0.086541, abs=5e-7)
+    assert attraction_ratio(*pair_forces(1e-18, 15e-3, 0.98e-9, 78.5)) == pytest.approx(
+        86.5, abs=0.05
+    )
 
 
 @pytest.mark.parametrize("debye_length", [0.98e-9, 98e-9])
 @pytest.mark.parametrize("root", ["inner", "outer"])
 def test_no_root_is_an_error_and_no_number(debye_length, root):
     with pytest.raises(ZoneError, match=r"no attraction zone.*give zone\.distance") as caught:
-        neutral_distance(1e-18, 15e-3, debye_length, 78.5, root)
+        neutral_distance(*pair_forces(1e-18, 15e-3, debye_length, 78.5), root)
     assert "\n" not in str(caught.value)
 
 
@@ -79,21 +86,26 @@ def test_no_root_is_an_error_and_no_number(debye_length, root):
 )
 def test_without_one_of_the_forces_there_is_no_root(hamaker, potential):
     with pytest.raises(ZoneError, match="no attraction zone"):
-        neutral_distance(hamaker, potential, 0.98e-6, 78.5, "outer")
+        neutral_distance(*pair_forces(hamaker, potential, 0.98e-6, 78.5), "outer")
 
 
 def test_the_roots_meet_where_they_vanish():
-    hamaker = PAPER[0] * LARGEST_RATIO / attraction_ratio(*PAPER)
+    hamaker = PAPER[0] * LARGEST_RATIO / attraction_ratio(*pair_forces(*PAPER))
     below, above = hamaker * (1.0 - 1e-9), hamaker * (1.0 + 1e-9)
     for root in ("inner", "outer"):
-        assert neutral_distance(below, *PAPER[1:], root) == pytest.approx(2 * 0.98e-6, rel=1e-4)
+        assert neutral_distance(*pair_forces(below, *PAPER[1:]), root) == pytest.approx(
+            2 * 0.98e-6, rel=1e-4
+        )
         with pytest.raises(ZoneError):
-            neutral_distance(above, *PAPER[1:], root)
+            neutral_distance(*pair_forces(above, *PAPER[1:]), root)
 
 
 def test_stronger_attraction_moves_the_roots_together():
     pairs = [
-        [neutral_distance(factor * PAPER[0], *PAPER[1:], root) for root in ("inner", "outer")]
+        [
+            neutral_distance(*pair_forces(factor * PAPER[0], *PAPER[1:]), root)
+            for root in ("inner", "outer")
+        ]
         for factor in (0.01, 0.1, 1.0, 5.0)
     ]
     inner, outer = zip(*pairs, strict=True)
@@ -107,7 +119,7 @@ def forces(count=1):
 
 
 def test_the_zone_is_the_radii_and_the_root():
-    expected = sum(RADII) + neutral_distance(*PAPER, "outer")
+    expected = sum(RADII) + neutral_distance(*pair_forces(*PAPER), "outer")
     assert zone_distance(ZoneConfig(), forces(), *RADII) == pytest.approx(expected, rel=1e-12)
     smaller = zone_distance(ZoneConfig(), forces(), 1e-6, 2e-6)
     assert smaller - 3e-6 == pytest.approx(expected - sum(RADII), rel=1e-9)

@@ -17,8 +17,9 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, FlocsimError
 from flocsim.io.journal import Journal
 from flocsim.io.records import CHUNK, SESSION
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from tests.helpers.hostile_files import encode_words
+from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import small_config
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 3}

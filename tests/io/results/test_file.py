@@ -18,6 +18,7 @@ from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.run_group import provenance
 from flocsim.io.results.schema import OUTCOMES, REPLICATES, TABLE
 from tests.helpers.results_files import same_data, write_results
+from tests.helpers.sealed import read_sealed
 from tests.helpers.synthetic_results import FAILURES, make_results
 
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
@@ -44,7 +45,7 @@ def written(once, tmp_path):
 
 def reseal(path, change):
     """Change a file by h5py and seal it again, as another version of the program might write."""
-    image = io.BytesIO(seals.read_sealed(path))
+    image = io.BytesIO(read_sealed(path))
     with h5py.File(image, "r+") as file:
         change(file)
     files.write_file(path, seals.seal(image.getvalue()), replace)

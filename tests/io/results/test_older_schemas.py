@@ -19,8 +19,9 @@ from flocsim.io.results import older
 from flocsim.io.results.file import read_overview, read_results, read_row
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES, TABLE
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from tests.helpers.results_files import write_results
+from tests.helpers.sealed import read_sealed
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow
 

@@ -13,7 +13,7 @@ from flocsim.geometry.shapes.parts import table_of
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import with_holes
-from flocsim.io.seals import read_sealed, seal
+from flocsim.io.seals import seal
 from flocsim.io.shapes.library import (
     FIT_COLUMNS,
     StoredFit,
@@ -22,6 +22,7 @@ from flocsim.io.shapes.library import (
     write_library,
 )
 from tests.helpers.compound_shapes import beads
+from tests.helpers.sealed import read_sealed
 
 PIXEL = 0.95e-6
 
