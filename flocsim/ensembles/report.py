@@ -1,7 +1,6 @@
 """The table of a study for the terminal."""
 
 import itertools
-import json
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -249,7 +248,7 @@ def undecided_line(results: Results) -> str:
     too_many = too_many_undecided(results)
     if not failed + undecided or not (too_many or results.kernel is not None):
         return ""
-    notes = json.loads(str(results.run.get("failed", "[]")))
+    notes = stored(results.run, "failed")
     first = f"; the first: {describe_note(notes[0])}" if notes else ""
     advice = (
         ": raise integrator.max_steps or scene.time_limit, for another output" if undecided else ""

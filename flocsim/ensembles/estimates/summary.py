@@ -12,10 +12,13 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.estimates import numerical, paired, statistics
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.study import Study
 from flocsim.io.results import schema
 from flocsim.io.results.events import events
+from flocsim.io.results.kernel_group import Kernel
 
 OF_OUTLINES = " of outlines"
 """Behind the name of a probability: what is summed of it for either end."""
@@ -173,3 +176,26 @@ def table_from(
     counts = {name: values for name, values in counted.items() if name.startswith("n_")}
     changes = numerical.change_intervals(counted) if changes is None else changes
     return counts | statistics.probabilities(counts) | numerical.numerical_of(changes)
+
+
+def results_of(
+    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
+    kernel: Kernel | None = None,
+) -> schema.Results:  # fmt: skip
+    """The Results of so many replicates of each condition from their Sums."""
+    config, tables = study.config, tables_of(sums)
+    if study.is_banded and not tables["outlines"]:  # a draft without any replicate has its place
+        tables["outlines"] = schema.blank(schema.OUTLINES, study.shape[:3])
+    return schema.Results(
+        types=config.scene.names,
+        vertices=np.array(config.shapes.vertices),
+        delta=np.array(config.scene.delta),
+        replicates=replicates,
+        run=run,
+        failures=FAILURES,
+        flocs=tuple(floc.name for floc in study.flocs),
+        count=count,
+        radii=study.radii,
+        kernel=kernel,
+        **tables,
+    )

@@ -39,10 +39,9 @@ from flocsim.io.json_text import matches
 from flocsim.io.records import CHUNK, Record
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import opened
-from flocsim.io.results.kernel_group import Kernel
 from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.older import why_apart
-from flocsim.io.results.schema import OUTLINES, Results, as_words, blank
+from flocsim.io.results.schema import Results, as_words
 
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
@@ -68,45 +67,22 @@ def results(
     if output is None:
         sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
         rows = reader.arrays(chunks.COLUMNS) if in_memory else None
-        return results_of(study, count, sums, run, rows, kernel)
+        return summary.results_of(study, count, sums, run, rows, kernel)
     # Where the rows go follows from the places of all tables. Of a large study these have no values
     # yet; few rows are counted at once, so that the tables need not be made twice.
     few = count * len(study.conditions) <= summary.BLOCK_ROWS
     first = summary.sums_of(
         reader.codes, len(study.conditions), 0, count if few else 0, study.scrambles
     )
-    draft = results_of(study, count, first, run, kernel=kernel)
+    draft = summary.results_of(study, count, first, run, kernel=kernel)
     with new_row_file(output, draft, start.replacing) as file:
         sums, digests = assemble(reader, file, comm, warn)
         same = few and sums.keys() == first.keys() and all(
             np.array_equal(sums[name], values) for name, values in first.items()
         )  # fmt: skip
-        found = draft if same else results_of(study, count, sums, run, kernel=kernel)
+        found = draft if same else summary.results_of(study, count, sums, run, kernel=kernel)
         file.complete(found, digests)
     return found
-
-
-def results_of(
-    study: Study, count: int, sums: summary.Sums, run: dict, replicates: dict | None = None,
-    kernel: Kernel | None = None,
-) -> Results:  # fmt: skip
-    """The Results of so many replicates of each condition from their Sums."""
-    config, tables = study.config, summary.tables_of(sums)
-    if study.is_banded and not tables["outlines"]:  # a draft without any replicate has its place
-        tables["outlines"] = blank(OUTLINES, study.shape[:3])
-    return Results(
-        types=config.scene.names,
-        vertices=np.array(config.shapes.vertices),
-        delta=np.array(config.scene.delta),
-        replicates=replicates,
-        run=run,
-        failures=FAILURES,
-        flocs=tuple(floc.name for floc in study.flocs),
-        count=count,
-        radii=study.radii,
-        kernel=kernel,
-        **tables,
-    )
 
 
 def facts(study: Study) -> dict[str, Any]:

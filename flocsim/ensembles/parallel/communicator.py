@@ -191,12 +191,12 @@ class Communicator:
             time.sleep(SLEEP)
         return self.inbox[source].popleft()
 
-    def gather(self, value: Any) -> list | None:
+    def gather(self, value: Any, heed_signals: bool = True) -> list | None:
         """The values of all ranks, on rank 0."""
         if self.rank > 0:
             self.send(0, value)
             return None
-        return [value, *(self.receive(rank) for rank in range(1, self.size))]
+        return [value, *(self.receive(rank, heed_signals) for rank in range(1, self.size))]
 
     def broadcast(self, value: Any) -> Any:
         """Rank 0's value, on all ranks."""
@@ -206,8 +206,8 @@ class Communicator:
             self.send(rank, value)
         return value
 
-    def barrier(self) -> None:
-        self.broadcast(self.gather(None))
+    def barrier(self, heed_signals: bool = True) -> None:
+        self.broadcast(self.gather(None, heed_signals))
 
     def close(self) -> None:
         """The work is done: let the others go."""
@@ -334,26 +334,15 @@ class MpiCommunicator(Communicator):
         """Go together, and leave no sign of life behind that MPI would wait for."""
         if self.heartbeat is None:
             return
-        self.meet()
+        self.barrier(heed_signals=False)
         self.unwatch()
         # From here on nobody looks after the others, but MPI's end waits for all of them.
         end = threading.Timer(max(LEAVING, self.heartbeat.seconds), os._exit, (STOPPED,))
         end.daemon = True
         end.start()
-        self.meet()
+        self.barrier(heed_signals=False)
         for _ in self.signs():
             pass
-
-    def meet(self) -> None:
-        """Wait for all ranks, whatever signals may come."""
-        others = range(1, self.size) if self.rank == 0 else (0,)
-        if self.rank > 0:
-            self.send(0, None)
-        for rank in others:
-            self.receive(rank, heed_signals=False)
-        if self.rank == 0:
-            for rank in others:
-                self.send(rank, None)
 
     def abort(self, code: int) -> None:
         sys.stdout.flush()

@@ -122,7 +122,7 @@ def first_methods(config: Config) -> dict[str, Integrator]:
 
 def sampling_error(config: Config) -> float:
     """The sampling error of a condition that the study will have: half an interval at Pr = ½."""
-    return sampling_half_width(expected_replicates(config.replicates, config.stop))
+    return sampling_half_width(expected_replicates(config))
 
 
 def choose(study: Study, share: Share = run_alone) -> Choice:
@@ -223,7 +223,7 @@ def explicit_ladders(study, ladders, share, target):
     """Ladders of explicit steps for the types where they may pay."""
     config = study.config
     cells = len(config.shapes.vertices) * len(config.scene.delta)
-    runs = cells * expected_replicates(config.replicates, config.stop)
+    runs = cells * expected_replicates(config)
     known = beliefs([each.seen() for each in ladders])
     candidates, jobs = [], []
     for ladder, belief in zip(ladders, known, strict=True):
@@ -313,7 +313,7 @@ def key_of(study: Study) -> str:
     which = {
         "types": list(scene.names), "delta": list(scene.delta),
         "vertices": list(config.shapes.vertices),
-        "replicates": expected_replicates(config.replicates, config.stop),
+        "replicates": expected_replicates(config),
         "indices": config.replicates, "max_steps": config.integrator.max_steps,
     }  # fmt: skip
     return short(identity_of(study) | which)

@@ -18,6 +18,8 @@ import numpy as np
 from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.estimates import summary
+from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.pilot.ladder import (
     MOST,
     Job,
@@ -149,7 +151,7 @@ def time_replicates(
 def pairs_made(study: Study, ranks: int) -> float:
     """How many pairs of flocs the study makes ready, on all ranks together."""
     config = study.config
-    count = expected_replicates(config.replicates, config.stop)
+    count = expected_replicates(config)
     numbers = [study.numbers(k) for k in range(min(count, 1000))]
     total = 0
     for condition in range(len(config.scene.names)):
@@ -220,7 +222,7 @@ def estimated(
 def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) -> Forecast:
     """The Forecast for so many ranks; ``before`` [s]: flocs grown, a choice made."""
     config = study.config
-    count = expected_replicates(config.replicates, config.stop)
+    count = expected_replicates(config)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     fixed = START * ranks + before + setting_up(study, runs, ranks)
     fixed += EACH * cells * count * len(config.scene.names)
@@ -254,19 +256,9 @@ def file_size(study: Study, count: int) -> float:
     """Bytes of the results file with so many replicates of each condition."""
     config = study.config
     shape = study.shape[:3]
-    draft = schema.Results(
-        types=config.scene.names,
-        vertices=np.array(config.shapes.vertices),
-        delta=np.array(config.scene.delta),
-        replicates=None,
-        probabilities=schema.blank(schema.TABLE, shape),
-        flocs=tuple(floc.name for floc in study.flocs),
-        pooled=schema.blank(schema.POOLED, shape[:2]),
-        differences=schema.blank(schema.DIFFERENCES, (3, len(schema.EVENTS), *shape)),
-        numerics=schema.blank(schema.NUMERICS, shape),
-        outlines=schema.blank(schema.OUTLINES, shape) if study.is_banded else {},
-        count=count,
-    )
+    none = (np.zeros((*shape, 0), "u1"),) * len(COUNTED)
+    sums = summary.sums_of(lambda *_: none, math.prod(shape), 0, 0, study.scrambles)
+    draft = summary.results_of(study, count, sums, {})
     plan = plan_of(frame_of(draft), math.prod(shape) * count)
     run = RUN_BYTES + len(config.text) + FLOC_BYTES * len(study.flocs)
     return float(plan.size + run + seal_size(len(plan.cuts())))

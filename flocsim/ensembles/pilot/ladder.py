@@ -38,7 +38,7 @@ from flocsim.ensembles.collision.checking import Z
 from flocsim.ensembles.collision.draw import FAILED, Draw
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.collision.pairings import pairings_of
-from flocsim.ensembles.config.schema import Config, StopConfig
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.preflight import measured_flocs
 from flocsim.ensembles.study import Study
 from flocsim.integrators import DormandPrince54, Implicit
@@ -71,13 +71,13 @@ class Task(NamedTuple):
     replicate: int
 
 
-def expected_replicates(replicates: int, stop: StopConfig) -> int:
+def expected_replicates(config: Config) -> int:
     """Replicates of each condition that a study is likely to have: with a rule that ends it early,
     those that narrow the interval of a probability of ½ to what the rule wants."""
-    if stop.half_width is None:
-        return replicates
-    wanted = math.ceil((0.98 / stop.half_width) ** 2)
-    return min(replicates, max(wanted, stop.least))
+    if config.stop.half_width is None:
+        return config.replicates
+    wanted = math.ceil((0.98 / config.stop.half_width) ** 2)
+    return min(config.replicates, max(wanted, config.stop.least))
 
 
 def pilot_size(config: Config) -> int:
@@ -87,7 +87,7 @@ def pilot_size(config: Config) -> int:
     """
     types = len(config.scene.names)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
-    replicates = expected_replicates(config.replicates, config.stop)
+    replicates = expected_replicates(config)
     found = int(min(MOST / types, SHARE * cells * replicates / LADDER))
     return found if found >= LEAST else 0
 

@@ -15,8 +15,7 @@ import pytest
 
 from benchmarks.faults.assembly import finish_here, kill_once, prepare, resumed, write_study
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.estimates.summary import Reader, sums_of
-from flocsim.ensembles.pairs.kind import results_of
+from flocsim.ensembles.estimates.summary import Reader, results_of, sums_of
 from flocsim.ensembles.parallel import assembly
 from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage import row_store

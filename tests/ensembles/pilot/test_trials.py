@@ -38,10 +38,10 @@ def test_a_study_that_is_too_small_has_none(tmp_path):
 
 
 def test_a_rule_that_ends_the_study_early_makes_the_pilot_smaller(tmp_path):
-    stop = config(tmp_path, 10_000, stop={"half_width": 0.05, "least": 100}).stop
-    assert expected_replicates(10_000, stop) == 385
-    assert expected_replicates(200, stop) == 200
-    assert expected_replicates(10_000, config(tmp_path, 10_000).stop) == 10_000
+    stop = {"half_width": 0.05, "least": 100}
+    assert expected_replicates(config(tmp_path, 10_000, stop=stop)) == 385
+    assert expected_replicates(config(tmp_path, 200, stop=stop)) == 200
+    assert expected_replicates(config(tmp_path, 10_000)) == 10_000
 
 
 @pytest.mark.parametrize("replicates", [60, 77, 100, 1000])
