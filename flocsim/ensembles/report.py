@@ -1,7 +1,7 @@
 """The table of a study for the terminal."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -43,28 +43,23 @@ EFFICIENCY = "aggregations per approach over delta, in the plane and axially [95
 """What the efficiencies are."""
 
 
-def format_table(
-    types: Sequence[str], vertices: Sequence[int] | np.ndarray,
-    delta: Sequence[float] | np.ndarray, table: Mapping[str, np.ndarray],
-    outlines: Mapping[str, np.ndarray] | None = None,
-) -> str:  # fmt: skip
+def format_table(results: Results) -> str:
     """Counts and probabilities with their errors, one row per condition, a block per type.
 
     Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound); of a
-    study whose outlines were cut closer and wider as well, ``outlines`` (OUTLINES), between what
-    Pr[A] would change by that (95 %).
+    study whose outlines were cut closer and wider as well, between what Pr[A] would change by that
+    (95 %).
 
-    ``types`` (T,) names, ``vertices`` (V,), ``delta`` (D,), ``table`` the dict of `tabulate` with
-    arrays (T, V, D). Plain ASCII apart from the names; up to 110 columns for counts below 1e5;
-    "-" where there was no event to estimate a probability from. A line below says of delta = 1 that
-    it grazes. Of the aggregations some hang by
-    their shapes, as statics shows, and the others stick. Returns text without a final line end.
+    Plain ASCII apart from the names; up to 110 columns for counts below 1e5; "-" where there was no
+    event to estimate a probability from. A line below says of delta = 1 that it grazes. Of the
+    aggregations some hang by their shapes, as statics shows, and the others stick. Returns text
+    without a final line end.
     """
-    conditions = list(np.ndindex(len(types), len(vertices), len(delta)))
-    ends = [name for name in ENDS if name != "n_held" or np.any(table[name])]
-    rows = [condition_row(vertices, delta, table, place, ends, outlines) for place in conditions]
+    conditions = list(np.ndindex(results.shape))
+    ends = [n for n in ENDS if n != "n_held" or np.any(results.probabilities[n])]
+    rows = [condition_row(results, place, ends) for place in conditions]
     header = list(HEADER)
-    if outlines:
+    if results.outlines:
         header.insert(SHAPE_COLUMN, ("of Pr[A]", "shape"))
     upper, lower = zip(*header, *(ENDS[name] for name in ends), strict=True)
     widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
@@ -73,9 +68,9 @@ def format_table(
     lines = [align(upper, widths), align(lower, widths)]
     for place, row in zip(conditions, rows, strict=True):
         if place[1:] == (0, 0):
-            lines.append(f"type {types[place[0]]}")
+            lines.append(f"type {results.types[place[0]]}")
         lines.append(align(row, widths))
-    return "\n".join([*lines, *graze_lines(delta)])
+    return "\n".join([*lines, *graze_lines(results.delta)])
 
 
 GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
@@ -316,12 +311,12 @@ def worst_changes(results, group, name):
     return f"{told[0]} to {told[1]}"
 
 
-def condition_row(vertices, delta, table, place, ends, outlines):
-    _, v, d = place
+def condition_row(results, place, ends):
+    (_, v, d), table, outlines = place, results.probabilities, results.outlines
     counts = ("n_total", "n_collided", "n_inside")
     return (
-        str(vertices[v]),
-        f"{delta[d]:g}",
+        str(results.vertices[v]),
+        f"{results.delta[d]:g}",
         *(str(table[name][place]) for name in counts),
         with_errors(table, "pr_inside", place),
         with_errors(table, "pr_a", place),

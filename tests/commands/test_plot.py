@@ -127,9 +127,8 @@ def test_info_counts_outcomes_reasons_and_steps(study, capsys):
 
 
 def test_info_ends_with_the_table_of_probabilities(study, capsys):
-    results = make_results(count=8)
     call("info", study)
-    table = format_table(results.types, results.vertices, results.delta, results.probabilities)
+    table = format_table(make_results(count=8))
     assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
 
 

@@ -135,8 +135,7 @@ def table(results: schema.Results) -> str:
     if results.kernel is not None:
         return "\n".join(report.kernel_lines(results.kernel))
     efficiencies = report.efficiency_lines(results)
-    axes = results.types, results.vertices, results.delta
-    counts = report.format_table(*axes, results.probabilities, results.outlines)
+    counts = report.format_table(results)
     return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
 
 
@@ -145,8 +144,7 @@ def told(found: schema.Results) -> str:
     if found.kernel is not None:
         lines = report.kernel_lines(found.kernel)
     else:
-        axes = found.types, found.vertices, found.delta
-        lines = [report.format_table(*axes, found.probabilities, found.outlines)]
+        lines = [report.format_table(found)]
     return "\n".join(
         [
             *lines,

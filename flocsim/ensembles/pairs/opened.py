@@ -204,9 +204,7 @@ class StudyResults(Tables):
 
     def table(self) -> str:
         """Counts and probabilities of every condition as the command prints them, as text."""
-        axes = self.types, self.vertices, self.delta
-        lines = [format_table(*axes, self.probabilities, self.outlines)]
-        return "\n".join([*lines, *filter(None, [checked_line(self.results)])])
+        return "\n".join(filter(None, [format_table(self.results), checked_line(self.results)]))
 
     def labelled(self, group: str = "probabilities") -> Labelled:
         """The arrays of a group of the file with their axes; UsageError for an unknown one."""

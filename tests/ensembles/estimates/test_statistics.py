@@ -2,6 +2,7 @@
 
 import math
 
+import attrs
 import numpy as np
 import pytest
 from scipy.stats import binom, norm
@@ -22,7 +23,7 @@ from flocsim.errors import UsageError
 from flocsim.io.confidence import bounds_quantile, proportion, wilson
 from flocsim.io.results.events import events, events_of
 from flocsim.io.results.file import read_results
-from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
+from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES, Results
 from tests.helpers.results_files import same_data
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config
@@ -246,7 +247,7 @@ def test_table_is_aligned_and_narrow(count):
     table = dict(results.probabilities)
     for name in COUNTS:
         table[name] = np.minimum(table[name] * count, count)
-    text = format_table(results.types, results.vertices, results.delta, table)
+    text = format_table(attrs.evolve(results, probabilities=table))
     lines = text.splitlines()
     assert lines[-1].startswith("delta 1: by construction the outlines just graze")
     rows = [line for line in lines[2:-1] if not line.startswith("type")]
@@ -260,7 +261,7 @@ def test_table_tells_the_numbers():
     outcome = np.array([0] * 6 + [3] * 3 + [4]).reshape(1, 1, 1, 10)
     inside = np.select([outcome == 0, outcome == 3], [1, 0], NOT_APPLICABLE)
     bond = bonds_of(outcome, np.array([1, 1, 2, 3, 1, 2, 1, 1, 1, 1]))
-    text = format_table(["II"], [16], [0.25], tabulate(outcome, inside, bond))
+    text = format_table(Results(["II"], [16], [0.25], None, tabulate(outcome, inside, bond)))
     row = text.splitlines()[-1]
     assert " ".join(row.split()) == (
         "16 0.25 10 9 6 .667 +-.312 - .667 +-.312 - .333 6 0 0 3 1 0 0"
@@ -270,13 +271,15 @@ def test_table_tells_the_numbers():
 
 def test_table_shows_a_dash_without_events():
     table = tabulate(np.full((1, 1, 1, 2), 4), *[np.full((1, 1, 1, 2), NOT_APPLICABLE)] * 2)
-    row = format_table(["I"], [4], [0.5], table).splitlines()[-1]
+    row = format_table(Results(["I"], [4], [0.5], None, table)).splitlines()[-1]
     assert " ".join(row.split()) == "4 0.5 2 0 0 - - - 0 0 0 0 2 0 0"
 
 
 def test_table_tells_certainty_from_rounding():
     outcome = np.zeros((1, 1, 1, 40), dtype=int)
-    text = format_table(["III"], [1], [0.0], tabulate(outcome, outcome + 1, bonds_of(outcome)))
+    text = format_table(
+        Results(["III"], [1], [0.0], None, tabulate(outcome, outcome + 1, bonds_of(outcome)))
+    )
     assert text.count("1.00 +-.088      -") == 2
 
 
@@ -285,7 +288,7 @@ def test_table_tells_the_numerical_error():
     first = outcome, outcome + 1, bonds_of(outcome)
     again = np.where(np.arange(40) < 4, 1, outcome)
     table = tabulate(*first, again, outcome + 1, bonds_of(again))
-    text = format_table(["III"], [1], [0.0], table)
+    text = format_table(Results(["III"], [1], [0.0], None, table))
     assert text.count("1.00 +-.088 +-.000") == 1
     # Four of 40 have departed; all were run again, and none a third time.
     assert text.count("1.00 +-.088 +-.100") == 1
