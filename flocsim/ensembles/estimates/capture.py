@@ -52,11 +52,10 @@ from flocsim.ensembles.kernels import KernelStudy, as_draws, bounds_of, offsets_
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import wilson
-from flocsim.io.results.events import KINDS, WITHOUT_OUTCOME, Events, kinds_of
+from flocsim.io.results.events import AGGREGATED, KINDS, WITHOUT_OUTCOME, Events, kinds_of
 from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel, fractal_in
-from flocsim.io.results.schema import AGGREGATED, NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.schema import NOT_APPLICABLE
 
-BOUND = [OUTCOMES.index(name) for name in AGGREGATED]
 COLUMNS = (*EXACT_RUNS, "floc_i", "floc_j")
 EDGE = 0.1
 """Outermost share of the offsets that are there for attraction alone."""
@@ -142,7 +141,7 @@ class Chi:
 def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, Chi]:
     """{c, inside, a: Chi} of codes as in the results file."""
     unknown, touched = np.isin(outcome, WITHOUT_OUTCOME), inside != NOT_APPLICABLE
-    least = {"c": touched, "inside": inside == 1, "a": np.isin(outcome, BOUND)}
+    least = {"c": touched, "inside": inside == 1, "a": np.isin(outcome, AGGREGATED)}
     return {
         name: Chi(each, each | (unknown if name == "a" else unknown & ~touched))
         for name, each in least.items()

@@ -75,6 +75,10 @@ class Beginning:
     replacing: Rule = keep
     resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
 
+    def remark(self, words: str) -> None:
+        """Say something of what is in the journal."""
+        self.remarks.append(f"{self.journal.path}: {words}")
+
     @property
     def journal(self) -> Journal | MemoryJournal:
         """Where finished chunks go."""
@@ -242,14 +246,12 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
         elif record.kind == CHUNK and chunks.fits(record.description, record.length, study.row):
             take_chunk(start, study, record, known, session)
         elif record.kind == CHUNK:
-            start.remarks.append(
-                f"{journal.path}: {chunks.named(record.description)}: its form is unknown: "
-                "computed again"
-            )
+            told = chunks.named(record.description)
+            start.remark(f"{told}: its form is unknown: computed again")
     for each in journal.damage:
-        start.remarks.append(
-            f"{journal.path}: damaged from byte {each.start} to {each.stop} "
-            f"({chunks.named(each.description)}); what is missing is computed again"
+        start.remark(
+            f"damaged from byte {each.start} to {each.stop} ({chunks.named(each.description)}); "
+            "what is missing is computed again"
         )
 
 
@@ -262,7 +264,7 @@ def take_part(start, study, record, known):
         place = start.store.places.get(chunks.condition_of(about))
         study.check_part(about, start.journal.read(record.offset, record.length))
     except ValueError as error:
-        start.remarks.append(f"{start.journal.path}: {error}: it is left out")
+        start.remark(f"{error}: it is left out")
         return
     if place is not None:
         start.store.parts[place, about["replicate"]].append(record)
@@ -289,9 +291,7 @@ def take_chunk(start, study, record, known, session):
     """
     about = record.description
     if about["identity"] not in known:
-        start.remarks.append(
-            f"{start.journal.path}: {chunks.named(about)} cannot be verified: computed again"
-        )
+        start.remark(f"{chunks.named(about)} cannot be verified: computed again")
         return
     place = start.store.places.get(chunks.condition_of(about))
     if place is None:
@@ -305,9 +305,7 @@ def take_chunk(start, study, record, known, session):
     try:
         start.store.add_chunk(record, place, check)
     except ValueError as error:
-        start.remarks.append(
-            f"{start.journal.path}: {chunks.named(about)}: {error}: computed again"
-        )
+        start.remark(f"{chunks.named(about)}: {error}: computed again")
         return
     start.notes += about.get("notes", [])
     start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])

@@ -8,6 +8,7 @@ import numpy as np
 from flocsim.io.groups import Group, hold_against, scalars_in
 from flocsim.io.hdf5 import Node
 from flocsim.io.results import schema
+from flocsim.io.results.events import AGGREGATED, HELD, MISSED
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.schema import Results
 
@@ -18,9 +19,7 @@ FURTHER_RUNS = ("checked", "third", *schema.BAND_ENDS)
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
-BOUND_CLASSES = [schema.CLASSES.index(name) for name in schema.AGGREGATED]
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
-APART = [schema.OUTCOMES.index(name) for name in ("missed", "held")]
 
 
 def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = schema.GROUPS) -> None:
@@ -81,7 +80,9 @@ def check_tables(results: Results) -> None:
         or np.any(ends + table["n_class"].sum(axis=-1) != results.count)
         or np.any(table["n_collided"] > results.count)
         or np.any(table["n_inside"] > table["n_collided"])
-        or np.any(table["n_bond"].sum(axis=-1) != table["n_class"][..., BOUND_CLASSES].sum(axis=-1))
+        or np.any(
+            table["n_bond"].sum(axis=-1) != table["n_class"][..., list(AGGREGATED)].sum(axis=-1)
+        )
         or np.any(table["n_checked"] > results.count)
         or np.any(table["n_flipped"] > table["n_checked"])
         or np.any(table["n_third"] > table["n_checked"])
@@ -137,8 +138,8 @@ def check_rows(
     decided = outcome < len(schema.CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
-    refuse_row(np.isin(outcome, APART) & (inside != schema.NOT_APPLICABLE), "inside")
-    bound = np.isin(outcome, BOUND_CLASSES)
+    refuse_row(np.isin(outcome, [MISSED, HELD]) & (inside != schema.NOT_APPLICABLE), "inside")
+    bound = np.isin(outcome, AGGREGATED)
     bond = column("bond")
     held = (bond >= 1) & (bond <= len(schema.BONDS))
     refuse_row(np.where(bound, ~held, bond != schema.NOT_APPLICABLE), "bond")
