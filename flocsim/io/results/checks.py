@@ -19,6 +19,15 @@ FURTHER_RUNS = ("checked", "third", *schema.BAND_ENDS)
 ROUNDING = 1e-9
 """By which a bound of a probability may miss 0 or 1."""
 
+LEAST = {"probabilities": 0, "pooled": 0, "differences": -1, "numerics": -1, "outlines": -1}
+"""Least value of what is not counted in a group; the largest is 1."""
+
+WITHIN = {
+    "n_collided": "n_total", "n_inside": "n_collided", "n_checked": "n_total",
+    "n_flipped": "n_checked", "n_third": "n_checked", "n_third_flipped": "n_third",
+}  # fmt: skip
+"""What is counted → that of which it is a part."""
+
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
@@ -68,36 +77,23 @@ def check_tables(results: Results) -> None:
     refuse(np.unique(results.delta).size < results.delta.size, "a value of delta twice")
     for name, values in results.radii.items():
         refuse(np.any(values <= 0.0) or np.any(np.isinf(values)), f"{name} that are not radii")
+    for group, least in LEAST.items():
+        for name, values in getattr(results, group).items():
+            if name.startswith("n_"):
+                refuse(np.any(values < 0), f"negative numbers in {group}/{name}")
+            else:
+                what = f"values outside [{least}, 1] in {group}/{name}"
+                refuse(beyond(values, least, 1.0), what)
     table = results.probabilities
-    for name in schema.TABLE:
-        if name.startswith("n_"):
-            refuse(np.any(table[name] < 0), f"negative numbers in probabilities/{name}")
-        else:
-            refuse(beyond(table[name], 0.0, 1.0), f"values outside [0, 1] in probabilities/{name}")
-    ends = sum(table[name] for name in ("n_missed", "n_held", "n_undecided", "n_failed"))
+    ended = sum(table[name] for name in ("n_missed", "n_held", "n_undecided", "n_failed"))
+    bound = table["n_class"][..., list(AGGREGATED)]
     refuse(
         np.any(table["n_total"] != results.count)
-        or np.any(ends + table["n_class"].sum(axis=-1) != results.count)
-        or np.any(table["n_collided"] > results.count)
-        or np.any(table["n_inside"] > table["n_collided"])
-        or np.any(
-            table["n_bond"].sum(axis=-1) != table["n_class"][..., list(AGGREGATED)].sum(axis=-1)
-        )
-        or np.any(table["n_checked"] > results.count)
-        or np.any(table["n_flipped"] > table["n_checked"])
-        or np.any(table["n_third"] > table["n_checked"])
-        or np.any(table["n_third_flipped"] > table["n_third"]),
+        or np.any(ended + table["n_class"].sum(axis=-1) != results.count)
+        or np.any(table["n_bond"].sum(axis=-1) != bound.sum(axis=-1))
+        or any(np.any(table[part] > table[whole]) for part, whole in WITHIN.items()),
         "counts that contradict each other",
     )
-    for name, values in results.pooled.items():
-        most = np.inf if name.startswith("n_") else 1.0
-        refuse(beyond(values, 0.0, most), f"values out of range in pooled/{name}")
-    for name, values in results.differences.items():
-        least, most = (0, np.inf) if name.startswith("n_") else (-1.0, 1.0)
-        refuse(beyond(values, least, most), f"values outside [-1, 1] in differences/{name}")
-    for group in ("numerics", "outlines"):
-        for name, values in getattr(results, group).items():
-            refuse(beyond(values, -1.0, 1.0), f"values outside [-1, 1] in {group}/{name}")
     refuse(len(results.failures) > 256, "too many reasons")
 
 
