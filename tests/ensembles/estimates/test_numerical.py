@@ -311,7 +311,7 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
     counted = count(*columns[:3]) | count_changes(*by_runs(columns)[:3])
     for name, values in numerical_errors(over_displacements(counted)).items():
         if name not in ("pr_class_numerical", "pr_bond_numerical"):
-            np.testing.assert_array_equal(tables.pooled[name], values)
+            np.testing.assert_array_equal(tables["pooled"][name], values)
 
 
 def test_of_a_kind_that_was_never_run_again_all_may_flip():
