@@ -23,7 +23,7 @@ from flocsim.io.images.pictures import Segmentation, check_names, corrected, seg
 from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
-from flocsim.io.plots.overlay import draw_overlay, single_fit
+from flocsim.io.plots.shapes import draw_overlay, single_fit
 from flocsim.io.plots.style import save
 from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
