@@ -77,7 +77,7 @@ another kind leave the text of a law as it is."""
 class Pieces:
     """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
-    gap of outlines is smoothed (smoothing.py), how far those all along them look and what acts
+    gap of outlines is smoothed, how far those all along them look and what acts
     between their charges (outline.py), how many events its contact forces have, whether its body
     forces are given PlainBodyViews, and which forces are used and left out, {name: force} and
     {name: why}, each by a name of its own (base.names_of)."""
