@@ -202,7 +202,7 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 (
     OPEN,  # the pair is apart
     TOUCHES,  # it touches, with the whole contact law
-    GRAZES,  # borne by a share of it (flocsim.integrators.rhs.grazing)
+    GRAZES,  # borne by a share of it (flocsim.integrators.rhs.friction)
 ) = range(3)
 
 # Columns of ``Scene.pieces``: segments and arcs of an outline, in the frame of its body.

@@ -20,8 +20,8 @@ from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
+from flocsim.integrators.implicit import Overdamped
 from flocsim.integrators.loop.driver import advance
-from flocsim.integrators.overdamped import Overdamped
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.plausibility.doubts import all_settled, doubts_of, settled
 from flocsim.plausibility.settling import lone_view

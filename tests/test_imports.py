@@ -62,7 +62,7 @@ INNER_ROWS = {
     "hydrodynamics": [["encounters", "lone_body"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["settling"]],
     "integrators": [
-        ["velocity_verlet", "dormand_prince", "overdamped"],
+        ["explicit"],
         ["implicit"],
         ["parts", "left_out"],
         ["backward_euler"],

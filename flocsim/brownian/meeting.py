@@ -15,7 +15,7 @@ from flocsim.forces.base import Force
 from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.integrators.base import Integrator, Status
-from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.implicit import Overdamped
 from flocsim.integrators.rhs.views import centre_line
 from flocsim.io.confidence import wilson
 from flocsim.run import Run

@@ -7,11 +7,9 @@ stages of the implicit methods.  May import geometry, body and what is below.
 
 from flocsim.integrators.backward_euler.method import BackwardEuler
 from flocsim.integrators.base import Integrator, Status
-from flocsim.integrators.dormand_prince import DormandPrince54
-from flocsim.integrators.implicit import Implicit
-from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.explicit import DormandPrince54, VelocityVerlet
+from flocsim.integrators.implicit import Implicit, Overdamped
 from flocsim.integrators.parts import FixedStep
-from flocsim.integrators.velocity_verlet import VelocityVerlet
 
 __all__ = [
     "BackwardEuler",

@@ -13,20 +13,19 @@ from flocsim.hooks import (
     note_step,
     step_across,
 )
-from flocsim.integrators.backward_euler.choice import hand_over, step_or_give_back
+from flocsim.integrators.backward_euler.method import hand_over, step_or_give_back
 from flocsim.integrators.backward_euler.step import next_across, note_rates
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
+from flocsim.integrators.events.first_event import leave_at_once, settle_grazes
 from flocsim.integrators.events.grazes import leave_early, settle
-from flocsim.integrators.events.modes import leave_at_once, settle_grazes
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
-from flocsim.integrators.radau.carried_error import carry_error
+from flocsim.integrators.radau.carried_error import carry_error, doubt_of_release
+from flocsim.integrators.radau.carried_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.grazing import any_grazes, hold_gaps, release_gaps
-from flocsim.integrators.radau.overlap_error import doubt_of_release
-from flocsim.integrators.radau.overlap_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
@@ -94,7 +93,7 @@ class Implicit(Integrator):
 
     Steps end where a pair of features touches or parts, so that the forces are smooth inside them;
     in a bed, where contacts switch all the time, they are those of BackwardEuler, by the rule of
-    flocsim.integrators.backward_euler.choice.
+    flocsim.integrators.backward_euler.method.
     Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
     velocity error leads to included; ``first_step`` [s].
 
@@ -162,3 +161,23 @@ class Implicit(Integrator):
             carry_vector: carry_error,
             overlap_error: step_overlap_error,
         }
+
+
+def massless(scene, body, axis):
+    """No inertia: forces balance at every instant."""
+    return 0.0
+
+
+@attrs.frozen
+class Overdamped(Implicit):
+    """The method of Implicit without inertia: drag balances all other forces at every instant.
+
+    For Stokes numbers far below 1, where a body has forgotten its velocity before it has moved.
+    The velocities given at the start do not matter. Every body needs a drag on each of its
+    coordinates: rotational drag, too. Parameters as for Implicit.
+    """
+
+    @property
+    def replaces(self) -> dict[Callable, Callable]:
+        """No inertia besides what Implicit replaces."""
+        return {**super().replaces, inertia: massless}

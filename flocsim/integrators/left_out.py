@@ -3,7 +3,7 @@
 Of few bodies: the search among many, and sparse systems; of two, also the steps across switches
 that Implicit goes over to by itself. All pairs of few bodies are watched, their systems are dense
 (flocsim.arrays: ALL_PAIRS, DENSE), and two are not handed over in a System (backward_euler/
-choice.py: FEWEST). Of forces: sums along outlines, and the numbers of shapes that slow flow asks
+method.py: FEWEST). Of forces: sums along outlines, and the numbers of shapes that slow flow asks
 for, where no force is of that kind: most scenes have neither.
 """
 
@@ -13,7 +13,7 @@ from collections.abc import Callable
 import flocsim.arrays as at
 from flocsim.geometry.contact import body_pairs
 from flocsim.hooks import choose_method, step_across
-from flocsim.integrators.backward_euler.choice import FEWEST
+from flocsim.integrators.backward_euler.method import FEWEST
 from flocsim.integrators.radau import elimination
 from flocsim.integrators.rhs import (
     charge_sum,

@@ -15,7 +15,7 @@ from flocsim.fields import quantity
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.events.modes import set_closed
+from flocsim.integrators.events.first_event import set_closed
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces

@@ -22,9 +22,8 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.events.modes import set_closed
-from flocsim.integrators.implicit import Implicit
-from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.events.first_event import set_closed
+from flocsim.integrators.implicit import Implicit, Overdamped
 from flocsim.integrators.radau.collocation import cubic, stage_weights
 from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import sum_forces

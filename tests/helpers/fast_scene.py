@@ -13,7 +13,7 @@ from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.parts import evaluate_as_they_lie
 from tests.reference import forces as plain_forces
 from tests.reference.contacts import contacts

@@ -10,7 +10,7 @@ from flocsim.arrays import work_of
 from flocsim.bonds.certificate import Load, bond_between
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from tests.helpers.swarm_scenes import WATER
 
 ANCHOR = [(-0.5, 8), (-0.5, 1), (-3, 1), (-3, 0), (3, 0), (3, 1), (0.5, 1), (0.5, 8)]

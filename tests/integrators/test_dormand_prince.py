@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.integrators.dormand_prince import ESTIMATE, MATRIX, NODES
+from flocsim.integrators.explicit import ESTIMATE, MATRIX, NODES
 
 EXPLICIT, EXPLICIT_NODES = np.array(MATRIX), np.array(NODES)
 HIGHER = EXPLICIT[6]

@@ -18,7 +18,7 @@ from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.outline import core_gap
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.swarms.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration
 from tests.helpers.small_study import small_config

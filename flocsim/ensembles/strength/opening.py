@@ -22,7 +22,7 @@ from flocsim.forces.thermal import Thermal
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.base import Integrator, Status
-from flocsim.integrators.overdamped import Overdamped
+from flocsim.integrators.implicit import Overdamped
 from flocsim.system import System
 from flocsim.trajectories.trajectory import State, Trajectory
 

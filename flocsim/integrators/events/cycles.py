@@ -17,8 +17,8 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.grazes import hums, takes_part
-from flocsim.integrators.events.modes import set_modes
 from flocsim.integrators.events.resolution import above_rounding
 
 MOST_SWITCHES = 64

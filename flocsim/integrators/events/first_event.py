@@ -4,18 +4,21 @@ How finely touching is told from not touching. A contact force may have several 
 a threshold, and each is watched by itself: two that change their signs in one step would hide each
 other in a product. The force is continuous there, so that a step that ends a little behind the
 kink errs by the square of that little alone.
+
+Which listed pairs are closed and which slide are flags that stay as they are inside a step, so that
+the forces are smooth functions of the state; the driver ends the step where one would change.
 """
 
 import math
 
 import flocsim.arrays as at
 from flocsim.constants import SHALLOWEST_TOUCH
-from flocsim.hooks import awaits_touch
+from flocsim.hooks import awaits_touch, hook
 from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.grazes import grazing_share
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
-from flocsim.integrators.rhs.friction import beyond
+from flocsim.integrators.rhs.friction import beyond, set_sliding
 from flocsim.integrators.rhs.views import contact_view, pressed_view
 from flocsim.laws import SLIP_LIMIT, contact_event, has
 
@@ -115,3 +118,42 @@ def switch_share(scene, work, observed, clock, step):
         share = first_switch(scene, work, step, resolution, depth)
         return share if share <= 1.0 else law_share(scene, work, clock, step)
     return math.inf
+
+
+SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
+"""What changed when pairs were flagged: nothing; what sticks and slides, by which no force jumps;
+which pairs touch."""
+
+
+def set_closed(work, state=at.NOW):
+    """Flag every listed pair by its gap in a state, but for those that graze; whether
+    any has changed."""
+    changed = False
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] == at.GRAZES:
+            continue
+        closed = at.TOUCHES if work.geometry[state, row, at.GAP] < 0.0 else at.OPEN
+        changed = changed or work.candidates[row, at.CLOSED] != closed
+        work.candidates[row, at.CLOSED] = closed
+    return changed
+
+
+@hook
+def leave_at_once(scene, work, clock, step):
+    """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
+    return False
+
+
+@hook
+def settle_grazes(scene, work, clock, step):
+    """Let pairs begin and cease to graze behind a step, where a method has that;
+    whether any has."""
+    return False
+
+
+def set_modes(scene, work):
+    """Flag every listed pair as it is now; what changed (see SAME)."""
+    contacts, friction = set_closed(work), set_sliding(scene, work)
+    if contacts:
+        return OTHER_CONTACTS
+    return OTHER_FRICTION if friction else SAME

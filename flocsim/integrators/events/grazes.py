@@ -1,6 +1,6 @@
 """When pairs begin and cease to graze: decided by forces at the end of a step.
 
-A pair that has just parted goes on grazing (rhs/grazing.py) instead of being apart where its own
+A pair that has just parted goes on grazing (rhs/friction.py) instead of being apart where its own
 tangential force has lifted it and all that comes of it is far below the tolerance: how high it
 would fly, and the displacement that its tangential spring would lose. What the spring lets go of
 has to be next to nothing, too, unless the pair has parted and touched again several times like
@@ -15,7 +15,7 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding
-from flocsim.integrators.rhs.grazing import STIFFER, coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.friction import STIFFER, coupling, grazing_force, normal_mobility
 from flocsim.integrators.rhs.views import (
     contact_view,
     memory_of,

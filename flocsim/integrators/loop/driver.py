@@ -17,17 +17,18 @@ from flocsim.hooks import (
     note_step,
     observe,
 )
-from flocsim.integrators.events.crossings import may_switch, passes_within
-from flocsim.integrators.events.first_event import law_share, resolutions_of, switch_share
-from flocsim.integrators.events.modes import (
+from flocsim.integrators.events.crossings import may_switch, overtakes, passes_within
+from flocsim.integrators.events.first_event import (
     OTHER_CONTACTS,
     OTHER_FRICTION,
     SAME,
+    law_share,
     leave_at_once,
+    resolutions_of,
     set_modes,
     settle_grazes,
+    switch_share,
 )
-from flocsim.integrators.events.overtaking import overtakes
 from flocsim.integrators.loop.kicks import kick_end, meet_kick, renew_kicks
 from flocsim.integrators.loop.step_size import (
     choose_step,

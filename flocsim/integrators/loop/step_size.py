@@ -5,8 +5,7 @@ import math
 import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import share_ahead, time_within
 from flocsim.hooks import next_step
-from flocsim.integrators.events.first_event import resolutions_of
-from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION
+from flocsim.integrators.events.first_event import OTHER_CONTACTS, OTHER_FRICTION, resolutions_of
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.stated_error import pressed_stiffness

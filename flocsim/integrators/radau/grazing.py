@@ -8,7 +8,7 @@ shut instead of open, the load drives it open, and the pair is apart.
 import flocsim.arrays as at
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
-from flocsim.integrators.rhs.grazing import STIFFER
+from flocsim.integrators.rhs.friction import STIFFER
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import memory_of, normal_rate
 

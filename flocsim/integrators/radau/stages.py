@@ -16,8 +16,7 @@ from flocsim.integrators.radau.systems import solve_both, write_changes, write_l
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_size, step_tolerance
 from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_stage
-from flocsim.integrators.rhs.friction import rolled, rolled_besides, slip_in
-from flocsim.integrators.rhs.grazing import STIFFER, grazing_force
+from flocsim.integrators.rhs.friction import STIFFER, grazing_force, rolled, rolled_besides, slip_in
 from flocsim.integrators.rhs.surface_gap import length_at, locate_sharing
 from flocsim.integrators.rhs.views import along_normal, lever, memory_of
 

@@ -7,7 +7,7 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.grazing import grazing_force
+from flocsim.integrators.rhs.friction import grazing_force
 from flocsim.integrators.rhs.outline_sum import acts_along, outlines_in
 from flocsim.integrators.rhs.pair_resistance import add_pair_resistance
 from flocsim.integrators.rhs.surface_gap import run_end, surface_view

@@ -26,7 +26,7 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.separation import length_of
 from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
-from flocsim.integrators.rhs.grazing import coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mobility
 from flocsim.integrators.rhs.views import (
     along_normal,
     contact_view,

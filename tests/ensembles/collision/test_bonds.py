@@ -26,7 +26,7 @@ from flocsim.ensembles.collision.outcomes import BOUND, bond_of, load_on, start_
 from flocsim.forces import VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.io.results.schema import BONDS
 from tests.helpers.small_study import small_config
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, polygon

@@ -35,7 +35,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.climb import BARRIER
 from tests.helpers.small_study import small_config
 

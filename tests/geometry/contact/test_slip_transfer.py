@@ -10,7 +10,7 @@ from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import hand_over
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.forces import rate_slips
 
 OVERLAP, RADIUS, BALL = 5e-8, 1e-6, 2e-6

@@ -14,7 +14,7 @@ from flocsim.body import scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate, look_at
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from tests.helpers.fast_scene import bodies_of
 from tests.helpers.methods import by_adaptive
 from tests.helpers.tiers import rest_slow

@@ -10,8 +10,7 @@ from flocsim.forces import Contact
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import Implicit
-from flocsim.integrators.events.first_event import law_event_share
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import law_event_share, set_modes
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.laws import contact_event
 

@@ -8,7 +8,7 @@ import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
-from flocsim.integrators.events.overtaking import overtakes
+from flocsim.integrators.events.crossings import overtakes
 from tests.helpers.fast_scene import flagged
 
 OVERLAP = 0.9e-9

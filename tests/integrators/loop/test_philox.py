@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.integrators.loop.philox import philox, three_normals
+from flocsim.integrators.loop.kicks import philox, three_normals
 from tests.reference import kicks as plain
 
 ONES = 0xFFFFFFFF

@@ -12,7 +12,7 @@ from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import Implicit
-from flocsim.integrators.events.modes import SAME
+from flocsim.integrators.events.first_event import SAME
 from flocsim.integrators.loop.step_size import adaptive_factor, plan, reject, step_behind_touch
 
 R = 10e-6

@@ -10,7 +10,7 @@ from flocsim.body import Fluid
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.elimination import factorise_sparse
 from flocsim.integrators.radau.ordering import PATTERN

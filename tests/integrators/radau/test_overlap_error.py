@@ -7,7 +7,7 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.forces import Contact
 from flocsim.integrators import DormandPrince54, Implicit
-from flocsim.integrators.radau.overlap_error import overlap_error
+from flocsim.integrators.radau.carried_error import overlap_error
 from flocsim.integrators.radau.tableau import NODES
 from flocsim.integrators.rhs import stated_error
 

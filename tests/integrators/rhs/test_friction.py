@@ -10,7 +10,7 @@ from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import DormandPrince54, Implicit, Status
-from flocsim.integrators.events.modes import OTHER_CONTACTS, OTHER_FRICTION, SAME, set_modes
+from flocsim.integrators.events.first_event import OTHER_CONTACTS, OTHER_FRICTION, SAME, set_modes
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.friction import beyond, slip_in
 from flocsim.integrators.rhs.jacobian import assemble_jacobian

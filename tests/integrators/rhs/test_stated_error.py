@@ -12,7 +12,7 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
-from flocsim.integrators.events.modes import set_modes
+from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.radau.carried_error import carry_error
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
