@@ -71,7 +71,7 @@ def read_kernel_file(path):
 def read_strengths_file(path):
     """Read it, describe it, draw it."""
     from flocsim.ensembles.estimates.strengths import table_of
-    from flocsim.io.plots.rates import over_rate
+    from flocsim.io.plots.curves import over_rate
     from flocsim.io.results.strength_file import read_strengths
 
     found = read_strengths(path)

@@ -110,8 +110,8 @@ def run_elasticities(args, study, how):
     """Run both values of each key, print the table and write the figure."""
     from flocsim.ensembles.studies.sweep import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
+    from flocsim.io.plots.curves import elasticities as figure_of
     from flocsim.io.plots.style import checked_format, save
-    from flocsim.io.plots.sweep import elasticities as figure_of
 
     if args.dry_run:
         raise UsageError("--dry-run is for --over: leave it out")
@@ -199,7 +199,7 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
 
 def run_strength(args: Namespace) -> int:
     """Survey, write, print, and draw; the exit code."""
-    from flocsim.io.plots.rates import over_rate
+    from flocsim.io.plots.curves import over_rate
     from flocsim.io.plots.style import save
     from flocsim.io.results.strength_file import read_strengths
 

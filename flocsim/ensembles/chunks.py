@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flocsim.errors import visible
-from flocsim.io.json_text import matches
-from flocsim.io.records import CHUNK, SNAPSHOT, encode
+from flocsim.io.records import CHUNK, SNAPSHOT, encode, matches
 from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384
@@ -26,7 +25,7 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 
 COLUMNS = tuple(REPLICATES)
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
-"""What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
+"""What is kept of a failed replicate, as a pattern of `flocsim.io.records`."""
 
 DESCRIPTION = {
     "type": str, "vertices": int, "delta": float, "first": int, "count": int, "identity": str

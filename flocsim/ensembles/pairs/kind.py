@@ -35,12 +35,10 @@ from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.interruption import WITHHELD
 from flocsim.io.groups import run_of
-from flocsim.io.json_text import matches
-from flocsim.io.records import CHUNK, Record
+from flocsim.io.records import CHUNK, Record, matches
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened
+from flocsim.io.results.file import opened, why_apart
 from flocsim.io.results.layout import FORMAT, new_row_file
-from flocsim.io.results.older import why_apart
 from flocsim.io.results.schema import Results, as_words
 
 

@@ -15,7 +15,7 @@ from flocsim.ensembles.chunks import ORDER
 from flocsim.ensembles.storage.identity import differences
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Old, write_file
-from flocsim.io.json_text import matches, read_json
+from flocsim.io.records import matches, read_json
 
 Facts = dict[str, Any]
 

@@ -24,9 +24,8 @@ from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import Journal, MemoryJournal, journal_path
-from flocsim.io.json_text import matches
 from flocsim.io.outputs import extension_rule, in_the_way
-from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, encode
+from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, encode, matches
 from flocsim.io.results.run_group import now
 
 NEW, RESUME, RESTART = "new", "resume", "restart"

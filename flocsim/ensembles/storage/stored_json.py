@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from flocsim.ensembles.chunks import NOTE
-from flocsim.io.json_text import matches, read_json
+from flocsim.io.records import matches, read_json
 
 CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm": [str]}
 SESSION = {"identity": {}, "short": str, "layout": str, "date": str, "command": str}
-"""The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
+"""The description of a journal's session, as a pattern of `flocsim.io.records`."""
 
 TRIED = {"method": str, "tolerance": float, "flips": int, "cost": float}
 CHOSEN = {

@@ -19,8 +19,7 @@ from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
 from flocsim.ensembles.storage.stored_json import is_session
 from flocsim.errors import FileError
-from flocsim.io.json_text import matches
-from flocsim.io.records import CHUNK, SESSION, Record, scan
+from flocsim.io.records import CHUNK, SESSION, Record, matches, scan
 
 MOST_CONDITIONS = 20_000
 """Of a study that is read while it runs."""

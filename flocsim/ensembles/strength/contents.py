@@ -4,7 +4,7 @@ from collections import Counter
 
 from flocsim.ensembles.contents import Contents, Facts, Summary
 from flocsim.ensembles.estimates.strengths import table_of
-from flocsim.io.plots.rates import STRENGTH_FIGURES
+from flocsim.io.plots.curves import STRENGTH_FIGURES
 from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths
 
 

@@ -16,8 +16,7 @@ import numpy as np
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.fields import is_number, is_whole
-from flocsim.io.json_text import matches
-from flocsim.io.records import Record
+from flocsim.io.records import Record, matches
 from flocsim.io.results import swarm_file
 from flocsim.swarms.progress import Effort
 
@@ -160,7 +159,7 @@ class Form:
 
 
 FORM = {"bodies": int, "bounds": [float], "times": [float], "periodic": str}
-"""Form.asked, as a pattern of `flocsim.io.json_text`."""
+"""Form.asked, as a pattern of `flocsim.io.records`."""
 
 
 def check_part(part: Part, form: Form) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from flocsim.io.confidence import efficiency
 from flocsim.io.plots import outcomes as ends
 from flocsim.io.plots import style
-from flocsim.io.plots.shape_effects import shape_effects
+from flocsim.io.plots.outcomes import shape_effects
 from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.schema import Results

@@ -24,8 +24,8 @@ from flocsim.io.groups import (
     write_groups,
 )
 from flocsim.io.hdf5 import Node
-from flocsim.io.json_text import matches, read_json
 from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.records import matches, read_json
 
 FORMAT = "flocsim sweep"
 SCHEMA_VERSION = 1

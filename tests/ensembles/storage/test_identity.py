@@ -26,7 +26,6 @@ NOT_PHYSICS = {
     "ensembles/kind.py": "what the machine asks of studies",
     "io/results/checks.py": "what is believed of files",
     "io/results/run_group.py": "text for people",
-    "io/json_text.py": "reads flocs, and these are compared themselves",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",
     "io/plots/": "draws",
     "io/trajectory.py": "writes motions",

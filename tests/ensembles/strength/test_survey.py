@@ -26,7 +26,7 @@ from flocsim.ensembles.strength.kind import (
 )
 from flocsim.ensembles.strength.opening import Opening
 from flocsim.errors import FileError, UsageError
-from flocsim.io.plots.rates import over_rate
+from flocsim.io.plots.curves import over_rate
 from flocsim.io.results.strength_file import QUANTILES, read_strengths, write_strengths
 from tests.helpers.small_rates import AXES, mixed
 from tests.helpers.small_study import small_config

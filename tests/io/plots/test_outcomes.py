@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from flocsim.io.labelled import Column
+from flocsim.io.plots.curves import against_key
 from flocsim.io.plots.outcomes import COLOURS, INSIDE, MARK_AT, causes_of
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import save
-from flocsim.io.plots.sweep import against_key
 from flocsim.io.results.events import ends_of
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.sweep_file import SweepResults, Swept

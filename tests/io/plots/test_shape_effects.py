@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.io.confidence import explained_share
-from flocsim.io.plots.shape_effects import PAIR_MEASURES, bins_of, shape_effect
+from flocsim.io.plots.outcomes import PAIR_MEASURES, bins_of, shape_effect
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
 
 

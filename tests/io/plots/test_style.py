@@ -13,9 +13,9 @@ from flocsim.errors import FileError, UsageError
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.io.labelled import Column
 from flocsim.io.plots.collision import draw_distance, draw_energies, draw_forces
+from flocsim.io.plots.curves import against_key, over_time
 from flocsim.io.plots.results import figure_4
 from flocsim.io.plots.style import keep_titles_whole, new_figure, plain, save, set_log_axis
-from flocsim.io.plots.sweep import against_key, over_time
 from flocsim.io.results.sweep_file import SweepResults, Swept
 from flocsim.io.trajectory import StoredTrajectory
 from flocsim.trajectories.figures import drawn

@@ -15,7 +15,7 @@ import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.pairs import contents
 from flocsim.errors import FileError, UsageError
-from flocsim.io.results import older
+from flocsim.io.results import file as results_file
 from flocsim.io.results.file import read_overview, read_results, read_row
 from flocsim.io.results.layout import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES, TABLE
@@ -26,7 +26,7 @@ from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow
 
 STORED = Path(__file__).parents[2] / "data"
-EVERY = (*older.VERSIONS, SCHEMA_VERSION)
+EVERY = (*results_file.VERSIONS, SCHEMA_VERSION)
 ENDS = EVERY[0], EVERY[-1]
 
 
@@ -45,7 +45,7 @@ def stored(tmp_path, monkeypatch):
 
 def test_every_version_has_its_migration_and_its_file():
     """Whoever changes the schema says what came with it, and stores a file of before."""
-    assert list(older.ADDED) == list(range(3, SCHEMA_VERSION + 1))
+    assert list(results_file.ADDED) == list(range(3, SCHEMA_VERSION + 1))
     for version in EVERY:
         assert (STORED / f"results_{version}.h5.gz").stat().st_size < 50_000
 
@@ -84,7 +84,7 @@ def test_its_numbers_are_those_that_it_holds_and_the_rest_is_blank(stored, versi
         }
         for group, (arrays, schema) in groups.items():
             held = set(file[group]) & set(schema)
-            assert set(schema) - held == set(schema) & older.lacking(version, group)
+            assert set(schema) - held == set(schema) & results_file.lacking(version, group)
             for name in held:
                 np.testing.assert_array_equal(arrays[name], file[group][name][()])
     assert found.probabilities["n_bond"].sum() == (found.replicates["bond"] != 255).sum()
@@ -117,7 +117,7 @@ def test_commands_read_it(stored, version, monkeypatch, capsys):
         opened.replicate(0)
 
 
-@pytest.mark.parametrize("version", rest_slow(older.VERSIONS, lambda version: False))
+@pytest.mark.parametrize("version", rest_slow(results_file.VERSIONS, lambda version: False))
 def test_it_is_compared_with_a_file_of_now_by_its_rows(stored, version, capsys):
     stored(version), stored(SCHEMA_VERSION)
     assert main(["compare", f"r{version}.h5", f"r{SCHEMA_VERSION}.h5"]) == 0
@@ -142,7 +142,9 @@ def test_it_is_not_extended_and_one_line_says_what_differs(stored, version, caps
     assert path.read_bytes() == before and not Path(f"{path.name}.journal").exists()
 
 
-@pytest.mark.parametrize("version", rest_slow(older.VERSIONS, lambda version: version == ENDS[0]))
+@pytest.mark.parametrize(
+    "version", rest_slow(results_file.VERSIONS, lambda version: version == ENDS[0])
+)
 def test_a_damaged_one_is_refused(stored, version):
     path = stored(version)
     with h5py.File(path, "r") as file:
@@ -173,7 +175,7 @@ def test_no_file_says_itself_that_it_was_older(tmp_path):
     image = tmp_path / "image.h5"
     image.write_bytes(read_sealed(tmp_path / "r.h5"))
     with h5py.File(image, "r+") as file:
-        file.attrs[older.WRITTEN_AS] = 2
+        file.attrs[results_file.WRITTEN_AS] = 2
     (tmp_path / "r.h5").write_bytes(seal(image.read_bytes()))
     with pytest.raises(FileError, match="which no file of flocsim has"):
         read_results(tmp_path / "r.h5")
