@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from flocsim.ensembles.contents import open_any as open
     from flocsim.ensembles.pairs.comparison import Comparison
     from flocsim.ensembles.pairs.opened import StudyResults
-    from flocsim.ensembles.studies.study import Study
-    from flocsim.ensembles.studies.sweep import sweep
+    from flocsim.ensembles.script_study import Study
     from flocsim.ensembles.swarms.contents import SwarmComparison
+    from flocsim.ensembles.sweep import sweep
     from flocsim.forces.base import Force
     from flocsim.geometry.shapes.shape import Shape, Sphere
     from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
@@ -47,7 +47,7 @@ HOMES = {
     "SwarmComparison": "ensembles.swarms.contents",
     "SwarmResults": "io.results.swarm_file",
     "SwarmTrajectory": "swarms.swarm",
-    "Study": "ensembles.studies.study",
+    "Study": "ensembles.script_study",
     "Comparison": "ensembles.pairs.comparison",
     "StudyResults": "ensembles.pairs.opened",
     "SweepResults": "io.results.sweep_file",
@@ -57,7 +57,7 @@ HOMES = {
     "curvilinear_factor": "io.results.kernel_tables",
     "floor": "swarms.placement",
     "open": "ensembles.contents:open_any",
-    "sweep": "ensembles.studies.sweep",
+    "sweep": "ensembles.sweep",
     "wall": "swarms.placement",
 }
 """Public name → module, with a colon what it is called there where that differs. Loaded when asked

@@ -72,7 +72,8 @@ INNER_ROWS = {
         ["amplification", "base"],
     ],
     "ensembles": [
-        ["cli", "studies"],
+        ["sweep"],
+        ["cli", "script_study"],
         ["runner"],
         [folder.name for folder in STUDIES.values()],
         ["dry_run", "report"],
@@ -82,7 +83,7 @@ INNER_ROWS = {
         ["contents"],
         ["storage"],
         ["kernels"],
-        ["study", "equivalent_spheres"],
+        ["study"],
         ["preflight"],
         ["collision"],
         ["kind"],
@@ -90,7 +91,8 @@ INNER_ROWS = {
     ],
     "io": [
         ["plots"],
-        ["shapes", "trajectory"],
+        ["fit_report"],
+        ["shape_library", "trajectory"],
         ["images", "results", "journal"],
         ["outputs", "groups", "records"],
         ["files", "hdf5", "json_text", "labelled", "confidence", "terminal"],

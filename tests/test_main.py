@@ -48,7 +48,7 @@ def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, 
     def fail(arguments):
         raise error
 
-    monkeypatch.setattr("flocsim.commands.info.run", fail)
+    monkeypatch.setattr("flocsim.commands.show.run_info", fail)
     assert entry.main(["info", "x.h5"]) == code
     assert capsys.readouterr() == ("", said)
 

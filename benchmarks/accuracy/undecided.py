@@ -15,7 +15,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim.ensembles.collision.start import points_of
+from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.capture import estimate, weighted
 from flocsim.ensembles.estimates.statistics import (

@@ -70,9 +70,8 @@ def read_kernel_file(path):
 
 def read_strengths_file(path):
     """Read it, describe it, draw it."""
-    from flocsim.ensembles.estimates.strengths import table_of
     from flocsim.io.plots.curves import over_rate
-    from flocsim.io.results.strength_file import read_strengths
+    from flocsim.io.results.strength_file import read_strengths, table_of
 
     found = read_strengths(path)
     table_of(found)
@@ -82,7 +81,7 @@ def read_strengths_file(path):
 def read_library_file(path):
     """Read it, and make the shapes."""
     from flocsim.ensembles.contents import text_of
-    from flocsim.io.shapes.library import read_library
+    from flocsim.io.shape_library import read_library
 
     entries = read_library(path)
     for entry in entries:

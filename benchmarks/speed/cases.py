@@ -6,9 +6,8 @@ import time
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.draw import Draw, outcome_of
+from flocsim.ensembles.collision.draw import Draw, draws, orientations, outcome_of
 from flocsim.ensembles.collision.encounter import OBSERVER, Encounter
-from flocsim.ensembles.collision.start import draws, orientations
 from flocsim.integrators.base import Status
 
 VERTICES = 64

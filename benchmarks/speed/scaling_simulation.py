@@ -69,7 +69,7 @@ def measure_costs(count):
 
 def timed(study, place, replicate):
     """Seconds of a processor for a replicate, its shapes made beforehand."""
-    from flocsim.ensembles.collision.start import draws
+    from flocsim.ensembles.collision.draw import draws
 
     study.encounter(*place[:2], draws(study.config.seed, replicate))
     began = time.process_time()

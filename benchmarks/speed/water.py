@@ -16,7 +16,7 @@ from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels import study_of
 from flocsim.hydrodynamics import Meeting, SpherePair, prism_drag
 from flocsim.hydrodynamics.two_spheres import functions_of
-from flocsim.io.shapes.library import SHIPPED, read_library
+from flocsim.io.shape_library import SHIPPED, read_library
 
 RATIOS = (1.0, 0.5, 0.1, 0.02)
 

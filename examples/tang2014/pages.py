@@ -14,7 +14,7 @@ from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import CLASSES
-from flocsim.io.shapes.library import read_library
+from flocsim.io.shape_library import read_library
 
 MOST_VERTICES = 64
 ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")

@@ -1,5 +1,5 @@
 """The subcommands of ``flocsim``; ``fit_pictures`` and ``processes`` are the work behind ``fit``,
-``judged`` that behind ``check``; ``contents`` is what files hold that are of no study.
+``judged`` that behind ``check``, ``show`` has those that show what is in a file.
 
 The file of a command has ``add_arguments(parser)``, ``run(arguments)``, which gives the exit code,
 and a DESCRIPTION; each has a line in SUMMARIES, and one in FILES where its file has another name.
@@ -40,8 +40,10 @@ ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""
 
 FILES = {
-    "compare": ("commands.plot", "_compare"), "strength": ("commands.sweep", "_strength"),
-} | dict.fromkeys(ENSEMBLES, ("ensembles.cli", ""))  # fmt: skip
+    "strength": ("commands.sweep", "_strength"),
+    **{name: ("commands.show", f"_{name}") for name in ("plot", "export", "compare", "info")},
+    **dict.fromkeys(ENSEMBLES, ("ensembles.cli", "")),
+}
 """{command: (the module that it shares, how the names of its functions end)}."""
 
 

@@ -20,12 +20,7 @@ from flocsim.commands.fit_pictures import (
 from flocsim.errors import UsageError
 from flocsim.fields import read_number
 from flocsim.io.files import make_folder, write_file
-from flocsim.io.images.masks import MASK_SUFFIXES
-from flocsim.io.images.pictures import label_image, read_names
-from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
-from flocsim.io.plots.style import checked_format
-from flocsim.io.shapes.fit_report import (
+from flocsim.io.fit_report import (
     coarse_line,
     errors_of,
     format_errors,
@@ -33,7 +28,12 @@ from flocsim.io.shapes.fit_report import (
     population_lines,
     summary_text,
 )
-from flocsim.io.shapes.library import make_entry, write_library
+from flocsim.io.images.masks import MASK_SUFFIXES
+from flocsim.io.images.pictures import label_image, read_names
+from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
+from flocsim.io.plots.style import checked_format
+from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility.doubts import PIXEL_SIZE
 
 DESCRIPTION = """\

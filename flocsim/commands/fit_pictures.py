@@ -17,6 +17,7 @@ from flocsim.commands.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
+from flocsim.io.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
@@ -25,7 +26,6 @@ from flocsim.io.images.regions import Region, mask_measures, with_holes
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.plots.shapes import draw_overlay, single_fit
 from flocsim.io.plots.style import save
-from flocsim.io.shapes.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.terminal import Progress
 
 Fits = dict[float, dict[int, Fit]]

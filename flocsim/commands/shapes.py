@@ -1,22 +1,32 @@
-"""`flocsim shapes`: list the flocs of shape libraries, select some of them, merge libraries."""
+"""`flocsim shapes`: list the flocs of shape libraries, select some of them, merge libraries; and
+what other commands show of one."""
 
 import argparse
 import fnmatch
+import os
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
+from typing import Any
 
 import attrs
 
 from flocsim.commands.fit import number
+from flocsim.ensembles.contents import Contents, Summary
 from flocsim.errors import UsageError, visible
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-from flocsim.io.shapes.fit_report import (
+from flocsim.hydrodynamics import prism_drag
+from flocsim.io.fit_report import (
     coarse_line,
     errors_of,
+    format_errors,
     measures_in,
     plural,
     population_lines,
 )
-from flocsim.io.shapes.library import ShapeEntry, read_library, read_settings, write_library
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.plots.shapes import POPULATION_FIGURES
+from flocsim.io.plots.style import Figure
+from flocsim.io.shape_library import ShapeEntry, read_library, read_settings, write_library
 from flocsim.io.terminal import aligned
 
 DESCRIPTION = """\
@@ -196,3 +206,70 @@ def named(option, text, entries, source):
 
 def names_of(entry):
     return {entry.floc_id, entry.floc_id.removesuffix(f" r={entry.spheroradius:g}")}
+
+
+@attrs.frozen(eq=False)
+class Library:
+    """The flocs of a library, and what their fits were made with."""
+
+    entries: list[ShapeEntry]
+    settings: dict[str, Any]
+
+
+def read(path: str | os.PathLike) -> Library:
+    """All that a library holds."""
+    return Library(read_library(path), read_settings(path))
+
+
+def summary(found: Library) -> Summary:
+    """How many flocs of how many pictures, their sizes, and how they were fitted."""
+    images = sorted({entry.image for entry in found.entries})
+    sizes = [1e6 * entry.measured_radius for entry in found.entries]
+    facts = [
+        ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
+        ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+        *(
+            [("outlines", "as cut, and at both ends of their bands (--band)")]
+            if all(entry.is_banded for entry in found.entries)
+            else []
+        ),
+        *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
+    ]
+    return Summary(facts)
+
+
+def water(path: str | os.PathLike) -> list[str]:
+    """What slow flow makes of the flocs of a library."""
+    entries = read_library(path)
+    rows: list[tuple[str, ...]] = [("floc", "sinks", "at least", "turns", "B", "+- %")]
+    for entry in entries:
+        count = max(entry.fits)
+        drag = prism_drag(entry.fits[count].shape.outline())
+        rows.append((
+            visible(entry.floc_id, ""), *(f"{each:.3f}" for each in drag.mobility),
+            f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
+        ))  # fmt: skip
+    heading = (
+        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: largest and least settling speed, and "
+        "rate of turning, over those of the equivalent spheres; B, the response to strain, over "
+        "that of a line"
+    )
+    return [heading, *aligned(rows)]
+
+
+def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
+    """A figure of flocs as one of a Library."""
+    return wraps(draw)(lambda found: draw(found.entries))
+
+
+FIGURES = {name: of_entries(draw) for name, draw in POPULATION_FIGURES.items()}
+
+LIBRARY = Contents(
+    title="a shape library",
+    read=read,
+    summary=summary,
+    table=lambda found: format_errors(found.entries),
+    figures=lambda found: FIGURES,
+    drawn={"a shape library written by flocsim fit": FIGURES},
+    water=water,
+)

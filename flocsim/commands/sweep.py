@@ -64,8 +64,8 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 def run(args: Namespace) -> int:
     """Run what is missing and join it, or find elasticities; the exit code."""
+    from flocsim.ensembles.script_study import Study
     from flocsim.ensembles.storage.resume import WAYS
-    from flocsim.ensembles.studies.study import Study
 
     if bool(args.elasticities) == bool(args.over):
         raise UsageError("sweep needs one of --over KEY=VALUE,VALUE and --elasticities KEY,KEY")
@@ -86,8 +86,8 @@ def run(args: Namespace) -> int:
 
 def run_sweep(args, study, how):
     """Run what is missing and join it, or say what there is to run."""
-    from flocsim.ensembles.studies.study import settings_of
-    from flocsim.ensembles.studies.sweep import planned, sweep
+    from flocsim.ensembles.script_study import settings_of
+    from flocsim.ensembles.sweep import planned, sweep
 
     if args.ratio is not None:
         raise UsageError("--ratio is for --elasticities: leave it out")
@@ -108,7 +108,7 @@ def run_sweep(args, study, how):
 
 def run_elasticities(args, study, how):
     """Run both values of each key, print the table and write the figure."""
-    from flocsim.ensembles.studies.sweep import RATIO, elasticities
+    from flocsim.ensembles.sweep import RATIO, elasticities
     from flocsim.io.outputs import Output, check_outputs, figure_rule
     from flocsim.io.plots.curves import elasticities as figure_of
     from flocsim.io.plots.style import checked_format, save

@@ -1,19 +1,30 @@
-"""`flocsim trajectory cfg.toml --replicate 17`: one collision as a strip of frames (Fig. 7)."""
+"""`flocsim trajectory cfg.toml --replicate 17`: one collision as a strip of frames (Fig. 7); and
+what commands show of a file of motion."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format, save
-from flocsim.io.trajectory import write_trajectory
+from flocsim.io.trajectory import (
+    StoredTrajectory,
+    centre_distance,
+    read_trajectory,
+    write_trajectory,
+)
 from flocsim.trajectories.figures import animated, drawn
 
 ANIMATION_FRAMES = 60
+STRIP_FRAMES = 7
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -135,3 +146,48 @@ def run(args: Namespace) -> int:
         )  # fmt: skip
         print(args.save)
     return 0
+
+
+def summary_of_motion(found: StoredTrajectory) -> Summary:
+    """What a trajectory file holds."""
+    moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+    facts = [
+        ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
+        *((f"body {number}", f"N = {len(shape.vertices)}, r_eq {1e6 * shape.equivalent_radius:.4g} "
+           f"µm, moved {1e6 * way:.4g} µm")
+          for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
+    ]  # fmt: skip
+    if len(found.shapes) == 2:
+        apart = 1e6 * centre_distance(found.position)
+        facts.append(
+            ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
+             f"{apart[-1]:.4g} at last")
+        )  # fmt: skip
+    for name, value in found.facts.items():
+        if name != "config":
+            told = f"{value:.6g}" if isinstance(value, float) else str(value)
+            facts.append((name.replace("_", " "), told))
+    return Summary(facts)
+
+
+def strip(trajectory: Any, figure: str = "strip") -> Any:
+    """Frames of the motion, evenly along the way of the bodies against each other."""
+    return drawn(trajectory, figure, STRIP_FRAMES)
+
+
+def distance(trajectory: Any) -> Any:
+    """Distance of the two centres against time."""
+    return strip(trajectory, "distance")
+
+
+MOTION_FIGURES: Figures = {"strip": strip, "distance": distance}
+
+TRAJECTORY = Contents(
+    title="a trajectory",
+    read=read_trajectory,
+    summary=summary_of_motion,
+    table=lambda found: "",
+    figures=lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
+    drawn={"a trajectory file (flocsim trajectory --save, Trajectory.save)": MOTION_FIGURES},
+    motion=lambda found: (found.t, found.position, found.velocity, found.shapes),
+)

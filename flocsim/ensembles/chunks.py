@@ -15,6 +15,7 @@ import numpy as np
 
 from flocsim.errors import visible
 from flocsim.io.records import CHUNK, SNAPSHOT, encode, matches
+from flocsim.io.results.run_group import NOTE
 from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384
@@ -24,8 +25,6 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 """One replicate: its row of the results file."""
 
 COLUMNS = tuple(REPLICATES)
-NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
-"""What is kept of a failed replicate, as a pattern of `flocsim.io.records`."""
 
 DESCRIPTION = {
     "type": str, "vertices": int, "delta": float, "first": int, "count": int, "identity": str

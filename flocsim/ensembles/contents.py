@@ -16,11 +16,11 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.kinds import FILES, STUDIES, contents_of
-from flocsim.ensembles.storage.stored_json import describe_kind, stored
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.plots.style import Figure
+from flocsim.io.results.run_group import describe_kind, stored
 from flocsim.io.seals import held
 
 Facts = list[tuple[str, str]]

@@ -1,17 +1,31 @@
-"""What a study would do, without doing it: what it is made of, and what a pilot says it takes."""
+"""What is known of a study without running it: what it is made of, what its equivalent spheres
+would do, and what a pilot says it takes.
 
+Equivalent spheres of a brownian study by integrals: how often they would touch, and how much their
+interaction slows down their coagulation. In the plane, where the study is, so many of two spheres
+that are let go at a distance r touch before they are b apart: ln(b/r)/ln(b/(r_i + r_j)) without
+forces between them. What shapes do beyond that is the difference to these. The stability ratio W is
+that of three dimensions. Of settling and flows by their ways in three dimensions, without inertia:
+the share of the rectilinear kernel of those that come to touch, with the water that they push at
+each other, and without (flocsim.hydrodynamics).
+"""
+
+import math
 import time
 from collections import Counter
-from math import inf
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
+from flocsim.constants import MINIMUM_GAP
 from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
-from flocsim.ensembles.collision.flocs import read_flocs
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.pairings import class_facts, pairings_of
-from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import BAND, Config
-from flocsim.ensembles.equivalent_spheres import sphere_facts
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choose, first_methods, run_alone
@@ -36,12 +50,16 @@ from flocsim.ensembles.preflight import (
     study_doubts,
 )
 from flocsim.ensembles.study import Study
-from flocsim.errors import FlocsimError
+from flocsim.errors import FlocsimError, UsageError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
+from flocsim.forces import VanDerWaals
+from flocsim.forces.drag import solid_radius
+from flocsim.forces.thermal import thermal_in
+from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.interruption import INTERRUPTION, stop_requested
+from flocsim.io.fit_report import coarse_line
 from flocsim.io.results.run_group import choice_lines, class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
-from flocsim.io.shapes.fit_report import coarse_line
 from flocsim.io.terminal import duration
 
 NOTHING_RUN = (
@@ -51,6 +69,87 @@ NOTHING_RUN = (
 
 MOST_CHOOSING = 60.0
 """Seconds that a dry run spends on what accuracy = "auto" chooses; a longer pilot is left out."""
+
+
+def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
+    """[{type, release, escape [m], diffusion [m²/s], free, touch, stability}] of the collision
+    types of a brownian study, nothing of others.
+
+    ``free`` and ``touch``: probabilities to touch without and with the forces between the spheres;
+    what is not a number, as for a potential beyond all bounds, is None.
+    """
+    return [
+        {"type": name, **facts_of(pair)}
+        for name, pair in sphere_pairs(config, flocs)
+        if pair.meeting == BROWNIAN
+    ]
+
+
+def facts_of(pair: Encounter) -> dict[str, Any]:
+    """The same of one pair of spheres."""
+    system, (near, far) = pair.system, pair.ends
+    radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
+    radii = radius_i, radius_j
+    [thermal] = thermal_in(system.forces)
+    known: dict[str, Any] = {"temperature": thermal.temperature, "fluid": system.fluid}
+    with np.errstate(all="ignore"):
+        found = {
+            "free": splitting_probability([], radii, near, far, **known),
+            "touch": splitting_probability(system.forces, radii, near, far, **known),
+            "stability": stability_ratio(system.forces, radii, **known),
+        }
+    plain = {name: value if math.isfinite(value) else None for name, value in found.items()}
+    return {"release": near, "escape": far, "diffusion": pair.diffusion} | plain
+
+
+def water_facts(config: Config) -> list[dict]:
+    """[{type, water, alone}] of the collision types that settling or a flow brings together: the
+    share of the rectilinear kernel of their equivalent spheres that touches with the water that
+    they push at each other, and without.
+
+    UsageError for ratios of radii that the resistance functions do not reach.
+    """
+    found = []
+    for name, pair in sphere_pairs(config):
+        if pair.meeting != BROWNIAN:
+            try:
+                shares = {key: share_in(pair, key == "water") for key in ("water", "alone")}
+            except UsageError as error:
+                raise UsageError(f"{name}: {error}") from error
+            found.append({"type": name, **shares})
+    return found
+
+
+def share_in(pair: Encounter, water: bool) -> float:
+    """Of one pair, with the water between the two or without."""
+    system = pair.system
+    if words := unknown_in_water(pair):
+        raise UsageError(f"how often spheres touch in water cannot be computed {words}")
+    first, second = (shape.equivalent_radius for shape in pair.shapes)
+    # Of flocs that water passes through the solid spheres that resist as much.
+    inner = solid_radius(first, system.forces), solid_radius(second, system.forces)
+    spheres = SpherePair(inner, system.fluid.viscosity)
+    passed = first + second - sum(inner)
+    force = repulsion(system.forces, (first, second), system.fluid)
+    cuts = [each.d_min for each in system.forces if isinstance(each, VanDerWaals)]
+    meeting = Meeting(spheres, force, min(cuts, default=MINIMUM_GAP), water, passed)
+    if pair.rate is not None:
+        return meeting.in_flow(pair.meeting, pair.rate)
+    # The weights of spheres that settle alone, by Stokes's law, as fast as these do.
+    speeds = [-float(velocity[1]) for velocity, _ in pair.settling]
+    drag = 6.0 * math.pi * system.fluid.viscosity
+    return meeting.settling((drag * inner[0] * speeds[0], drag * inner[1] * speeds[1]))
+
+
+def unknown_in_water(pair: Encounter) -> str:
+    """Why what water does to two spheres cannot be said of a pair; "" where it can."""
+    if thermal_in(pair.system.forces):
+        return "with thermal kicks: leave [forces.thermal] out"
+    if any(body.fixed for body in pair.system.bodies):
+        return "with a fixed receiver: choose scene.receiver = 'free'"
+    if pair.meeting == SETTLING and any(pair.system.fluid.flow):
+        return "when they settle in a flow: leave fluid.velocity and fluid.gradient out"
+    return ""
 
 
 def condition_lines(config, flocs):
@@ -110,7 +209,7 @@ def checked_words(config):
         return f"none, {config.integrator.label} has no tolerance or step to reduce"
     elif not count:
         return "none, so the numerical error stays unknown (integrator.check_share)"
-    elif exact.tolerance < inf:
+    elif exact.tolerance < math.inf:
         how = f"a tolerance of {exact.tolerance:g} m"
     else:
         how = f"a step of {exact.first_step:g} s"
@@ -276,7 +375,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         flocs += f", {BAND_WORDS[shapes.outlines]}"
     if shapes.pairs_alike_in == "error":
         flocs += ", the receiver with the N whose RE is nearest to that of the approaching floc"
-    accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < inf else "fixed step"
+    accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < math.inf else "fixed step"
     count = len(scene.names) * len(shapes.vertices) * len(scene.delta)
     lines = [
         f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "

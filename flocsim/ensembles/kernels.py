@@ -14,9 +14,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.ensembles.collision.draw import point, point_facts
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc
-from flocsim.ensembles.collision.start import point, point_facts
 from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.study import Study, flocs_of

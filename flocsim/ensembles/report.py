@@ -5,12 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import visible
 from flocsim.io.confidence import efficiency, wilson
 from flocsim.io.results.events import HOOK, MOST_UNKNOWN
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
-from flocsim.io.results.run_group import describe_note
+from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
 
 ENDS = {

@@ -42,14 +42,19 @@ from flocsim.ensembles.pilot.choice import (
 from flocsim.ensembles.pilot.ladder import Job, try_out
 from flocsim.ensembles.preflight import said_doubts
 from flocsim.ensembles.storage.identity import arithmetic_digest, short
-from flocsim.ensembles.storage.plan import refuse_other_part
 from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.storage.stored_json import distinct, mixture_warnings
+from flocsim.ensembles.storage.unfinished import refuse_other_part
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal import MemoryJournal
-from flocsim.io.results.run_group import choice_lines, provenance, storable
+from flocsim.io.results.run_group import (
+    choice_lines,
+    distinct,
+    mixture_warnings,
+    provenance,
+    storable,
+)
 from flocsim.io.terminal import Progress, tell
 
 

@@ -17,12 +17,14 @@ from flocsim.ensembles.collision.draw import (
     THIRD,
     Draw,
     columns_of,
+    draws,
+    point,
+    point_facts,
     run_safely,
 )
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
-from flocsim.ensembles.collision.start import draws, point, point_facts
 from flocsim.ensembles.collision.zone import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, CUT, Config

@@ -9,7 +9,7 @@ from PIL import Image
 
 from flocsim.commands import add_command, fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
-from flocsim.io.shapes.library import read_library, read_settings
+from flocsim.io.shape_library import read_library, read_settings
 from tests.helpers.real_images import real_image
 
 

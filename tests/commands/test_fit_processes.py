@@ -16,7 +16,7 @@ from flocsim.commands import fit_pictures
 from flocsim.commands import processes as fit_processes
 from flocsim.commands.processes import Lost, workers
 from flocsim.errors import UsageError
-from flocsim.io.shapes.library import read_library
+from flocsim.io.shape_library import read_library
 from tests.helpers.small_study import ROOT
 from tests.helpers.tiers import rest_slow
 

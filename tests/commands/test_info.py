@@ -5,7 +5,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.ensembles.contents import text_of
 from flocsim.io.results.strength_file import write_strengths
-from flocsim.io.shapes.library import SHIPPED
+from flocsim.io.shape_library import SHIPPED
 from tests.helpers.results_files import write_results
 from tests.helpers.small_rates import mixed
 from tests.helpers.synthetic_results import make_results

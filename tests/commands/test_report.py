@@ -14,7 +14,7 @@ import flocsim
 from flocsim.commands import add_command
 from flocsim.ensembles.pairs import contents
 from flocsim.ensembles.report import efficiency_rows
-from flocsim.ensembles.studies.study import Study
+from flocsim.ensembles.script_study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.results.file import first_of_each, read_results

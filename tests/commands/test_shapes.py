@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.geometry.shapes.outline import ShapeMeasures
-from flocsim.io.shapes.library import (
+from flocsim.io.shape_library import (
     ShapeEntry,
     StoredFit,
     read_library,

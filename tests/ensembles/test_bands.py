@@ -12,7 +12,7 @@ from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.io.shapes.library import read_library, write_library
+from flocsim.io.shape_library import read_library, write_library
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
 from tests.helpers.tiers import rest_slow

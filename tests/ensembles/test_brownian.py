@@ -9,7 +9,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.body import Fluid
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.equivalent_spheres import sphere_facts
+from flocsim.ensembles.dry_run import sphere_facts
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError

@@ -9,8 +9,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.estimates.paired import between, newcombe
-from flocsim.ensembles.estimates.statistics import EXACT_RUNS
+from flocsim.ensembles.estimates.statistics import EXACT_RUNS, between, newcombe
 from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from flocsim.ensembles.collision.start import (
+from flocsim.ensembles.collision.draw import (
     half_extents,
     largest_displacement,
     place_pair,

@@ -20,11 +20,11 @@ from flocsim.ensembles.preflight import (
     settling_facts,
     study_doubts,
 )
-from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, KernelError
 from flocsim.fields import quantity
 from flocsim.forces import ContactForce
 from flocsim.io.results.file import read_results
+from flocsim.io.results.run_group import stored
 from tests.helpers.small_study import small_config, write_small
 
 HEAVY = {"bodies": {"surface_density": 20.0}}

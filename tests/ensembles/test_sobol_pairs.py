@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from flocsim.ensembles.collision.start import points_of
+from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.estimates.statistics import OF_SCRAMBLES, scrambled_sums
 from flocsim.ensembles.estimates.summary import added
 from flocsim.ensembles.runner import run

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 
 from flocsim import run
-from flocsim.ensembles.collision.draw import FAILED, FAILURES, Draw
-from flocsim.ensembles.collision.start import draws
+from flocsim.ensembles.collision.draw import FAILED, FAILURES, Draw, draws
 from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.io.results.schema import OUTCOMES, REPLICATES
-from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
+from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import framed
 from tests.helpers.small_study import (
     load_text,

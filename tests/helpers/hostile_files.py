@@ -23,7 +23,7 @@ from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
 from flocsim.io.seals import seal
-from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
+from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from flocsim.io.results.schema import Results
-from flocsim.io.shapes.library import ShapeEntry, StoredFit
+from flocsim.io.shape_library import ShapeEntry, StoredFit
 from tests.helpers.synthetic_results import bonds_of
 from tests.helpers.tabulate import tabulate
 

@@ -5,8 +5,8 @@ import io
 import os
 
 from flocsim.__main__ import main
-from flocsim.ensembles.studies import study as studies
-from flocsim.ensembles.studies.study import error_of
+from flocsim.ensembles import script_study as studies
+from flocsim.ensembles.script_study import error_of
 
 
 def run_here(words, text, folder, quiet):

@@ -15,7 +15,7 @@ import numpy as np
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.files import keep
-from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED, ShapeEntry, StoredFit, write_library
+from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED, ShapeEntry, StoredFit, write_library
 
 FLOCS, VERTICES = 24, (4, 8, 16, 32, 64)
 PARTICLES, DIMENSION, RATIO, SEED = 60, 1.8, 16.0, 1

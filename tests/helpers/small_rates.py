@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 
-from flocsim.ensembles.estimates.strengths import (
+from flocsim.io.results.kernel_group import KERNEL, Kernel
+from flocsim.io.results.strength_file import (
     FAILED,
     HOLDS,
     OPENED,
     OPENS_AT_LEAST,
     strengths_of,
 )
-from flocsim.io.results.kernel_group import KERNEL, Kernel
 
 AXES = ("I", "III"), np.array([1, 16]), np.array([0.0, 0.5])
 

@@ -12,7 +12,7 @@ import pytest
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.io.shapes.library import ShapeEntry, StoredFit, write_library
+from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 
 SMALL = """\
 preset = "tang2014"

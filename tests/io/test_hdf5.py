@@ -12,7 +12,7 @@ from flocsim.errors import FileError
 from flocsim.io.hdf5 import Unfit, structure_of
 from flocsim.io.results.file import read_overview, read_results
 from flocsim.io.seals import seal
-from flocsim.io.shapes.library import read_library, read_settings
+from flocsim.io.shape_library import read_library, read_settings
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import write_star_library

@@ -23,7 +23,7 @@ from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.results.schema import BAND_ENDS
 
 if TYPE_CHECKING:
-    from flocsim.io.shapes.library import ShapeEntry
+    from flocsim.io.shape_library import ShapeEntry
 
 SYNTHETIC_RATIO = 16.0
 """r_eq/r at which synthetic flocs are fitted: between the paper's small and large flocs."""
@@ -109,7 +109,7 @@ def read_flocs(shapes: ShapesConfig) -> list[Floc]:
 
     Where pairs are alike in their error, at every number of vertices that the library has.
     """
-    from flocsim.io.shapes.library import read_library
+    from flocsim.io.shape_library import read_library
 
     wanted = [n for n in shapes.vertices if n > 1]
     flocs = []

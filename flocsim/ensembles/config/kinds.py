@@ -29,9 +29,9 @@ STUDIES = {
 """What a results file says that it is → the Folder of the kind."""
 
 FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
-    "flocsim sweep": "ensembles.studies.sweep_contents",
-    "flocsim trajectory": "commands.contents:TRAJECTORY",
-    "flocsim shape library": "commands.contents:LIBRARY",
+    "flocsim sweep": "ensembles.sweep",
+    "flocsim trajectory": "commands.trajectory:TRAJECTORY",
+    "flocsim shape library": "commands.shapes:LIBRARY",
 }
 """What any file says that it is → the module of its CONTENTS, or of what a colon precedes."""
 

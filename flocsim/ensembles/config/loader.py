@@ -52,7 +52,7 @@ from flocsim.ensembles.config.values import (
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import list_words
-from flocsim.io.shapes.library import NAME_OF_SHIPPED, SHIPPED
+from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED
 
 
 def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -34,8 +34,8 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
+from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.start import points_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.numerical import (

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.draw import FAILURES
-from flocsim.ensembles.estimates import numerical, paired, statistics
+from flocsim.ensembles.estimates import numerical, statistics
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.results import schema
@@ -40,7 +40,7 @@ def outline_sums(
         run = codes[0] != schema.NOT_APPLICABLE
         for name, here in events(*codes).items():
             there = as_cut[name]
-            cells = paired.bounded_cells(
+            cells = statistics.bounded_cells(
                 type(here)(*(run & flags for flags in here)),
                 type(there)(*(run & flags for flags in there)),
             )
@@ -60,7 +60,7 @@ def outline_changes(
     for key, cells in sums.items():
         name = key.removesuffix(OF_OUTLINES)
         differences, lows, highs = zip(
-            *(paired.bounded_difference(each, scrambled=False) for each in cells), strict=True
+            *(statistics.bounded_difference(each, scrambled=False) for each in cells), strict=True
         )
         found |= {f"{name}_{end}": change
                   for end, change in zip(schema.BAND_ENDS, differences, strict=True)}  # fmt: skip
@@ -127,7 +127,7 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
             **statistics.count(*own),
             **numerical.count_changes(own, again, third),
             **statistics.pooled_sums(*own),
-            JOINT: paired.joint_counts(own[0], own[1], start, scrambles),
+            JOINT: statistics.joint_counts(own[0], own[1], start, scrambles),
             **statistics.scrambled_sums(own, start, scrambles),
             **outline_sums(own, ends),
         }
@@ -162,7 +162,7 @@ def tables_of(sums: Sums) -> dict[str, Any]:
     return {
         "probabilities": table,
         "pooled": pooled_table | {k: each for k, each in together.items() if k in schema.POOLED},
-        "differences": paired.paired_differences(sums[JOINT], bool(of_scrambles)),
+        "differences": statistics.paired_differences(sums[JOINT], bool(of_scrambles)),
         "numerics": numerical.change_columns(changes),
         "outlines": outline_changes(of_outlines, table),
     }

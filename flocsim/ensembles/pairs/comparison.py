@@ -8,16 +8,17 @@ import numpy as np
 from flocsim.ensembles.chunks import ORDER
 from flocsim.ensembles.contents import Differences, changes_between, common, labelled_of, starred
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
-from flocsim.ensembles.estimates.paired import (
+from flocsim.ensembles.estimates.statistics import (
+    EXACT_RUNS,
     between,
     bounded_cells,
     bounded_difference,
+    by_runs,
     change_of_differences,
     joined,
     of_each_scramble,
     sums_of_scrambles,
 )
-from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
 from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.report import SCRAMBLES
 from flocsim.io.confidence import proportion, scrambled_proportion

@@ -22,13 +22,13 @@ from flocsim.ensembles.contents import (
     later,
     origin,
 )
-from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import ConfigError, visible
 from flocsim.io.plots.curves import KERNEL_FIGURES, SWEEP_FIGURES
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.results import run_group, schema
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
 from flocsim.io.results.file import Overview, read_overview, read_results, with_rows
+from flocsim.io.results.run_group import stored
 
 SHOWN = {
     "pr_inside": "Pr[inside]", "pr_a": "Pr[A]", "pr_sticks": "Pr[A, sticks]",

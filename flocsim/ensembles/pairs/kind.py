@@ -15,8 +15,7 @@ from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
-from flocsim.ensembles.dry_run import dry_run
-from flocsim.ensembles.equivalent_spheres import sphere_facts
+from flocsim.ensembles.dry_run import dry_run, sphere_facts
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
@@ -27,10 +26,9 @@ from flocsim.ensembles.parallel.assembly import assemble
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
-from flocsim.ensembles.storage.plan import ASKED
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
-from flocsim.ensembles.storage.unfinished import Unfinished, store_of
+from flocsim.ensembles.storage.unfinished import ASKED, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.interruption import WITHHELD

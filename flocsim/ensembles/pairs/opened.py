@@ -18,7 +18,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.config.sources import Consent, Sources, read_sources
 from flocsim.ensembles.contents import Example, file_kind, stored_in
-from flocsim.ensembles.equivalent_spheres import water_facts
+from flocsim.ensembles.dry_run import water_facts
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.kind import Place
 from flocsim.ensembles.pilot.choice import final_methods

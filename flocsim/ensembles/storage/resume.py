@@ -19,14 +19,13 @@ from flocsim.ensembles import chunks
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
-from flocsim.ensembles.storage.stored_json import distinct, is_session, stored
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, encode, matches
-from flocsim.io.results.run_group import now
+from flocsim.io.results.run_group import distinct, is_session, now, stored
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""

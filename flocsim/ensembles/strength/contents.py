@@ -3,9 +3,8 @@
 from collections import Counter
 
 from flocsim.ensembles.contents import Contents, Facts, Summary
-from flocsim.ensembles.estimates.strengths import table_of
 from flocsim.io.plots.curves import STRENGTH_FIGURES
-from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths
+from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths, table_of
 
 
 def facts_of(found: Strengths) -> Facts:

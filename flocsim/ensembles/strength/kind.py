@@ -13,7 +13,6 @@ import numpy as np
 
 from flocsim.ensembles.chunks import ORDER, Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
-from flocsim.ensembles.estimates.strengths import FAILED, strengths_in
 from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
@@ -28,6 +27,7 @@ from flocsim.io.records import Record
 from flocsim.io.results import strength_file
 from flocsim.io.results.run_group import now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
+from flocsim.io.results.strength_file import FAILED, strengths_in
 
 TESTING = ("ensembles/strength/opening.py",)
 """The code by which a doublet is tested; that by which it is run is part of the study's identity,

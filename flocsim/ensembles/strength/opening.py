@@ -12,7 +12,6 @@ import numpy as np
 from flocsim.body import Body, Fluid
 from flocsim.brownian.splitting import repulsion
 from flocsim.constants import MINIMUM_GAP
-from flocsim.ensembles.estimates.strengths import FAILED, HOLDS, OPENED, OPENS_AT_LEAST
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force
 from flocsim.forces.gravity import Gravity
@@ -23,6 +22,7 @@ from flocsim.geometry.shapes.outline import core_gap
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Overdamped
+from flocsim.io.results.strength_file import FAILED, HOLDS, OPENED, OPENS_AT_LEAST
 from flocsim.system import System
 from flocsim.trajectories.trajectory import State, Trajectory
 

@@ -21,12 +21,12 @@ from flocsim.ensembles.contents import (
     origin,
     starred,
 )
-from flocsim.ensembles.storage.stored_json import stored
 from flocsim.errors import UsageError, visible
 from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
 from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
 from flocsim.io.results import swarm_file
+from flocsim.io.results.run_group import stored
 from flocsim.io.terminal import aligned
 
 

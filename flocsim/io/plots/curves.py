@@ -14,7 +14,7 @@ from flocsim.io.plots.results import BARS, LABELS, PANEL_SIZE, ROOM, panel_grid
 from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import ENDS_COUNTED
 from flocsim.io.results.schema import Results
-from flocsim.io.results.strength_file import STATUS, Strengths
+from flocsim.io.results.strength_file import FAILED, OPENED, OPENS_AT_LEAST, Strengths
 from flocsim.io.results.swarm_file import mean
 from flocsim.io.results.sweep_file import SweepResults
 
@@ -220,8 +220,6 @@ MOST_LINES = 6
 BOUND_WORDS = "no hydrodynamic interaction: upper bounds"
 WATER_WORDS = "with hydrodynamic interaction"
 
-FAILED = STATUS.index("failed")
-
 
 def kernels(results: Results) -> Figure:
     """Kernels over those of equivalent spheres, against size: panels by mechanism, lines by N."""
@@ -297,14 +295,11 @@ KERNEL_FIGURES: dict[str, Callable[[Results], Figure]] = {
 """Name → figure."""
 
 
-OPENED = [STATUS.index(name) for name in ("opened", "opens_at_least_rate")]
-
-
 def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tuple:
     """(rates (k,), shares (k,) opened by then) of all doublets of a type and an N."""
     rows = (found.column("type") == type_place) & (found.column("vertices") == vertices_place)
     status = found.column("status")[rows]
-    opens = np.sort(found.column("opens")[rows][np.isin(status, OPENED)])
+    opens = np.sort(found.column("opens")[rows][np.isin(status, (OPENED, OPENS_AT_LEAST))])
     tested = int(np.sum(status != FAILED))
     return opens, np.arange(1, len(opens) + 1) / max(tested, 1)
 

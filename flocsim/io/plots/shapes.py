@@ -11,10 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
-from flocsim.io.images.regions import Region
-from flocsim.io.plots import style
-from flocsim.io.plots.style import Figure, drawing, plain
-from flocsim.io.shapes.fit_report import (
+from flocsim.io.fit_report import (
     CLASS_LIMIT,
     SHARES,
     diameters_at,
@@ -22,7 +19,10 @@ from flocsim.io.shapes.fit_report import (
     one_each,
     perimeter_dimension,
 )
-from flocsim.io.shapes.library import ShapeEntry
+from flocsim.io.images.regions import Region
+from flocsim.io.plots import style
+from flocsim.io.plots.style import Figure, drawing, plain
+from flocsim.io.shape_library import ShapeEntry
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit

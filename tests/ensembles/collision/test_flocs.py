@@ -10,7 +10,7 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.ensembles.storage.identity import shape_numbers
 from flocsim.errors import ConfigError, FileError
-from flocsim.io.shapes.library import read_library
+from flocsim.io.shape_library import read_library
 from tests.helpers.small_study import grown, write_star_library
 
 ROD = SpheroPolygon([[-4e-6, 0.0], [4e-6, 0.0]], 1e-6)

@@ -12,7 +12,14 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import FAILURES, Draw
+from flocsim.ensembles.collision.draw import (
+    FAILURES,
+    Draw,
+    draws,
+    largest_displacement,
+    orientations,
+    place_pair,
+)
 from flocsim.ensembles.collision.encounter import make_encounter
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
@@ -24,7 +31,6 @@ from flocsim.ensembles.collision.outcomes import (
     turn_left,
     watch_pair,
 )
-from flocsim.ensembles.collision.start import draws, largest_displacement, orientations, place_pair
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates

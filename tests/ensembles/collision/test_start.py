@@ -6,7 +6,7 @@ from scipy.stats import kstest
 from shapely.geometry import LineString, Point, Polygon
 
 from flocsim import Sphere, SpheroPolygon
-from flocsim.ensembles.collision.start import (
+from flocsim.ensembles.collision.draw import (
     draws,
     half_extents,
     largest_displacement,

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.start import points_of
+from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
     estimate,

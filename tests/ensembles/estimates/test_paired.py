@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.ensembles.estimates.paired import (
+from flocsim.ensembles.estimates.statistics import (
     change_of_differences,
     joint_counts,
     newcombe,
     paired_differences,
+    pooled_probabilities,
+    pooled_sums,
 )
-from flocsim.ensembles.estimates.statistics import pooled_probabilities, pooled_sums
 from flocsim.io.confidence import scrambled_difference, wilson
 from flocsim.io.results.events import events
 from flocsim.io.results.schema import NOT_APPLICABLE

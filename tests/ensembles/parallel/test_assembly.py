@@ -311,7 +311,7 @@ def test_a_kill_while_the_file_is_made_loses_nothing(folders, reference, name, k
 PEAKS = """\
 import contextlib, io, resource, sys
 from flocsim.__main__ import main
-from flocsim.commands.plot import read_content
+from flocsim.commands.show import read_content
 from tests.helpers.results_files import same_data
 
 for path in sys.argv[1:]:

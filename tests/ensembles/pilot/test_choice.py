@@ -22,11 +22,10 @@ from flocsim.ensembles.pilot.ladder import (
     scene_length,
 )
 from flocsim.ensembles.storage.identity import differences, identity_of
-from flocsim.ensembles.storage.stored_json import stored
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit
-from flocsim.io.results.run_group import choice_lines
+from flocsim.io.results.run_group import choice_lines, stored
 from tests.helpers.small_study import small_config
 
 AUTO = {"integrator": {"accuracy": "auto"}, "shapes": {"vertices": [1]}}

@@ -21,7 +21,7 @@ NOT_PHYSICS = {
     "explain.py": "text for people",
     "plausibility/doubts.py": "text for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
-    "io/shapes/library.py": "reads flocs, and these are compared themselves",
+    "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",
     "ensembles/kind.py": "what the machine asks of studies",
     "io/results/checks.py": "what is believed of files",

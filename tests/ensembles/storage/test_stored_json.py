@@ -13,14 +13,14 @@ from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
-from flocsim.ensembles.storage.stored_json import (
+from flocsim.io.journal import journal_path
+from flocsim.io.records import SESSION, scan
+from flocsim.io.results.file import read_results
+from flocsim.io.results.run_group import (
     describe_kind,
     distinct,
     mixture_warnings,
 )
-from flocsim.io.journal import journal_path
-from flocsim.io.records import SESSION, scan
-from flocsim.io.results.file import read_results
 from tests.helpers.small_study import problems, small_config
 from tests.helpers.tiers import rest_slow
 

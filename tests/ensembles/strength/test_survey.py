@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from flocsim import __main__ as program
-from flocsim.commands import plot
+from flocsim.commands import show
 from flocsim.commands.sweep import places
-from flocsim.ensembles.estimates.strengths import FAILED, OPENED, quantiles_of, table_of
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run, run_to_file
 from flocsim.ensembles.strength import kind as module
@@ -27,7 +26,15 @@ from flocsim.ensembles.strength.kind import (
 from flocsim.ensembles.strength.opening import Opening
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.curves import over_rate
-from flocsim.io.results.strength_file import QUANTILES, read_strengths, write_strengths
+from flocsim.io.results.strength_file import (
+    FAILED,
+    OPENED,
+    QUANTILES,
+    quantiles_of,
+    read_strengths,
+    table_of,
+    write_strengths,
+)
 from tests.helpers.small_rates import AXES, mixed
 from tests.helpers.small_study import small_config
 
@@ -232,7 +239,7 @@ def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
     write_strengths(tmp_path / "s.h5", mixed(complete=False))
     back = read_strengths(tmp_path / "s.h5")
     assert not back.complete and mixed().complete
-    assert plot.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 of 4 doublets"
+    assert show.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 of 4 doublets"
     words = ["plot", str(tmp_path / "s.h5"), "--output-dir", str(tmp_path)]
     assert program.main(words) == 0
     assert (tmp_path / "s-strength.png").exists()
@@ -282,7 +289,7 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     assert names >= {"study-strength.h5", "study-strength.png"} and len(names) == 4
     found = read_strengths("study-strength.h5")
     assert found.about["flow"] == "shear" and "features" in json.loads(found.about["cpus"])[0]
-    kind, found, _ = plot.read_content("study-strength.h5")
+    kind, found, _ = show.read_content("study-strength.h5")
     assert kind.figures(found).keys() == {"strength"}
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()

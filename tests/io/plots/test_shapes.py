@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.io.plots.shapes import POPULATION_FIGURES, figure_2, figure_3, shape, sizes
 from flocsim.io.plots.style import save
-from flocsim.io.shapes.library import ShapeEntry, StoredFit
+from flocsim.io.shape_library import ShapeEntry, StoredFit
 from tests.helpers.tiers import rest_slow
 
 

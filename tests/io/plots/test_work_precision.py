@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.io.plots.work_precision import COLOURS, Rung, draw_ladders
+from flocsim.commands.work_precision import COLOURS, Rung, draw_ladders
 
 
 def rung(method, tolerance, flips, cpu):

@@ -7,8 +7,8 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.studies.study import Study
-from flocsim.ensembles.studies.sweep import elasticities
+from flocsim.ensembles.script_study import Study
+from flocsim.ensembles.sweep import elasticities
 from tests.helpers import parts_here
 from tests.helpers.small_study import write_small
 

@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.ensembles.collision.flocs import load_flocs
 from flocsim.errors import ConfigError
-from flocsim.io.shapes.library import SHIPPED, read_library
+from flocsim.io.shape_library import SHIPPED, read_library
 from tests.helpers.shipped_library import FLOCS, SIZES, VERTICES, entry
 from tests.helpers.small_study import SMALL, load_text
 

@@ -19,14 +19,25 @@ from typing import Any
 import attrs
 import numpy as np
 
+from flocsim.ensembles.config.kinds import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
-from flocsim.ensembles.contents import Joined, open_any, stored_in
+from flocsim.ensembles.contents import (
+    Contents,
+    Figures,
+    Joined,
+    Summary,
+    in_words,
+    open_any,
+    stored_in,
+    studies,
+)
 from flocsim.ensembles.kind import flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.pairs.comparison import Comparison, compare, with_change
 from flocsim.ensembles.pairs.opened import open_results
 from flocsim.ensembles.pilot.choice import first_methods
+from flocsim.ensembles.script_study import WAYS, Study
 from flocsim.ensembles.storage.identity import machine_facts
-from flocsim.ensembles.storage.plan import (
+from flocsim.ensembles.storage.unfinished import (
     NAME,
     Facts,
     Plan,
@@ -38,8 +49,6 @@ from flocsim.ensembles.storage.plan import (
     read_plan,
     write_plan,
 )
-from flocsim.ensembles.studies.study import WAYS, Study
-from flocsim.ensembles.studies.sweep_contents import joined_of, kinds_joined, read_joined
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import make_folder
@@ -47,7 +56,7 @@ from flocsim.io.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
 from flocsim.io.results.schema import GROUPS
-from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
+from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.terminal import aligned
 
 MOST_PARTS = 10_000
@@ -341,3 +350,56 @@ def number_of(study: Study, key: str) -> float:
             "above 0 in the config, or sweep it"
         )
     return float(value)
+
+
+def kinds_joined() -> list[Joined]:
+    """What is joined of each kind that sweeps can run."""
+    return [each.joined for each in studies() if each.joined is not None]
+
+
+def joined_of(results: Any) -> Joined | None:
+    """What is joined of results; None for those of a kind that sweeps cannot run."""
+    name = getattr(results, "format", "")
+    found: Joined | None = contents_of(name).joined if name in STUDIES else None
+    return found
+
+
+def read_joined(path: str | os.PathLike) -> SweepResults:
+    """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
+    or version."""
+    return read_sweep(path, [(each.groups, each.axes) for each in kinds_joined()])
+
+
+def joined_in(found: SweepResults) -> Joined:
+    """What was joined in a file."""
+    return next(each for each in kinds_joined() if each.groups.keys() == found.groups.keys())
+
+
+def summary(found: SweepResults) -> Summary:
+    """The swept keys, by the names of their dimensions, and their values."""
+    facts: list[tuple[str, str]] = []
+    for name, each in found.swept.items():
+        unit = "" if each.unit == "1" else f" {each.unit}"
+        values = ", ".join(map(in_words, each.values))
+        facts.append((f"{each.key} (as {name})", f"{values}{unit}"))
+    return Summary(facts)
+
+
+def table(found: SweepResults) -> str:
+    """Numbers at every value."""
+    kind = joined_in(found)
+    return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
+
+
+def figures(found: SweepResults) -> Figures:
+    """The figures of what was joined."""
+    return joined_in(found).figures
+
+
+CONTENTS = Contents(
+    title="a sweep", read=read_joined, summary=summary, table=table,
+    figures=figures,
+    drawn={"the joined file of flocsim sweep":
+           {name: draw for each in kinds_joined() for name, draw in each.figures.items()}},
+    opened=lambda path, folder=None, sources=None: read_joined(path),
+)  # fmt: skip

@@ -14,7 +14,7 @@ import pytest
 import flocsim
 from flocsim.ensembles import run
 from flocsim.ensembles.config.toml_text import toml_text
-from flocsim.ensembles.studies.study import settings_of
+from flocsim.ensembles.script_study import settings_of
 from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
 from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
@@ -151,7 +151,7 @@ def test_a_replicate_of_a_study_is_kept_as_motion(tmp_path):
 
 
 def test_scripts_get_no_words_of_the_command():
-    from flocsim.ensembles.studies.study import error_of
+    from flocsim.ensembles.script_study import error_of
 
     error = error_of(75, ["", "flocsim: stopped by SIGTERM: continue with --resume"])
     assert type(error) is FlocsimError

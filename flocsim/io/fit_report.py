@@ -16,7 +16,7 @@ from flocsim.errors import visible
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
-from flocsim.io.shapes.library import MEASURE_COLUMNS, ShapeEntry
+from flocsim.io.shape_library import MEASURE_COLUMNS, ShapeEntry
 from flocsim.io.terminal import aligned
 
 CLASS_LIMIT = 5.0

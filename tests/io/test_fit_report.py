@@ -2,7 +2,7 @@
 
 import pytest
 
-from flocsim.io.shapes.fit_report import coarse_line
+from flocsim.io.fit_report import coarse_line
 
 
 @pytest.mark.parametrize(

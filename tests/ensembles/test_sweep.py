@@ -8,7 +8,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.commands.sweep import values_of
-from flocsim.ensembles.studies.sweep import planned, swept_keys
+from flocsim.ensembles.sweep import planned, swept_keys
 from flocsim.errors import FileError, UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers import parts_here

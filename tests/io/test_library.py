@@ -14,7 +14,7 @@ from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import with_holes
 from flocsim.io.seals import seal
-from flocsim.io.shapes.library import (
+from flocsim.io.shape_library import (
     FIT_COLUMNS,
     StoredFit,
     make_entry,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.io.shapes.fit_report import diameters_at, perimeter_dimension
+from flocsim.io.fit_report import diameters_at, perimeter_dimension
 
 
 def test_of_flocs_of_one_size_all_diameters_are_that():

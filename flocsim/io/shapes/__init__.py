@@ -1,1 +1,0 @@
-"""Shape libraries (``library``), and what a fit tells its user (``fit_report``)."""
