@@ -9,8 +9,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from flocsim.ensembles.config import presets
-from flocsim.ensembles.config.kinds import SCENE_WORDS
+from flocsim.ensembles.config import SCENE_WORDS, presets
 from flocsim.ensembles.config.pair_scene import PAIR_SCENES
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, keys_of

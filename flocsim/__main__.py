@@ -17,7 +17,7 @@ if is_limited():
 
 from flocsim.commands import SUMMARIES, add_command
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
-from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
+from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError
 
 STUDIES = {"ensemble", "kernel", "swarm", "strength"}

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from flocsim.ensembles.config.kinds import STUDIES
+from flocsim.ensembles.config import STUDIES
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -87,7 +87,7 @@ INNER_ROWS = {
         ["preflight"],
         ["collision"],
         ["kind"],
-        ["config", "chunks"],
+        ["config"],
     ],
     "io": [
         ["plots"],
@@ -102,7 +102,7 @@ INNER_ROWS = {
 
 # Slow to import or not always there: at home in these files only, and inside functions only.
 HEAVYWEIGHTS = {
-    "mpi4py": ["ensembles/parallel/communicator.py"],
+    "mpi4py": ["ensembles/parallel/processes.py"],
     "h5py": [
         "io/groups.py",
         "io/results/layout.py",

@@ -19,7 +19,7 @@ import attrs
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim.ensembles.collision.checking import MORE_STEPS
+from flocsim.ensembles.collision.draw import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.pilot.choice import (
     ALLOWED,

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim.ensembles.collision.checking import TIGHTER, further_runs, third_tolerance
+from flocsim.ensembles.collision.draw import TIGHTER, further_runs, third_tolerance
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.numerical import change_intervals, count_changes
 from flocsim.ensembles.estimates.statistics import CODES, count, probabilities

@@ -24,9 +24,9 @@ import numpy as np
 
 from benchmarks.faults.job import KINDS, STUDY, Job, Tally
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from flocsim.ensembles.chunks import COLUMNS, ROW, chunk_record, layout
 from flocsim.ensembles.collision.draw import FURTHER
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.kind import COLUMNS, ROW, chunk_record, layout
 from flocsim.ensembles.pairs.kind import KIND
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 
 from benchmarks.faults.job import Tally, make_study, run_here
-from flocsim.ensembles.chunks import ROW
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.resume import Beginning, take_journal
 from flocsim.ensembles.storage.row_store import RowStore

@@ -148,7 +148,7 @@ class SwarmJournalReader:
     """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
 
     def __init__(self, folder):
-        from flocsim.ensembles.chunks import chunk_record, kept_record
+        from flocsim.ensembles.kind import chunk_record, kept_record
         from flocsim.ensembles.swarms.study import SwarmStudy
         from flocsim.io.records import CHUNK, SNAPSHOT, record_at
         from tests.helpers.swarm_study import swarm_config
@@ -213,7 +213,7 @@ class JournalReader:
 
     def rows(self):
         """Two good rows."""
-        from flocsim.ensembles.chunks import ROW
+        from flocsim.ensembles.kind import ROW
         from flocsim.io.results.checks import FURTHER_RUNS
         from flocsim.io.results.schema import SHAPE_COLUMNS
 
@@ -233,8 +233,8 @@ class JournalReader:
 
     def read(self, path):
         """Take its rows and look at them."""
-        from flocsim.ensembles.chunks import ROW
         from flocsim.ensembles.collision.draw import FAILURES
+        from flocsim.ensembles.kind import ROW
         from flocsim.ensembles.storage.resume import Beginning, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.io.journal import Journal

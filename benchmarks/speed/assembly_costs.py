@@ -18,9 +18,9 @@ import attrs
 import numpy as np
 
 from benchmarks.faults.assembly import resumed, write_study
-from flocsim.ensembles.chunks import ROW, Condition
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.summary import Reader, results_of, sums_of, tables_of
+from flocsim.ensembles.kind import ROW, Condition
 from flocsim.ensembles.parallel.assembly import COUNTED_ROWS, Answer, Assembly, Share
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import identity_of

@@ -13,7 +13,7 @@ from pathlib import Path
 from statistics import mean
 from typing import NamedTuple
 
-from flocsim.ensembles.collision.checking import MORE_STEPS, count_checks
+from flocsim.ensembles.collision.draw import MORE_STEPS, count_checks
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels import study_of
 

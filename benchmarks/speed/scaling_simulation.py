@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from benchmarks.speed.assembly_costs import BANDWIDTHS
-from flocsim.ensembles.chunks import ROW, Condition, chunk_record
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.kind import ROW, Condition, chunk_record
 from flocsim.ensembles.parallel.communicator import SLEEP, ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState, chunk_seconds
 from flocsim.ensembles.storage.row_store import RowStore

@@ -9,7 +9,7 @@ from exceptions import exceptions_figure
 from output import save_all, write_page, write_table
 from summary import write_summary
 
-from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.collision.start import zone_distance
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.file import read_results

@@ -19,7 +19,7 @@ import numpy as np
 from output import marked, save_all, write_page
 from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 
-from flocsim.ensembles.collision.zone import only_one
+from flocsim.ensembles.collision.start import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
 from flocsim.io.confidence import proportion

@@ -151,7 +151,7 @@ def draw_trajectory(path, replicate, changes):
 
 def refuse_launchers():
     """This script starts the launcher for the steps that have work for many ranks."""
-    from flocsim.ensembles.parallel.communicator import launched_rank, launched_size
+    from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 
     if launched_size() not in (0, 1):
         if launched_rank() == 0:

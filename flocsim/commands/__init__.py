@@ -1,5 +1,5 @@
 """The subcommands of ``flocsim``; ``fit_pictures`` and ``processes`` are the work behind ``fit``,
-``judged`` that behind ``check``, ``show`` has those that show what is in a file.
+``show`` has those that show what is in a file.
 
 The file of a command has ``add_arguments(parser)``, ``run(arguments)``, which gives the exit code,
 and a DESCRIPTION; each has a line in SUMMARIES, and one in FILES where its file has another name.

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.config.kinds import FILES, contents_of
+from flocsim.ensembles.config import FILES, contents_of
 from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import compare, file_kind, studies, text_of, unfinished_text
 from flocsim.errors import FileError, UsageError, visible

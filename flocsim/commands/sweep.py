@@ -14,8 +14,8 @@ from typing import Any
 from flocsim.commands import FOLDER_HELP
 from flocsim.ensembles.cli import run as run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
-from flocsim.ensembles.parallel.communicator import launched_rank
-from flocsim.ensembles.parallel.heartbeat import SECONDS
+from flocsim.ensembles.parallel.communicator import SECONDS
+from flocsim.ensembles.parallel.processes import launched_rank
 from flocsim.errors import UsageError
 from flocsim.interruption import STOPPED
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule

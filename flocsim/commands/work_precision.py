@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.commands.judged import HEADER, Case, Checker, line_of
+from flocsim.commands.check import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
-from flocsim.ensembles.collision.checking import MORE_STEPS
+from flocsim.ensembles.collision.draw import MORE_STEPS
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels import study_of

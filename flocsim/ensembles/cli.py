@@ -10,14 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from flocsim.compiler import units
-from flocsim.ensembles.parallel.communicator import (
-    Communicator,
-    StopRequested,
-    find_communicator,
-    launched_rank,
-    launched_size,
-)
-from flocsim.ensembles.parallel.heartbeat import SECONDS
+from flocsim.ensembles.parallel.communicator import SECONDS, Communicator, StopRequested
+from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule

@@ -1,7 +1,7 @@
 """What a file holds, of whatever kind it is: the contract of a kind of file.
 
 Each kind gives its Contents, by which `open`, `info`, `plot`, `report`, `compare`, `sweep` and
-`export` read it and show it; they know no kind themselves. `flocsim.ensembles.config.kinds` is the
+`export` read it and show it; they know no kind themselves. `flocsim.ensembles.config` is the
 table of all. `open_any` is `flocsim.open`, what a script has of a file; `compare` what two of one
 kind differ in, and Differences what comparisons of all kinds have in common.
 """
@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from flocsim.ensembles.config.kinds import FILES, STUDIES, contents_of
+from flocsim.ensembles.config import FILES, STUDIES, contents_of
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables

@@ -20,7 +20,7 @@ import numpy as np
 
 from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import MINIMUM_GAP
-from flocsim.ensembles.collision.checking import EASILY, THIRD_OF, count_checks, exact_method
+from flocsim.ensembles.collision.draw import EASILY, THIRD_OF, count_checks, exact_method
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.pairings import class_facts, pairings_of

@@ -20,12 +20,12 @@ import flocsim.arrays as at
 from flocsim.arrays import ContactView, OutlineView, PairView, work_of
 from flocsim.compiler.refused import refuse_interpreter
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.ensembles.collision.checking import exact_method
+from flocsim.ensembles.collision.draw import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.meetings import refuse_release
 from flocsim.ensembles.collision.pairings import pairings_of
-from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import Config

@@ -16,12 +16,11 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
-from flocsim.ensembles.chunks import merged
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.estimates.statistics import borders
-from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, merged, study_of
 from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist

@@ -21,7 +21,7 @@ from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
-from flocsim.ensembles.parallel.communicator import launched_size
+from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
 from flocsim.fields import is_whole

@@ -8,16 +8,18 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
-from flocsim.ensembles.collision.checking import MORE_STEPS, exact_methods, further_runs
 from flocsim.ensembles.collision.draw import (
     CHECKED,
     FAILED,
     FAILURES,
+    MORE_STEPS,
     NO_FLOC,
     THIRD,
     Draw,
     columns_of,
     draws,
+    exact_methods,
+    further_runs,
     point,
     point_facts,
     run_safely,
@@ -25,7 +27,7 @@ from flocsim.ensembles.collision.draw import (
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
-from flocsim.ensembles.collision.zone import zone_distance
+from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind

@@ -1,9 +1,9 @@
 """One study at several values of its keys, joined in one file with the swept keys as dimensions.
 
 Every value is a part: a study with a results file of its own in a folder beside the joined one,
-NAME.parts. What each of them is, is fixed before the first is run (`storage.plan`), and what is
-found, made or joined is held against that. So a sweep that was stopped goes on there, and a cluster
-may fill it by `flocsim ensemble`.
+NAME.parts. What each of them is, is fixed before the first is run (`storage.unfinished`), and what
+is found, made or joined is held against that. So a sweep that was stopped goes on there, and a
+cluster may fill it by `flocsim ensemble`.
 
 Which parameter matters: elasticities of Pr[A], one parameter at a time on the same draws.
 """
@@ -19,7 +19,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.config.kinds import STUDIES, contents_of
+from flocsim.ensembles.config import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
 from flocsim.ensembles.contents import (
     Contents,

@@ -7,7 +7,7 @@ import attrs
 import pytest
 
 from flocsim.__main__ import main, make_parser
-from flocsim.commands import check, judged
+from flocsim.commands import check
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.forces import Contact
@@ -76,7 +76,7 @@ class Judged:
 
     def __init__(self):
         config, found = cases("--count", "1")
-        self.checker, self.case = judged.Checker(config), found[0]
+        self.checker, self.case = check.Checker(config), found[0]
 
     def __call__(self):
         return self.checker.judge(self.case, 1e-13)
@@ -84,15 +84,15 @@ class Judged:
 
 def test_an_error_beyond_the_tolerance_must_be_within_what_is_stated(folder, monkeypatch):
     judge = Judged()
-    assert judge().kind == judged.RIGHT
-    monkeypatch.setattr(judged, "allowed", lambda scene: 0.0)
+    assert judge().kind == check.RIGHT
+    monkeypatch.setattr(check, "allowed", lambda scene: 0.0)
     verdict = judge()
-    assert verdict.kind == judged.STATED and 0.0 < verdict.error <= verdict.stated
-    monkeypatch.setattr(judged.Run, "error", property(lambda run: 0.9 * verdict.error))
+    assert verdict.kind == check.STATED and 0.0 < verdict.error <= verdict.stated
+    monkeypatch.setattr(check.Run, "error", property(lambda run: 0.9 * verdict.error))
     assert judge().why.startswith("no good reference: off by ")
-    monkeypatch.setattr(judged.Run, "error", property(lambda run: 0.1 * verdict.error))
+    monkeypatch.setattr(check.Run, "error", property(lambda run: 0.1 * verdict.error))
     beyond = judge()
-    assert (beyond.kind, beyond.error) == (judged.WRONG, verdict.error)
+    assert (beyond.kind, beyond.error) == (check.WRONG, verdict.error)
     assert beyond.why.endswith("10 times its stated error")
 
 
@@ -107,30 +107,30 @@ def test_an_outcome_that_is_not_the_references_fails(folder, monkeypatch):
     plain = Draw.row
     monkeypatch.setattr(Draw, "row", row_of)
     verdict = judge()
-    assert verdict.kind == judged.WRONG
+    assert verdict.kind == check.WRONG
     assert verdict.why.startswith("A, inside, and the reference B, inside")
 
 
 def test_without_a_reference_nothing_is_right(folder, monkeypatch):
     judge = Judged()
     judge()
-    monkeypatch.setattr(judged, "MORE_STEPS", 0)
+    monkeypatch.setattr(check, "MORE_STEPS", 0)
     verdict = judge()
-    assert verdict.kind == judged.WRONG
+    assert verdict.kind == check.WRONG
     assert verdict.why == "no reference: it ends undecided (step budget)"
 
 
 def test_an_exception_is_a_row(folder, monkeypatch):
     judge = Judged()
-    monkeypatch.setattr(judged, "judged", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(check, "judged", lambda *arguments: 1 / 0)
     assert judge().why == "ZeroDivisionError: division by zero"
 
 
 def test_a_motion_that_amplifies_a_nudge_says_so(folder, monkeypatch):
     judge = Judged()
-    monkeypatch.setattr(judged, "allowed", lambda scene: 0.0)
-    monkeypatch.setattr(judged, "MOST_AMPLIFIED", 0.0)
-    monkeypatch.setattr(judged.Run, "error", property(lambda run: 1e-20))
+    monkeypatch.setattr(check, "allowed", lambda scene: 0.0)
+    monkeypatch.setattr(check, "MOST_AMPLIFIED", 0.0)
+    monkeypatch.setattr(check.Run, "error", property(lambda run: 1e-20))
     words = judge().why
     assert "; the motion amplifies a perturbation " in words
     # Spheres that fall head on forget what they were moved by along their way, and no more grows.
@@ -160,7 +160,7 @@ def test_auto_has_the_ends_of_its_ladder(folder):
 
 
 def test_the_stiffness_takes_the_tangential_one_with_it(folder):
-    law = judged.law_of(judged.stiff(load_config("small.toml"), 500.0))
+    law = check.law_of(check.stiff(load_config("small.toml"), 500.0))
     assert (law.k_n, law.k_t) == (500.0, 50.0)
 
 
@@ -176,7 +176,7 @@ def test_a_law_without_k_n_is_run_as_it_is(folder):
     others = tuple(force for force in config.forces if not isinstance(force, Contact))
     bare = attrs.evolve(config, forces=others)
     assert all(map(math.isnan, check.stiffnesses(bare, None)))
-    assert judged.stiff(bare, math.nan) is bare
+    assert check.stiff(bare, math.nan) is bare
     with pytest.raises(check.UsageError, match=r"--stiffness needs forces\.contact"):
         check.stiffnesses(bare, (1.0, 2.0))
 
@@ -220,4 +220,4 @@ def ends(outcome, inside, distance):
     ],
 )
 def test_a_graze_and_the_border_of_the_zone_are_close_calls(one, two, expected):
-    assert judged.is_close_call(one, two, 1e-9) is expected
+    assert check.is_close_call(one, two, 1e-9) is expected

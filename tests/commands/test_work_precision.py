@@ -4,7 +4,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands import work_precision
-from flocsim.commands.judged import HEADER
+from flocsim.commands.check import HEADER
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from tests.helpers.small_study import write_small
 

@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 KIND = ROOT / "tests/helpers/lone_flocs"
-TABLE = "flocsim/ensembles/config/kinds.py"
+TABLE = "flocsim/ensembles/config/__init__.py"
 BEFORE = '    "flocsim strength": Folder("strength"),\n'
 LINE = '    "flocsim lone": Folder("lone", "lone"),\n'
 MOST_LINES = 330

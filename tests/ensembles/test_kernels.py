@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from flocsim.ensembles.collision.draw import (
-    half_extents,
-    largest_displacement,
-    place_pair,
-    point,
-    points_of,
-)
+from flocsim.ensembles.collision.draw import point, points_of
+from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
 from flocsim.ensembles.kernels import (
     ANGLE_I,
     OFFSET,

@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 from PIL import Image
 
-from flocsim.ensembles.chunks import Condition, chunk_record, layout
+from flocsim.ensembles.kind import Condition, chunk_record, layout
 from flocsim.geometry.shapes.parts import table_of
 from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths

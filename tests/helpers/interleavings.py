@@ -20,9 +20,9 @@ import attrs
 import numpy as np
 
 from flocsim.__main__ import main
-from flocsim.ensembles.chunks import ROW, fits, rows_of
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.config.sources import digest_of
+from flocsim.ensembles.kind import ROW, fits, rows_of
 from flocsim.ensembles.storage.identity import short
 from flocsim.ensembles.study import Study
 from flocsim.ensembles.swarms.study import SwarmStudy

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flocsim.ensembles.chunks import ROW, Condition, chunk_record
+from flocsim.ensembles.kind import ROW, Condition, chunk_record
 from flocsim.ensembles.parallel.communicator import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.row_store import RowStore

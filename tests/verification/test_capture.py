@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.collision.draw import Draw, place_pair, points_of
+from flocsim.ensembles.collision.draw import Draw, points_of
+from flocsim.ensembles.collision.start import place_pair
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels import settling_interval, study_of
 from flocsim.ensembles.runner import run

@@ -6,6 +6,14 @@ turn: all of them grow evenly with the number of replicates, and no number of ra
 
 An exception, or a number that is none, costs that one replicate: a row says so, and a note has
 what is needed to run it again.
+
+Some replicates are run again, more exactly, so that what numerics change is seen and counted. Which
+follows from the seed, the replicate's index and how it ended: whatever ranks, kills, and later
+extensions there are, the same ones are run again. An index does nothing but name random numbers, so
+that a choice which does not look at them is a random sample of those that ended alike. More are
+taken of those that flip easily (`io.results.events.flips_easily`), and each kind counts for as many
+as there are of it (`estimates.numerical`). One in THIRD_OF of these is run a third time, more
+exactly still: first and second runs may lie on one plateau.
 """
 
 import math
@@ -17,13 +25,8 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import compose
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
-from flocsim.geometry.contact import compounds
-from flocsim.geometry.contact.compounds import outlines_of
-from flocsim.geometry.contact.near_pairs import core_distance
-from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator, Status
 from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.schema import (
@@ -43,15 +46,12 @@ if TYPE_CHECKING:
     from flocsim.ensembles.collision.encounter import Encounter
 
 DIMENSIONS = 5
-STREAM = (0, 0, 2)
+POINTS_STREAM = (0, 0, 2)
 """Spawn key, with the scramble's number behind it, of the numbers that scramble the sequence."""
 
 FIRST_POINTS = 256
 SAMPLE = 16
 """Points of each scramble that stand for the sequence."""
-
-MOST_ADVANCES = 1000
-"""Moves towards the wanted gap; each is as long as the distance still allows."""
 
 FAILURES = ("none", "time limit", "step budget", "stalled", "too deep", "not finite", "exception")
 """Reasons of an undecided or failed outcome; a code is a place here."""
@@ -109,7 +109,7 @@ def points(seed: int, scramble: int, size: int) -> np.ndarray:
     """The first ``size`` points (size, 5) of a scramble, in [0, 1); ``size`` a power of 2."""
     from scipy.stats import qmc
 
-    stream = np.random.SeedSequence(seed, spawn_key=(*STREAM, scramble))
+    stream = np.random.SeedSequence(seed, spawn_key=(*POINTS_STREAM, scramble))
     generator = np.random.Generator(np.random.Philox(stream))
     sequence = qmc.Sobol(DIMENSIONS, scramble=True, seed=generator)
     found = np.asarray(sequence.random_base2(size.bit_length() - 1))
@@ -133,64 +133,6 @@ def point_facts(seed: int, scrambles: int) -> dict[str, list[float]]:
     """What rows follow from besides the config: the points themselves."""
     first = points_of(seed, scrambles, 0, SAMPLE * scrambles)
     return {"scene.points": [float(each) for each in first.sum(axis=0)]}
-
-
-def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
-    """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
-    parts = shape.placed_parts(angle=angle)
-    return (
-        max(part.radius - part.points[:, 0].min() for part in parts),
-        max(part.radius + part.points[:, 0].max() for part in parts),
-    )
-
-
-def largest_displacement(
-    rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
-) -> float:
-    """δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j ("radius")."""
-    if rule == "radius":
-        return shape_i.bounding_radius + shape_j.bounding_radius
-    return half_extents(shape_i, angle_i)[1] + half_extents(shape_j, angle_j)[0]
-
-
-def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
-    """Height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
-
-    ``outlines``: those of i and j; ``contact`` = r_i + r_j of the spheroradii; ``reach`` =
-    R_i + R_j. From far above, j comes down by the distance that is left (it cannot overshoot);
-    where it passes without coming so near, it starts clear above.
-    """
-    clear = reach + gap
-    height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
-    turn_c, turn_s = math.cos(angle_j - angle_i), math.sin(angle_j - angle_i)
-    c, s = math.cos(angle_i), math.sin(angle_i)
-    for _ in range(MOST_ADVANCES):
-        x, y = c * displacement + s * height, c * height - s * displacement
-        left = core_distance(outlines, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
-        if left <= 1e-6 * gap:
-            return height
-        height -= left
-        if height < -clear:
-            break
-    return clear
-
-
-@cache
-def compiled_height(compound):
-    return compose(start_height, compounds.FILLINGS if compound else {})
-
-
-def place_pair(
-    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float
-) -> np.ndarray:
-    """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
-    contact = shapes[0].radius + shapes[1].radius
-    reach = shapes[0].bounding_radius + shapes[1].bounding_radius
-    height = compiled_height(any(shape.is_compound for shape in shapes))(
-        outlines_of(shapes), float(angles[0]), float(angles[1]),
-        contact, reach, float(displacement), gap,
-    )  # fmt: skip
-    return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
 
 
 def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
@@ -342,3 +284,108 @@ class Draw:
             place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
             bodies.append(attrs.evolve(body, **place))
         return system.changed(bodies=tuple(bodies))
+
+
+TIGHTER = 0.01
+"""Tolerance of a second run over that of the first."""
+
+THIRD_TIGHTER, FINEST, LEAST_TIGHTER = 1e-3, 1e-12, 0.1
+"""Tolerance of a third run over that of the second; the tolerance [m] at which it ends, unless it
+is to be tighter than the second at least by the last."""
+
+SHORTER = 0.25
+"""The same for a fixed step: 16 times less error of a method of second order."""
+
+MORE_STEPS = 5
+"""By how much a run may take more steps than the one before."""
+
+THIRD_OF = 16
+"""One in so many second runs has a third one behind it."""
+
+THIRD_COST = 4.0
+"""CPU time of a third run over that of a second (benchmarks.accuracy.numerical_error)."""
+
+Z = 1.959963984540054
+"""Normal quantile of 95 % intervals."""
+
+LEAST_SHARE, MOST_SHARE, FEW = 0.01, 0.035, 16
+"""Of the replicates "auto" has run again at least, and at most where that is more than FEW: less
+than a fifth of the cost of a study of 1,000 (benchmarks.accuracy.numerical_error)."""
+
+EASILY = 3
+"""Times as many "auto" has run again of those that flip easily."""
+
+CHOICE_STREAM = (0, 0, 1)
+"""Spawn key of the number that the choice starts from; replicates have keys of one part."""
+
+
+def expected_checks(replicates: int, share: float | str, easily: bool = False) -> float:
+    """How many of the first so many replicates of a condition are run again, before rounding.
+
+    ``easily``: if all of them were of those that flip easily, EASILY times as many by "auto".
+
+    "auto": where no outcome flips, Wilson's interval of the flip rate at m is as wide as that of a
+    probability of ½ at n replicates, z²/(m + z²) = z/√(n + z²), so m = z √(n + z²) − z²; beyond
+    FEW of them at most MOST_SHARE, and at least LEAST_SHARE. Never falls, nor rises by more than 1
+    from one replicate to the next.
+    """
+    if isinstance(share, str):
+        wanted = Z * math.sqrt(replicates + Z * Z) - Z * Z
+        wanted = min(wanted, max(FEW, MOST_SHARE * replicates))
+        wanted = max(wanted, LEAST_SHARE * replicates)
+        return min(EASILY * wanted, replicates) if easily else wanted
+    return share * replicates
+
+
+@cache
+def beginning(seed: int) -> float:
+    """A number in [0, 1) that says where the choice begins."""
+    stream = np.random.SeedSequence(seed, spawn_key=CHOICE_STREAM)
+    return float(np.random.Generator(np.random.Philox(stream)).random())
+
+
+def further_runs(seed: int, replicate: int, share: float | str, easily: bool = False) -> int:
+    """How often a replicate is run again, up to twice: a systematic sample from a random beginning.
+
+    Of the first n of any condition expected_checks(n) would be, up or down to a whole number, if
+    all ended alike, the first of these and one in THIRD_OF twice; ``easily``: whether it is of
+    those that flip easily.
+    """
+    start = beginning(seed)
+    before, after = (
+        math.floor(expected_checks(n, share, easily) + start) for n in (replicate, replicate + 1)
+    )
+    return 0 if after == before else 1 if before % THIRD_OF else 2
+
+
+def count_checks(seed: int, replicates: int, share: float | str) -> int:
+    """How many of the first so many replicates of a condition are run again."""
+    return math.floor(expected_checks(replicates, share) + beginning(seed))
+
+
+def exact_method(
+    method: Integrator, tighter: Callable[[float], float] = lambda value: TIGHTER * value
+) -> Integrator | None:
+    """The method with a 100 times tighter tolerance, or a quarter of its step; None for neither.
+
+    ``tighter`` gives another tolerance. A class of a user's own has them as parameters of these
+    names, or cannot be checked.
+    """
+    names = {field.alias for field in attrs.fields(type(method)) if field.init}
+    for name, smaller in (("tolerance", tighter), ("step", lambda value: SHORTER * value)):
+        value = getattr(method, name, math.inf)
+        if name in names and value < math.inf:
+            return attrs.evolve(method, **{name: float(f"{smaller(value):.15g}")})
+    return None
+
+
+def third_tolerance(second: float) -> float:
+    """That of a third run behind a second one [m]."""
+    return max(THIRD_TIGHTER * second, min(FINEST, LEAST_TIGHTER * second))
+
+
+def exact_methods(method: Integrator) -> tuple[Integrator, Integrator] | None:
+    """Those of the second and the third run; None where a method cannot be made more exact."""
+    second = exact_method(method)
+    third = None if second is None else exact_method(second, third_tolerance)
+    return None if second is None or third is None else (second, third)

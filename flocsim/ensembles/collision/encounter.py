@@ -14,7 +14,8 @@ from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.ensembles.collision import meetings, outcomes
-from flocsim.ensembles.collision.draw import largest_displacement, orientations, place_pair
+from flocsim.ensembles.collision.draw import orientations
+from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError

@@ -1,7 +1,7 @@
 """A study's TOML file: what may stand in it, how it is read strictly, and the objects it makes.
 
 ``schema`` holds every table and key, ``pair_scene`` and ``kernel_scene`` those of [scene], a class
-for each kind of it, which other kinds keep in their folders (``kinds`` is the table of all);
+for each kind of it, which other kinds keep in their folders (STUDIES is the table of all);
 ``loader`` makes a Config of a file. Under it lie ``presets``, over it ``--set``;
 ``sources`` keeps what was read of files. ``values`` reads one value, and tells all that is wrong at
 once, with the lines that ``toml_text`` knows; ``own_classes`` finds a user's force, integrator or
@@ -10,4 +10,51 @@ shape. May import forces, integrators, geometry and body, and nothing else of
 
 The readers are our own, not cattrs: that would replace one loop of twelve lines, while units,
 dimensions and every message stayed ours and its exceptions had to be turned back into places.
+
+All that a kind of study is lies in its folder, whose modules are loaded by name, when something of
+the kind is there: `scene` has the class of its [scene] as SCENE, where that has a `kind` of its
+own; `kind` what runs it as KIND, a `flocsim.ensembles.kind.Kind`; `contents` what its files hold as
+CONTENTS, a `flocsim.ensembles.contents.Contents`.
 """
+
+import importlib
+from typing import Any, NamedTuple
+
+
+class Folder(NamedTuple):
+    """The folder of a kind in flocsim/ensembles, and its `[scene] kind`, if it has one itself."""
+
+    name: str
+    scene: str = ""
+
+    def part(self, module: str) -> Any:
+        """One of its modules."""
+        return importlib.import_module(f"flocsim.ensembles.{self.name}.{module}")
+
+
+STUDIES = {
+    "flocsim results": Folder("pairs"),
+    "flocsim swarm": Folder("swarms", "swarm"),
+    "flocsim strength": Folder("strength"),
+}
+"""What a results file says that it is → the Folder of the kind."""
+
+FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
+    "flocsim sweep": "ensembles.sweep",
+    "flocsim trajectory": "commands.trajectory:TRAJECTORY",
+    "flocsim shape library": "commands.shapes:LIBRARY",
+}
+"""What any file says that it is → the module of its CONTENTS, or of what a colon precedes."""
+
+SCENE_WORDS = tuple(each.scene for each in STUDIES.values() if each.scene)
+
+
+def scenes() -> dict[str, type]:
+    """`[scene] kind` → class of the table, of kinds that have one of their own."""
+    return {each.scene: each.part("scene").SCENE for each in STUDIES.values() if each.scene}
+
+
+def contents_of(file_format: str) -> Any:
+    """The Contents of a kind of file, by what such a file says that it is."""
+    module, _, name = FILES[file_format].partition(":")
+    return getattr(importlib.import_module(f"flocsim.{module}"), name or "CONTENTS")

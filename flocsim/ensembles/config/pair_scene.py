@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 import attrs
 
-from flocsim.ensembles.config.kinds import SCENE_WORDS
+from flocsim.ensembles.config import SCENE_WORDS
 from flocsim.ensembles.config.values import (
     either,
     list_of,

@@ -19,9 +19,8 @@ from typing import Any
 import attrs
 
 from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config import own_classes, pair_scene
+from flocsim.ensembles.config import own_classes, pair_scene, scenes
 from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.kinds import scenes
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.values import (
     list_of,

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ORDER
 from flocsim.ensembles.contents import Differences, changes_between, common, labelled_of, starred
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
 from flocsim.ensembles.estimates.statistics import (
@@ -19,6 +18,7 @@ from flocsim.ensembles.estimates.statistics import (
     of_each_scramble,
     sums_of_scrambles,
 )
+from flocsim.ensembles.kind import ORDER
 from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.report import SCRAMBLES
 from flocsim.io.confidence import proportion, scrambled_proportion

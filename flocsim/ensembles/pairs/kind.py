@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles import chunks, report
+from flocsim.ensembles import kind, report
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.config.kernel_scene import KernelScene
@@ -48,7 +48,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
         raise ValueError(apart)
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
-    places = chunks.places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
+    places = kind.places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
     run = run_of(file)
     return OldTable(rows, places, len(rows["replicate"]), run)
 
@@ -62,7 +62,7 @@ def results(
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     if output is None:
         sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
-        rows = reader.arrays(chunks.COLUMNS) if in_memory else None
+        rows = reader.arrays(kind.COLUMNS) if in_memory else None
         return summary.results_of(study, count, sums, run, rows, kernel)
     # Where the rows go follows from the places of all tables. Of a large study these have no values
     # yet; few rows are counted at once, so that the tables need not be made twice.
@@ -108,13 +108,13 @@ def verdict(found: Results) -> tuple[int, str]:
 def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     """What a journal has of pairs: their counts and probabilities."""
     axes = axes_of(sessions[-1], [
-        chunks.condition_of(each.description) for each in found
-        if each.kind == CHUNK and chunks.fits(each.description, each.length)
+        kind.condition_of(each.description) for each in found
+        if each.kind == CHUNK and kind.fits(each.description, each.length)
     ])  # fmt: skip
     checked = partial(check_rows, failures=len(FAILURES), flocs=2**31)
     with ReadOnlyJournal(str(path)) as journal:
-        store, notes, unread = store_of(journal, sessions, found, axes, chunks.ROW, checked)
-        table = tables(store, tuple(len(axes[name]) for name in chunks.ORDER))
+        store, notes, unread = store_of(journal, sessions, found, axes, kind.ROW, checked)
+        table = tables(store, tuple(len(axes[name]) for name in kind.ORDER))
     made = Results(
         types=axes["types"], vertices=axes["vertices"], delta=axes["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
@@ -123,7 +123,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
     return Unfinished(path, FORMAT, made, store.there(), asked, notes, sessions, unread)
 
 
-def axes_of(session: dict, found: list[chunks.Condition]) -> dict[str, Any]:
+def axes_of(session: dict, found: list[kind.Condition]) -> dict[str, Any]:
     """ASKED of a session; of one that does not say it, what was found, and 0 replicates."""
     asked = session.get("asked")
     if matches(asked, ASKED):
@@ -169,7 +169,7 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
 
     runs, known = store.intervals(place), store.known(place)
     begins = [0, *accumulate(stop - first for first, stop in runs)][:-1]
-    sums = summary.sums_of(codes, 1, 0, chunks.total(runs))
+    sums = summary.sums_of(codes, 1, 0, kind.total(runs))
     return {
         name: values for name, values in sums.items()
         if name not in (*summary.POOLED_NAMES, summary.JOINT)

@@ -17,9 +17,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import COLUMNS, ROW, Interval
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.estimates.summary import Reader, Sums, added, sums_of
+from flocsim.ensembles.kind import COLUMNS, ROW, Interval
 from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage import row_store
 from flocsim.errors import FileError, FlocsimError

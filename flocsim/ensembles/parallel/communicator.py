@@ -1,5 +1,5 @@
-"""The ranks of a job behind one interface: one process, MPI's, or processes of this machine; and
-what they say to each other while a study runs. The only importer of mpi4py.
+"""The ranks of a job behind one interface (`processes` has those that there are), what they say to
+each other while a study runs, and their signs of life.
 
 All ranks talk to rank 0 only. Nobody waits inside a library: a rank that waits looks for a message,
 then sleeps a little, so that it takes no processor from those who compute, and hears signals.
@@ -12,41 +12,52 @@ rank 0 → another rank         how many replicates are to be run, and the key o
                               Halt, while it works, when its chunk is of no use any more
                               ExitCode, after the last answer, when all is written
 every other rank → rank 0     Kept and Going, while it works, where replicates take long
+
+A rank that is not heard of for long ends the job, instead of being waited for. Every rank gives
+rank 0 a sign now and then, and rank 0 gives one to each of them; what is missing is a rank that is
+stopped, or whose machine is gone. A thread does both, so that a rank that is busy, with a long
+replicate or with compiling, is heard of. Where MPI allows no thread beside the main one, the main
+one does it whenever it looks for messages, and silence may last longer.
 """
 
 import collections
-import contextlib
-import faulthandler
 import os
+import socket
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from flocsim.ensembles.parallel.heartbeat import Heartbeat
-from flocsim.errors import FlocsimError, UsageError
-from flocsim.interruption import (
-    INTERRUPTION,
-    LAUNCHER_RANKS,
-    STOPPED,
-    end_with_parent,
-    stop_requested,
-)
+from flocsim.errors import FlocsimError
+from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
+from flocsim.io.terminal import tell
 
 if TYPE_CHECKING:
-    from flocsim.ensembles.chunks import Chunk
-
-LAUNCHER_SIZES = (
-    "PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PMIX_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS",
-)  # fmt: skip
-"""Environment variables in which launchers tell a process how many ranks there are. Slurm's is the
-last: where mpirun runs inside a step, it counts mpirun's own helpers."""
+    from flocsim.ensembles.kind import Chunk
 
 SLEEP = 5e-4
 """Seconds between two looks for a message."""
+
+SECONDS = 300.0
+"""Seconds of silence after which a rank is taken for lost, unless the user gives another time."""
+
+SIGNS = 6
+"""Signs that a rank gives in that time."""
+
+LONGEST_INTERVAL = 10.0
+"""Seconds between two signs at most."""
+
+WITHOUT_THREADS = 4.0
+"""How many times as long silence may last where the main thread gives the signs: it compiles."""
+
+FIRST_SIGN = 60.0
+"""Seconds more that a rank has before its first sign: Python and its libraries have to load."""
+
+TURN = 2.0
+"""Seconds in which one rank after the other speaks up, where rank 0 is lost and cannot."""
 
 
 class StopRequested(FlocsimError):
@@ -116,11 +127,11 @@ class Communicator:
 
     A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
     job, and ``arrived()``, which yields (source, message) of all that has come in; ``beat(sign)``
-    and ``signs()`` do the same for signs of life (flocsim.ensembles.parallel.heartbeat), and never
-    wait. ``threads`` says whether a thread of rank 0 may send and receive while the main one
-    computes, ``concurrent`` whether two may at once; ``ends_all``, whether ``abort`` ends the other
-    ranks as well where it is not rank 0 that calls it. ``called``: the rank that a call of the
-    library is for, which may not return, and ``calls`` how many there were.
+    and ``signs()`` do the same for signs of life (Heartbeat), and never wait. ``threads`` says
+    whether a thread of rank 0 may send and receive while the main one computes, ``concurrent``
+    whether two may at once; ``ends_all``, whether ``abort`` ends the other ranks as well where it
+    is not rank 0 that calls it. ``called``: the rank that a call of the library is for, which may
+    not return, and ``calls`` how many there were.
     """
 
     rank = 0
@@ -214,138 +225,100 @@ class Communicator:
         self.unwatch()
 
 
-def launched_size() -> int | None:
-    """Number of ranks that the launcher started: None where it does not say, 0 without one."""
-    for name in LAUNCHER_SIZES:
-        if os.environ.get(name, "").isdigit():
-            return int(os.environ[name])
-    return None if any(name in os.environ for name in LAUNCHER_RANKS) else 0
+class Awake:
+    """A clock that stands still while this process does: it goes on where it was."""
+
+    def __init__(self, clock: Callable[[], float], interval: float) -> None:
+        """``interval``: seconds after which somebody looks again, unless the process is stopped."""
+        self.clock, self.most = clock, 2.0 * interval
+        self.looked = clock()
+
+    def seconds(self) -> float:
+        """Seconds since the last look."""
+        now = self.clock()
+        seconds = min(now - self.looked, self.most)
+        self.looked = now
+        return seconds
 
 
-def launched_rank() -> int:
-    """This process's rank according to its launcher, 0 without one; needs no MPI library."""
-    said = [os.environ.get(name, "") for name in (*LAUNCHER_RANKS, "SLURM_PROCID")]
-    return next((int(rank) for rank in said if rank.isdigit()), 0)
+class Heartbeat:
+    """One rank's: gives signs, and counts how long each of the others has given none.
 
+    Only time in which this rank itself was awake counts: a job that is suspended as a whole, or a
+    laptop that sleeps, goes on where it was.
+    """
 
-def find_communicator() -> Communicator:
-    """The ranks of this job: MPI only where a launcher started more than one."""
-    try:
-        size = launched_size()
-        return Communicator() if size in (0, 1) else MpiCommunicator(size)
-    finally:
-        INTERRUPTION.held = False
+    def __init__(
+        self, comm: Communicator, seconds: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """``seconds``: how long a rank may be silent."""
+        self.comm = comm
+        self.seconds = seconds if comm.concurrent else WITHOUT_THREADS * seconds
+        self.interval = min(seconds / SIGNS, LONGEST_INTERVAL)
+        self.clock = clock
+        peers = range(1, comm.size) if comm.rank == 0 else (0,)
+        self.silence = dict.fromkeys(peers, -FIRST_SIGN)
+        self.where: dict[int, str] = {}
+        self.sign = f"{socket.gethostname()}, process {os.getpid()}".encode()
+        self.given = clock() - self.interval
+        self.awake = Awake(clock, self.interval)
+        self.ended = False
+        self.stopped = threading.Event()
+        self.thread = threading.Thread(target=self.go_on, daemon=True)
 
+    def start(self) -> None:
+        self.thread.start()
 
-WORDS, LIFE = 0, 1
-"""Tags of messages, and of signs of life."""
+    def stop(self) -> None:
+        self.stopped.set()
+        self.thread.join()
 
-JOINING = 900.0
-"""Seconds in which all ranks have to come to MPI's start, where a rank waits without being able to
-do anything else: on a large machine loading Python alone takes minutes."""
+    def go_on(self) -> None:
+        """The thread: all turns, or where only the main thread may talk, an eye on that one."""
+        before, waiting = None, Awake(self.clock, self.interval)
+        while not self.stopped.wait(0.5 * self.interval):
+            if self.comm.concurrent:
+                self.turn()
+                continue
+            call, seconds = (self.comm.calls, self.comm.called), waiting.seconds()
+            if call == before and call[1] is not None:
+                self.add([call[1]], seconds)
+            before = call
 
-LEAVING = 60.0
-"""Seconds in which all ranks have to come to MPI's end."""
-
-LAST_WORDS = 0.5
-"""Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
-
-
-def load_mpi() -> Any:
-    """mpi4py's MPI module; UsageError where it or its library is missing."""
-    # MPI's start waits for all ranks and holds the interpreter's lock: no thread of Python's could
-    # end that.
-    with open(os.devnull, "w") as nowhere:
-        faulthandler.dump_traceback_later(JOINING, exit=True, file=nowhere)
-        try:
-            from mpi4py import MPI
-        except (ImportError, RuntimeError) as error:
-            raise UsageError(
-                f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
-                "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
-                "the launcher"
-            ) from None
-        finally:
-            faulthandler.cancel_dump_traceback_later()
-    return MPI
-
-
-class MpiCommunicator(Communicator):
-    """The ranks of MPI's world."""
-
-    def __init__(self, launched: int | None) -> None:
-        """Join the world; UsageError where its size is not what the launcher started."""
-        super().__init__()
-        self.mpi = load_mpi()
-        self.world = self.mpi.COMM_WORLD
-        self.rank = self.world.rank
-        self.size = self.world.size
-        self.threads = self.mpi.Query_thread() >= self.mpi.THREAD_SERIALIZED
-        self.concurrent = self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE
-        self.given: dict[int, Any] = {}
-        if launched is not None and launched != self.size:
-            if launched_rank() > 0:
-                raise SystemExit(UsageError.exit_code)  # the first says it for all
-            raise UsageError(
-                f"the launcher started {launched} ranks but MPI counts {self.size}: mpirun and the "
-                "MPI library used by mpi4py do not match; use the mpirun of this Python "
-                "environment, or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix (Open MPI)"
-            )
-        INTERRUPTION.speaks = self.rank == 0
-        if self.concurrent:
-            # Where one rank just goes, the launcher kills the others, and says so by its code.
-            INTERRUPTION.leave = self.abort
-        end_with_parent()
-
-    def send(self, to: int, message: Any) -> None:
-        with self.calling(to):
-            self.world.send(message, to, tag=WORDS)
-
-    def arrived(self) -> Iterator[tuple[int, Any]]:
-        status = self.mpi.Status()
-        while self.world.Iprobe(tag=WORDS, status=status):
-            source = status.Get_source()
-            with self.calling(source):
-                message = self.world.recv(source=source, tag=WORDS)
-            yield source, message
-
-    @contextlib.contextmanager
-    def calling(self, rank: int) -> Iterator[None]:
-        """A call of MPI that returns when a rank does its part, which a lost one never does."""
-        self.called, self.calls = rank, self.calls + 1
-        try:
-            yield
-        finally:
-            self.called = None
-
-    def beat(self, sign: bytes) -> None:
-        for rank in range(1, self.size) if self.rank == 0 else (0,):
-            # To who does not take the last sign there is no use in sending another.
-            if rank not in self.given or self.given[rank].Test():
-                self.given[rank] = self.world.isend(sign, rank, tag=LIFE)
-
-    def signs(self) -> Iterator[tuple[int, bytes]]:
-        status = self.mpi.Status()
-        while self.world.Iprobe(tag=LIFE, status=status):
-            source = status.Get_source()
-            yield source, self.world.recv(source=source, tag=LIFE)
-
-    def close(self) -> None:
-        """Go together, and leave no sign of life behind that MPI would wait for."""
-        if self.heartbeat is None:
+    def turn(self) -> None:
+        """Give a sign where one is due, take in those of the others, and count; never waits."""
+        if self.clock() - self.given < self.interval:
             return
-        self.barrier(heed_signals=False)
-        self.unwatch()
-        # From here on nobody looks after the others, but MPI's end waits for all of them.
-        end = threading.Timer(max(LEAVING, self.heartbeat.seconds), os._exit, (STOPPED,))
-        end.daemon = True
-        end.start()
-        self.barrier(heed_signals=False)
-        for _ in self.signs():
-            pass
+        self.given = self.clock()
+        self.comm.beat(self.sign)
+        seconds = self.awake.seconds()
+        for rank, sign in self.comm.signs():
+            self.silence[rank], self.where[rank] = -seconds, sign.decode(errors="replace")
+        self.add(self.silence, seconds)
 
-    def abort(self, code: int) -> None:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        time.sleep(LAST_WORDS)
-        self.world.Abort(code)
+    def add(self, ranks: Iterable[int], seconds: float) -> None:
+        """Add to the silence of ranks; end the job where that has become too long."""
+        for rank in ranks:
+            self.silence[rank] = self.silence.get(rank, 0.0) + seconds
+        if lost := [rank for rank in ranks if self.silence[rank] > self.seconds]:
+            self.end(lost)
+
+    def end(self, lost: list[int]) -> None:
+        """Say who is lost, and end the job: what has come to rank 0 is in the journal."""
+        if self.ended:
+            return  # MPI's abort may come back, until the launcher has ended this process as well
+        self.ended = True
+        # Where rank 0 is lost, the first of the others to speak up ends all the rest.
+        self.stopped.wait(min(TURN * max(0, self.comm.rank - 1), 20.0))
+        if self.comm.rank < 2 or self.comm.ends_all:
+            tell(f"flocsim: {self.words(lost)}", sys.stderr)
+        self.comm.abort(STOPPED)
+
+    def words(self, lost: list[int]) -> str:
+        first = lost[0]
+        who = f"rank {first} ({self.where.get(first, 'of which there was no sign at all')})"
+        more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
+        return (
+            f"{who}{more} has been silent for {self.seconds:g} s, so the job ends; what was "
+            "computed is kept: continue with --resume"
+        )

@@ -12,8 +12,7 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import Chunk, chunk_record, kept_record
-from flocsim.ensembles.kind import StudyKind
+from flocsim.ensembles.kind import Chunk, StudyKind, chunk_record, kept_record
 from flocsim.ensembles.parallel.communicator import (
     SLEEP,
     ChunkResult,

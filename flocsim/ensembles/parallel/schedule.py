@@ -15,7 +15,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.chunks import MOST_ROWS, Chunk, Interval, missing, total
+from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError

@@ -19,7 +19,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.collision.checking import MORE_STEPS
+from flocsim.ensembles.collision.draw import MORE_STEPS
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pilot.ladder import (

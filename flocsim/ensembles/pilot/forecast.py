@@ -15,8 +15,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.checking import MORE_STEPS, THIRD_COST, THIRD_OF, expected_checks
-from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.draw import MORE_STEPS, THIRD_COST, THIRD_OF, Draw, expected_checks
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import COUNTED

@@ -34,8 +34,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision.checking import Z
-from flocsim.ensembles.collision.draw import FAILED, Draw
+from flocsim.ensembles.collision.draw import FAILED, Draw, Z
 from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.config.schema import Config

@@ -15,7 +15,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles import chunks
+from flocsim.ensembles import kind
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
@@ -64,7 +64,7 @@ class Beginning:
     notes: list[dict] = attrs.Factory(list)
     history: list[dict] = attrs.Factory(list)
     rule: list | None = None
-    unasked: list[chunks.Condition] = attrs.Factory(list)
+    unasked: list[kind.Condition] = attrs.Factory(list)
     farthest: int = 0
     at_least: int = 0
     accuracy: dict = attrs.Factory(dict)
@@ -92,7 +92,7 @@ class Beginning:
             and all(condition in old.places for condition in self.store.conditions)
         )
 
-    def found(self, count: int) -> list[list[chunks.Interval]]:
+    def found(self, count: int) -> list[list[kind.Interval]]:
         """Of every condition the replicates below ``count`` that exist, as intervals."""
         whole = (self.store.intervals(place) for place in range(len(self.store.conditions)))
         return [
@@ -160,7 +160,7 @@ def begin(
         take_place(start, output, mode, overwrite, take_rows)
         refuse_fewer(start, output, study.config.replicates)
         session = {
-            "identity": identity, "short": short(identity), "layout": chunks.layout(study.row),
+            "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
             "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
             "rule": start.rule, "accuracy": start.accuracy, "asked": study.asked(),
         }  # fmt: skip
@@ -232,7 +232,7 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
     start.history += [{key: each[key] for key in HISTORY} for each in sessions]
     for description in sessions:
         refuse_other(start, journal.path, description["identity"])
-        if description["layout"] != chunks.layout(study.row):
+        if description["layout"] != kind.layout(study.row):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
     known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
     session: dict = {}
@@ -241,14 +241,14 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
             session = record.description
         elif record.kind == SNAPSHOT:
             take_part(start, study, record, known)
-        elif record.kind == CHUNK and chunks.fits(record.description, record.length, study.row):
+        elif record.kind == CHUNK and kind.fits(record.description, record.length, study.row):
             take_chunk(start, study, record, known, session)
         elif record.kind == CHUNK:
-            told = chunks.named(record.description)
+            told = kind.named(record.description)
             start.remark(f"{told}: its form is unknown: computed again")
     for each in journal.damage:
         start.remark(
-            f"damaged from byte {each.start} to {each.stop} ({chunks.named(each.description)}); "
+            f"damaged from byte {each.start} to {each.stop} ({kind.named(each.description)}); "
             "what is missing is computed again"
         )
 
@@ -257,9 +257,9 @@ def take_part(start, study, record, known):
     """Note what was kept of an unfinished replicate, if it can be of this study."""
     about = record.description
     try:
-        if not matches(about, chunks.KEPT) or about["identity"] not in known:
+        if not matches(about, kind.KEPT) or about["identity"] not in known:
             raise ValueError("what was kept of a replicate cannot be verified")
-        place = start.store.places.get(chunks.condition_of(about))
+        place = start.store.places.get(kind.condition_of(about))
         study.check_part(about, start.journal.read(record.offset, record.length))
     except ValueError as error:
         start.remark(f"{error}: it is left out")
@@ -289,11 +289,11 @@ def take_chunk(start, study, record, known, session):
     """
     about = record.description
     if about["identity"] not in known:
-        start.remark(f"{chunks.named(about)} cannot be verified: computed again")
+        start.remark(f"{kind.named(about)} cannot be verified: computed again")
         return
-    place = start.store.places.get(chunks.condition_of(about))
+    place = start.store.places.get(kind.condition_of(about))
     if place is None:
-        start.unasked.append(chunks.condition_of(about))
+        start.unasked.append(kind.condition_of(about))
         return
 
     def check(rows):
@@ -303,7 +303,7 @@ def take_chunk(start, study, record, known, session):
     try:
         start.store.add_chunk(record, place, check)
     except ValueError as error:
-        start.remark(f"{chunks.named(about)}: {error}: computed again")
+        start.remark(f"{kind.named(about)}: {error}: computed again")
         return
     start.notes += about.get("notes", [])
     start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])

@@ -17,7 +17,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import (
+from flocsim.ensembles.kind import (
     COLUMNS,
     ROW,
     Condition,

@@ -21,8 +21,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ORDER, Condition, condition_of, fits, layout
-from flocsim.ensembles.kind import kinds
+from flocsim.ensembles.kind import ORDER, Condition, condition_of, fits, kinds, layout
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
 from flocsim.errors import FileError, UsageError

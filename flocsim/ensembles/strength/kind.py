@@ -11,9 +11,20 @@ from typing import Any, ClassVar, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.ensembles.chunks import ORDER, Condition, Interval, missing, places_in
 from flocsim.ensembles.config.schema import Config, IntegratorConfig, OutputConfig, StopConfig
-from flocsim.ensembles.kind import Code, Going, Keep, Kind, Place, StudyKind
+from flocsim.ensembles.kind import (
+    ORDER,
+    Code,
+    Condition,
+    Going,
+    Interval,
+    Keep,
+    Kind,
+    Place,
+    StudyKind,
+    missing,
+    places_in,
+)
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.storage.identity import physics_digest
 from flocsim.ensembles.storage.resume import Beginning

@@ -14,9 +14,8 @@ import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.refused import refuse_interpreter
-from flocsim.ensembles.chunks import Condition, is_chunk
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kind import Kind
+from flocsim.ensembles.kind import Condition, Kind, is_chunk
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import names_in
 from flocsim.ensembles.storage import identity

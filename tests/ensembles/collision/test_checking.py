@@ -6,15 +6,17 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.checking import (
+from flocsim.ensembles.collision.draw import (
+    FAILED,
     THIRD_OF,
+    Draw,
     count_checks,
     exact_method,
     exact_methods,
     expected_checks,
     further_runs,
+    run_safely,
 )
-from flocsim.ensembles.collision.draw import FAILED, Draw, run_safely
 from flocsim.ensembles.dry_run import checked_words
 from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of

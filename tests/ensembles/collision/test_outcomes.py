@@ -12,14 +12,7 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import (
-    FAILURES,
-    Draw,
-    draws,
-    largest_displacement,
-    orientations,
-    place_pair,
-)
+from flocsim.ensembles.collision.draw import FAILURES, Draw, draws, orientations
 from flocsim.ensembles.collision.encounter import make_encounter
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
@@ -31,6 +24,7 @@ from flocsim.ensembles.collision.outcomes import (
     turn_left,
     watch_pair,
 )
+from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates

@@ -6,13 +6,8 @@ from scipy.stats import kstest
 from shapely.geometry import LineString, Point, Polygon
 
 from flocsim import Sphere, SpheroPolygon
-from flocsim.ensembles.collision.draw import (
-    draws,
-    half_extents,
-    largest_displacement,
-    orientations,
-    place_pair,
-)
+from flocsim.ensembles.collision.draw import draws, orientations
+from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
 from flocsim.geometry.shapes.cores import edges_of, from_edges
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import small_study

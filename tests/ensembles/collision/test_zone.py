@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.special import lambertw
 
 from flocsim.arrays import PairView
-from flocsim.ensembles.collision.zone import (
+from flocsim.ensembles.collision.start import (
     LARGEST_RATIO,
     attraction_ratio,
     balance,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles import runner
-from flocsim.ensembles.chunks import COLUMNS, ROW
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.sources import Sources
+from flocsim.ensembles.kind import COLUMNS, ROW
 from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import (
     Facts,

@@ -9,13 +9,9 @@ import time
 import pytest
 
 from flocsim.ensembles.cli import main
-from flocsim.ensembles.parallel import communicator
-from flocsim.ensembles.parallel.communicator import (
-    Communicator,
-    find_communicator,
-    launched_rank,
-    launched_size,
-)
+from flocsim.ensembles.parallel import processes
+from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
 from flocsim.ensembles.storage.identity import arithmetic_digest
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
@@ -31,7 +27,7 @@ from tests.helpers.small_study import (
 )
 from tests.helpers.tiers import rest_slow
 
-LAUNCHER = (*communicator.LAUNCHER_SIZES, *communicator.LAUNCHER_RANKS)
+LAUNCHER = (*processes.LAUNCHER_SIZES, *processes.LAUNCHER_RANKS)
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +103,7 @@ def test_without_a_launcher_mpi_is_not_even_imported(serial):
 
 FAILS_LATE = """\
 import attrs
-from flocsim.ensembles.parallel.communicator import launched_rank
+from flocsim.ensembles.parallel.processes import launched_rank
 from flocsim.ensembles.study import Study
 from flocsim.forces import CentreForce
 
@@ -152,7 +148,7 @@ class Yukawa(CentreForce):
 """
 
 FAILS_EARLY = """\
-from flocsim.ensembles.parallel.communicator import launched_rank
+from flocsim.ensembles.parallel.processes import launched_rank
 if launched_rank() == 1:
     raise RuntimeError("no licence")
 """

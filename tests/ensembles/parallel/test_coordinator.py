@@ -2,7 +2,7 @@
 
 import pytest
 
-from flocsim.ensembles.chunks import Chunk
+from flocsim.ensembles.kind import Chunk
 from flocsim.ensembles.parallel import communicator
 from flocsim.ensembles.parallel.communicator import Communicator, Halt, Request, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator

@@ -11,11 +11,11 @@ import pytest
 
 from benchmarks.faults.job import alive, descendants, is_python
 from flocsim.ensembles.cli import main
-from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.parallel.heartbeat import (
+from flocsim.ensembles.parallel.communicator import (
     FIRST_SIGN,
     SECONDS,
     WITHOUT_THREADS,
+    Communicator,
     Heartbeat,
 )
 from flocsim.io.records import CHUNK, Record, scan

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.ensembles.chunks import MOST_ROWS, merged, missing, total
+from flocsim.ensembles.kind import MOST_ROWS, merged, missing, total
 from flocsim.ensembles.parallel.schedule import (
     Phase,
     Schedule,

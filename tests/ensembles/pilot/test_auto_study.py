@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles import runner
-from flocsim.ensembles.chunks import COLUMNS
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.kind import COLUMNS
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME

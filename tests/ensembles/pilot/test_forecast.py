@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.checking import expected_checks
+from flocsim.ensembles.collision.draw import expected_checks
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.pilot.forecast import (
     CLOCK,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.faults.fuzz_readers import JournalReader
-from flocsim.ensembles.chunks import ROW, named
+from flocsim.ensembles.kind import ROW, named
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME, Beginning, take_journal

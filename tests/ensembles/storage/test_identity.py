@@ -23,7 +23,7 @@ NOT_PHYSICS = {
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",
-    "ensembles/kind.py": "what the machine asks of studies",
+    "ensembles/kind.py": "what is asked of studies, and how rows are stored",
     "io/results/checks.py": "what is believed of files",
     "io/results/run_group.py": "text for people",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",
@@ -38,7 +38,6 @@ NOT_PHYSICS = {
     "io/seals.py": "how files are sealed",
     "io/records.py": "how rows are stored, sealed by checksums",
     "ensembles/config/": "reads values, and these are compared themselves",
-    "ensembles/chunks.py": "how rows are stored; the columns are compared on their own",
 }
 """What a replicate imports without its rows depending on it, and why."""
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.ensembles.chunks import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS
+from flocsim.ensembles.kind import COLUMNS, ROW, Condition, chunk_record, layout
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
 from flocsim.io.journal import Journal, journal_of

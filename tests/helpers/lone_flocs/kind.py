@@ -12,9 +12,8 @@ from flocsim.ensembles.lone.scene import LoneScene
 
 import flocsim.arrays as at
 from flocsim.body import Body
-from flocsim.ensembles.chunks import Condition
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kind import Code, Kind, Place, StudyKind
+from flocsim.ensembles.kind import Code, Condition, Kind, Place, StudyKind
 from flocsim.ensembles.storage.identity import (
     PHYSICS,
     config_facts,

@@ -1,4 +1,6 @@
-"""The attraction zone d_c < D_0: where van der Waals attraction and double-layer repulsion balance.
+"""Two distances of a pair: where it begins, j above i, displaced sideways, a gap apart; and D_0.
+
+The attraction zone is d_c < D_0: where van der Waals attraction and double-layer repulsion balance.
 
 With x = κ d, F_A = F_R reads x² exp(−x) = S, S = H_A κ/(24π ε0 ε_r φ²): sizes cancel. It has two
 roots where S ≤ 4/e², x = −2 W₀(−√S/2) (inner) and −2 W₋₁(−√S/2) (outer), W Lambert's function, and
@@ -7,14 +9,83 @@ none above.
 
 import math
 from collections.abc import Sequence
+from functools import cache
 
+import numpy as np
+
+from flocsim.compiler.composer import compose
 from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
+from flocsim.geometry.contact import compounds
+from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.contact.near_pairs import core_distance
+from flocsim.geometry.shapes.shape import Shape
+
+MOST_ADVANCES = 1000
+"""Moves towards the wanted gap; each is as long as the distance still allows."""
 
 LARGEST_RATIO = 4.0 / math.e**2
 """S above which attraction wins at every distance."""
+
+
+def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
+    """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
+    parts = shape.placed_parts(angle=angle)
+    return (
+        max(part.radius - part.points[:, 0].min() for part in parts),
+        max(part.radius + part.points[:, 0].max() for part in parts),
+    )
+
+
+def largest_displacement(
+    rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
+) -> float:
+    """δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j ("radius")."""
+    if rule == "radius":
+        return shape_i.bounding_radius + shape_j.bounding_radius
+    return half_extents(shape_i, angle_i)[1] + half_extents(shape_j, angle_j)[0]
+
+
+def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
+    """Height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
+
+    ``outlines``: those of i and j; ``contact`` = r_i + r_j of the spheroradii; ``reach`` =
+    R_i + R_j. From far above, j comes down by the distance that is left (it cannot overshoot);
+    where it passes without coming so near, it starts clear above.
+    """
+    clear = reach + gap
+    height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
+    turn_c, turn_s = math.cos(angle_j - angle_i), math.sin(angle_j - angle_i)
+    c, s = math.cos(angle_i), math.sin(angle_i)
+    for _ in range(MOST_ADVANCES):
+        x, y = c * displacement + s * height, c * height - s * displacement
+        left = core_distance(outlines, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
+        if left <= 1e-6 * gap:
+            return height
+        height -= left
+        if height < -clear:
+            break
+    return clear
+
+
+@cache
+def compiled_height(compound):
+    return compose(start_height, compounds.FILLINGS if compound else {})
+
+
+def place_pair(
+    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float
+) -> np.ndarray:
+    """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
+    contact = shapes[0].radius + shapes[1].radius
+    reach = shapes[0].bounding_radius + shapes[1].bounding_radius
+    height = compiled_height(any(shape.is_compound for shape in shapes))(
+        outlines_of(shapes), float(angles[0]), float(angles[1]),
+        contact, reach, float(displacement), gap,
+    )  # fmt: skip
+    return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
 
 
 def attraction_ratio(attraction: VanDerWaals, layer: DoubleLayer) -> float:
