@@ -31,13 +31,14 @@ from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.choice import choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
     Forecast,
+    finding_words,
+    findings,
     forecast_of,
     in_turn,
     time_replicates,
     timed,
 )
 from flocsim.ensembles.pilot.ladder import LADDER, pilot_size
-from flocsim.ensembles.pilot.needless import find, words_of
 from flocsim.ensembles.preflight import (
     IMPLIED,
     kinds,
@@ -285,7 +286,10 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
     return [
         *lines,
         *forecast_lines(config, found, ranks, compiled),
-        *(f"without {words_of(each, found.runs)}" for each in find(study, found.runs, go_on)),
+        *(
+            f"without {finding_words(each, found.runs)}"
+            for each in findings(study, found.runs, go_on)
+        ),
         "nothing is left out beyond what the config leaves out",
     ]
 

@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles import cli, dry_run
-from flocsim.ensembles.pilot import forecast, needless
+from flocsim.ensembles.pilot import forecast
 from flocsim.errors import FlocsimError
 from tests.helpers.small_study import run_command, small_config, write_small
 from tests.helpers.tiers import rest_slow
@@ -16,8 +16,8 @@ from tests.helpers.tiers import rest_slow
 def brief(monkeypatch):
     """Pilots of the least that they run, and nothing compiled but what the suite has anyway."""
     monkeypatch.setattr(forecast.time_replicates, "__defaults__", (0.0,))
-    monkeypatch.setattr(needless, "LARGEST_STOKES", 0.0)
-    monkeypatch.setattr(needless.find, "__defaults__", (0.0,))
+    monkeypatch.setattr(forecast, "LARGEST_STOKES", 0.0)
+    monkeypatch.setattr(forecast.findings, "__defaults__", (0.0,))
 
 
 def spheres(folder, **over):

@@ -1,45 +1,52 @@
-"""What a study will take, from some of its replicates: core-hours, and bytes on the disk.
+"""What some replicates of a study say, for `--dry-run`: what it will take, core-hours and bytes on
+the disk, and which parts of its physics changed no outcome.
 
 The replicates of `sample` are run in turn, until SECONDS of this process's time are spent, and each
 third of them again as `check_share` has it. What they took is extrapolated type by type, as they
 are spread evenly over N and δ; the interval is that of samples drawn anew from them (bootstrap).
 What is made once for two flocs at one N, is counted once. Unlike a choice of accuracy it looks at
 the clock: it changes no result.
+
+The same replicates are run again without every force in turn, and without inertia, from the same
+start and judged by the same zone. Nothing is left out of the study: what is found is said, and what
+it would save.
 """
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.draw import MORE_STEPS, THIRD_COST, THIRD_OF, Draw, expected_checks
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import COUNTED
-from flocsim.ensembles.pilot.ladder import (
-    MOST,
-    Job,
-    Task,
-    Trial,
-    expected_replicates,
-    is_flip,
-    sample_of,
-    try_out,
-)
+from flocsim.ensembles.pilot import ladder
+from flocsim.ensembles.pilot.ladder import Job, Task, Trial, is_flip, try_out
+from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.study import Study
+from flocsim.errors import FlocsimError
+from flocsim.explain import RELAXATION, body_scales
+from flocsim.forces import ContactForce
+from flocsim.integrators import Overdamped
+from flocsim.io.confidence import wilson
 from flocsim.io.results import schema
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.layout import frame_of, plan_of
 from flocsim.io.seals import seal_size
+from flocsim.system import System
 
 SECONDS = 5.0
 """CPU time of the replicates that are timed, their second runs included."""
 
 LEAST = 6
-"""Replicates of a type that are run, however long they take."""
+"""Replicates of a type, and without a part of the physics, that are run, however long they take."""
 
 EVERY = 3
 """Of so many replicates one is run again."""
@@ -62,6 +69,17 @@ RUN_BYTES = 9_000
 
 FLOC_BYTES = 300
 """The same for each floc."""
+
+TRYING = 4.0
+"""CPU time of all that is run without a part."""
+
+ENOUGH = 8
+"""Outcomes changed after which no more are run."""
+
+LARGEST_STOKES = 1.0
+"""Stokes number beyond which inertia matters, tried or not."""
+
+INERTIA = "inertia"
 
 
 class Timed(NamedTuple):
@@ -106,7 +124,7 @@ class Forecast:
 def in_turn(config: Config) -> list[Task]:
     """Tasks of all types in turn, at most MOST: any first few are spread over all conditions."""
     types = len(config.scene.names)
-    lists = sample_of(config, max(MOST // types, LEAST))
+    lists = ladder.sample_of(config, max(ladder.MOST // types, LEAST))
     return [task for tasks in zip(*lists, strict=True) for task in tasks]
 
 
@@ -150,7 +168,7 @@ def time_replicates(
 def pairs_made(study: Study, ranks: int) -> float:
     """How many pairs of flocs the study makes ready, on all ranks together."""
     config = study.config
-    count = expected_replicates(config)
+    count = ladder.expected_replicates(config)
     numbers = [study.numbers(k) for k in range(min(count, 1000))]
     total = 0
     for condition in range(len(config.scene.names)):
@@ -221,7 +239,7 @@ def estimated(
 def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) -> Forecast:
     """The Forecast for so many ranks; ``before`` [s]: flocs grown, a choice made."""
     config = study.config
-    count = expected_replicates(config)
+    count = ladder.expected_replicates(config)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     fixed = START * ranks + before + setting_up(study, runs, ranks)
     fixed += EACH * cells * count * len(config.scene.names)
@@ -261,3 +279,150 @@ def file_size(study: Study, count: int) -> float:
     plan = plan_of(frame_of(draft), math.prod(shape) * count)
     run = RUN_BYTES + len(config.text) + FLOC_BYTES * len(study.flocs)
     return float(plan.size + run + seal_size(len(plan.cuts())))
+
+
+class Part(NamedTuple):
+    """Something that a scene may do without: its name, and the System without it."""
+
+    name: str
+    left_out: Callable[[System], System]
+
+
+class Finding(NamedTuple):
+    """What came of leaving a part out: ``changed`` of ``runs`` outcomes, and CPU time without it
+    over that with it; or ``why`` it was not tried."""
+
+    name: str
+    changed: int = 0
+    runs: int = 0
+    time: float = 1.0
+    why: str = ""
+
+
+def stokes_number(config: Config, flocs: Sequence[Floc] | None = None) -> float:
+    """Largest τ v/(r_i + r_j) of the collision types: relaxation time, relative settling speed.
+
+    ``flocs``: those of the study, where they have been read.
+    """
+    numbers = []
+    for _, pair in sphere_pairs(config, flocs, "fastest"):
+        time = body_scales(pair.system).get(RELAXATION)
+        numbers += [] if time is None else [time / pair.turn_time]
+    return max(numbers, default=0.0)
+
+
+def without_force(force, system):
+    """The System without one of its forces."""
+    return attrs.evolve(system, forces=[each for each in system.forces if each is not force])
+
+
+def without_inertia(system):
+    """The System moved by Overdamped, at the tolerance that it has."""
+    tolerance = getattr(system.integrator, "tolerance", None)
+    method = Overdamped(tolerance) if tolerance else Overdamped()
+    return attrs.evolve(system, integrator=method)
+
+
+def parts_of(
+    config: Config, methods: Sequence[object], flocs: Sequence[Floc] | None = None
+) -> Iterator[Part | Finding]:
+    """The parts that may be left out; a Finding for those that cannot, or need not be tried."""
+    contacts = [force for force in config.forces if isinstance(force, ContactForce)]
+    pairs = [pair for _, pair in sphere_pairs(config, flocs)]
+    # By themselves: where bodies meet without their weight, its place is another force's.
+    acting = {id(each) for pair in pairs for each in pair.system.forces}
+    for name, force in zip(config.force_names, config.forces, strict=True):
+        if force.absent or id(force) not in acting:
+            continue
+        if contacts == [force]:
+            yield Finding(name, why="a collision needs a contact force")
+            continue
+        part = Part(name, partial(without_force, force))
+        try:
+            for pair in pairs:
+                attrs.evolve(pair, system=part.left_out(pair.system))
+        except FlocsimError:
+            yield Finding(name, why="the pair would not meet")
+            continue
+        yield part
+    if all(isinstance(each, Overdamped) for each in methods):
+        return
+    number = stokes_number(config, flocs)
+    if number > LARGEST_STOKES:
+        yield Finding(INERTIA, why=f"it matters at a Stokes number of {number:.2g}")
+    else:
+        yield Part(INERTIA, without_inertia)
+
+
+def findings(
+    study: Study, runs: Sequence[Timed], go_on: Callable[[], None], seconds: float = TRYING
+) -> list[Finding]:
+    """A Finding for every force of a study, and for inertia, from replicates that were run."""
+    parts = list(parts_of(study.config, list(study.methods.values()), study.flocs))
+    tried = sum(isinstance(part, Part) for part in parts)
+    return [
+        tried_without(study, runs, part, go_on, seconds / tried) if isinstance(part, Part) else part
+        for part in parts
+    ]
+
+
+def tried_without(
+    study: Study, runs: Sequence[Timed], part: Part, go_on: Callable[[], None], seconds: float
+) -> Finding:
+    """Run replicates without a part until it matters, or the time [s] is up."""
+    # With the encounters themselves, as an id is another's once its owner has gone.
+    made: dict[int, tuple[Encounter, Encounter]] = {}
+    warm: set[str] = set()
+    changed, count, spent, before, whole = 0, 0, 0.0, 0.0, 0.0
+
+    def bare(draw: Draw) -> Draw:
+        encounter = draw.encounter
+        if id(encounter) not in made:
+            system = part.left_out(encounter.system)
+            made[id(encounter)] = attrs.evolve(encounter, system=system), encounter
+        return attrs.evolve(draw, encounter=made[id(encounter)][0])
+
+    for run in runs:
+        go_on()
+        if count >= LEAST and (whole > seconds or changed >= ENOUGH):
+            break
+        system = bare(study.draw(*run.task)).encounter.system
+        job = Job(run.task, system.integrator, study.config.integrator.max_steps)
+        if system.family not in warm:  # compiled before it is timed
+            try_out(study, job, changed=bare)
+            warm.add(system.family)
+        began = time.process_time()
+        found, _ = try_out(study, job, changed=bare)
+        count += 1
+        changed += is_flip(found, run.first)
+        spent, before = spent + found.cpu, before + run.first.cpu
+        whole += time.process_time() - began
+    return Finding(part.name, changed, count, spent / max(before, 1e-12))
+
+
+def finding_words(finding: Finding, runs: Sequence[Timed]) -> str:
+    """A Finding for people, in one line.
+
+    What changes no more outcomes than a tighter tolerance does in the ``runs`` of the pilot that
+    were run again (95 % intervals overlap), may have changed none.
+    """
+    name, changed, count = finding.name, finding.changed, finding.runs
+    if finding.why:
+        return f"{name}: stays, {finding.why}"
+    saved = 100.0 * (1.0 - finding.time)
+    cost = f"leaving it out would save {f'{saved:.0f} %' if saved >= 1.0 else 'none'} of the time"
+    low, most = (float(end) for end in wilson(changed, count))
+    if not changed:
+        agrees = " (Overdamped agrees)" if name == INERTIA else ""
+        return (
+            f"{name}: never changed an outcome of {count} replicates{agrees} (rate below "
+            f"{100.0 * most:.2g} %); {cost}"
+        )
+    again = [run for run in runs if run.second is not None]
+    flips = sum(run.flipped for run in again)
+    if again and low <= float(wilson(flips, len(again))[1]):
+        return (
+            f"{name}: {changed} of {count} outcomes change, which may be numerical error ({flips} "
+            f"of {len(again)} change when run again more accurately); {cost}"
+        )
+    return f"{name}: matters, without it {changed} of {count} outcomes change"

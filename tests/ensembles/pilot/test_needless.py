@@ -1,25 +1,29 @@
 """Which parts of the physics changed no outcome: said, tried fairly, and never acted on."""
 
+from functools import partial
+
 import attrs
 import pytest
 
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.pilot import needless
-from flocsim.ensembles.pilot.forecast import Timed, in_turn, time_replicates
-from flocsim.ensembles.pilot.ladder import Task, Trial
-from flocsim.ensembles.pilot.needless import (
+from flocsim.ensembles.pilot import forecast
+from flocsim.ensembles.pilot.forecast import (
     ENOUGH,
     INERTIA,
     LEAST,
     Finding,
     Part,
-    find,
+    Timed,
+    finding_words,
+    findings,
+    in_turn,
     parts_of,
     stokes_number,
+    time_replicates,
     tried_without,
     without_force,
-    words_of,
 )
+from flocsim.ensembles.pilot.ladder import Task, Trial
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.small_study import small_study
@@ -47,9 +51,9 @@ def runs(study):
 
 
 def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, runs, monkeypatch):
-    monkeypatch.setattr(needless, "LARGEST_STOKES", 0.0)  # another engine to compile
+    monkeypatch.setattr(forecast, "LARGEST_STOKES", 0.0)  # another engine to compile
     before = dict(study.zones), study.config.forces
-    found = {each.name: each for each in find(study, runs, never, seconds=0.0)}
+    found = {each.name: each for each in findings(study, runs, never, seconds=0.0)}
     assert list(found) == [*study.config.force_names, INERTIA]
     for name in ("gravity", "drag"):
         assert "would not meet" in found[name].why
@@ -61,7 +65,7 @@ def test_what_cannot_be_left_out_says_why_and_what_is_weak_never_matters(study, 
 
 def test_attraction_that_holds_spheres_matters(study, runs):
     place = study.config.force_names.index("van_der_waals")
-    part = Part("van_der_waals", without_force(study.config.forces[place]))
+    part = Part("van_der_waals", partial(without_force, study.config.forces[place]))
     found = tried_without(study, runs * 3, part, never, seconds=100.0)
     # Spheres that no force holds roll off each other: a few are enough to know.
     assert found[1:3] == (ENOUGH, ENOUGH)
@@ -116,7 +120,7 @@ def test_light_solids_do_without_inertia(tmp_path):
     )  # fmt: skip
     study = Study(load_config(path))
     runs = time_replicates(study, in_turn(study.config), never)
-    found = {each.name: each for each in find(study, runs, never)}
+    found = {each.name: each for each in findings(study, runs, never)}
     assert found[INERTIA][1:3] == (0, 20)
 
 
@@ -143,11 +147,11 @@ def again(count, flips):
     ],
 )  # fmt: skip
 def test_findings_in_words(finding, flips, words):
-    assert words in words_of(finding, again(100, flips))
+    assert words in finding_words(finding, again(100, flips))
 
 
 def test_without_second_runs_what_changes_an_outcome_matters():
-    assert "matters" in words_of(Finding("a", 1, 200, 0.9), again(0, 0))
+    assert "matters" in finding_words(Finding("a", 1, 200, 0.9), again(0, 0))
 
 
 def test_a_signal_ends_it(study, runs):
@@ -155,5 +159,5 @@ def test_a_signal_ends_it(study, runs):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        find(study, runs, stop)
+        findings(study, runs, stop)
     assert all(isinstance(run, Timed) for run in runs)
