@@ -95,7 +95,7 @@ INNER_ROWS = {
         ["shape_library", "trajectory"],
         ["images", "results", "journal"],
         ["outputs", "groups", "records"],
-        ["files", "hdf5", "json_text", "labelled", "confidence", "terminal"],
+        ["files", "hdf5", "labelled", "confidence", "terminal"],
         ["seals"],
     ],
 }

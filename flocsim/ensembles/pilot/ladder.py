@@ -1,10 +1,10 @@
 """Replicates tried out: one by a method within a step budget, what came of it, and at what cost;
 the settings that a pilot tries, the rungs of a ladder, and a collision type's climb.
 
-Pilots, forecasts, what is needless and work-precision are tables of such trials, each held against
-another of the same replicate: where the outcome is another one, it has flipped. A pilot runs
-replicates spread over all conditions, and no more than the study can bear. An index does nothing
-but name random numbers, so that any choice that does not look at them is a random sample.
+Pilots, forecasts and work-precision are tables of such trials, each held against another of the
+same replicate: where the outcome is another one, it has flipped. A pilot runs replicates spread
+over all conditions, and no more than the study can bear. An index does nothing but name random
+numbers, so that any choice that does not look at them is a random sample.
 
 A tolerance has its meaning against the lengths of a scene: 1e-6 m is a spheroradius of `tang2014`,
 so the ladder begins at the smallest length of the outlines, rounded to a decade.
