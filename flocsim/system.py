@@ -27,7 +27,7 @@ from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
 from flocsim.forces.thermal import key_of, kicks_of
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
-from flocsim.geometry.contact.overlap import overlap_fault
+from flocsim.geometry.contact.points import overlap_fault
 from flocsim.hooks import HOOKS
 from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.forces import VanDerWaals
-from flocsim.geometry.surfaces.energy import attraction_energy
+from flocsim.geometry.surfaces.attraction import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
 from tests.integrators.rhs.test_outline_sum import HAMAKER, SIZE, Pair, at_gap, rough, slopes
 

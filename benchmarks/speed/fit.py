@@ -16,11 +16,16 @@ from scipy import stats
 from benchmarks.pictures import PICTURES, checked, silhouettes
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.geometry.fit import fit_mask, search
-from flocsim.geometry.fit.coverage import compiled, cover, move_vertex, neighbours, padded
-from flocsim.geometry.fit.edge_errors import leaves_room
-from flocsim.geometry.fit.search import searched
+from flocsim.geometry.fit.coverage import (
+    compiled,
+    cover,
+    leaves_room,
+    move_vertex,
+    neighbours,
+    padded,
+)
+from flocsim.geometry.fit.search import even_start, inset, searched, trace_outline
 from flocsim.geometry.fit.simple import stays_simple
-from flocsim.geometry.fit.starts import even_start, inset, trace_outline
 
 COUNTS = (4, 8, 16, 28, 64)
 CLASSES = {"14 to 26 px": (14.0, 26.0), "4 to 5 px": (4.0, 5.0)}

@@ -24,7 +24,7 @@ from flocsim.compiler.composer import compose
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import DoubleLayer, VanDerWaals
-from flocsim.geometry.surfaces import charges, field
+from flocsim.geometry.surfaces import charges
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.integrators.rhs.test_outline_sum import at_gap, rough
 
@@ -134,7 +134,7 @@ def main():
         shape, times = rough(n, 16e-6, 99), [time.perf_counter()]
         known = charges.charges_of_shape(shape, THICK.kappa)
         times.append(time.perf_counter())
-        nodes = field.field_of_shape(shape, THICK.kappa).field
+        nodes = charges.field_of_shape(shape, THICK.kappa).field
         times.append(time.perf_counter())
         spent = 1e3 * np.diff(times)
         made.add(n, len(known), float(spent[0]), len(nodes), float(spent[1]))

@@ -27,8 +27,7 @@ from typing import NamedTuple
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.points import least_listed_gap, separation
 from flocsim.geometry.contact.slip_transfer import contact_point
 from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart

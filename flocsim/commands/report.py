@@ -24,7 +24,7 @@ import numpy as np
 from flocsim.commands import FOLDER_HELP
 from flocsim.ensembles.contents import Contents, Example, Table, overview_of, summary_of
 from flocsim.errors import UsageError, visible
-from flocsim.geometry.contact.overlap import placed_contacts
+from flocsim.geometry.contact.points import placed_contacts
 from flocsim.io.files import write_file
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule, marked
 from flocsim.io.plots.collision import (

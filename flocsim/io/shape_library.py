@@ -26,8 +26,8 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
+from flocsim.geometry.shapes.cores import Part, PointTable, is_compound, parts_in, table_of
 from flocsim.geometry.shapes.outline import ShapeMeasures
-from flocsim.geometry.shapes.parts import Part, PointTable, is_compound, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep

@@ -14,7 +14,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.parts import Part, PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep, write_file

@@ -13,7 +13,7 @@ from flocsim.body import Body
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.body_pairs import list_near
 from flocsim.geometry.contact.near_pairs import gap_between
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.points import separation
 from flocsim.hydrodynamics.clusters import mobilities
 
 

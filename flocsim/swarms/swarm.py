@@ -18,8 +18,7 @@ from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import refuse_pair_resistance
 from flocsim.forces.thermal import kicks_of
-from flocsim.geometry.contact.overlap import overlap_fault
-from flocsim.geometry.contact.separation import PERIODIC
+from flocsim.geometry.contact.points import PERIODIC, overlap_fault
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status

@@ -9,7 +9,7 @@ import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.fields import is_whole
-from flocsim.geometry.contact.overlap import placed_contacts
+from flocsim.geometry.contact.points import placed_contacts
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule
 from flocsim.io.outputs import figure_rule

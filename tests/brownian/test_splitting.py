@@ -12,8 +12,8 @@ from flocsim.brownian.splitting import repulsion, splitting_probability, stabili
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerWaals
+from flocsim.geometry.surfaces.attraction import attraction_energy
 from flocsim.geometry.surfaces.charges import layer_energy
-from flocsim.geometry.surfaces.energy import attraction_energy
 from flocsim.geometry.surfaces.pieces import outline_pieces
 from tests.helpers.tiers import rest_slow
 

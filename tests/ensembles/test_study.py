@@ -9,7 +9,7 @@ from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
-from flocsim.geometry.shapes.parts import table_of
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import OUTCOMES, REPLICATES
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import framed

@@ -18,7 +18,7 @@ import numpy as np
 from PIL import Image
 
 from flocsim.ensembles.kind import Condition, chunk_record, layout
-from flocsim.geometry.shapes.parts import table_of
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm

@@ -9,7 +9,7 @@ import pytest
 
 from flocsim.errors import FileError, UsageError
 from flocsim.geometry.fit import fit_mask
-from flocsim.geometry.shapes.parts import table_of
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import with_holes

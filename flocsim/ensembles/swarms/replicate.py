@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.swarms.records import BODIES, MOMENT, STATE, Left, Part
-from flocsim.geometry.shapes.parts import table_of
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import GONE, OF_CLUSTERS, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY

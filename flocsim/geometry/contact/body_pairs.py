@@ -14,7 +14,7 @@ Where space repeats itself, the sweep goes on round the seam.
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.separation import length_of, nearest_way
+from flocsim.geometry.contact.points import length_of, nearest_way
 from flocsim.hooks import hook
 
 WANDER = 0.25

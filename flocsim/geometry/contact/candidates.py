@@ -10,7 +10,7 @@ import math
 import flocsim.arrays as at
 from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.contact.slip_transfer import keep_slips, restore_slips
 
 SKIN = 0.1

@@ -19,7 +19,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
 

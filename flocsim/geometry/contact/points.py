@@ -1,4 +1,5 @@
-"""Contact points: where and how the listed vertex–edge pairs touch.
+"""Where bodies touch: how far two lie apart, and where and how listed vertex–edge pairs of them do,
+in kernels; and of placed shapes, where they touch, and whether they overlap too deeply to start.
 
 A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
 vertex–edge method); two spheres are one pair of points.
@@ -20,11 +21,17 @@ turned back, finds the same.
 """
 
 import math
+from collections.abc import Callable, Sequence
+from itertools import combinations, product
+
+import numpy as np
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.separation import length_of, separation
-from flocsim.geometry.shapes.cores import closest_share
+from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.geometry.shapes.cores import Part, closest_share, edges_of, from_edges
+from flocsim.geometry.shapes.outline import core_gap
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import hook
 
 TINY = 1e-300
@@ -35,6 +42,41 @@ PER_RADIAN = 64.0
 
 LARGEST = 1e6
 """Beyond that angle [rad] the library is asked every time."""
+
+TOUCHING = 1e-12
+"""Gap [m] below which outlines are shown as touching."""
+
+
+def length_of(x, y):
+    """The length of a vector: a root, where math.hypot calls a library's function, which costs more
+    than most of what is done with it. Squares of what a run has in it neither overflow nor vanish.
+    """
+    return math.sqrt(x * x + y * y)
+
+
+@hook
+def separation(scene, work, state, a, b):
+    """(x, y) of body a as seen from body b, in a state [m]."""
+    m = work.motion
+    return m[state, a, at.X] - m[state, b, at.X], m[state, a, at.Y] - m[state, b, at.Y]
+
+
+def nearest_way(length, period):
+    """A way along an axis, by the nearest image [m]."""
+    if period < math.inf:
+        return length - period * math.floor(length / period + 0.5)
+    return length
+
+
+def nearest_image(scene, work, state, a, b):
+    """The same where space repeats itself: of a's image that is nearest to b."""
+    m, (width, height) = work.motion, scene.box
+    x = nearest_way(m[state, a, at.X] - m[state, b, at.X], width)
+    return x, nearest_way(m[state, a, at.Y] - m[state, b, at.Y], height)
+
+
+PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
+"""The replacement for scenes that repeat themselves."""
 
 
 def cosine_and_sine(work, body, angle):
@@ -175,3 +217,55 @@ def least_listed_gap(work):
     for row in range(work.tally[at.CANDIDATES]):
         least = min(least, work.geometry[at.NOW, row, at.GAP])
     return least
+
+
+def overlap_fault(
+    a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
+) -> str | None:
+    """What is wrong with two placed bodies, by their parts, in words; None if nothing is.
+
+    ``along_outlines``: the overlap [m] up to which what acts all along them is known.
+    """
+    gaps = [(core_gap(one, other), one.radius + other.radius) for one, other in product(a, b)]
+    if min(gaps)[0] == 0.0:
+        return "with one core inside or across the other"
+    for gap, contact in gaps:
+        overlap = contact - gap
+        if overlap > DEEPEST_OVERLAP * contact:
+            return f"overlapping by {overlap:.3g} m, more than half of r_i + r_j"
+        if overlap > along_outlines:
+            return (
+                f"overlapping by {overlap:.3g} m, beyond d_min = {along_outlines:.3g} m of the "
+                "force along their outlines"
+            )
+    return None
+
+
+def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
+    """Middles (c, 2) [m] of the overlaps of two placed rings (N, 2) with their radii.
+
+    A gap of less than TOUCHING counts: a step that ends at a first touch ends on either side of it.
+    """
+    found = []
+    for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):
+        if len(core) == 1 < len(points):
+            continue  # A sphere has no edge for the vertices of a polygon to touch.
+        away = points[:, None] - core if len(core) == 1 else from_edges(points, *edges_of(core))
+        distance = np.hypot(away[..., 0], away[..., 1])
+        normal = away / np.maximum(distance, 1e-300)[..., None]
+        feet = points[:, None] - away
+        middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
+        found.append(middle[distance < radius + other + TOUCHING])
+    return np.concatenate(found)
+
+
+def placed_contacts(shapes: Sequence[Shape], places: np.ndarray) -> np.ndarray:
+    """Where any two of the bodies at these places (n, 3) touch: (c, 2) [m]."""
+    bodies = [shape.placed_parts(*place) for shape, place in zip(shapes, places, strict=True)]
+    found = [
+        touching_points(ring, one.radius, core, other.radius)
+        for a, b in combinations(bodies, 2)
+        for one, other in product(a, b)
+        for ring, core in product(one.rings, other.rings)
+    ]
+    return np.concatenate([np.empty((0, 2)), *(np.reshape(each, (-1, 2)) for each in found)])

@@ -22,14 +22,16 @@ from flocsim.geometry.fit.search import (
     INSCRIBED,
     INSIDE,
     PLAIN,
+    even_start,
     paper_fit,
     pattern_fit,
     searched,
+    telling_points,
+    trace_outline,
 )
 from flocsim.geometry.fit.simple import is_simple, simple_inset
-from flocsim.geometry.fit.starts import even_start, telling_points, trace_outline
+from flocsim.geometry.shapes.cores import Part, Parts
 from flocsim.geometry.shapes.outline import simplicity_fault
-from flocsim.geometry.shapes.parts import Part, Parts
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, parts_factor
 

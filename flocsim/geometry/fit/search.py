@@ -1,9 +1,9 @@
 """From a mask to N vertices: starts, steps of all vertices at once, annealing, pattern search.
 
-1. Starts: the best N of points along the outline (splits.py); the points that tell most; even
-   spacing; where vertices are crowded, a search with half as many.
-2. The best two are lowered by steps of all their vertices at once, and annealed (annealing.py).
-   Both take V as a sum over edges (edge_errors.py).
+1. Starts: the best N of points along the outline; the points that tell most; even spacing; where
+   vertices are crowded, a search with half as many.
+2. The best two are lowered by steps of all their vertices at once, and annealed. Both are in
+   global_search.py, as are the best N points.
 3. The best of all these, by the pixels counted, is searched vertex by vertex.
 
 The starts are among those, so that V never ends above that of even spacing.
@@ -21,18 +21,20 @@ of a pixel, even spacing, and no lower V for a while.
 
 import numpy as np
 
-from flocsim.geometry.fit.annealing import annealed_runs
-from flocsim.geometry.fit.coverage import compiled, count_wrong, cover, move_vertex, neighbours
-from flocsim.geometry.fit.edge_errors import leaves_room, running_sums
-from flocsim.geometry.fit.simple import is_simple, stays_simple
-from flocsim.geometry.fit.splits import descend, split_outline
-from flocsim.geometry.fit.starts import (
-    even_points,
-    inset,
-    ring_inside,
-    telling_points,
-    trace_outline,
+from flocsim.geometry.fit.coverage import (
+    compiled,
+    count_wrong,
+    cover,
+    leaves_room,
+    move_vertex,
+    neighbours,
+    running_sums,
 )
+from flocsim.geometry.fit.global_search import annealed_runs, descend, split_outline
+from flocsim.geometry.fit.simple import is_simple, simple_inset, stays_simple
+
+HEADINGS = ((0, 1), (1, 0), (0, -1), (-1, 0))
+"""Walks along pixel edges as (rows, columns): right, down, left, up, each a right turn on."""
 
 COARSE = np.array([8.0, 4.0, 2.0, 1.0])
 """First steps of the search [px]: from past the usual detail of a floc to a pixel."""
@@ -71,6 +73,101 @@ parts of the floc for the first few pixels."""
 
 INSIDE = (0, 10**6)
 """No number of missed pixels makes up for one outside: the end of an inscribed fit."""
+
+
+def trace_outline(mask: np.ndarray) -> np.ndarray:
+    """The outer outline of a mask's first region, (M, 2) as x = column, y = row.
+
+    The points are the middles of the pixel edges between the region and its outside, in order
+    around the region, which is taken 8-connected.  Their polygon is simple.  `mask` has a margin
+    of at least one empty pixel.
+    """
+    start = row, column = tuple(int(place[0]) for place in np.nonzero(mask))
+    inside = mask.tolist()
+    heading, middles = 0, []
+    while True:
+        down, right = HEADINGS[heading]
+        middles.append((column - 0.5 + 0.5 * right, row - 0.5 + 0.5 * down))
+        row, column = row + down, column + right
+        # The pixels ahead of the upper left corner of this one, on the left and on the right.
+        on_left, on_right = (
+            inside[row + (down + hand * right - 1) // 2][column + (right - hand * down - 1) // 2]
+            for hand in (-1, 1)
+        )
+        heading = (heading + (-1 if on_left else 0 if on_right else 1)) % 4
+        if (row, column) == start and heading == 0:
+            return np.array(middles)
+
+
+def even_points(outline: np.ndarray, count: int) -> np.ndarray:
+    """`count` points evenly spaced along the closed outline."""
+    closed = np.vstack([outline, outline[:1]])
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
+    places = np.arange(count) / count * along[-1]
+    return np.column_stack([np.interp(places, along, axis) for axis in closed.T])
+
+
+def ring_inside(mask: np.ndarray, count: int) -> np.ndarray:
+    """A regular polygon around the deepest pixel of the mask: a start that is always simple."""
+    from scipy.ndimage import distance_transform_edt
+
+    depth = distance_transform_edt(mask)
+    row, column = np.unravel_index(np.argmax(depth), depth.shape)
+    radius = max(0.5 * depth[row, column], 1.0, 0.01 * count)
+    angles = 2.0 * np.pi * np.arange(count) / count
+    return np.column_stack([column + radius * np.cos(angles), row + radius * np.sin(angles)])
+
+
+def inset(points: np.ndarray, mask: np.ndarray, depth: float) -> np.ndarray:
+    """A simple polygon through the points, drawn in by `depth` [px] or less where it must.
+
+    Points whose polygon is not simple are reordered, or a ring inside the mask takes their place.
+    """
+    drawn = np.array(points)
+    if compiled(simple_inset)(drawn, float(depth)):
+        return drawn
+    drawn = ring_inside(mask, len(points))
+    compiled(simple_inset)(drawn, float(depth))
+    return drawn
+
+
+def even_start(mask: np.ndarray, count: int, radius: float) -> np.ndarray:
+    return inset(even_points(trace_outline(mask), count), mask, radius)
+
+
+def triangle(points, before, k, after):
+    """Twice the area of the triangle of three of the points."""
+    ux, uy = points[before, 0] - points[k, 0], points[before, 1] - points[k, 1]
+    wx, wy = points[after, 0] - points[k, 0], points[after, 1] - points[k, 1]
+    return abs(ux * wy - uy * wx)
+
+
+def telling_points(outline: np.ndarray, count: int) -> np.ndarray:
+    """The `count` points that tell most of a closed outline (Visvalingam and Whyatt 1993): of its
+    own, or of twice as many even ones where it has fewer.
+
+    The point that spans the smallest triangle with its neighbours is left out, again and again.
+    """
+    points = outline if len(outline) >= 2 * count else even_points(outline, 2 * count)
+    areas = np.empty(len(points))
+    compiled(leave_out)(points, count, areas)
+    return points[np.isfinite(areas)]
+
+
+def leave_out(points, count, areas):
+    """Twice the areas of the triangles of all but `count` points, inf where one is left out."""
+    size = len(points)
+    before, after = np.arange(size) - 1, np.arange(size) + 1
+    before[0], after[size - 1] = size - 1, 0
+    for k in range(size):
+        areas[k] = triangle(points, before[k], k, after[k])
+    for _ in range(size - count):
+        k = np.argmin(areas)
+        areas[k] = np.inf
+        left, right = before[k], after[k]
+        after[left], before[right] = right, left
+        areas[left] = triangle(points, before[left], left, right)
+        areas[right] = triangle(points, left, right, after[right])
 
 
 def weighed(wrong, excess, weights):

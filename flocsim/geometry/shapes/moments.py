@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from flocsim.geometry.shapes.cores import (
+    Part,
     cross,
     edges_of,
     from_edges,
     inside_rings,
     unit_edges,
 )
-from flocsim.geometry.shapes.parts import Part
 
 
 class Pieces(NamedTuple):

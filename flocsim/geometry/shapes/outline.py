@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.parts import Part
+from flocsim.geometry.shapes.cores import Part
 
 
 def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> str | None:

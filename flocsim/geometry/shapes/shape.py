@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from flocsim.errors import RangeError, ShapeError
 from flocsim.fields import in_unit, is_number
-from flocsim.geometry.shapes.cores import signed_area
+from flocsim.geometry.shapes.cores import Part, Parts, is_compound, moved_parts, signed_area
 from flocsim.geometry.shapes.moments import all_moments
 from flocsim.geometry.shapes.outline import (
     ShapeMeasures,
@@ -21,7 +21,6 @@ from flocsim.geometry.shapes.outline import (
     require_simple,
     swept_rings,
 )
-from flocsim.geometry.shapes.parts import Part, Parts, is_compound, moved_parts
 
 ROUND = 1e-12
 """Shapes whose principal moments differ by less than this share of their sum have no long axis."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.errors import ShapeError
+from flocsim.geometry.shapes.cores import Part, Parts, moved_parts, scaled_parts
 from flocsim.geometry.shapes.moments import area_and_growth
-from flocsim.geometry.shapes.parts import Part, Parts, moved_parts, scaled_parts
 from flocsim.geometry.shapes.shape import (
     Shape,
     Sphere,

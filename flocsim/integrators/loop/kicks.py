@@ -22,7 +22,7 @@ Source: Salmon, Moraes, Dror and Shaw (2011), Parallel random numbers: as easy a
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, separation
 
 KICK, HALVINGS, SPREAD, LEAST_WAY = range(4)
 """Places in ``Scene.kicks``: how long the longest kick is [s], 0 where there are none; how often it

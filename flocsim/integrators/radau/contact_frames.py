@@ -13,7 +13,7 @@ Newton's method adds keeps their momentum however far it has come.
 """
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.separation import length_of
+from flocsim.geometry.contact.points import length_of
 from flocsim.laws import CENTRE_FORCE, has
 
 LEADING_SHARE = 0.2

@@ -1,7 +1,8 @@
 """Forces between double layers: those of all charges of one body in the field of another.
 
-What charges are, and why there are any: flocsim.geometry.surfaces.charges; the field is in tables
-(field.py there). The two sums of forces between outlines share the way in (outline_sum.py).
+What charges are, why there are any, and the tables of their field:
+flocsim.geometry.surfaces.charges. The two sums of forces between outlines share the way in
+(outline_sum.py).
 """
 
 from typing import NamedTuple

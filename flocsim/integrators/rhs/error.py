@@ -7,8 +7,7 @@ A velocity error e displaces a body by e·T until drag, or the next encounter, h
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.geometry.contact.separation import length_of
+from flocsim.geometry.contact.points import least_listed_gap, length_of
 from flocsim.integrators.rhs.views import inertia, lever
 
 ROUNDING = 1e-15

@@ -14,8 +14,7 @@ the torque changes by N σ.
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import row_radii
-from flocsim.geometry.contact.separation import separation
+from flocsim.geometry.contact.points import row_radii, separation
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities

@@ -9,7 +9,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.arrays import OrientedView
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, separation
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.laws import oriented_energy
 

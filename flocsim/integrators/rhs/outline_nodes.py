@@ -1,5 +1,5 @@
 """Where the smaller one of two outlines is looked at: nodes along its pieces, from feet of the
-other one's pieces on (flocsim.geometry.surfaces.nodes says how they are spaced).
+other one's pieces on (flocsim.geometry.surfaces.pieces says how they are spaced).
 
 Which nodes there are changes little by little with where the bodies are: jumps of a force cost
 steps. So panels end wherever the gap has a bend, and lose it again where it no longer counts.
@@ -11,8 +11,15 @@ import flocsim.arrays as at
 from flocsim.arrays import MOST_FEET
 from flocsim.compiler.linker import loops_apart
 from flocsim.geometry.surfaces.attraction import arc_ends
-from flocsim.geometry.surfaces.distances import distance_to, from_core, piece_at
-from flocsim.geometry.surfaces.nodes import at_parameter, ends_of, foot_of, parameter_before
+from flocsim.geometry.surfaces.pieces import (
+    at_parameter,
+    distance_to,
+    ends_of,
+    foot_of,
+    from_core,
+    parameter_before,
+    piece_at,
+)
 
 SAME = 1e-3
 """Of the gap: pieces of the other outline that are as near as that are both the nearest, and feet

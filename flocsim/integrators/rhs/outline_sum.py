@@ -10,17 +10,17 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import MOST_NODES, MOST_ORDER, OutlineView
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.surfaces.attraction import add_arc, add_segment, find_plates
-from flocsim.geometry.surfaces.distances import (
+from flocsim.geometry.surfaces.pieces import (
     Pose,
     are_within,
     between_cores,
+    ends_of,
     may_be_within,
     piece_at,
     placed,
 )
-from flocsim.geometry.surfaces.nodes import ends_of
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import between_oriented

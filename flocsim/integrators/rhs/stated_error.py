@@ -23,7 +23,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.separation import length_of
+from flocsim.geometry.contact.points import length_of
 from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import hook
 from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mobility

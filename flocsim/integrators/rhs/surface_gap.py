@@ -16,8 +16,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import core_radius, relative_speed
-from flocsim.geometry.contact.points import locate_polygons, turn_bodies
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, locate_polygons, separation, turn_bodies
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 
 RANGE = 40.0

@@ -5,8 +5,7 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import BodyView, ContactView, PairView, PlainBodyView
 from flocsim.constants import CENTRE_SOFTENING
-from flocsim.geometry.contact.points import row_radii
-from flocsim.geometry.contact.separation import length_of, separation
+from flocsim.geometry.contact.points import length_of, row_radii, separation
 from flocsim.hooks import hook
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flocsim.geometry.shapes.parts import parts_in
+from flocsim.geometry.shapes.cores import parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule

@@ -18,7 +18,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.geometry.shapes.parts import PointTable, parts_in
+from flocsim.geometry.shapes.cores import PointTable, parts_in
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import (
     Group,

@@ -24,7 +24,7 @@ from flocsim.geometry.contact.near_pairs import (
     run_of,
     side_of,
 )
-from flocsim.geometry.contact.overlap import overlap_fault, placed_contacts
+from flocsim.geometry.contact.points import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, cross, drawn, framed
 

@@ -7,13 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim import Sphere
-from flocsim.geometry.contact.overlap import (
+from flocsim.geometry.contact.points import (
     overlap_fault,
     placed_contacts,
     touching_points,
 )
+from flocsim.geometry.shapes.cores import Part
 from flocsim.geometry.shapes.outline import core_gap
-from flocsim.geometry.shapes.parts import Part
 from tests.reference.contacts import contacts
 from tests.reference.outline import core_geometry
 from tests.reference.samples import SEEDS, random_core, scene_of

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.annealing import (
+from flocsim.geometry.fit.coverage import running_sums
+from flocsim.geometry.fit.global_search import (
     JUMPS,
     SLIDES,
     annealed,
@@ -12,9 +13,8 @@ from flocsim.geometry.fit.annealing import (
     put_into_edge,
     random_moves,
 )
-from flocsim.geometry.fit.edge_errors import running_sums
+from flocsim.geometry.fit.search import even_start
 from flocsim.geometry.fit.simple import is_open
-from flocsim.geometry.fit.starts import even_start
 from tests.geometry.fit.test_fit import blob, count_errors
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.coverage import crossed_and_near
-from flocsim.geometry.fit.edge_errors import (
+from flocsim.geometry.fit.coverage import (
     BARRED,
+    crossed_and_near,
     running_sums,
     set_bisectors,
     set_edge_sums,

@@ -5,11 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.edge_errors import BARRED, POSSIBLE, running_sums
-from flocsim.geometry.fit.search import DIRECTIONS
+from flocsim.geometry.fit.coverage import BARRED, POSSIBLE, running_sums
+from flocsim.geometry.fit.global_search import best_ring, descend, split_outline
+from flocsim.geometry.fit.search import DIRECTIONS, even_start, trace_outline
 from flocsim.geometry.fit.simple import is_open
-from flocsim.geometry.fit.splits import best_ring, descend, split_outline
-from flocsim.geometry.fit.starts import even_start, trace_outline
 from tests.geometry.fit.test_fit import blob, count_errors
 
 

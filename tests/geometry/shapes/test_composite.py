@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from flocsim import Body, Composite, Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.parts import PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import PointTable, parts_in, table_of
 from flocsim.geometry.shapes.spheropolygon import resized, shape_of_parts
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, covers, cross, drawn, framed, lace
 from tests.helpers.tiers import rest_slow

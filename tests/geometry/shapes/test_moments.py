@@ -6,9 +6,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flocsim.geometry.shapes.cores import edges_of, from_edges, inside_polygon
+from flocsim.geometry.shapes.cores import Part, edges_of, from_edges, inside_polygon
 from flocsim.geometry.shapes.moments import all_moments, area_and_growth
-from flocsim.geometry.shapes.parts import Part
 from tests.helpers.tiers import rest_slow
 from tests.reference.outline import area_centroid_inertia
 from tests.reference.samples import random_core

@@ -6,13 +6,13 @@ import shapely
 
 from flocsim import Composite, Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
+from flocsim.geometry.shapes.cores import Part
 from flocsim.geometry.shapes.outline import (
     feret_diameters,
     require_simple,
     simplicity_fault,
     swept_rings,
 )
-from flocsim.geometry.shapes.parts import Part
 from tests.reference.samples import random_core
 from tests.reference.scenes import c_shape, spiral, star
 

@@ -7,9 +7,13 @@ import pytest
 
 import flocsim.arrays as at
 from flocsim.geometry.surfaces.attraction import NO_ATTRACTION, add_arc, add_segment, find_plates
-from flocsim.geometry.surfaces.distances import distance_to, piece_at
-from flocsim.geometry.surfaces.nodes import at_parameter
-from flocsim.geometry.surfaces.pieces import arc_rows, segment_rows
+from flocsim.geometry.surfaces.pieces import (
+    arc_rows,
+    at_parameter,
+    distance_to,
+    piece_at,
+    segment_rows,
+)
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 RADIUS, LENS = 1e-6, 8e-7

@@ -9,8 +9,12 @@ from scipy.special import iti0k0, k0, k1
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
 from flocsim.geometry.surfaces import charges
-from flocsim.geometry.surfaces.bessel import bessel_pair
-from flocsim.geometry.surfaces.charges import charges_of_shape, check_length, layer_energy
+from flocsim.geometry.surfaces.charges import (
+    bessel_pair,
+    charges_of_shape,
+    check_length,
+    layer_energy,
+)
 
 SQUARE = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]])
 

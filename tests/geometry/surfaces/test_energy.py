@@ -8,7 +8,7 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
-from flocsim.geometry.surfaces.energy import attraction_energy
+from flocsim.geometry.surfaces.attraction import attraction_energy
 from flocsim.geometry.surfaces.pieces import (
     outline_pieces,
     pieces_of_shape,

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.geometry.surfaces.distances import Placed
-from flocsim.geometry.surfaces.nodes import at_parameter, parameter_before
+from flocsim.geometry.surfaces.pieces import Placed, at_parameter, parameter_before
 
 
 def segment(x, y, angle, half):

@@ -9,8 +9,7 @@ import flocsim.arrays as at
 from flocsim import SpheroPolygon
 from flocsim.compiler.composer import compose
 from flocsim.forces import DoubleLayer, VanDerWaals
-from flocsim.geometry.surfaces.distances import Pose, placed
-from flocsim.geometry.surfaces.nodes import at_parameter, ends_of
+from flocsim.geometry.surfaces.pieces import Pose, at_parameter, ends_of, placed
 from flocsim.integrators.rhs.outline_sum import (
     add_nodes,
     look_around,

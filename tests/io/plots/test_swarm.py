@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.geometry.shapes.parts import table_of
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.plots.style import new_figure
 from flocsim.io.plots.swarm import SWARM_FIGURES, draw_bodies, last_known, outlines_of, shape_of
 from flocsim.io.results.swarm_file import GONE, read_swarm, write_swarm
