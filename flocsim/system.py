@@ -19,12 +19,12 @@ from flocsim.errors import KernelError, KernelWarning, PlausibilityWarning, Usag
 from flocsim.explain import explain
 from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
+from flocsim.forces.body_forces import key_of, kicks_of
 from flocsim.forces.codegen import Pieces, laws_of
 from flocsim.forces.dlvo import refuse_unlike
 from flocsim.forces.drag import resistance_numbers, shields_clusters
 from flocsim.forces.outline import smoothing_of
 from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
-from flocsim.forces.thermal import key_of, kicks_of
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.points import overlap_fault

@@ -54,12 +54,12 @@ INNER_ROWS = {
     "swarms": [
         ["swarm"],
         ["progress"],
-        ["bonds", "placement", "runner", "shielding"],
+        ["bonds", "placement", "runner"],
         ["clusters", "islands"],
         ["arrays"],
     ],
     "brownian": [["meeting"], ["splitting"]],
-    "hydrodynamics": [["encounters", "lone_body"], ["pair"], ["two_spheres"]],
+    "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["two_spheres"]],
     "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["explicit"],

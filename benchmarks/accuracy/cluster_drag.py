@@ -20,8 +20,8 @@ import numpy as np
 from benchmarks.reporting import Table, print_heading
 from flocsim import Body, Fluid, Sphere, Swarm
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
-from flocsim.hydrodynamics import lone_body
-from flocsim.hydrodynamics.clusters import mobilities
+from flocsim.hydrodynamics import rigid_bodies
+from flocsim.hydrodynamics.rigid_bodies import mobilities
 
 R = 5e-6
 WATER = Fluid(buoyancy=True)
@@ -103,10 +103,10 @@ def exact(rings, middle):
         for r in rings
     ]
     places = np.concatenate([
-        lone_body.surface([ring - middle], 4.0 / 3.0, spacing)
+        rigid_bodies.surface([ring - middle], 4.0 / 3.0, spacing)
         for ring, spacing in zip(rings, spacings, strict=True)
     ])  # fmt: skip
-    loads = lone_body.loads(places, lone_body.RADIUS * float(np.mean(spacings)))
+    loads = rigid_bodies.loads(places, rigid_bodies.RADIUS * float(np.mean(spacings)))
     return np.linalg.inv(loads[:, :3])[:2, :2] / ALONE
 
 

@@ -12,7 +12,7 @@ from flocsim.body import Body, Fluid
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole
 from flocsim.forces.base import Force
-from flocsim.forces.thermal import key_of, thermal_in
+from flocsim.forces.body_forces import key_of, thermal_in
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Overdamped

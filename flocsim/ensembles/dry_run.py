@@ -54,8 +54,8 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.explain import force_lines, machinery_lines, scale_lines
 from flocsim.forces import VanDerWaals
+from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import solid_radius
-from flocsim.forces.thermal import thermal_in
 from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.fit_report import coarse_line

@@ -10,12 +10,11 @@ from flocsim.forces.base import (
     PairForce,
     SurfaceForce,
 )
+from flocsim.forces.body_forces import Gravity, Thermal
 from flocsim.forces.contact import Contact
 from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
 from flocsim.forces.drag import StokesDrag
-from flocsim.forces.gravity import Gravity
 from flocsim.forces.pair_resistance import Lubrication, PairResistance
-from flocsim.forces.thermal import Thermal
 
 __all__ = [
     "BodyForce",

@@ -20,8 +20,8 @@ from flocsim.fields import choice, flag, quantity
 from flocsim.forces.base import BodyForce, Force
 from flocsim.geometry.shapes import cores
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.hydrodynamics import lone_body
-from flocsim.hydrodynamics.lone_body import drag_factor, turning_factor
+from flocsim.hydrodynamics import rigid_bodies
+from flocsim.hydrodynamics.rigid_bodies import drag_factor, turning_factor
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
@@ -131,12 +131,12 @@ class StokesDrag(BodyForce):
 
     ``clusters``: bodies of a swarm that touch shield each other from the flow. Their drag R becomes
     Q R Q, the same Q for all of a cluster, with which all of them together resist as much as the
-    cluster does (flocsim.swarms.shielding); torques stay those of each. Re is then that of
+    cluster does (flocsim.swarms.clusters); torques stay those of each. Re is then that of
     Q (v − u).
 
     ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the
     equivalent sphere, 2β²(1 − tanh β/β)/(2β² + 3(1 − tanh β/β)) with β = r_eq/√k, its torque by
-    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.lone_body); 0 is impermeable.
+    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.rigid_bodies); 0 is impermeable.
 
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
@@ -370,7 +370,7 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
 
     def made() -> bytes:
         rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
-        found = lone_body.prism_drag(rings, height)
+        found = rigid_bodies.prism_drag(rings, height)
         r = found.resistance
         if not np.linalg.eigvalsh(r)[0] > 0.0:
             raise UsageError(
@@ -381,7 +381,7 @@ def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, .
         return np.array(numbers, dtype=float).tobytes()
 
     told = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
-    data = kept("flocsim_drag", f"{told} {height} {facts_of(lone_body, cores)}", made)
+    data = kept("flocsim_drag", f"{told} {height} {facts_of(rigid_bodies, cores)}", made)
     return tuple(np.frombuffer(data).tolist())
 
 

@@ -15,8 +15,8 @@ from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import quantity
 from flocsim.forces.base import Force, SurfaceForce
+from flocsim.forces.body_forces import Thermal
 from flocsim.forces.drag import StokesDrag, drag_radius, facts_of, is_permeable
-from flocsim.forces.thermal import Thermal
 from flocsim.hydrodynamics import pair, two_spheres
 from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
 

@@ -14,12 +14,11 @@ import attrs
 from flocsim.body import Body, Fluid
 from flocsim.errors import UsageError
 from flocsim.forces.base import ContactForce, told_apart
+from flocsim.forces.body_forces import Gravity, Thermal, thermal_in
 from flocsim.forces.contact import Contact
 from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
 from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, follows_shape, reynolds_number
-from flocsim.forces.gravity import Gravity
 from flocsim.forces.pair_resistance import Lubrication
-from flocsim.forces.thermal import Thermal, thermal_in
 from flocsim.plausibility.settling import largest_mobility, terminal_motion
 
 CHECK = "check the number and its unit"

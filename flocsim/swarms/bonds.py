@@ -34,8 +34,8 @@ from flocsim.bonds.certificate import (
 from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
+from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import follows_shape
-from flocsim.forces.thermal import thermal_in
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of

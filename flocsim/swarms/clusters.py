@@ -1,8 +1,20 @@
-"""Which bodies of a swarm are near each other at an instant, and the clusters that they make."""
+"""Which bodies of a swarm are near each other at an instant, the clusters that they make, and the
+drag of bodies in these.
 
-import functools
+A cluster resists as much as `mobilities` says, R, in any direction of the plane. Its bodies alone
+would resist by K = Σ R_i together; each has Q R_i Q instead, with the one symmetric Q for which
+Q K Q = R. So a cluster settles at its own speed, every body keeps the share of the drag that it
+had, and loads on bonds, which come from those shares, stay what they are. Q is positive and no
+more than 1: such a drag takes energy from a body that moves, whatever its cluster.
+
+Bodies are of a cluster where they touch or, for their drag, nearly do. Q follows from places alone
+and is kept for a window, in the directions of the window's beginning. Where two clusters touch
+within a window, their drag changes with the next one, at once: velocities relax to it, which takes
+microseconds, and nothing else jumps.
+"""
+
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import attrs
 import numpy as np
@@ -10,11 +22,28 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.arrays import Scene, with_room, work_of
 from flocsim.body import Body
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled, compose
+from flocsim.forces.base import Force
+from flocsim.forces.drag import drag_radius, follows_shape
 from flocsim.geometry.contact.body_pairs import list_near
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import separation
-from flocsim.hydrodynamics.clusters import mobilities
+from flocsim.hydrodynamics.rigid_bodies import mobilities
+
+ROUNDING = 1e-6
+"""Ways round a cluster that differ by less than this share of its extent differ by rounding: the
+others by a whole box."""
+
+DIRECTIONS = 256
+"""In which the furthest point of a cluster is sought, for its convex hull."""
+
+NEARLY = 0.01
+"""Bodies count as touching up to this share of their mean r_eq: to the flow around both it is all
+one, and a contact that opens for a moment changes no drag."""
+
+WAY = 0.5
+"""Bodies go so many mean bounding radii against each other in a window at most: by that much later
+does the drag of those that meet change."""
 
 
 def measure_gaps(scene, work, within):
@@ -66,11 +95,6 @@ class Gauge:
         return Neighbours(self.work.pairs[near, :2], gaps[near], self.work.along[near, :2])
 
 
-ROUNDING = 1e-6
-"""Ways round a cluster that differ by less than this share of its extent differ by rounding: the
-others by a whole box."""
-
-
 def walk_together(pairs, vectors, first, other, way, labels, places, queue):
     """``labels`` (n,) of clusters in the order of their first bodies, and ``places`` (n, 2) as seen
     from those along contacts from ``pairs[k, 1]`` to ``pairs[k, 0]``; the rest is scratch."""
@@ -109,17 +133,13 @@ def walk_together(pairs, vectors, first, other, way, labels, places, queue):
         clusters += 1
 
 
-walk = functools.cache(lambda: compose(walk_together, {}, what="the search for clusters"))
-"""Makes the compiled function."""
-
-
 def placed_together(count: int, neighbours: Neighbours) -> tuple[np.ndarray, np.ndarray]:
     """(label of every body's cluster (n,), the body's place (n, 2) [m] as seen from the cluster's
     first one, along the contacts): clusters are whole across the seams of a box, but for those that
     percolate."""
     ends = 2 * len(neighbours.pairs)
     labels, places = np.zeros(count, dtype=np.int64), np.zeros((count, 2))
-    walk()(
+    compiled(walk_together, what="the search for clusters")(
         neighbours.pairs, neighbours.vector, np.zeros(count + 1, dtype=np.int64),
         np.zeros(ends, dtype=np.int64), np.zeros((ends, 2)), labels, places,
         np.zeros(count, dtype=np.int64),
@@ -148,7 +168,7 @@ class Clusters:
     its bodies; ``mass`` [kg]; ``area`` [m²] of its bodies; ``gyration`` [m], the radius of gyration
     R_g = √(Σ (m ρ² + I)/Σ m) about its centre of mass, that of a body by itself included;
     ``hydrodynamic`` [m], R_h of the sphere that is as hard to move in the mean of all directions of
-    the plane, of bodies that are spheres of r_eq (flocsim.hydrodynamics.clusters);
+    the plane, of bodies that are spheres of r_eq (flocsim.hydrodynamics.rigid_bodies);
     ``velocity`` (c, 2) [m/s] of its centre of mass; ``porosity``, 1 − area/area of the convex hull
     of its bodies' core points swept by their disks (0 for one convex body); ``percolates`` (c,),
     whether it hangs together with its own images round a box that repeats itself. Such a cluster
@@ -251,10 +271,6 @@ def hydrodynamic_radii(
     return found
 
 
-DIRECTIONS = 256
-"""In which the furthest point of a cluster is sought, for its convex hull."""
-
-
 def support_areas(starts, first, points, radii, x, y, angle, furthest, areas):
     """Areas [m²] of the convex hulls of clusters, of their furthest points in many directions.
 
@@ -288,10 +304,6 @@ def support_areas(starts, first, points, radii, x, y, angle, furthest, areas):
         areas[c] = 0.5 * area
 
 
-supports = functools.cache(lambda: compose(support_areas, {}, what="the hulls of clusters"))
-"""Makes the compiled function."""
-
-
 def hull_areas(
     bodies: list[Body], places: np.ndarray, angles: np.ndarray, label: np.ndarray, ends: np.ndarray
 ) -> np.ndarray:
@@ -305,9 +317,74 @@ def hull_areas(
     parts = np.cumsum([0, *(len(shape.parts) for shape in shapes)])
     x, y = np.ascontiguousarray(places[order].T)
     areas = np.zeros(len(ends))
-    supports()(
+    compiled(support_areas, what="the hulls of clusters")(
         np.append(0, np.cumsum(np.bincount(label, minlength=len(ends)))),
         np.append(0, np.cumsum(sizes))[parts], np.concatenate(rings),
         np.repeat(np.array(swept), sizes), x, y, angles[order], np.zeros((DIRECTIONS, 5)), areas,
     )  # fmt: skip
     return np.where(ends, areas, math.nan)
+
+
+class Shielding:
+    """What clusters make of the drag of a swarm's ``bodies``, whose gaps ``gauge`` measures."""
+
+    def __init__(self, bodies: Sequence[Body], forces: Sequence[Force], gauge: Gauge) -> None:
+        self.gauge, self.shaped = gauge, follows_shape(forces)
+        self.radii = np.array([1.0 if each.fixed else drag_radius(forces, each) for each in bodies])
+        sizes = [body.shape.equivalent_radius for body in bodies if not body.fixed]
+        self.nearly = NEARLY * float(np.mean(sizes))
+
+    def apply(self, known: np.ndarray, position: np.ndarray) -> None:
+        """Write Q of all bodies at ``position`` (n, 3) into what is ``known`` of them (n, …), as
+        Scene.bodies has it. What hangs together with a fixed body does not settle, and keeps the
+        drag of its bodies."""
+        free = known[:, at.FREE] == 1.0
+        near = self.gauge.neighbours(position, self.nearly)
+        label, places = placed_together(len(free), near.among(free))
+        size = np.bincount(label)
+        size[label[near.pairs[~free[near.pairs].all(axis=1)]]] = 1  # on a wall
+        known[:, at.SHIELDING : at.SHIELDING + 3] = at.UNSHIELDED
+        members = np.flatnonzero((size[label] > 1) & free)
+        if not len(members):
+            return
+        _, own_label = np.unique(label[members], return_inverse=True)
+        resistance = self.resistances(known[members], position[members, 2], members)
+        own = packed(np.linalg.inv(resistance))
+        found = mobilities(own_label, places[members], self.radii[members], own)
+        together = np.zeros((len(found), 2, 2))
+        np.add.at(together, own_label, resistance)
+        shielding = between(together, np.linalg.inv(unpacked(found)))
+        known[members, at.SHIELDING : at.SHIELDING + 3] = packed(shielding)[own_label]
+
+    def resistances(self, known: np.ndarray, angle: np.ndarray, members: np.ndarray) -> np.ndarray:
+        """(n, 2, 2) of every one's drag alone, held from turning, over the viscosity."""
+        if not self.shaped:
+            return 6.0 * math.pi * self.radii[members, None, None] * np.eye(2)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
+        own = unpacked(known[:, at.RESISTANCE : at.RESISTANCE + 3])
+        return turn @ own @ np.swapaxes(turn, 1, 2)
+
+
+def unpacked(columns: np.ndarray) -> np.ndarray:
+    """Symmetric matrices (n, 2, 2) of their (xx, xy, yy) (n, 3)."""
+    return columns[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
+
+
+def packed(matrices: np.ndarray) -> np.ndarray:
+    """The other way round."""
+    return matrices[:, [0, 0, 1], [0, 1, 1]]
+
+
+def between(together: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Q (n, 2, 2) with Q K Q = R, of K ``together`` and R ``wanted``: K⁻½ (K½ R K½)½ K⁻½."""
+    outer = roots(together)
+    inverse = np.linalg.inv(outer)
+    return inverse @ roots(outer @ wanted @ outer) @ inverse
+
+
+def roots(matrices: np.ndarray) -> np.ndarray:
+    """Square roots of positive ones (n, 2, 2): (M + √det 1)/√(tr M + 2 √det)."""
+    root = np.sqrt(np.linalg.det(matrices))[:, None, None]
+    trace = np.trace(matrices, axis1=1, axis2=2)[:, None, None]
+    return (matrices + root * np.eye(2)) / np.sqrt(trace + 2.0 * root)

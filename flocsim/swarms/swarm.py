@@ -14,10 +14,10 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, in_unit
 from flocsim.forces.base import Force
+from flocsim.forces.body_forces import kicks_of
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import refuse_pair_resistance
-from flocsim.forces.thermal import kicks_of
 from flocsim.geometry.contact.points import PERIODIC, overlap_fault
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import observe
@@ -26,12 +26,11 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.bonds import BondGauge, Bonds
-from flocsim.swarms.clusters import Clusters, Gauge, Neighbours
+from flocsim.swarms.clusters import Clusters, Gauge, Neighbours, Shielding
 from flocsim.swarms.islands import find_islands, run_islands, watch_paths
 from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
-from flocsim.swarms.shielding import Shielding
 from flocsim.system import System, check_bodies, check_forces, read_seed
 
 

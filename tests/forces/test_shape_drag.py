@@ -17,7 +17,7 @@ from flocsim.forces.drag import (
     resistance_matrices,
     resistance_numbers,
 )
-from flocsim.hydrodynamics import lone_body, prism_drag
+from flocsim.hydrodynamics import prism_drag, rigid_bodies
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.plausibility.doubts import all_settled
 from flocsim.plausibility.settling import free_mobilities, held_mobility, terminal_motion
@@ -84,7 +84,7 @@ def test_a_resistance_that_is_not_positive_is_refused(monkeypatch):
     def upside_down(rings, height):
         return attrs.evolve(prism_drag(rings, height), resistance=-np.eye(3))
 
-    monkeypatch.setattr(lone_body, "prism_drag", upside_down)
+    monkeypatch.setattr(rigid_bodies, "prism_drag", upside_down)
     with pytest.raises(UsageError, match="cannot be computed: its resistance"):
         body_resistance(body_of(TWO_TO_ONE, depth=1.77 * TWO_TO_ONE.equivalent_radius))
 

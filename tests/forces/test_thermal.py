@@ -8,8 +8,8 @@ import pytest
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import RangeError, UsageError
 from flocsim.forces import Contact, Lubrication, StokesDrag, Thermal
+from flocsim.forces.body_forces import kicks_of
 from flocsim.forces.check import SAMPLE_BODIES
-from flocsim.forces.thermal import kicks_of
 from flocsim.integrators import Implicit
 from flocsim.plausibility.doubts import doubts_of
 

@@ -11,7 +11,7 @@ from flocsim.arrays import work_of
 from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
-from flocsim.hydrodynamics import lone_body
+from flocsim.hydrodynamics import rigid_bodies
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from tests.helpers.real_images import silhouettes
@@ -83,10 +83,12 @@ def multiblobs(shapes, places):
     spacings, found = [], []
     for count in COVERINGS:
         spacing = math.sqrt(area / (count * len(shapes)))
-        blobs = [lone_body.surface(*each, spacing) for each in zip(outlines, heights, strict=True)]
+        blobs = [
+            rigid_bodies.surface(*each, spacing) for each in zip(outlines, heights, strict=True)
+        ]
         owner = np.repeat(range(len(shapes)), [len(each) for each in blobs])
-        loads = lone_body.loads(
-            np.concatenate(blobs), lone_body.RADIUS * spacing, owner, places[:, :2] / SIZE
+        loads = rigid_bodies.loads(
+            np.concatenate(blobs), rigid_bodies.RADIUS * spacing, owner, places[:, :2] / SIZE
         )
         spacings.append(spacing)
         found.append(0.5 * (loads[:, :-2] + loads[:, :-2].T))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from flocsim.hydrodynamics import SpherePair, clusters, lone_body
-from flocsim.hydrodynamics.clusters import LESS_ACROSS, LESS_ALONG, mobilities, push
+from flocsim.hydrodynamics import SpherePair, rigid_bodies
+from flocsim.hydrodynamics.rigid_bodies import LESS_ACROSS, LESS_ALONG, mobilities, push
 from tests.helpers.tiers import rest_slow
 
 RADIUS = 2.0e-6
@@ -33,11 +33,12 @@ def mobility(places, radii=None):
 def by_multiblobs(places, count=80):
     """(the same of disc prisms, and the radius of the sphere with the drag of one of them)."""
     spacing = np.sqrt((0.5 * 4.0 / 3.0 * 2.0 * np.pi + np.pi) / count)
-    one = lone_body.surface([DISC], 4.0 / 3.0, spacing)
+    one = rigid_bodies.surface([DISC], 4.0 / 3.0, spacing)
     middle = np.mean(places, axis=0)
     whole = np.concatenate([one + [*(np.array(place) - middle), 0.0] for place in places])
     several, alone = (
-        np.linalg.inv(lone_body.loads(each, lone_body.RADIUS * spacing)[:, :3])[:2, :2] / ALONE
+        np.linalg.inv(rigid_bodies.loads(each, rigid_bodies.RADIUS * spacing)[:, :3])[:2, :2]
+        / ALONE
         for each in (whole, one)
     )
     return several, 2.0 / np.trace(alone)
@@ -119,7 +120,7 @@ def test_cells_of_many_bodies_count_as_the_bodies_do(monkeypatch):
     places = np.cumsum(2.0 * np.column_stack([np.cos(turns), np.sin(turns)]), axis=0)
     radii = rng.uniform(0.7, 1.0, 400)
     by_cells = mobility(places, radii)
-    monkeypatch.setattr(clusters, "FEW", 1000)
+    monkeypatch.setattr(rigid_bodies, "FEW", 1000)
     assert by_cells == pytest.approx(mobility(places, radii), rel=1e-2, abs=1e-3)
 
 

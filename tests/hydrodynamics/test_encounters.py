@@ -5,7 +5,7 @@ import pytest
 
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import Meeting, SpherePair, encounters
-from flocsim.hydrodynamics.lone_body import drag_factor
+from flocsim.hydrodynamics.rigid_bodies import drag_factor
 from tests.helpers.tiers import rest_slow
 
 

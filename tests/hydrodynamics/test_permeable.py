@@ -8,7 +8,7 @@ import pytest
 from flocsim import Body, Fluid, Sphere, Swarm, System
 from flocsim.errors import RangeError, UsageError
 from flocsim.forces import Contact, Gravity, PairResistance, StokesDrag, Thermal
-from flocsim.hydrodynamics.lone_body import drag_factor, happel_permeability, turning_factor
+from flocsim.hydrodynamics.rigid_bodies import drag_factor, happel_permeability, turning_factor
 from flocsim.plausibility.settling import terminal_motion
 
 R = 5e-6

@@ -5,7 +5,7 @@ import pytest
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import UsageError
-from flocsim.hydrodynamics import lone_body, prism_drag
+from flocsim.hydrodynamics import prism_drag, rigid_bodies
 from tests.helpers.real_images import silhouettes
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
@@ -39,8 +39,8 @@ def test_a_sphere_of_spheres(count):
         flat = np.sqrt(1.0 - z * z)
         points = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), z])
         spacings.append((4.0 * np.pi / number) ** 0.5)
-        radius = lone_body.RADIUS * spacings[-1]
-        matrix = np.moveaxis(lone_body.pushes(points, points, radius), 2, 1)
+        radius = rigid_bodies.RADIUS * spacings[-1]
+        matrix = np.moveaxis(rigid_bodies.pushes(points, points, radius), 2, 1)
         matrix = matrix.reshape(3 * number, 3 * number)
         wanted = np.tile(np.eye(3), (number, 1))
         speeds.append(6.0 * np.pi / (wanted.T @ np.linalg.solve(matrix, wanted))[0, 0])
@@ -53,7 +53,7 @@ def test_a_sphere_of_spheres(count):
 @pytest.mark.slow
 def test_the_stated_error_covers_a_finer_covering(monkeypatch):
     usual = prism_drag([HOOK])
-    monkeypatch.setattr(lone_body, "SPHERES", (300, 600, 1200))
+    monkeypatch.setattr(rigid_bodies, "SPHERES", (300, 600, 1200))
     finer = prism_drag([HOOK])
     assert np.all(np.abs(finer.mobility / usual.mobility - 1.0) < usual.error)
     assert abs(finer.turning / usual.turning - 1.0) < usual.error < 0.05

@@ -19,9 +19,9 @@ from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.config.pair_scene import BROWNIAN, FLOWS, SETTLING, PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
+from flocsim.forces.body_forces import key_of, thermal_in
 from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
-from flocsim.forces.thermal import key_of, thermal_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
 from flocsim.hydrodynamics.pair import node_radii, slots

@@ -9,7 +9,7 @@ import attrs
 from flocsim.ensembles.config import pair_scene, values
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, number_range, quantity, word_or_quantity
-from flocsim.forces.thermal import thermal_in
+from flocsim.forces.body_forces import thermal_in
 
 MOST_SCRAMBLES = 64
 

@@ -26,9 +26,9 @@ from flocsim.fields import (
     quantity,
     word_or_quantity,
 )
+from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import ASK_FOR_BOTH, asks_for_both
-from flocsim.forces.thermal import thermal_in
 
 LARGEST_LENGTH = 0.01
 """[m] Upper limit of sizes: a larger one is a length in µm whose unit was forgotten."""

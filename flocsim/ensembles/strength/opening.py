@@ -14,10 +14,9 @@ from flocsim.brownian.splitting import repulsion
 from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force
-from flocsim.forces.gravity import Gravity
+from flocsim.forces.body_forces import Gravity, Thermal
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
-from flocsim.forces.thermal import Thermal
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.base import Integrator, Status

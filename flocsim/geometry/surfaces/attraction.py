@@ -29,12 +29,11 @@ panels as well. It takes milliseconds: runs have sums of their own (integrators.
 """
 
 import math
-from functools import cache
 
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled
 from flocsim.compiler.linker import loops_apart
 from flocsim.geometry.surfaces.pieces import (
     Pose,
@@ -390,11 +389,6 @@ def sum_of_pairs(pieces_a, pieces_b, x, y, angle, depth, rule, marks):
     return total
 
 
-@cache
-def compiled_sum():
-    return compose(sum_of_pairs, {})
-
-
 def attraction_energy(
     pieces_a: np.ndarray,
     pieces_b: np.ndarray,
@@ -409,5 +403,5 @@ def attraction_energy(
     """
     rule = np.array([NODES, WEIGHTS])
     x, y, angle = (float(each) for each in pose)
-    total = compiled_sum()(pieces_a, pieces_b, x, y, angle, float(depth), rule, np.zeros(3))
+    total = compiled(sum_of_pairs)(pieces_a, pieces_b, x, y, angle, float(depth), rule, np.zeros(3))
     return hamaker / (24.0 * math.pi) * total * (1.0 if depth == math.inf else depth)

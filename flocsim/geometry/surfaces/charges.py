@@ -22,13 +22,13 @@ them, its slope within 1e-3, and the force that follows is the slope of the pote
 
 import math
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.pieces import at_parameter, piece_at, pieces_of_shape
@@ -324,11 +324,6 @@ def fill(charges, kappa, step, corners, near, field):
             field[row, at.BY_XY] = step * step * by_both
 
 
-@cache
-def compiled_fill():
-    return compose(fill, {})
-
-
 def tiles_around(shape, kappa, step):
     """(lower left corner, (across, up), whether a tile has nodes (across · up,)) around a shape."""
     from scipy.spatial import cKDTree
@@ -367,7 +362,7 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     field = np.empty((nodes, at.FIELD_COLUMNS))
     charges = rows_of_shape(shape, kappa)
     near = np.zeros(len(charges), np.int64)
-    compiled_fill()(charges, kappa, step, corners, near, field)
+    compiled(fill)(charges, kappa, step, corners, near, field)
     return Field(np.array([[*low, step, *counts, 0.0, 1.0 / step]]), tiles, field)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim.forces.thermal import key_of
+from flocsim.forces.body_forces import key_of
 from flocsim.run import Run
 from tests.helpers.small_study import small_study
 

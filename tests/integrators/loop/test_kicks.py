@@ -10,7 +10,7 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
-from flocsim.forces.thermal import key_of
+from flocsim.forces.body_forces import key_of
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.loop.kicks import mean_noise, renew_kicks
 from tests.reference.kicks import increment

@@ -1,4 +1,6 @@
-"""Thermal motion: the kicks of the fluid's molecules, which Stokes's drag balances."""
+"""Forces on every body by itself, besides drag: weight, and the kicks of thermal motion, which
+Stokes's drag balances.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,7 +10,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid
-from flocsim.constants import BOLTZMANN, MINIMUM_GAP
+from flocsim.constants import BOLTZMANN, MINIMUM_GAP, STANDARD_GRAVITY
 from flocsim.errors import UsageError
 from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import BodyForce, Force
@@ -20,6 +22,28 @@ other while they are far apart."""
 
 MOST_HALVINGS = 40
 """More would take a kick below what a double can tell of the time."""
+
+KICKS = 0x7E4D
+"""Keeps kicks apart from what else is drawn with a seed and a replicate."""
+
+
+@attrs.frozen
+class Gravity(BodyForce):
+    """Weight F = m g towards −y, times (1 − ρ_f/ρ) with the fluid's buoyancy on.
+
+    Parameters: ``g`` [m/s²].  Source: Tang et al. (2014), eq. 3; the paper has no buoyancy.
+    """
+
+    g: float = quantity("m/s^2", at_least=0.0, default=STANDARD_GRAVITY)
+
+    @property
+    def absent(self) -> str:
+        return "g is zero" if self.g == 0.0 else ""
+
+    @staticmethod
+    def kernel(body, g):
+        """(0, −m_b g, 0), m_b the mass less the displaced fluid's where buoyancy is on."""
+        return 0.0, -body.buoyant_mass * g, 0.0
 
 
 @attrs.frozen
@@ -145,7 +169,3 @@ def key_of(*numbers: int) -> tuple[int, int]:
     stream = np.random.SeedSequence(numbers[0], spawn_key=(*numbers[1:], KICKS))
     first, second = stream.generate_state(2).tolist()
     return first, second
-
-
-KICKS = 0x7E4D
-"""Keeps kicks apart from what else is drawn with a seed and a replicate."""
