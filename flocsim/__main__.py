@@ -5,9 +5,8 @@ import sys
 from collections.abc import Sequence
 
 from flocsim import __version__
-from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
-from flocsim.limits import check_memory, is_limited
+from flocsim.process import check_memory, install, is_limited
 
 if {"ensemble", "kernel", "swarm", "strength"}.intersection(sys.argv[1:2]):
     fill_descriptors()

@@ -2,9 +2,8 @@
 
 import sys
 
-from flocsim.interruption import install
 from flocsim.io.terminal import fill_descriptors
-from flocsim.limits import check_memory
+from flocsim.process import check_memory, install
 
 if __name__ == "__main__":
     fill_descriptors()

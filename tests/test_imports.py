@@ -36,8 +36,8 @@ ROWS = [
     ["hydrodynamics"],
     ["geometry", "laws"],
     ["arrays", "hooks"],
-    ["compiler", "fields", "interruption", "water"],
-    ["constants", "errors", "limits"],
+    ["compiler", "fields", "water"],
+    ["constants", "errors", "process"],
 ]
 
 # The same inside a room: its sub-rooms and files. A room's own __init__ may import all of them.

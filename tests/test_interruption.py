@@ -11,14 +11,14 @@ from tests.helpers.tiers import rest_slow
 
 WAITS = """\
 import sys, time
-from flocsim import interruption
-interruption.install()
+from flocsim import process
+process.install()
 print("ready", flush=True)
 until = time.monotonic() + 20
-while not interruption.stop_requested() and time.monotonic() < until:
+while not process.stop_requested() and time.monotonic() < until:
     time.sleep(0.01)
-print(interruption.INTERRUPTION.name, flush=True)
-sys.exit(interruption.STOPPED)
+print(process.INTERRUPTION.name, flush=True)
+sys.exit(process.STOPPED)
 """
 
 DEAF = WAITS[: WAITS.index("until")] + "time.sleep(20)\n" * 2
@@ -53,7 +53,7 @@ def test_a_process_that_does_not_answer_is_ended_in_time():
 
 def test_a_process_that_another_speaks_for_is_silent_and_goes_after_it():
     speaker = started(DEAF)
-    words = "import flocsim.interruption as i\ni.INTERRUPTION.speaks, i.HEAD_START = False, 2.0\n"
+    words = "import flocsim.process as i\ni.INTERRUPTION.speaks, i.HEAD_START = False, 2.0\n"
     silent = started(words + DEAF)
     for process in (silent, speaker):
         process.send_signal(signal.SIGUSR1)
@@ -74,8 +74,8 @@ def test_a_second_signal_ends_it_at_once():
 
 
 ENDLESS = """\
-from flocsim import interruption
-interruption.install()
+from flocsim import process
+process.install()
 from flocsim.compiler.composer import compose
 def inner(x):
     while x > 0.0:

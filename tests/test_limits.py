@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from flocsim import limits
+from flocsim import process
 from flocsim.compiler.composer import compose
 from flocsim.errors import FlocsimError
 from tests.helpers.tiers import rest_slow
@@ -16,7 +16,7 @@ from tests.helpers.tiers import rest_slow
 def limited(size, *words):
     """A command that may take so many bytes of address space, ended."""
     limit = lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size))  # noqa: E731
-    env = {name: value for name, value in os.environ.items() if name != limits.BLAS_THREADS}
+    env = {name: value for name, value in os.environ.items() if name != process.BLAS_THREADS}
     return subprocess.run(
         [sys.executable, *words], preexec_fn=limit, env=env, capture_output=True, text=True,
         timeout=60,
@@ -34,7 +34,7 @@ def test_too_little_to_load_the_libraries_is_one_line(size, words):
 
 
 def test_enough_to_load_them_is_enough():
-    done = limited(int(limits.LOADING), "-m", "flocsim.ensemble", "none.toml")
+    done = limited(int(process.LOADING), "-m", "flocsim.ensemble", "none.toml")
     assert done.returncode == 2
     assert done.stderr.startswith("none.toml: no such file")
 
@@ -45,16 +45,16 @@ def entry(x):
 
 def test_too_little_to_compile_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
-    monkeypatch.setattr(limits, "address_space", lambda: 1e9)
+    monkeypatch.setattr(process, "address_space", lambda: 1e9)
     with pytest.raises(FlocsimError, match="limited to 1000 MB, and compiling takes 1500 MB"):
         compose(entry, {})(1.0)
-    monkeypatch.setattr(limits, "address_space", lambda: 2e9)
+    monkeypatch.setattr(process, "address_space", lambda: 2e9)
     assert compose(entry, {})(1.0) == 7.0
 
 
 def test_without_a_limit_nothing_is_changed(monkeypatch):
-    monkeypatch.delenv(limits.BLAS_THREADS, raising=False)
-    monkeypatch.setattr(limits, "address_space", lambda: float("inf"))
-    limits.check_memory()
-    assert limits.BLAS_THREADS not in os.environ
-    assert limits.lacking(limits.COMPILING, "compiling") == ""
+    monkeypatch.delenv(process.BLAS_THREADS, raising=False)
+    monkeypatch.setattr(process, "address_space", lambda: float("inf"))
+    process.check_memory()
+    assert process.BLAS_THREADS not in os.environ
+    assert process.lacking(process.COMPILING, "compiling") == ""

@@ -17,7 +17,7 @@ from typing import Any
 import attrs
 
 from flocsim.errors import FlocsimError
-from flocsim.interruption import end_with_parent
+from flocsim.process import end_with_parent
 
 AHEAD = 2
 """Tasks for each process that are handed out before there are results: none has to wait."""

@@ -17,9 +17,9 @@ from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.ensembles.parallel.communicator import SECONDS
 from flocsim.ensembles.parallel.processes import launched_rank
 from flocsim.errors import UsageError
-from flocsim.interruption import STOPPED
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.terminal import tell
+from flocsim.process import STOPPED
 
 DESCRIPTION = """\
 Run a study at every value of a key, or of several (all combinations), and join the results in

@@ -31,7 +31,7 @@ from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import Called, ObjectCode, link
 from flocsim.compiler.processor import compiled_for, numba_settings
 from flocsim.errors import FlocsimError, KernelError
-from flocsim.limits import COMPILING, lacking
+from flocsim.process import COMPILING, lacking
 
 INLINED_SIZE = 400
 """Functions of less bytecode [bytes] are always inlined; of the others LLVM decides."""

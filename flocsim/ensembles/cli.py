@@ -13,9 +13,9 @@ from flocsim.compiler import units
 from flocsim.ensembles.parallel.communicator import SECONDS, Communicator, StopRequested
 from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
-from flocsim.interruption import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
+from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
 
 UNSHARED = ("quiet", "run", "read", "command")
 """Arguments in which ranks may differ: the others say what is run."""

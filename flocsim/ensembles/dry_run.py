@@ -57,11 +57,11 @@ from flocsim.forces import VanDerWaals
 from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import solid_radius
 from flocsim.hydrodynamics import Meeting, SpherePair
-from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.fit_report import coarse_line
 from flocsim.io.results.run_group import choice_lines, class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
+from flocsim.process import INTERRUPTION, stop_requested
 
 NOTHING_RUN = (
     "nothing was run (--dry-run); --pilot runs some replicates, to estimate core-hours and file "

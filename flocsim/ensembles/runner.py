@@ -45,7 +45,6 @@ from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_c
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import refuse_other_part
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.journal import MemoryJournal
 from flocsim.io.results.run_group import (
     choice_lines,
@@ -55,6 +54,7 @@ from flocsim.io.results.run_group import (
     storable,
 )
 from flocsim.io.terminal import Progress, tell
+from flocsim.process import INTERRUPTION, STOPPED, stop_requested
 
 
 @attrs.define

@@ -25,9 +25,9 @@ from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
 from flocsim.fields import is_whole
-from flocsim.interruption import INTERRUPTED, STOPPED, WITHHELD
 from flocsim.io.journal import SUFFIX
 from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.process import INTERRUPTED, STOPPED, WITHHELD
 from flocsim.trajectories.trajectory import Trajectory
 
 SAVING = 30.0

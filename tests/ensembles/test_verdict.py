@@ -6,8 +6,8 @@ import pytest
 
 from flocsim.ensembles.pairs.contents import told
 from flocsim.ensembles.pairs.kind import verdict
-from flocsim.interruption import WITHHELD
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from flocsim.process import WITHHELD
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tabulate import tabulate
 

@@ -27,10 +27,10 @@ from flocsim.ensembles.storage.identity import short
 from flocsim.ensembles.study import Study
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
-from flocsim.interruption import install
 from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, Record, scan
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
+from flocsim.process import install
 from tests.helpers.small_study import write_star_library
 
 PAIRS = """\

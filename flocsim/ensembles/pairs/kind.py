@@ -31,13 +31,13 @@ from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowSt
 from flocsim.ensembles.storage.unfinished import ASKED, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
-from flocsim.interruption import WITHHELD
 from flocsim.io.groups import run_of
 from flocsim.io.records import CHUNK, Record, matches
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import opened, why_apart
 from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.schema import Results, as_words
+from flocsim.process import WITHHELD
 
 
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:

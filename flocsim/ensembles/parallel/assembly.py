@@ -23,8 +23,8 @@ from flocsim.ensembles.kind import COLUMNS, ROW, Interval
 from flocsim.ensembles.parallel.communicator import Communicator, ExitCode, StopRequested
 from flocsim.ensembles.storage import row_store
 from flocsim.errors import FileError, FlocsimError
-from flocsim.interruption import INTERRUPTION, stop_requested
 from flocsim.io.results.layout import ROWS, Plan, RowFile, shared_row_file
+from flocsim.process import INTERRUPTION, stop_requested
 
 COUNTED_ROWS = 524_288
 """Rows that a rank counts, at least: an answer has as many numbers as many ranks'."""

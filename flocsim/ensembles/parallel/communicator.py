@@ -32,8 +32,8 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from flocsim.errors import FlocsimError
-from flocsim.interruption import INTERRUPTION, STOPPED, stop_requested
 from flocsim.io.terminal import tell
+from flocsim.process import INTERRUPTION, STOPPED, stop_requested
 
 if TYPE_CHECKING:
     from flocsim.ensembles.kind import Chunk
@@ -191,7 +191,7 @@ class Communicator:
         """The next message of a rank; on rank 0, StopRequested where a signal comes first.
 
         The other ranks wait for rank 0 to end the job, which says why: one that ended it first
-        would cut that short. Where rank 0 does not, flocsim.interruption does.
+        would cut that short. Where rank 0 does not, flocsim.process does.
         """
         while not self.inbox[source]:
             self.take_in()

@@ -23,7 +23,7 @@ from flocsim.ensembles.parallel.communicator import (
     Request,
 )
 from flocsim.ensembles.parallel.schedule import Phase, StudyState, chunk_seconds
-from flocsim.interruption import stop_requested
+from flocsim.process import stop_requested
 
 GOING_SECONDS = 1.0
 """Seconds between two messages of a rank that say how far it is."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.interruption import (
+from flocsim.process import (
     INTERRUPTION,
     LAUNCHER_RANKS,
     STOPPED,

@@ -33,7 +33,7 @@ NOT_PHYSICS = {
     "io/groups.py": "how arrays are stored; flocs that are read are compared themselves",
     "io/labelled.py": "how rates are named",
     "io/outputs.py": "what may be written to",
-    "limits.py": "what the system allows; a row is what comes without an error",
+    "process.py": "what the system allows; a row is what comes without an error",
     "io/files.py": "how files are written",
     "io/seals.py": "how files are sealed",
     "io/records.py": "how rows are stored, sealed by checksums",

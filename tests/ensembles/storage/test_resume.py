@@ -16,9 +16,9 @@ from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
-from flocsim.interruption import STOPPED
 from flocsim.io.records import encode
 from flocsim.io.results.file import read_results
+from flocsim.process import STOPPED
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config
 from tests.helpers.tiers import rest_slow

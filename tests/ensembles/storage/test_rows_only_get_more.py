@@ -17,10 +17,10 @@ from flocsim.ensembles.storage import row_store
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, KernelError, UsageError
-from flocsim.interruption import STOPPED
 from flocsim.io import journal as locked_file
 from flocsim.io.journal import Journal
 from flocsim.io.records import CHUNK
+from flocsim.process import STOPPED
 from tests.ensembles.storage.test_resume import stop_after
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, small_config

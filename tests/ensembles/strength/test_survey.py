@@ -308,7 +308,7 @@ def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
     fake, command, tmp_path, monkeypatch, capsys
 ):
     from flocsim.ensembles.parallel import coordinator
-    from flocsim.interruption import Interruption
+    from flocsim.process import Interruption
 
     stop = Interruption()
     for name in ("flocsim.ensembles.runner", "flocsim.ensembles.cli"):

@@ -1,9 +1,13 @@
-"""Signals that ask a long run to stop: noted at once, answered by ending cleanly in time.
+"""What the system asks of a process: to stop in time, and to do with the memory that it may take.
 
-SIGTERM, SIGINT and SIGUSR1 (Slurm's warnings, Ctrl-C) only set a flag, which the run reads between
-replicates. Python calls its own handlers between two bytecodes of the main thread only, so a
-thread that waits on a pipe, to which the C handler writes, ends the process where the main thread
-stays in compiled code: all that was computed before is in the journal already.
+Signals are noted at once, and answered by ending cleanly in time. SIGTERM, SIGINT and SIGUSR1
+(Slurm's warnings, Ctrl-C) only set a flag, which the run reads between replicates. Python calls its
+own handlers between two bytecodes of the main thread only, so a thread that waits on a pipe, to
+which the C handler writes, ends the process where the main thread stays in compiled code: all that
+was computed before is in the journal already.
+
+Too little memory is told before it hangs or crashes a library. Imports nothing of flocsim and
+nothing slow: it is asked before numpy is loaded.
 """
 
 import contextlib
@@ -46,6 +50,16 @@ PARENT_SECONDS = 0.5
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGUSR1") if hasattr(signal, name)
 )
+
+LOADING = 700 * 10**6
+"""Address space [bytes] for Python, numpy, numba and their libraries, with a study's data."""
+
+COMPILING = 1500 * 10**6
+"""The same while an engine is compiled."""
+
+BLAS_THREADS = "OPENBLAS_NUM_THREADS"
+
+FAILED = 70
 
 
 class Interruption:
@@ -145,3 +159,42 @@ def end_with_parent(parent: int | None = None) -> None:
         os._exit(STOPPED)
 
     threading.Thread(target=look, daemon=True).start()
+
+
+def address_space() -> float:
+    """Bytes of address space that this process may take (`ulimit -v`); infinite without a limit."""
+    try:
+        import resource
+    except ImportError:
+        return float("inf")  # Windows
+    least, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return float("inf") if least == resource.RLIM_INFINITY else least
+
+
+def is_limited() -> bool:
+    return address_space() < float("inf")
+
+
+def lacking(needed: float, work: str) -> str:
+    """One line where the address space will not do for some work; "" where it does."""
+    found = address_space()
+    if found >= needed:
+        return ""
+    return (
+        f"the address space is limited to {found / 1e6:.0f} MB, and {work} takes "
+        f"{needed / 1e6:.0f} MB: raise the limit (ulimit -v, or the batch system's)"
+    )
+
+
+def check_memory() -> None:
+    """End the process in one line where its libraries could not be loaded.
+
+    OpenBLAS spins without end where it gets no memory for its threads, each of which asks for some
+    hundred MB of addresses; under a limit it gets one thread, unless the user has chosen.
+    """
+    if not is_limited():
+        return
+    os.environ.setdefault(BLAS_THREADS, "1")
+    if text := lacking(LOADING, "loading flocsim"):
+        print(f"flocsim: {text}", file=sys.stderr)
+        sys.exit(FAILED)
