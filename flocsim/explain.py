@@ -20,11 +20,11 @@ from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
 from flocsim.forces.codegen import PLACES, VELOCITIES
 from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
+from flocsim.forces.settling import lone_view
 from flocsim.integrators.implicit import Overdamped
 from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.plausibility.doubts import all_settled, doubts_of, settled
-from flocsim.plausibility.settling import lone_view
+from flocsim.plausibility import all_settled, doubts_of, settled
 
 LAWLESS = (
     ("centre_force", "forces along lines of centres", "none are given"),

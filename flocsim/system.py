@@ -35,7 +35,7 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.laws import compiled_calls, law_table
-from flocsim.plausibility.doubts import doubts_of
+from flocsim.plausibility import doubts_of
 from flocsim.run import Run
 from flocsim.trajectories.blame import UNABLE, force_to_blame
 from flocsim.trajectories.replay import Origin

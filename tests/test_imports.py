@@ -58,9 +58,7 @@ INNER_ROWS = {
         ["clusters", "islands"],
         ["arrays"],
     ],
-    "brownian": [["meeting"], ["splitting"]],
     "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["two_spheres"]],
-    "plausibility": [["doubts"], ["settling"]],
     "integrators": [
         ["explicit"],
         ["implicit"],

@@ -22,11 +22,11 @@ from sweeps import TYPES, config_of, parse_arguments, sweep, transition
 from flocsim.ensembles.collision.start import only_one
 from flocsim.ensembles.study import Study
 from flocsim.forces import VanDerWaals
+from flocsim.forces.settling import terminal_motion
 from flocsim.io.confidence import proportion
 from flocsim.io.plots.style import graded_colours, house_style, new_figure, set_probability_axis
 from flocsim.io.terminal import markdown_table
 from flocsim.io.trajectory import centre_distance
-from flocsim.plausibility.settling import terminal_motion
 
 CUT_OFFS = (0.5e-9, 1e-9, 2e-9, 4e-9)
 RATIOS = np.geomspace(0.2, 20.0, 11)

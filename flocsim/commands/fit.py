@@ -34,7 +34,7 @@ from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
 from flocsim.io.shape_library import make_entry, write_library
-from flocsim.plausibility.doubts import PIXEL_SIZE
+from flocsim.plausibility import PIXEL_SIZE
 
 DESCRIPTION = """\
 Find the flocs in pictures, fit a spheropolygon to each at every requested number of vertices, and

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
+from flocsim.brownian import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import MINIMUM_GAP
 from flocsim.ensembles.collision.draw import EASILY, THIRD_OF, count_checks, exact_method
 from flocsim.ensembles.collision.encounter import Encounter

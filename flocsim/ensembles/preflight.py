@@ -39,7 +39,7 @@ from flocsim.integrators.loop.driver import advance
 from flocsim.integrators.rhs.orientation import oriented_view
 from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
-from flocsim.plausibility.doubts import ROUNDING, Names, doubts_of, settled
+from flocsim.plausibility import ROUNDING, Names, doubts_of, settled
 from flocsim.system import System
 from flocsim.trajectories.blame import wrong_answer
 

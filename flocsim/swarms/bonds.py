@@ -36,10 +36,10 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import follows_shape
+from flocsim.forces.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
-from flocsim.plausibility.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.swarms.clusters import Neighbours, placed_together
 
 KINDS = ("touching", "certificate", "hook", "rest")

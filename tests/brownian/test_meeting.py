@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
-from flocsim.brownian.meeting import brownian_meetings
-from flocsim.brownian.splitting import splitting_probability
+from flocsim.brownian import brownian_meetings, splitting_probability
 from flocsim.errors import UsageError
 from flocsim.forces import DoubleLayer, StokesDrag, Thermal, VanDerWaals
 

@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.body import Fluid
-from flocsim.brownian.splitting import repulsion, splitting_probability, stability_ratio
+from flocsim.brownian import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerWaals

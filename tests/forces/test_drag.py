@@ -11,8 +11,8 @@ from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.drag import reynolds_number
+from flocsim.forces.settling import largest_mobility, least_mobility, terminal_motion
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.plausibility.settling import largest_mobility, least_mobility, terminal_motion
 
 WATER = Fluid(viscosity=1.0e-3, density=1000.0, buoyancy=True)
 INERTIAL = StokesDrag(law="schiller_naumann")

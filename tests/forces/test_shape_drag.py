@@ -17,10 +17,10 @@ from flocsim.forces.drag import (
     resistance_matrices,
     resistance_numbers,
 )
+from flocsim.forces.settling import free_mobilities, held_mobility, terminal_motion
 from flocsim.hydrodynamics import prism_drag, rigid_bodies
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.plausibility.doubts import all_settled
-from flocsim.plausibility.settling import free_mobilities, held_mobility, terminal_motion
+from flocsim.plausibility import all_settled
 from tests.forces.test_strain import SHEAR, ellipse
 from tests.helpers.tiers import rest_slow
 

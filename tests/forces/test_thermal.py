@@ -11,7 +11,7 @@ from flocsim.forces import Contact, Lubrication, StokesDrag, Thermal
 from flocsim.forces.body_forces import kicks_of
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.integrators import Implicit
-from flocsim.plausibility.doubts import doubts_of
+from flocsim.plausibility import doubts_of
 
 WATER = Fluid(viscosity="0.89 mPa s")
 ROOM = Thermal("298.15 K")

@@ -8,8 +8,8 @@ import pytest
 from flocsim import Body, Fluid, Sphere, Swarm, System
 from flocsim.errors import RangeError, UsageError
 from flocsim.forces import Contact, Gravity, PairResistance, StokesDrag, Thermal
+from flocsim.forces.settling import terminal_motion
 from flocsim.hydrodynamics.rigid_bodies import drag_factor, happel_permeability, turning_factor
-from flocsim.plausibility.settling import terminal_motion
 
 R = 5e-6
 WATER = Fluid(buoyancy=True)

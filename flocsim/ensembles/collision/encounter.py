@@ -22,6 +22,12 @@ from flocsim.errors import UsageError
 from flocsim.forces.body_forces import key_of, thermal_in
 from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
+from flocsim.forces.settling import (
+    held_mobility,
+    largest_mobility,
+    least_mobility,
+    terminal_motion,
+)
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
 from flocsim.hydrodynamics.pair import node_radii, slots
@@ -29,12 +35,6 @@ from flocsim.hydrodynamics.two_spheres import FADES_FROM
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
-from flocsim.plausibility.settling import (
-    held_mobility,
-    largest_mobility,
-    least_mobility,
-    terminal_motion,
-)
 from flocsim.system import System
 
 OBSERVER: dict[Callable, Callable] = {

@@ -29,8 +29,8 @@ from flocsim.forces import Gravity
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import kernel_arguments, reach_of, sample_pairs
 from flocsim.forces.drag import follows_shape
+from flocsim.forces.settling import lone_view, no_force
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.plausibility.settling import lone_view, no_force
 
 SLACK = 1.5
 """A flow's start is at least so many times as far as its ways are from i's centre there."""

@@ -38,7 +38,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
-    "run.py", "plausibility/settling.py", "trajectories/blame.py", "compiler", "bonds",
+    "run.py", "trajectories/blame.py", "compiler", "bonds",
     "hydrodynamics", "forces", "integrators", "geometry/shapes", "geometry/contact",
     "geometry/surfaces", "io/results/schema.py",
     "io/results/events.py",

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid
-from flocsim.brownian.splitting import repulsion
+from flocsim.brownian import repulsion
 from flocsim.constants import MINIMUM_GAP
 from flocsim.errors import PlausibilityWarning
 from flocsim.forces.base import Force

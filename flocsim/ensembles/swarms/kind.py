@@ -32,7 +32,7 @@ from flocsim.forces import ContactForce
 from flocsim.io.records import CHUNK, SNAPSHOT, Record
 from flocsim.io.results import swarm_file
 from flocsim.io.terminal import duration
-from flocsim.plausibility.doubts import doubts_of, settled
+from flocsim.plausibility import doubts_of, settled
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.swarm import Swarm, check_box
 from flocsim.system import System

@@ -18,11 +18,11 @@ from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
 from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
+from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
 from flocsim.io.records import Record
 from flocsim.io.results.swarm_file import ENDS
-from flocsim.plausibility.settling import terminal_motion
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
 from flocsim.swarms.swarm import Swarm, stops_of
 from flocsim.system import System

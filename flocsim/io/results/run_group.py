@@ -40,7 +40,7 @@ CHOICE = {
 SETTLED = {
     "type": str, "body": str, "radius": float, "speed": float, "reynolds": float, "stokes": float,
 }  # fmt: skip
-"""A body at its terminal speed: flocsim.plausibility.settling.Settled."""
+"""A body at its terminal speed: flocsim.forces.settling.Settled."""
 
 SPHERES = {
     "type": str, "release": float, "escape": float, "diffusion": float,

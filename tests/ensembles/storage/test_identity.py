@@ -19,7 +19,7 @@ NOT_PHYSICS = {
     "errors.py": "messages; a row is what comes without an error",
     "water.py": "what follows of [fluid] and forces is compared itself",
     "explain.py": "text for people",
-    "plausibility/doubts.py": "text for people",
+    "plausibility.py": "text for people",
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",

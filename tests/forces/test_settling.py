@@ -10,7 +10,7 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
-from flocsim.plausibility.settling import terminal_motion
+from flocsim.forces.settling import terminal_motion
 
 G, VISCOSITY = 9.81, 8.9e-4
 

@@ -19,7 +19,7 @@ from flocsim.forces.contact import Contact
 from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
 from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, follows_shape, reynolds_number
 from flocsim.forces.pair_resistance import Lubrication
-from flocsim.plausibility.settling import largest_mobility, terminal_motion
+from flocsim.forces.settling import largest_mobility, terminal_motion
 
 CHECK = "check the number and its unit"
 

@@ -17,7 +17,7 @@ from flocsim.forces import (
     Thermal,
     VanDerWaals,
 )
-from flocsim.plausibility.doubts import PIXEL_SIZE, USUAL, all_settled, doubts_of, settled
+from flocsim.plausibility import PIXEL_SIZE, USUAL, all_settled, doubts_of, settled
 from tests.helpers.trial_scenes import hook
 
 WATER = Fluid(buoyancy=True)
