@@ -601,7 +601,7 @@ class Scene(NamedTuple):
     tiles: np.ndarray  # (tiles,): where the nodes of each begin in ``field``; −1: it has none
     field: Annotated[np.ndarray, ("nodes", FIELD_COLUMNS)]  # see POTENTIAL
     parameters: np.ndarray  # what the laws read of the forces
-    laws: Any  # see flocsim.laws
+    laws: Any  # see flocsim.hooks
     surface_reach: float = -1.0  # the gap up to which surface forces act [m]; −1: there are none
     centre_reach: float = -1.0  # the same of centre forces [m]
     outlines: tuple[float, float, float, float] = NO_OUTLINES  # of forces between: forces.outline

@@ -22,7 +22,7 @@ from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.surfaces.charges import charges_of_bodies, field_of_bodies
 from flocsim.geometry.surfaces.pieces import pieces_of_bodies
-from flocsim.laws import LAWS
+from flocsim.hooks import LAWS
 
 NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""

@@ -28,13 +28,12 @@ from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.points import overlap_fault
-from flocsim.hooks import HOOKS
+from flocsim.hooks import HOOKS, compiled_calls, law_table
 from flocsim.integrators.amplification import amplification_of
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
-from flocsim.laws import compiled_calls, law_table
 from flocsim.plausibility import doubts_of
 from flocsim.run import Run
 from flocsim.trajectories.blame import UNABLE, force_to_blame

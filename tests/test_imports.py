@@ -34,8 +34,9 @@ ROWS = [
     ["forces", "integrators"],
     ["body"],
     ["hydrodynamics"],
-    ["geometry", "laws"],
-    ["arrays", "hooks"],
+    ["geometry"],
+    ["hooks"],
+    ["arrays"],
     ["compiler", "fields", "water"],
     ["constants", "errors", "process"],
 ]

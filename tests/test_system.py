@@ -9,9 +9,8 @@ from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
-from flocsim.hooks import HOOKS
+from flocsim.hooks import HOOKS, compiled_calls
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
-from flocsim.laws import compiled_calls
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import ELASTIC, PolygonSystem, head_on, hook, star
 

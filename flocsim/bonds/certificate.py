@@ -29,11 +29,7 @@ from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import least_listed_gap, separation
 from flocsim.geometry.contact.slip_transfer import contact_point
-from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
-from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
-from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
-from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass, pair_view
-from flocsim.laws import (
+from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,
     ORIENTED_ENERGY,
@@ -42,6 +38,10 @@ from flocsim.laws import (
     has,
     surface_force,
 )
+from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
+from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
+from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
+from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass, pair_view
 
 NO_BOND, CERTIFICATE, HOOK, REST = range(4)
 """Kinds of bond."""

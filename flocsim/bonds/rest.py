@@ -43,9 +43,9 @@ from flocsim.bonds.certificate import (
 )
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.integrators.rhs.views import contact_view
-from flocsim.laws import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
 
 STILL = 1e-3
 """A pair that has moved by less than this share of the drift's way keeps its pose."""

@@ -4,7 +4,7 @@
 (flocsim.hooks), clones every function that the driver reaches with those replaced, and compiles the
 whole (flocsim.compiler.units): an engine, the same for all scenes of a family (method, spheres or
 polygons, observer). ``compile_law`` does the same for what a scene's forces add up to
-(flocsim.laws), and gives the address at which the engine calls it, so that other forces never
+(flocsim.hooks), and gives the address at which the engine calls it, so that other forces never
 compile an engine.
 
 What goes to disk is named by a hash of all that was reached: bytecode, constants, Python, numba and

@@ -33,7 +33,7 @@ from flocsim.forces.outline import (
 )
 from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.laws import LAWS
+from flocsim.hooks import LAWS
 
 
 def body_change(view, axis):
@@ -75,7 +75,7 @@ another kind leave the text of a law as it is."""
 
 @attrs.define
 class Pieces:
-    """What forces make of a scene: its laws {name of flocsim.laws.LAWS: plain function}, their
+    """What forces make of a scene: its laws {name of flocsim.hooks.LAWS: plain function}, their
     numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
     gap of outlines is smoothed, how far those all along them look and what acts
     between their charges (outline.py), how many events its contact forces have, whether its body

@@ -21,6 +21,7 @@ from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed
 from flocsim.integrators.implicit import Implicit, Overdamped
@@ -29,7 +30,6 @@ from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import contact_view
-from flocsim.laws import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.run import Run
 
 Slips = dict[tuple[int, int, int, int], float]

@@ -51,9 +51,7 @@ from flocsim.bonds.certificate import (
 from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.integrators.rhs.climb import repulsion_at
-from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
-from flocsim.laws import (
+from flocsim.hooks import (
     CENTRE_FORCE,
     VELOCITY_DERIVATIVES,
     body_force,
@@ -61,6 +59,8 @@ from flocsim.laws import (
     has,
     velocity_derivatives,
 )
+from flocsim.integrators.rhs.climb import repulsion_at
+from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
 
 (
     ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J, LOAD,

@@ -37,7 +37,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "laws.py",
+    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py",
     "run.py", "trajectories/blame.py", "compiler", "bonds",
     "hydrodynamics", "forces", "integrators", "geometry/shapes", "geometry/contact",
     "geometry/surfaces", "io/results/schema.py",

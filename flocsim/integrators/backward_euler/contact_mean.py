@@ -20,6 +20,7 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
+from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
     add_product,
@@ -28,7 +29,6 @@ from flocsim.integrators.rhs.jacobian import (
     tangent_rows,
 )
 from flocsim.integrators.rhs.views import effective_mass, push_pair, tangential_rate
-from flocsim.laws import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 
 FADING = 0.01
 """The tangential force of a pair that opens falls to half within a gap of this share of the

@@ -24,6 +24,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
+from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
     friction_force,
@@ -33,7 +34,6 @@ from flocsim.integrators.backward_euler.contact_mean import (
 )
 from flocsim.integrators.rhs.jacobian import add_turning, normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import pressed_view, push_pair, tangential_rate
-from flocsim.laws import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 
 FAR_FROM_WALL = 0.99
 """What is to stay above 0 goes so far towards it at most in an iteration."""

@@ -22,7 +22,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import postponed
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.hooks import note_step
+from flocsim.hooks import CONTACT_FORCE, has, note_step
 from flocsim.integrators.backward_euler.step import (
     end_at_switches,
     euler_step,
@@ -32,7 +32,6 @@ from flocsim.integrators.backward_euler.step import (
 )
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.views import lever
-from flocsim.laws import CONTACT_FORCE, has
 
 RESOLVED_BOUNCE = 0.003
 """Steps are this share of 1/ω0 at most while bodies touch that fly apart again."""

@@ -17,6 +17,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import (
     FADING,
     add_all_derivatives,
@@ -32,7 +33,6 @@ from flocsim.integrators.rhs.forces import sum_other_forces
 from flocsim.integrators.rhs.jacobian import assemble_others
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
-from flocsim.laws import CONTACT_FORCE, has
 
 NEWTON_SHARE = 0.01
 """Newton's method goes on until what is left is below this share of the tolerance."""

@@ -19,6 +19,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
+from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import takes_part
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
 from flocsim.integrators.backward_euler.path import find_closed
@@ -30,7 +31,6 @@ from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, memory_of
-from flocsim.laws import CONTACT_FORCE, has
 
 FEW = 2
 """Behind a step with so few switches at most, contacts are taken to be as they were, first."""

@@ -13,14 +13,13 @@ import math
 
 import flocsim.arrays as at
 from flocsim.constants import SHALLOWEST_TOUCH
-from flocsim.hooks import awaits_touch, hook
+from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has, hook
 from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.grazes import grazing_share
 from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
 from flocsim.integrators.rhs.friction import beyond, set_sliding
 from flocsim.integrators.rhs.views import contact_view, pressed_view
-from flocsim.laws import SLIP_LIMIT, contact_event, has
 
 RESOLUTION = 1e-3
 """A switch is located to this share of the tolerance, …"""

@@ -13,6 +13,7 @@ import math
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.rhs.friction import STIFFER, coupling, grazing_force, normal_mobility
@@ -23,7 +24,6 @@ from flocsim.integrators.rhs.views import (
     pressed_view,
     tangential_rate,
 )
-from flocsim.laws import contact_derivatives, contact_force
 
 SHARE_OF_FLIGHT = 0.1
 """The speed with which a pair parts may lift it by this share of the tolerance, where it has done

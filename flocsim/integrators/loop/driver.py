@@ -10,9 +10,12 @@ from flocsim.geometry.contact.candidates import list_ahead, outlived, spent, too
 from flocsim.geometry.contact.points import locate_contacts, row_radii
 from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import (
+    CENTRE_FORCE,
+    CONTACT_FORCE,
     attempt,
     choose_method,
     end_within,
+    has,
     leave_out_cycles,
     note_step,
     observe,
@@ -42,7 +45,6 @@ from flocsim.integrators.loop.step_size import (
 from flocsim.integrators.rhs.friction import rolled, rolled_besides, slip_in
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
-from flocsim.laws import CENTRE_FORCE, CONTACT_FORCE, has
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10

@@ -14,7 +14,7 @@ Newton's method adds keeps their momentum however far it has come.
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import length_of
-from flocsim.laws import CENTRE_FORCE, has
+from flocsim.hooks import CENTRE_FORCE, has
 
 LEADING_SHARE = 0.2
 """Share of a surface force from which on a pair's normal counts among those that bodies follow,

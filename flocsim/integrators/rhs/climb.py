@@ -8,9 +8,9 @@ straight.
 import math
 
 import flocsim.arrays as at
+from flocsim.hooks import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import pair_view
-from flocsim.laws import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 
 BARRIER = 20.0
 """Thermal energies k_B T that hold a pair: by Kramers' rate kicks take e^20 = 5e8 times as long to

@@ -6,7 +6,17 @@ An integrator that freezes these flags for a step has a smooth right-hand side i
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
-from flocsim.hooks import hook
+from flocsim.hooks import (
+    BODY_FORCE,
+    CENTRE_FORCE,
+    CONTACT_FORCE,
+    body_force,
+    centre_force,
+    contact_force,
+    has,
+    hook,
+    surface_force,
+)
 from flocsim.integrators.rhs.friction import grazing_force
 from flocsim.integrators.rhs.outline_sum import acts_along, outlines_in
 from flocsim.integrators.rhs.pair_resistance import add_pair_resistance
@@ -19,16 +29,6 @@ from flocsim.integrators.rhs.views import (
     push_pair,
     soft_centre_line,
     tangential_rate,
-)
-from flocsim.laws import (
-    BODY_FORCE,
-    CENTRE_FORCE,
-    CONTACT_FORCE,
-    body_force,
-    centre_force,
-    contact_force,
-    has,
-    surface_force,
 )
 
 

@@ -41,8 +41,8 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.points import row_radii
+from flocsim.hooks import SLIP_LIMIT, has, slip_limit
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
-from flocsim.laws import SLIP_LIMIT, has, slip_limit
 
 FULL = 1.0 - 1e-9
 """A displacement is at its limit from this share of it on."""

@@ -15,7 +15,22 @@ import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import row_radii, separation
-from flocsim.hooks import hook
+from flocsim.hooks import (
+    CENTRE_FORCE,
+    CONTACT_FORCE,
+    POSITION_DERIVATIVES,
+    VELOCITY_DERIVATIVES,
+    centre_derivatives,
+    centre_force,
+    contact_derivatives,
+    contact_force,
+    has,
+    hook,
+    position_derivatives,
+    surface_derivatives,
+    surface_force,
+    velocity_derivatives,
+)
 from flocsim.integrators.rhs.blocks import block_count, lower_block, own_block, upper_block
 from flocsim.integrators.rhs.error import remember_velocities
 from flocsim.integrators.rhs.friction import limit_slope
@@ -33,21 +48,6 @@ from flocsim.integrators.rhs.views import (
     centre_view,
     contact_view,
     soft_centre_line,
-)
-from flocsim.laws import (
-    CENTRE_FORCE,
-    CONTACT_FORCE,
-    POSITION_DERIVATIVES,
-    VELOCITY_DERIVATIVES,
-    centre_derivatives,
-    centre_force,
-    contact_derivatives,
-    contact_force,
-    has,
-    position_derivatives,
-    surface_derivatives,
-    surface_force,
-    velocity_derivatives,
 )
 
 

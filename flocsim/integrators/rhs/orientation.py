@@ -10,8 +10,8 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import OrientedView
 from flocsim.geometry.contact.points import length_of, separation
+from flocsim.hooks import oriented_energy
 from flocsim.integrators.rhs.views import effective_mass
-from flocsim.laws import oriented_energy
 
 TURN = 1e-4
 """Angle by which bodies are turned for a difference [rad]: its square is what differences leave."""

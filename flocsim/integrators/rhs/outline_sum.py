@@ -21,12 +21,11 @@ from flocsim.geometry.surfaces.pieces import (
     piece_at,
     placed,
 )
-from flocsim.hooks import hook
+from flocsim.hooks import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, hook, outline_pressure
 from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import between_oriented
 from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, growth_at, put_side
 from flocsim.integrators.rhs.views import effective_mass
-from flocsim.laws import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, outline_pressure
 
 LENS = 300.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes

@@ -25,7 +25,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import length_of
 from flocsim.geometry.contact.slip_transfer import slip_error
-from flocsim.hooks import hook
+from flocsim.hooks import CONTACT_FORCE, contact_force, has, hook
 from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mobility
 from flocsim.integrators.rhs.views import (
     along_normal,
@@ -34,7 +34,6 @@ from flocsim.integrators.rhs.views import (
     normal_rate,
     pressed_view,
 )
-from flocsim.laws import CONTACT_FORCE, contact_force, has
 
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""

@@ -9,10 +9,10 @@ from flocsim.arrays import work_of
 from flocsim.forces import Contact
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.hooks import contact_event
 from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import law_event_share, set_modes
 from flocsim.integrators.rhs.views import contact_view
-from flocsim.laws import contact_event
 
 RADIUS, OVERLAP = 5e-6, 1e-8
 PULL, SLIDE = range(2)
