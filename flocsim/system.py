@@ -35,8 +35,7 @@ from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import doubts_of
-from flocsim.run import Run
-from flocsim.trajectories.blame import UNABLE, force_to_blame
+from flocsim.run import UNABLE, Run, force_to_blame
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 

@@ -40,8 +40,8 @@ from flocsim.integrators.rhs.orientation import oriented_view
 from flocsim.integrators.rhs.views import body_view
 from flocsim.io.outputs import loaded_sources
 from flocsim.plausibility import ROUNDING, Names, doubts_of, settled
+from flocsim.run import wrong_answer
 from flocsim.system import System
-from flocsim.trajectories.blame import wrong_answer
 
 PARTS = 16
 """Intervals of the work of the contact force, an even number."""

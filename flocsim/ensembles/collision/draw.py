@@ -38,9 +38,8 @@ from flocsim.io.results.schema import (
     REPLICATES,
     SHAPE_COLUMNS,
 )
-from flocsim.run import Run
+from flocsim.run import UNABLE, Run, force_to_blame
 from flocsim.system import System
-from flocsim.trajectories.blame import UNABLE, force_to_blame
 
 if TYPE_CHECKING:
     from flocsim.ensembles.collision.encounter import Encounter
