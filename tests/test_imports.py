@@ -46,9 +46,9 @@ INNER_ROWS = {
     "compiler": [
         ["composer"],
         ["units"],
-        ["fingerprint", "refused"],
+        ["fingerprint"],
         ["numba_internals"],
-        ["by_pointer", "disk_cache", "object_code", "linker"],
+        ["by_pointer", "disk_cache", "linker"],
         ["processor"],
     ],
     "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],

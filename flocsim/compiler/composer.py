@@ -29,10 +29,9 @@ from flocsim.compiler.by_pointer import (
     types_within,
     words_in,
 )
-from flocsim.compiler.fingerprint import fingerprint
+from flocsim.compiler.disk_cache import function_at
+from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.object_code import function_at
-from flocsim.compiler.refused import refuse_interpreter
 from flocsim.compiler.units import Code, argument_names, options_text
 
 _composed: dict = {}

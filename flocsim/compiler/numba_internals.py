@@ -33,8 +33,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from flocsim.compiler.by_pointer import address_of_data, is_array
+from flocsim.compiler.disk_cache import LENT, ObjectCode
 from flocsim.compiler.linker import PACKAGE, is_in_library, names_in, where
-from flocsim.compiler.object_code import LENT, ObjectCode
 from flocsim.compiler.processor import BASELINE, baseline
 from flocsim.errors import KernelError
 

@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import types_within
+from flocsim.compiler.disk_cache import Called, ObjectCode, link
 from flocsim.compiler.fingerprint import Intrinsic, hashed, tell
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.object_code import Called, ObjectCode, link
 from flocsim.compiler.processor import compiled_for, numba_settings
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.process import COMPILING, lacking

@@ -18,7 +18,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.arrays import ContactView, OutlineView, PairView, work_of
-from flocsim.compiler.refused import refuse_interpreter
+from flocsim.compiler.fingerprint import refuse_interpreter
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.draw import exact_method
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter

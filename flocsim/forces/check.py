@@ -15,9 +15,8 @@ import numpy as np
 
 from flocsim.arrays import BodyView, ContactView, OrientedView, OutlineView, PairView
 from flocsim.body import Fluid
-from flocsim.compiler.fingerprint import globals_read, tell
+from flocsim.compiler.fingerprint import globals_read, made_by, tell, wrong_return
 from flocsim.compiler.linker import names_in, refuse_closure, where
-from flocsim.compiler.refused import made_by, wrong_return
 from flocsim.errors import KernelError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 

@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Body, Sphere, System
 from flocsim.compiler.composer import compile_law, compose
-from flocsim.compiler.refused import refuse_interpreter
+from flocsim.compiler.fingerprint import refuse_interpreter
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.preflight import check_study
 from flocsim.errors import KernelError

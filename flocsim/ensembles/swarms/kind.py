@@ -12,8 +12,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.refused import refuse_interpreter
+from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import Condition, Kind, is_chunk
 from flocsim.ensembles.parallel.communicator import Communicator
