@@ -248,7 +248,7 @@ BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
     NODE_NORMAL_Y,
     NODE_WEIGHT,  # how much of the outline it stands for [m]
     NODE_GAP,  # how far the other outline is [m]
-    NODE_SUM,  # what attraction comes to there: geometry.surfaces.attraction [1/m³]
+    NODE_SUM,  # what attraction comes to there: geometry.contact.attraction [1/m³]
     NODE_PLATES,  # at which gap plates attract each other as strongly [m]
     NODE_LOG_SHARE,  # scratch of that: what a logarithm counts for
     NODE_LOG_OF,  # and of what it is; below 0 where there is none
@@ -269,7 +269,7 @@ MOST_ORDER = 16
     GROUP_Y,
     GROUP_EXTENT,  # and its radius [m]
     GROUP_COUNT,  # how many there are
-    FIRST_CHARGE,  # from here on, of each x, y [m], and its charge: geometry.surfaces.charges
+    FIRST_CHARGE,  # from here on, of each x, y [m], and its charge: geometry.contact.charges
 ) = range(5)
 
 GROUP = 8

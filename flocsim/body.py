@@ -18,10 +18,10 @@ from flocsim.constants import (
 )
 from flocsim.errors import RangeError, UsageError
 from flocsim.fields import choice, flag, in_unit, is_number, only, quantity, word_or_quantity
+from flocsim.geometry.contact.charges import charges_of_bodies, field_of_bodies
 from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.shapes.pieces import pieces_of_bodies
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.surfaces.charges import charges_of_bodies, field_of_bodies
-from flocsim.geometry.surfaces.pieces import pieces_of_bodies
 from flocsim.hooks import LAWS
 
 NO_LAWS = (None,) * len(LAWS)

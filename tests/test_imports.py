@@ -51,7 +51,7 @@ INNER_ROWS = {
         ["by_pointer", "disk_cache", "linker"],
         ["processor"],
     ],
-    "geometry": [["fit"], ["contact", "surfaces"], ["shapes"]],
+    "geometry": [["fit"], ["contact"], ["shapes"]],
     "swarms": [
         ["swarm"],
         ["progress"],

@@ -14,8 +14,8 @@ import numpy as np
 
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim.forces import VanDerWaals
-from flocsim.geometry.surfaces.attraction import attraction_energy
-from flocsim.geometry.surfaces.pieces import outline_pieces
+from flocsim.geometry.contact.attraction import attraction_energy
+from flocsim.geometry.shapes.pieces import outline_pieces
 from tests.integrators.rhs.test_outline_sum import HAMAKER, SIZE, Pair, at_gap, rough, slopes
 
 GAPS = (1e-9, 3e-9, 1e-8, 3e-8, 1e-7)

@@ -24,7 +24,7 @@ from flocsim.compiler.composer import compose
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import DoubleLayer, VanDerWaals
-from flocsim.geometry.surfaces import charges
+from flocsim.geometry.contact import charges
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.integrators.rhs.test_outline_sum import at_gap, rough
 

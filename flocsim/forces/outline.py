@@ -24,8 +24,8 @@ from flocsim.errors import UsageError
 from flocsim.forces.base import Force, PairForce
 from flocsim.forces.check import fields_read, kernel_arguments, reach_of, results, sample_pairs
 from flocsim.forces.dlvo import BesideCharges, DoubleLayer
+from flocsim.geometry.contact.charges import FADED, THIN, is_thin
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.surfaces.charges import FADED, THIN, is_thin
 
 TOUCHING = 0.005
 """Of a Debye length: where outlines are nearer, and no attraction says how near they count, the

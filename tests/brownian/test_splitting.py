@@ -12,9 +12,9 @@ from flocsim.brownian import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerWaals
-from flocsim.geometry.surfaces.attraction import attraction_energy
-from flocsim.geometry.surfaces.charges import layer_energy
-from flocsim.geometry.surfaces.pieces import outline_pieces
+from flocsim.geometry.contact.attraction import attraction_energy
+from flocsim.geometry.contact.charges import layer_energy
+from flocsim.geometry.shapes.pieces import outline_pieces
 from tests.helpers.tiers import rest_slow
 
 KT = 1.380649e-23 * 298.15

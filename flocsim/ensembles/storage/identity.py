@@ -39,7 +39,7 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 PHYSICS = (
     "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "run.py",
     "compiler", "bonds", "hydrodynamics", "forces", "integrators", "geometry/shapes",
-    "geometry/contact", "geometry/surfaces", "io/results/schema.py", "io/results/events.py",
+    "geometry/contact", "io/results/schema.py", "io/results/events.py",
     "ensembles/collision", "ensembles/study.py", "ensembles/kernels.py",
 )  # fmt: skip
 """The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit

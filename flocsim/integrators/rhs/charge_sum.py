@@ -1,7 +1,7 @@
 """Forces between double layers: those of all charges of one body in the field of another.
 
 What charges are, why there are any, and the tables of their field:
-flocsim.geometry.surfaces.charges. The two sums of forces between outlines share the way in
+flocsim.geometry.contact.charges. The two sums of forces between outlines share the way in
 (outline_sum.py).
 """
 

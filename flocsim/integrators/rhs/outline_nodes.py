@@ -1,5 +1,5 @@
 """Where the smaller one of two outlines is looked at: nodes along its pieces, from feet of the
-other one's pieces on (flocsim.geometry.surfaces.pieces says how they are spaced).
+other one's pieces on (flocsim.geometry.shapes.pieces says how they are spaced).
 
 Which nodes there are changes little by little with where the bodies are: jumps of a force cost
 steps. So panels end wherever the gap has a bend, and lose it again where it no longer counts.
@@ -10,8 +10,8 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import MOST_FEET
 from flocsim.compiler.linker import loops_apart
-from flocsim.geometry.surfaces.attraction import arc_ends
-from flocsim.geometry.surfaces.pieces import (
+from flocsim.geometry.contact.attraction import arc_ends
+from flocsim.geometry.shapes.pieces import (
     at_parameter,
     distance_to,
     ends_of,

@@ -10,9 +10,9 @@ import math
 import flocsim.arrays as at
 from flocsim.arrays import MOST_NODES, MOST_ORDER, OutlineView
 from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.attraction import add_arc, add_segment, find_plates
 from flocsim.geometry.contact.points import length_of, separation
-from flocsim.geometry.surfaces.attraction import add_arc, add_segment, find_plates
-from flocsim.geometry.surfaces.pieces import (
+from flocsim.geometry.shapes.pieces import (
     Pose,
     are_within,
     between_cores,

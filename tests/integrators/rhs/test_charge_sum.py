@@ -15,7 +15,7 @@ from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import samples_of
-from flocsim.geometry.surfaces.charges import charges_of_shape, layer_energy
+from flocsim.geometry.contact.charges import charges_of_shape, layer_energy
 from flocsim.integrators.rhs.charge_sum import between_corners, cubics, grid_of, put_charge
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.helpers.tiers import rest_slow

@@ -9,7 +9,7 @@ import flocsim.arrays as at
 from flocsim import SpheroPolygon
 from flocsim.compiler.composer import compose
 from flocsim.forces import DoubleLayer, VanDerWaals
-from flocsim.geometry.surfaces.pieces import Pose, at_parameter, ends_of, placed
+from flocsim.geometry.shapes.pieces import Pose, at_parameter, ends_of, placed
 from flocsim.integrators.rhs.outline_sum import (
     add_nodes,
     look_around,

@@ -13,9 +13,9 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import Contact, Gravity, OutlineForce, StokesDrag, VanDerWaals
+from flocsim.geometry.contact.attraction import attraction_energy
 from flocsim.geometry.shapes.outline import core_gap
-from flocsim.geometry.surfaces.attraction import attraction_energy
-from flocsim.geometry.surfaces.pieces import outline_pieces
+from flocsim.geometry.shapes.pieces import outline_pieces
 from flocsim.integrators.rhs.forces import add_outline_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines

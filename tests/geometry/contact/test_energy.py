@@ -8,8 +8,8 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
-from flocsim.geometry.surfaces.attraction import attraction_energy
-from flocsim.geometry.surfaces.pieces import (
+from flocsim.geometry.contact.attraction import attraction_energy
+from flocsim.geometry.shapes.pieces import (
     outline_pieces,
     pieces_of_shape,
     pieces_that_count,

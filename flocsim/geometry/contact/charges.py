@@ -12,7 +12,7 @@ a length, the charges q being those of potential 1 on the outline. Unlike σ the
 from afar even at touch, where sums over the outlines themselves would need nodes as near as the
 gap. Each lies DEEP behind the point at which the potential is asked for, in units of the radius by
 which the core is rounded or of 1/κ, whichever is less; next ones are as far apart. That makes
-energies right within 2e-3 (tests/geometry/surfaces/test_charges.py).
+energies right within 2e-3 (tests/geometry/contact/test_charges.py).
 
 Nodes of the tables lie on a grid, STEP of a charge's unit apart, in square tiles wherever a charge
 of another body may be; at each stand the potential and its derivatives, exactly, between which
@@ -30,8 +30,8 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.compiler.composer import compiled
 from flocsim.errors import ShapeError
+from flocsim.geometry.shapes.pieces import at_parameter, piece_at, pieces_of_shape
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.geometry.surfaces.pieces import at_parameter, piece_at, pieces_of_shape
 
 DEEP = 0.6
 """Depth of charges, and their distance from each other."""

@@ -8,8 +8,8 @@ from scipy.special import iti0k0, k0, k1
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
-from flocsim.geometry.surfaces import charges
-from flocsim.geometry.surfaces.charges import (
+from flocsim.geometry.contact import charges
+from flocsim.geometry.contact.charges import (
     bessel_pair,
     charges_of_shape,
     check_length,

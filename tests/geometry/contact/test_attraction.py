@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim.geometry.surfaces.attraction import NO_ATTRACTION, add_arc, add_segment, find_plates
-from flocsim.geometry.surfaces.pieces import (
+from flocsim.geometry.contact.attraction import NO_ATTRACTION, add_arc, add_segment, find_plates
+from flocsim.geometry.shapes.pieces import (
     arc_rows,
     at_parameter,
     distance_to,

@@ -35,7 +35,7 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.compiler.composer import compiled
 from flocsim.compiler.linker import loops_apart
-from flocsim.geometry.surfaces.pieces import (
+from flocsim.geometry.shapes.pieces import (
     Pose,
     at_parameter,
     between_cores,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.geometry.surfaces.pieces import Placed, at_parameter, parameter_before
+from flocsim.geometry.shapes.pieces import Placed, at_parameter, parameter_before
 
 
 def segment(x, y, angle, half):
