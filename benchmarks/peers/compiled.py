@@ -7,9 +7,8 @@ listed pair.
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.candidates import list_ahead, outline_speed, spent
+from flocsim.geometry.contact.candidates import hand_over, list_ahead, outline_speed, spent
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import observe
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.loop.driver import too_deep

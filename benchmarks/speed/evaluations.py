@@ -12,8 +12,7 @@ import numpy as np
 import flocsim.arrays as at
 from benchmarks.speed.scenes import rolling_pair
 from flocsim.arrays import work_of
-from flocsim.geometry.contact.candidates import list_candidates, spent
-from flocsim.geometry.contact.slip_transfer import hand_over
+from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.views import inertia

@@ -27,8 +27,7 @@ from typing import NamedTuple
 import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import least_listed_gap, separation
-from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.geometry.contact.points import contact_point, least_listed_gap, separation
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,

@@ -42,7 +42,7 @@ from flocsim.bonds.certificate import (
     size_of,
 )
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.integrators.rhs.views import contact_view

@@ -27,9 +27,9 @@ from flocsim.geometry.contact.body_pairs import (
     near_pairs,
     watches_all,
 )
+from flocsim.geometry.contact.candidates import keep_slips
 from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.points import nearest_way
-from flocsim.geometry.contact.slip_transfer import keep_slips
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
 from flocsim.integrators.radau.contact_frames import unite

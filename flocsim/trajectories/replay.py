@@ -19,8 +19,7 @@ from flocsim.forces.codegen import laws_of
 from flocsim.forces.pair_resistance import PairResistance
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import list_candidates
-from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.geometry.contact.points import contact_point, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed

@@ -11,7 +11,7 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds import rest
 from flocsim.bonds.certificate import is_closed, size_of
 from flocsim.forces import Contact
-from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.geometry.contact.points import contact_point
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import star
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, TwoBodies, load, polygon

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.geometry.contact import near_pairs, slip_transfer
+from flocsim.geometry.contact import candidates, near_pairs
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.near_pairs import (
     ROUNDING,
@@ -177,6 +177,6 @@ FILLINGS: dict[Callable, Callable] = {
     near_pairs.list_one_way: list_one_way,
     near_pairs.run_distance: swollen_run_distance,
     contacts.row_radii: swollen_radii,
-    slip_transfer.same_corner: same_corner,
+    candidates.same_corner: same_corner,
 }
 """The replacements, for flocsim.compiler.composer.compose."""

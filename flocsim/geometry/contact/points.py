@@ -219,6 +219,17 @@ def least_listed_gap(work):
     return least
 
 
+def contact_point(work, row, body):
+    """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
+    geometry = work.geometry[at.NOW]
+    nx, ny = geometry[row, at.NORMAL_X], geometry[row, at.NORMAL_Y]
+    if work.candidates[row, at.VERTEX_BODY] == body:
+        across, along = geometry[row, at.VERTEX_ARM_N], geometry[row, at.VERTEX_ARM_T]
+    else:
+        across, along = geometry[row, at.EDGE_ARM_N], geometry[row, at.EDGE_ARM_T]
+    return along * nx + across * ny, along * ny - across * nx
+
+
 def overlap_fault(
     a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
 ) -> str | None:

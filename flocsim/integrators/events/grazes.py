@@ -12,7 +12,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.slip_transfer import contact_point
+from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.crossings import NEVER
 from flocsim.integrators.events.resolution import above_rounding

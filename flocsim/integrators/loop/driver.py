@@ -6,9 +6,8 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import list_ahead, outlived, spent, too_wide
+from flocsim.geometry.contact.candidates import hand_over, list_ahead, outlived, spent, too_wide
 from flocsim.geometry.contact.points import locate_contacts, row_radii
-from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,

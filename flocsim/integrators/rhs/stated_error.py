@@ -23,8 +23,8 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.candidates import slip_error
 from flocsim.geometry.contact.points import length_of
-from flocsim.geometry.contact.slip_transfer import slip_error
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, hook
 from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mobility
 from flocsim.integrators.rhs.views import (

@@ -7,9 +7,8 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
-from flocsim.geometry.contact.candidates import list_candidates, spent
+from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.geometry.contact.slip_transfer import hand_over
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.forces import rate_slips
 
