@@ -70,11 +70,6 @@ def is_in_library(file: str) -> bool:
     return within and "site-packages" not in place and "dist-packages" not in place
 
 
-def is_users_module(value: Any) -> bool:
-    """Whether a value is a module whose code no version tells."""
-    return isinstance(value, types.ModuleType) and not is_versioned(value)
-
-
 def plain(value: Any) -> Any:
     """The Python function behind one of @njit, which is compiled anew; anything else as it is."""
     if not hasattr(value, "py_func"):
@@ -229,7 +224,7 @@ class Linker:
         """A copy of the function whose globals are its own, linked."""
         linked = {"__builtins__": builtins, "__name__": function.__module__}
         for name, value in reached(function).items():
-            if not is_users_module(value):
+            if not isinstance(value, types.ModuleType) or is_versioned(value):
                 linked[name] = self.linked_value(value)
         for chain, value in module_reads(function).items():
             self.put(linked, chain, self.linked_value(value))

@@ -10,6 +10,9 @@ import numpy as np
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import Part
 
+MEASURED_QUADRANT = 64
+"""Chords in the place of a quarter of a circle where an outline is measured."""
+
 
 def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> str | None:
     """None where the closed polygon (N ≥ 3, 2) is simple and its holes lie inside, apart from each
@@ -70,18 +73,6 @@ def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np
     return [np.asarray(ring.coords) for ring in rings]
 
 
-MEASURED_QUADRANT = 64
-"""Chords in the place of a quarter of a circle where an outline is measured."""
-
-
-def outline_sizes(parts: Sequence[Part]) -> tuple[float, float, float, np.ndarray]:
-    """(area, perimeter, area of the convex hull, corners of the hull (k, 2)) of all parts, each
-    core ⊕ disk."""
-    whole = swept_geometry(parts, MEASURED_QUADRANT)
-    hull = whole.convex_hull
-    return whole.area, whole.length, hull.area, np.asarray(hull.exterior.coords)[:-1]
-
-
 def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
     """All parts, each core ⊕ disk, as shapely has them."""
     import shapely
@@ -131,9 +122,12 @@ def measures_of(parts: Sequence[Part], elongation: float) -> ShapeMeasures:
     if len(parts) == 1 and len(parts[0].points) == 1:
         width = 2.0 * parts[0].radius
         return ShapeMeasures(np.pi * width, 1.0, 1.0, 1.0, width, width)
-    area, perimeter, hull_area, hull = outline_sizes(parts)
-    circularity = 4.0 * np.pi * area / perimeter**2
-    return ShapeMeasures(perimeter, aspect, circularity, area / hull_area, *feret_diameters(hull))
+    whole = swept_geometry(parts, MEASURED_QUADRANT)
+    hull, perimeter = whole.convex_hull, whole.length
+    return ShapeMeasures(
+        perimeter, aspect, 4.0 * np.pi * whole.area / perimeter**2, whole.area / hull.area,
+        *feret_diameters(np.asarray(hull.exterior.coords)[:-1]),
+    )  # fmt: skip
 
 
 def feret_diameters(hull: np.ndarray) -> tuple[float, float]:
