@@ -458,7 +458,7 @@ class BodyView(NamedTuple):
     goes along [m², m², m³] (flocsim.hydrodynamics.PrismDrag), 0 where no drag follows shapes.
 
     ``shielding_xx``, ``_xy`` and ``_yy``: Q, symmetric, by which the drag R of a body in a cluster
-    of a swarm becomes Q R Q (flocsim.swarms.clusters); 1, 0 and 1 elsewhere.
+    of a swarm becomes Q R Q (flocsim.swarms.together.clusters); 1, 0 and 1 elsewhere.
     """
 
     time: float

@@ -55,8 +55,8 @@ INNER_ROWS = {
     "swarms": [
         ["swarm"],
         ["progress"],
-        ["bonds", "placement", "runner"],
-        ["clusters", "islands"],
+        ["placement", "runner"],
+        ["islands", "together"],
         ["arrays"],
     ],
     "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["two_spheres"]],

@@ -131,7 +131,7 @@ class StokesDrag(BodyForce):
 
     ``clusters``: bodies of a swarm that touch shield each other from the flow. Their drag R becomes
     Q R Q, the same Q for all of a cluster, with which all of them together resist as much as the
-    cluster does (flocsim.swarms.clusters); torques stay those of each. Re is then that of
+    cluster does (flocsim.swarms.together.clusters); torques stay those of each. Re is then that of
     Q (v − u).
 
     ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the

@@ -28,7 +28,7 @@ from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import WallShape
 from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
-from flocsim.swarms.clusters import Gauge, placed_together
+from flocsim.swarms.together.clusters import Gauge, placed_together
 
 MOST_TRIALS = 5_000
 """Places tried for a body before it is said that none is left."""

@@ -17,9 +17,9 @@ import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
 from flocsim.swarms.arrays import Swarm, with_links
-from flocsim.swarms.clusters import WAY, Shielding
 from flocsim.swarms.placement import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
+from flocsim.swarms.together.clusters import WAY, Shielding
 
 NONE = -1
 """Label of a body whose island has not been run."""

@@ -25,12 +25,12 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.bonds import BondGauge, Bonds
-from flocsim.swarms.clusters import Clusters, Gauge, Neighbours, Shielding
 from flocsim.swarms.islands import find_islands, run_islands, watch_paths
 from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
+from flocsim.swarms.together.bonds import BondGauge, Bonds
+from flocsim.swarms.together.clusters import Clusters, Gauge, Neighbours, Shielding
 from flocsim.system import System, check_bodies, check_forces, read_seed
 
 

@@ -229,7 +229,7 @@ def test_a_swarm_knows_how_far_angles_take_bodies_off():
     bodies = [body_of(TWO_TO_ONE, 0.7), body_of(Sphere(2e-6), position=(1e-5, 0.0))]
     forces = [Gravity(), DRAG, Contact(1e-2, 1e-3)]
     swarm = Swarm(bodies, forces, fluid=WATER)
-    from flocsim.swarms.bonds import alone
+    from flocsim.swarms.together.bonds import alone
 
     velocity, resistance, aslant = alone(swarm)
     assert aslant[1] == pytest.approx(0.0, abs=1e-12) and aslant[0] > 0.0

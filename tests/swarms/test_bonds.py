@@ -19,7 +19,7 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.swarms.bonds import BondGauge, alone
+from flocsim.swarms.together.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R

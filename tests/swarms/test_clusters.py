@@ -8,7 +8,7 @@ import pytest
 from flocsim import Body, Sphere, Swarm
 from flocsim.ensembles.swarms.replicate import summary_of
 from flocsim.forces import Contact
-from flocsim.swarms.clusters import Clusters
+from flocsim.swarms.together.clusters import Clusters
 
 R = 5e-6
 STEP = 1.999 * R

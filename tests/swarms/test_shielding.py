@@ -13,8 +13,8 @@ from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators import BackwardEuler, DormandPrince54, Overdamped, VelocityVerlet
-from flocsim.swarms.clusters import Shielding, between, roots, unpacked
 from flocsim.swarms.placement import floor
+from flocsim.swarms.together.clusters import Shielding, between, roots, unpacked
 from tests.forces.test_shape_drag import STRAINED, TWO_TO_ONE
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R, crowd

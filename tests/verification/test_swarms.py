@@ -8,8 +8,8 @@ import pytest
 from flocsim import Body, Sphere, Swarm, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Status
-from flocsim.swarms.clusters import Clusters
 from flocsim.swarms.placement import place_at_random
+from flocsim.swarms.together.clusters import Clusters
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces
 
 

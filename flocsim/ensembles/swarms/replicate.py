@@ -13,10 +13,10 @@ from flocsim.geometry.shapes.cores import table_of
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import GONE, OF_CLUSTERS, WALL
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
-from flocsim.swarms.bonds import Bonds
-from flocsim.swarms.clusters import Clusters, Gauge
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.swarm import Swarm
+from flocsim.swarms.together.bonds import Bonds
+from flocsim.swarms.together.clusters import Clusters, Gauge
 
 
 def run_replicate(

@@ -40,7 +40,7 @@ from flocsim.forces.settling import free_mobilities, least_mobility, terminal_mo
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
-from flocsim.swarms.clusters import Neighbours, placed_together
+from flocsim.swarms.together.clusters import Neighbours, placed_together
 
 KINDS = ("touching", "certificate", "hook", "rest")
 """Kinds of bonds: those of pairs, and none that is proved."""

@@ -1,0 +1,1 @@
+"""What hangs together in a swarm: gaps, clusters, and what holds them."""
