@@ -22,7 +22,7 @@ from flocsim.geometry.shapes.shape import (
     swept_parts,
 )
 
-SETTLED = 1e-4
+SETTLED = 3e-5
 """Relative error of the area from which one more step of the model below leaves less than 1e-9."""
 
 FLATNESS = 1e6
