@@ -590,7 +590,10 @@ class World:
         if not path.exists():
             return set()
         is_journal = path == self.journal
-        return self.tasks_of_journal(path) if is_journal else self.tasks_of_results(path)
+        try:
+            return self.tasks_of_journal(path) if is_journal else self.tasks_of_results(path)
+        except FileNotFoundError:  # a run that ends takes its journal away
+            return set()
 
     def replace_while_it_runs(self):
         child = self.begun()
