@@ -147,6 +147,11 @@ def order_of(width, nearness):
     return 6 if width > 0.1 else 4
 
 
+def t_after(share):
+    """t where a piece has gone on from a foot by so many times its scale: 2 t/(1 − t²) of it."""
+    return share / (1.0 + math.sqrt(1.0 + share * share))
+
+
 def growth_at(scene, work, piece, foot):
     """(gap, its slope along a piece [-], that of the slope [1/m], metres for a unit of the
     parameter) at a foot."""
@@ -178,8 +183,7 @@ def put_side(scene, work, count, piece, foot, growth, end, inset, lens, least):
     x, y, _, _, _ = at_parameter(piece, foot + math.copysign(way / metres, reach))
     grown = (gap_from(scene, work, x, y) - gap) / parted
     scale = way / math.sqrt(max(grown, LEAST_GROWTH))
-    share = whole / scale
-    last = share / (1.0 + math.sqrt(1.0 + share * share))
+    last = t_after(whole / scale)
     scale, low = math.copysign(scale / metres, reach), 0.0
     bends = min(BENDS * parted, lens)
     for panel in range(1, MOST_PANELS + 1):
@@ -223,6 +227,5 @@ def earlier(met, foot, scale, low, bend):
     """t at a parameter, or another one where that is earlier, or this one not behind ``low``."""
     if met == math.inf:
         return bend
-    share = (met - foot) / scale
-    t = share / (1.0 + math.sqrt(1.0 + share * share))
+    t = t_after((met - foot) / scale)
     return t if low + LEAST_WIDTH < t < bend else bend
