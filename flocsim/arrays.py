@@ -127,8 +127,25 @@ SLIP_RATES = STATES
     CYCLE_GAP,  # gaps at the end of the last cycle [m]
     CYCLE_GAP_BEFORE,  # of the one before [m]
     FLOWN_AT,  # when the pair last touched again behind a flight next to nothing [s]
+    SAMPLED,  # its margin (events.crossings) at the last place looked at in a step [m]
+    SAMPLED_RATE,  # and the rate of that [m/s]
     SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 29)
+) = range(2 * STATES, 2 * STATES + 31)
+
+TERMS = 44
+"""Terms of a step's series at most."""
+
+# The series in ``Work.series``, and the forces they follow from in ``Work.remainder``.
+(
+    MOTION,  # of the motion in the step
+    CHANGED,  # of a change of it: by an iteration, by an error
+) = range(2)
+
+# Rows of ``Work.weights``.
+(
+    MOVED,  # how far a force moves a body in the square of the step [m/N, rad/(N m)]
+    LEVER,  # how far its outline moves for a unit of a coordinate [1, 1, m]
+) = range(2)
 
 MOST_FRAMES = 3
 """Stages for which a body keeps a frame."""
@@ -178,8 +195,9 @@ MOST_FRAMES = 3
     KNOWN_SINE,
     MOST_PLACE,  # of a cluster: by how much a place in it may be wrong [m]
     STATED,  # the body's stated error [m]
+    WAY,  # how far its points move at most in a step that is a series [m]
     FRAMES,  # from here on: its frames at an implicit step's stages
-) = range(34)
+) = range(35)
 
 BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
 """How many columns ``Work.bodies`` has."""
@@ -378,8 +396,9 @@ SOFT_GAP = 6
     SOLVES,  # systems solved so far
     KEPT,  # one more than displacements set aside for a list that found no room; 0: none are
     FULL,  # what has found no room, see NOTHING_FULL
+    SERIES_TERMS,  # terms of the last step's series in ``Work.series``; 0: it was none
     TALLY_SIZE,
-) = range(8)
+) = range(9)
 
 # What FULL says.
 (
@@ -421,8 +440,10 @@ SOFT_GAP = 6
     CYCLE_AT,  # the end of the last cycle of switches [s]
     CYCLE_AT_BEFORE,  # of the one before [s]
     CYCLE_ERROR,  # the stated error at the last [m]
+    LONGEST_SERIES,  # the longest step whose motion may be a series; inf: others do as well [s]
+    SERIES_STEP,  # that of the series in ``Work.series`` [s]
     CLOCK_SIZE,
-) = range(30)
+) = range(32)
 
 # Places in the ``counts`` of a run.
 (
@@ -639,6 +660,10 @@ class Work(NamedTuple):
 
     motion: Annotated[np.ndarray, ("rows", "n", MOTION_COLUMNS)]  # by states, then see START
     rates: Annotated[np.ndarray, ("states", "n", MOTION_COLUMNS)]  # velocity, then see FX
+    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # of a motion, see MOTION [m, m, rad]
+    remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ [N, N m]
+    weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
+    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # what it follows from, see DAMPING
     slip: np.ndarray  # (SLIP_ROWS, capacity): ξ in the states [m], SLIP_RATES, then see SLIP_OFFSET
     bodies: Annotated[np.ndarray, ("n", BODY_COLUMNS)]  # see LISTED
     cluster: np.ndarray  # (n,): first of the bodies that one acts on, through others, too
@@ -748,6 +773,10 @@ def work_of(
     work = Work(
         motion=motion,
         rates=np.zeros((STATES, n, MOTION_COLUMNS)),
+        series=np.zeros((2, TERMS, dense, 3)),
+        remainder=np.zeros((2, 4, dense, 3)),
+        weights=np.zeros((2, dense, 3)),
+        linear=np.zeros((2, dense, dense, 3, 3)),
         slip=np.zeros((SLIP_ROWS, capacity)),
         bodies=np.zeros((n, BODY_COLUMNS)),
         cluster=np.zeros(n, dtype=np.int64),

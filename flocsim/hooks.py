@@ -77,6 +77,30 @@ def end_within(scene, work, step, ratio, share):
     return False
 
 
+SHARE_OF_TOUCH = 0.1
+"""The error of the first step behind a touch is taken to be that which it leads to times (h ω0)⁴
+over this share."""
+
+
+def resolving_step(clock, frequency, later):
+    """The step behind a touch at a speed by which bodies would go so far later [m], that resolves
+    how contacts of a frequency [1/s] take it up, as far as the tolerance asks for it."""
+    return (SHARE_OF_TOUCH * clock[at.TOLERANCE] / later) ** 0.25 / frequency
+
+
+@hook
+def first_step(work, clock, frequency, speed, later):
+    """The step behind a touch at a speed [m/s]: see resolving_step."""
+    return resolving_step(clock, frequency, later)
+
+
+@hook
+def cut(scene, work, clock, step, resolution):
+    """End a step where something has switched in it that its ends do not show, in NEW; the share of
+    it that is left."""
+    return 1.0
+
+
 @hook
 def choose_method(scene, work, clock, counts):
     """Whether the next steps end at switches or go on across them, into ACROSS of the clock, where

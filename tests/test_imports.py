@@ -65,6 +65,7 @@ INNER_ROWS = {
         ["implicit"],
         ["parts", "left_out"],
         ["backward_euler"],
+        ["exponential"],
         ["loop", "radau"],
         ["events"],
         ["rhs"],

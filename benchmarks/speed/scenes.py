@@ -67,13 +67,13 @@ def grazing_capture():
     """Type I spheres under `tang2014`, displaced by a little less than what would let them pass."""
     config = collisions("tang2014")
     displacement = (1.0 - 1e-4) * CAPTURE_LIMIT
+    small, large = Sphere(RECEIVER), Sphere(APPROACHER)
     bodies = (
-        Body(Sphere(RECEIVER), velocity=(0.0, -0.06029292), **config.body_options),
+        Body(small, velocity=(0.0, -0.06029292), **config.body_options(small)),
         Body(
-            Sphere(APPROACHER), (displacement, 20e-6), velocity=(0.0, -0.0845791),
-            **config.body_options,
+            large, (displacement, 20e-6), velocity=(0.0, -0.0845791), **config.body_options(large)
         ),
-    )  # fmt: skip
+    )
     return BenchmarkScene("grazing capture", bodies, config.forces, config.fluid, 3e-3)
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
+import flocsim.arrays as at
 from flocsim.commands.check import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.draw import MORE_STEPS
@@ -42,6 +43,7 @@ from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rul
 from flocsim.io.plots.style import Figure, checked_format, drawing, save, set_log_axis, type_titles
 from flocsim.io.results.schema import OUTCOMES, UNKNOWN
 from flocsim.io.terminal import tell
+from flocsim.run import Run
 
 TIGHTEST = 1e-13
 """Tolerance [m] of the reference."""
@@ -153,28 +155,39 @@ def part_of(config: Config, args: Namespace) -> Config:
     return attrs.evolve(config, scene=scene)
 
 
-def measured(study: Study, job: Job) -> tuple[Trial, tuple | None]:
-    """(Trial whose cost is CPU time [µs], times, d_c and its rate) of a replicate; None for no
-    motion."""
-    trial, run = try_out(study, job, record=True)
+class End(NamedTuple):
+    """How a Job has ended: when [s], behind how many steps, and d_c [m] then."""
+
+    job: Job
+    time: float
+    steps: int
+    distance: float
+
+
+def measured(study: Study, job: Job) -> tuple[Trial, End | None]:
+    """(Trial whose cost is CPU time [µs], how it ended) of a replicate; None for no motion."""
+    trial, run = try_out(study, job)
     trial = trial._replace(cost=1e6 * trial.cpu)
-    if run is None:
-        return trial, None
-    times, position, velocity = run.motion()
-    apart, speed = (each[:, 1, :2] - each[:, 0, :2] for each in (position, velocity))
-    distance = np.hypot(*apart.T)
-    rate = np.sum(apart * speed, axis=1) / np.maximum(distance, 1e-300)
-    return trial, (times, distance, rate)
+    return trial, None if run is None else End(job, run.time, run.steps, centre_distance(run))
 
 
-def distance_at(motion: tuple, instant: float) -> float:
-    """d_c [m] at a time of a motion (times, d_c, rates), by Hermite's cubic between two steps."""
-    from scipy.interpolate import CubicHermiteSpline
+def centre_distance(run: Run) -> float:
+    """d_c [m] now."""
+    x, y = run.work.motion[at.NOW, 1, :2] - run.work.motion[at.NOW, 0, :2]
+    return math.hypot(x, y)
 
-    times, values, rates = (each[np.diff(motion[0], prepend=-1.0) > 0.0] for each in motion)
-    if len(times) < 2:
-        return float(values[-1])
-    return float(CubicHermiteSpline(times, values, rates)(instant))
+
+def distance_at(study: Study, end: End, instant: float) -> float:
+    """d_c [m] at a time of a replicate that has ended, run anew until then: steps may be so long
+    that nothing less tells what is between two."""
+    if instant == end.time:
+        return end.distance
+    draw = study.draw(*end.job.task)
+    driver = study.driver(draw.encounter, end.job.integrator)
+    run = draw.begin(driver, end.job.max_steps, integrator=end.job.integrator)
+    run.clock[at.HORIZON], run.clock[at.UNTIL] = run.clock[at.UNTIL], instant
+    run.to_end()
+    return centre_distance(run)
 
 
 def climb(
@@ -189,8 +202,8 @@ def climb(
     reference = REFERENCE * DECADES[-1]
     exact = at_rung(Implicit(), reference * length)
     found = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
-    trials, motions = [each for each, _ in found], [motion for _, motion in found]
-    steps = np.mean([len(motion[0]) for motion in motions if motion is not None] or [1])
+    trials, ends = [each for each, _ in found], [end for _, end in found]
+    steps = np.mean([end.steps for end in ends if end is not None] or [1])
     for method in (Implicit(), DormandPrince54()):
         ladder = Ladder(condition, method, length, list(tasks), reference, trials)
         ladder.max_steps = budget if isinstance(method, Implicit) else int(PATIENCE * steps)
@@ -200,17 +213,17 @@ def climb(
         for rung in DECADES:
             found = [measured(study, job) for job in ladder.jobs(rung)]
             ladder.tried[rung] = [each for each, _ in found]
-            pairs = zip([motion for _, motion in found], motions, strict=True)
-            distances[rung] = np.array([apart(*pair) for pair in pairs])
+            pairs = zip([end for _, end in found], ends, strict=True)
+            distances[rung] = np.array([apart(study, *pair) for pair in pairs])
         yield ladder, distances
 
 
-def apart(motion, exact):
+def apart(study: Study, end: End | None, exact: End | None) -> float:
     """By how much d_c of two runs differs [m] at the last time that both have; NaN for none."""
-    if motion is None or exact is None:
+    if end is None or exact is None:
         return math.nan
-    instant = min(motion[0][-1], exact[0][-1])
-    return abs(distance_at(motion, instant) - distance_at(exact, instant))
+    instant = min(end.time, exact.time)
+    return abs(distance_at(study, end, instant) - distance_at(study, exact, instant))
 
 
 def rung_of(ladder: Ladder, distances: np.ndarray, rung: float) -> Rung:

@@ -1,5 +1,7 @@
-"""Implicit: Radau IIA of order 5 on smooth stretches, for any stiffness."""
+"""Implicit: exponential collocation of order 6 where steps resolve what vibrates, Radau IIA of
+order 5 where they leave it out."""
 
+import math
 from collections.abc import Callable
 
 import attrs
@@ -8,9 +10,12 @@ import flocsim.arrays as at
 from flocsim.fields import quantity
 from flocsim.hooks import (
     choose_method,
+    cut,
     end_within,
+    first_step,
     leave_out_cycles,
     note_step,
+    resolving_step,
     step_across,
 )
 from flocsim.integrators.backward_euler.method import hand_over, step_or_give_back
@@ -20,19 +25,21 @@ from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
 from flocsim.integrators.events.first_event import leave_at_once, settle_grazes
 from flocsim.integrators.events.grazes import leave_early, settle
+from flocsim.integrators.exponential.collocation import carry_known, judge_series, solve_series
+from flocsim.integrators.exponential.samples import cut as cut_series
+from flocsim.integrators.exponential.series import write_at
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
-from flocsim.integrators.radau.carried_error import carry_error, doubt_of_release
+from flocsim.integrators.radau.carried_error import add_step, carry_error, doubt_of_release
 from flocsim.integrators.radau.carried_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
 from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.integrators.radau.estimate import estimate_error
 from flocsim.integrators.radau.grazing import any_grazes, hold_gaps, release_gaps
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
-from flocsim.integrators.radau.systems import factorise_systems, solve_for_free
-from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
-from flocsim.integrators.rhs.blocks import subtract_product
+from flocsim.integrators.radau.systems import factorise_systems, is_dense
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.integrators.rhs.stated_error import carry_vector, overlap_error
+from flocsim.integrators.rhs.stated_error import bound_carried, carry_vector, overlap_error
 from flocsim.integrators.rhs.views import inertia
 
 ORDER_OF_ESTIMATE = 4.0
@@ -40,43 +47,6 @@ ORDER_OF_ESTIMATE = 4.0
 
 COMFORTABLE_PACE = 0.4
 """Newton's pace goes about with the square of the step; the next step aims at this."""
-
-
-def estimated_rate(work, row, first, step):
-    """Weighted mean of the stages' increments over h, of a place or, ``first`` being VELOCITY, of a
-    velocity."""
-    body, axis = row // 3, first + row % 3
-    now = work.motion[at.NOW, body, axis]
-    total = 0.0
-    for stage in range(3):
-        total += ESTIMATE[stage] * (work.motion[at.FIRST_STAGE + stage, body, axis] - now)
-    return total / step
-
-
-def write_error_load(scene, work, step):
-    """The load of the estimate; the mean rates of places stay in CHANGE."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(3):
-            row = 3 * body + axis
-            load = work.rates[at.NOW, body, at.FORCE + axis]
-            load += inertia(scene, body, axis) * estimated_rate(work, row, at.VELOCITY, step)
-            work.loads[REAL, row] = load
-            drift = work.motion[at.NOW, body, at.VELOCITY + axis]
-            work.motion[at.CHANGE, body, axis] = drift + estimated_rate(work, row, at.X, step)
-    subtract_product(work, at.STIFFNESS, step / EIGENVALUES[REAL].real)
-
-
-def estimate_error(scene, work, step):
-    write_error_load(scene, work, step)
-    solve_for_free(scene, work)
-    damped = step / EIGENVALUES[REAL].real
-    for body in range(work.motion.shape[1]):
-        free = scene.bodies[body, at.FREE]
-        for axis in range(3):
-            speed = work.loads[REAL, 3 * body + axis].real
-            drift = work.motion[at.CHANGE, body, axis]
-            work.motion[at.DEVIATION, body, axis] = free * damped * (speed + drift)
-            work.motion[at.DEVIATION, body, at.VELOCITY + axis] = free * speed
 
 
 def is_tried_again(scene, clock):
@@ -87,17 +57,82 @@ def is_tried_again(scene, clock):
     return staged and scene.listed_reach <= 0.0
 
 
+SHARE_OF_TOUCH = 0.1
+"""The error of the first step behind a touch, where it is a series, is taken to be how deep it
+gets, speed/ω0, times (h ω0)⁵ over this share: what turns meanwhile is not in the series."""
+
+
+def step_behind_touch(work, clock, frequency, speed, later):
+    """The first step behind a touch."""
+    if is_dense(work):
+        share = SHARE_OF_TOUCH * clock[at.TOLERANCE] * frequency / speed
+        return share**0.2 / frequency
+    return resolving_step(clock, frequency, later)
+
+
+def carry_over_step(scene, work, clock, step):
+    """Carry the error over an accepted step; the largest one of a body's outline [m]."""
+    if work.tally[at.SERIES_TERMS] == 0:
+        return carry_error(scene, work, clock, step)
+    bound_carried(scene, work)
+    whole = clock[at.SERIES_STEP]
+    carry_known(work, whole, step / whole)
+    add_step(work)
+    return bound_carried(scene, work)
+
+
+def within(work, step, share, body):
+    """Write a body's motion at a share of the step into TRIAL."""
+    terms = work.tally[at.SERIES_TERMS]
+    if terms > 0:
+        write_at(work, at.START, terms, step, share, at.TRIAL, body, body + 1)
+    else:
+        collocate(work, step, share, body)
+
+
+def end_early(scene, work, step, ratio, share):
+    """Make the motion at a share of the step the new state, where it is known well enough."""
+    terms = work.tally[at.SERIES_TERMS]
+    if terms > 0:
+        write_at(work, at.START, terms, step, share, at.NEW, 0, work.motion.shape[1])
+        return True
+    return end_on_the_cubic(scene, work, step, ratio, share)
+
+
+def solve_as_series(scene, work, clock, step, known):
+    """Take a step as a series, if that can be: its error over the tolerance, or −1. ``known``:
+    whether the last one was."""
+    if not is_dense(work) or inertia(scene, 0, 0) == 0.0:
+        return -1.0
+    work.tally[at.SERIES_TERMS] = solve_series(scene, work, clock, step, known)
+    if work.tally[at.SERIES_TERMS] == 0:
+        return -1.0
+    judge_series(scene, work, clock, step)
+    return error_ratio(scene, work, clock, step)
+
+
+def forget_series(work, clock, known):
+    """No series is there any more; how long ago the stages of Radau IIA, if they are there, or the
+    state before, began."""
+    if known:
+        staged = clock[at.STAGED_STEP] > 0.0
+        clock[at.STAGED_STEP] = clock[at.STAGED_AT] - clock[at.TIME] if staged else 0.0
+
+
 @attrs.frozen
 class Implicit(Integrator):
-    """Radau IIA of order 5, adaptive and stable for any stiffness: the default.
+    """Adaptive and stable for any stiffness: the default.
 
-    Steps end where a pair of features touches or parts, so that the forces are smooth inside them;
-    in a bed, where contacts switch all the time, they are those of BackwardEuler, by the rule of
-    flocsim.integrators.backward_euler.method.
+    Of up to six bodies steps that are not long against the fastest vibration are a power series,
+    exact where forces are linear and of order 6 in what is left (flocsim.integrators.exponential);
+    all others Radau IIA of order 5. They end where a pair of features touches or parts, so that the
+    forces are smooth inside them; in a bed, where contacts switch all the time, they are those of
+    BackwardEuler, by the rule of flocsim.integrators.backward_euler.method.
     Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
     velocity error leads to included; ``first_step`` [s].
 
-    Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), section IV.8.
+    Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), section IV.8;
+    Hochbruck & Ostermann, Acta Numerica 19 (2010), section 2.3.
     """
 
     estimate_share = 0.5
@@ -108,6 +143,8 @@ class Implicit(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where Newton's method fails."""
+        known = work.tally[at.SERIES_TERMS] > 0
+        work.tally[at.SERIES_TERMS], clock[at.LONGEST_SERIES] = 0, math.inf
         if clock[at.ACROSS] == 1.0:
             return step_across(scene, work, clock, step)
         time = clock[at.TIME]
@@ -119,6 +156,11 @@ class Implicit(Integrator):
             evaluate_states(scene, work, time, 0.0, at.NOW, at.NOW + 1)
             gather_clusters(scene, work)
             assemble_jacobian(scene, work, time, remaining)
+        if not grazes:
+            ratio = solve_as_series(scene, work, clock, step, known)
+            if work.tally[at.SERIES_TERMS] > 0:
+                return ratio
+        forget_series(work, clock, known)
         if grazes:
             if not factorise_systems(scene, work, step):
                 return -1.0
@@ -144,21 +186,27 @@ class Implicit(Integrator):
         factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
         if clock[at.PACE] > 0.0:
             factor = min(factor, (COMFORTABLE_PACE / clock[at.PACE]) ** 0.5)
-        return step * max(factor, SMALLEST_FACTOR)
+        factor = max(factor, SMALLEST_FACTOR)
+        if ratio <= 1.0:
+            return max(min(step * factor, clock[at.LONGEST_SERIES]), min(step, step * factor))
+        return step * factor
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Dense output, and ends of steps, by the stages' cubic; the error as a vector."""
+        """Dense output, and ends of steps, by the series or the stages' cubic; the error as a
+        vector."""
         return {
-            interpolate: collocate,
-            end_within: end_on_the_cubic,
+            interpolate: within,
+            end_within: end_early,
+            cut: cut_series,
+            first_step: step_behind_touch,
             settle_grazes: settle,
             leave_at_once: leave_early,
             choose_method: hand_over,
             step_across: step_or_give_back,
             note_step: note_rates,
             leave_out_cycles: leave_out,
-            carry_vector: carry_error,
+            carry_vector: carry_over_step,
             overlap_error: step_overlap_error,
         }
 

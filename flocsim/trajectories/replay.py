@@ -23,6 +23,7 @@ from flocsim.geometry.contact.points import contact_point, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed
+from flocsim.integrators.exponential.series import write_at
 from flocsim.integrators.implicit import Implicit, Overdamped
 from flocsim.integrators.radau.collocation import cubic, stage_weights
 from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
@@ -208,10 +209,15 @@ def step_motion(
 ) -> np.ndarray:
     """The motion (n, 6) at a time inside of the step that a run has just taken.
 
-    Of implicit methods the cubic through the stages, which the engine itself goes by; of others,
-    and where the stages are no longer those of the step, Hermite's through both ends.
+    Of implicit methods the series or the cubic through the stages, which the engine itself goes by;
+    of others, and where the stages are no longer those of the step, Hermite's through both ends.
     """
     work, clock = run.work, run.clock
+    terms = int(work.tally[at.SERIES_TERMS])
+    if terms > 0 and np.array_equal(work.motion[at.START], start):
+        whole = float(clock[at.SERIES_STEP])
+        write_at(work, at.START, terms, whole, (time - begin) / whole, at.TRIAL, 0, len(start))
+        return work.motion[at.TRIAL].copy()
     stages = work.motion[[at.START, at.FIRST_STAGE, SECOND_STAGE, THIRD_STAGE]]
     whole = float(clock[at.STAGED_STEP])
     if whole == 0.0 and np.array_equal(stages[3], work.motion[at.NOW]):
@@ -247,12 +253,19 @@ def hermite(
     return np.concatenate([place, rate], axis=1)
 
 
+LOBATTO = 0.5 + 0.5 * (3.0 / 7.0) ** 0.5 * np.array([-1.0, 0.0, 1.0])
+"""The points of Lobatto's rule between the ends of a step."""
+
+LOBATTO_WEIGHTS = (1 / 20, 49 / 180, 16 / 45, 49 / 180, 1 / 20)
+"""Its weights, those of the ends included."""
+
+
 @attrs.frozen(eq=False)
 class Energies:
     """Kinetic energies and work over a run.
 
     ``t`` (k,) [s]; ``kinetic`` (k, n) ½ m v² + ½ I ω² of every body [J]; ``work`` {force: (k,)}
-    done on all free bodies since the start [J], by Simpson's rule over each step on the
+    done on all free bodies since the start [J], by Lobatto's rule over each step, on the
     integrator's interpolation. Contacts are stiff within steps: theirs, "contact", is what the
     balance Δ(kinetic) = Σ work leaves. ``error`` (k,) [J]: what it leaves where there are no
     contact forces, None else.
@@ -281,11 +294,14 @@ def energies_of(origin: Origin, times: np.ndarray, velocity: np.ndarray) -> Ener
         rates = instant.work.motion[at.NOW, :, 3:] * free
         return np.array([np.sum(instant.forces(scene) * rates) for scene in smooth.values()])
 
-    order = np.sort(np.concatenate([times, times[:-1] + 0.5 * np.diff(times)]))
+    inside = times[:-1, None] + np.diff(times)[:, None] * LOBATTO
+    order = np.append(np.column_stack([times[:-1], inside]).ravel(), times[-1])
     found = np.array([powers(each) for each in replay.instants(order, times)])
     found = found.reshape(len(order), len(smooth))
-    steps = np.diff(times)[:, None] / 6.0
-    parts = steps * (found[:-2:2] + 4.0 * found[1:-1:2] + found[2::2])
+    parts = np.zeros((len(times) - 1, len(smooth)))
+    for place, weight in enumerate(LOBATTO_WEIGHTS):
+        parts += weight * found[place : len(order) - 4 + place : 4]
+    parts *= np.diff(times)[:, None]
     total = np.concatenate([np.zeros((1, len(smooth))), np.cumsum(parts, axis=0)])
     work = {name: total[:, place] for place, name in enumerate(smooth)}
     inertias = np.array([(body.mass, body.mass, body.inertia) for body in origin.bodies])

@@ -152,9 +152,10 @@ class Trajectory:
         """The State at a time, in s or as "5 ms", or at an array of times [s].
 
         At a step, what was computed. Between two, the interpolation that the method itself goes by:
-        of Implicit and Overdamped the cubic through the stages, whose error is below a quarter of
-        what the method estimates for the step where that is smooth; of all others Hermite's cubic
-        through places and velocities at both ends, whose error goes with h⁴ in places.
+        of Implicit and Overdamped the series of the step, or the cubic through its stages, whose
+        error is below a quarter of what the method estimates for the step where that is smooth; of
+        all others Hermite's cubic through places and velocities at both ends, whose error goes with
+        h⁴ in places.
         """
         wanted = self.checked_times(t)
         times, position, velocity = self.all_steps

@@ -132,12 +132,16 @@ class Watched:
         return self.motion[:, 3:]
 
 
-def watched(system, until, *, max_steps=10**12, awaited=False, capacity=256, jit=True):
+def watched(
+    system, until, *, max_steps=10**12, awaited=False, capacity=256, jit=True, largest_step=None
+):
     """Run a system to a time under the observer above, nothing recorded."""
     observed = np.zeros(OBSERVED_SIZE)
     observed[AWAITED] = float(awaited)
     run = system.begin(until, max_steps=max_steps, observer=WATCH, observed=observed, jit=jit)
     run.work = work_of(run.scene, *system.motion(), capacity)
+    if largest_step is not None:
+        run.clock[at.LARGEST_STEP] = min(run.clock[at.LARGEST_STEP], largest_step)
     status = run.to_end()
     return Watched(
         motion=run.work.motion[at.NOW].copy(), status=status, time=run.time, steps=run.steps,

@@ -80,12 +80,16 @@ def test_the_doublet_has_stuck_and_turned(scene):
     assert np.abs(end.position[:, 2] - [body.angle for body in start]).min() > 0.2
 
 
+ROUNDING = 1e-17
+"""What rounding alone does to places [m]: forces without friction or turning are followed to it."""
+
+
 @by_adaptive
 @pytest.mark.parametrize("tolerance", [1e-9, 1e-10, 1e-12])
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_estimated_error_is_no_less_than_a_tenth_of_the_true_one(scene, tolerance, integrator):
     end = run(scene, attrs.evolve(integrator, tolerance=tolerance))
-    assert apart(end, run(scene, Implicit(1e-14))) <= 10.0 * end.error
+    assert apart(end, run(scene, Implicit(1e-14))) <= 10.0 * end.error + ROUNDING
 
 
 @by_adaptive

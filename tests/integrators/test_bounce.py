@@ -50,7 +50,8 @@ def test_errors_stay_near_the_tolerance_through_a_bounce(integrator, z):
         error, end = bounce(attrs.evolve(integrator, tolerance=tolerance), z)
         # A step's error in velocity goes on for as long as the run: the tolerance counts that in.
         assert error < 20.0 * tolerance
-        assert error < 10.0 * end.error
+        # Down to rounding: a bounce without damping is followed as exactly as that.
+        assert error < 10.0 * end.error + 1e-17
 
 
 @pytest.mark.parametrize("tension", [True, False])

@@ -83,8 +83,8 @@ CASES = [
     (VelocityVerlet(), "pressed", (128, 256, 512), 2.0),
     (DormandPrince54(), "trapped", (128, 256, 512), 5.0),
     (DormandPrince54(), "pressed", (32, 64, 128), 5.0),
-    (Implicit(), "trapped", (128, 256, 512), 5.0),
-    (Implicit(), "pressed", (16, 32, 64), 5.0),
+    (Implicit(), "trapped", (32, 64, 128), 6.0),
+    (Implicit(), "pressed", (16, 32, 64), 6.0),
     (OWN, "trapped", (256, 512), 5.0),
 ]
 

@@ -45,7 +45,7 @@ def thrown(shapes, spin=2e3, speed=0.02):
 def test_momentum_and_energy_are_kept(make):
     """Elastic collisions, whose springs have given all back at the end."""
     bodies = thrown([make(UNIT), cross(0.8 * UNIT)])
-    found = finished(System(bodies, [Contact(damping_n=0.0, k_t=0.0)], Implicit(1e-10)), 4e-4)
+    found = finished(System(bodies, [Contact(damping_n=0.0, k_t=0.0)], Implicit(1e-12)), 4e-4)
     mass = np.array([body.mass for body in bodies])
     inertia = np.array([body.inertia for body in bodies])
     v, x = found.velocity[[0, -1]], found.position[[0, -1]]

@@ -73,7 +73,8 @@ def test_the_error_falls_with_the_tolerance_and_stays_near_it(integrator):
     bodies = orbit(star(), hook())
     tolerances = np.array([1e-9, 1e-10, 1e-11, 1e-12, 1e-13])
     errors = [miss(bodies, attrs.evolve(integrator, tolerance=t), 0.8) for t in tolerances]
-    assert np.all(np.divide(errors[:-1], errors[1:]) > 3.0)
+    falls = np.divide(errors[:-1], errors[1:]) > 3.0
+    assert np.all(falls | (np.array(errors[1:]) < 1e-16))  # rounding
     assert np.all(errors < 20.0 * tolerances)
 
 

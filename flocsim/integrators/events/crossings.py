@@ -15,7 +15,8 @@ is taken anew, until it is short against the vibrations, or the contacts change 
 import math
 
 import flocsim.arrays as at
-from flocsim.geometry.contact.points import locate_polygons, turn_body
+from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.geometry.contact.points import locate_polygons, row_radii, turn_body
 from flocsim.hooks import hook
 from flocsim.integrators.events.resolution import release_resolution, touch_resolution
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
@@ -62,6 +63,12 @@ def margin_rate(work, state, row):
     if work.candidates[row, at.CLOSED] == at.GRAZES:
         return 0.0
     return -rate if work.geometry[at.NOW, row, at.GAP] < 0.0 else rate
+
+
+def is_too_deep(scene, work, state, row):
+    """Whether a listed pair overlaps past the limit of the contact law."""
+    radius_a, radius_b = row_radii(scene, work, row)
+    return -work.geometry[state, row, at.GAP] > DEEPEST_OVERLAP * (radius_a + radius_b)
 
 
 def look_at(scene, work, step, share, row):
@@ -190,6 +197,18 @@ def passes_within(scene, work, step, depth):
             and lowest_share(scene, work, step, row, reach) < 1.0
             and g[at.TRIAL, row, at.GAP] < reach - depth
         ):
+            return True
+    return False
+
+
+def changes_sides(work):
+    """Whether a vertex has come from one side of an edge to the other in a step across switches,
+    which is told of a touch by its end alone."""
+    g = work.geometry
+    for row in range(work.tally[at.CANDIDATES]):
+        along = g[at.NOW, row, at.NORMAL_X] * g[at.NEW, row, at.NORMAL_X]
+        along += g[at.NOW, row, at.NORMAL_Y] * g[at.NEW, row, at.NORMAL_Y]
+        if along < 0.0:
             return True
     return False
 

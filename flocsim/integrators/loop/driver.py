@@ -4,22 +4,28 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
-from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import hand_over, list_ahead, outlived, spent, too_wide
-from flocsim.geometry.contact.points import locate_contacts, row_radii
+from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,
     attempt,
     choose_method,
+    cut,
     end_within,
     has,
     leave_out_cycles,
     note_step,
     observe,
 )
-from flocsim.integrators.events.crossings import may_switch, overtakes, passes_within
+from flocsim.integrators.events.crossings import (
+    changes_sides,
+    is_too_deep,
+    may_switch,
+    overtakes,
+    passes_within,
+)
 from flocsim.integrators.events.first_event import (
     OTHER_CONTACTS,
     OTHER_FRICTION,
@@ -59,11 +65,10 @@ MOST_STILL = 100
 
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
+    deep = False
     for row in range(work.tally[at.CANDIDATES]):
-        radius_a, radius_b = row_radii(scene, work, row)
-        if -work.geometry[at.NOW, row, at.GAP] > DEEPEST_OVERLAP * (radius_a + radius_b):
-            return True
-    return False
+        deep = deep or is_too_deep(scene, work, at.NOW, row)
+    return deep
 
 
 def take_new_state(work):
@@ -153,6 +158,8 @@ def went_too_far(scene, work, clock, step):
     if spent(scene, work, at.NEW) > 1.0:
         return True
     locate_contacts(scene, work, at.NEW)
+    if clock[at.ACROSS] == 1.0 and changes_sides(work):
+        return True
     if scene.listed_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
         return False
     if overlooked(scene, work) or passes_within(scene, work, step, clock[at.TOLERANCE]):
@@ -228,6 +235,13 @@ def advance(scene, work, observed, clock, counts, record):
             trials += 1
             clock[at.STAGED_STEP] = 0.0
             continue
+        if lists and trials < MOST_TRIALS and clock[at.ACROSS] == 0.0:
+            kept = cut(scene, work, clock, step, resolutions_of(work, clock)[0])
+            if kept < 1.0:
+                step *= kept
+                trials += 1
+                locate_contacts(scene, work, at.NEW)
+                roll_slips(scene, work, step)
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1

@@ -4,7 +4,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import share_ahead, time_within
-from flocsim.hooks import next_step
+from flocsim.hooks import first_step, next_step
 from flocsim.integrators.events.first_event import OTHER_CONTACTS, OTHER_FRICTION, resolutions_of
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
@@ -16,10 +16,6 @@ SAFETY = 0.9
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
 """Bounds of the change from one step to the next."""
-
-SHARE_OF_TOUCH, ORDER_OF_TOUCH = 0.1, 4.0
-"""The error of the first step behind a touch at a speed v: v times its memory times (h ω0)⁴ over
-this share."""
 
 LOWEST_ORDER = 0.5
 """Least power of the step that an error is taken to go with."""
@@ -156,18 +152,18 @@ def shortest_needed(scene, work):
 def step_behind_touch(scene, work, clock):
     """The step that resolves how contacts take up the speed at which they have just touched, as far
     as that displaces bodies by the tolerance [s]."""
-    pace, later = 0.0, 0.0
+    pace, speed_of, later = 0.0, 0.0, 0.0
     for row in range(work.tally[at.CANDIDATES]):
         speed = -normal_rate(work, at.NOW, row)
         if work.candidates[row, at.CLOSED] == at.TOUCHES and speed > 0.0:
             view = contact_view(scene, work, at.NOW, row)
             stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
             pace += stiffness / view.effective_mass
+            speed_of = max(speed_of, speed)
             later = max(later, speed * memory_of(work, row))
     if not (pace > 0.0 and later > 0.0):
         return math.inf
-    share = SHARE_OF_TOUCH * clock[at.TOLERANCE] / later
-    return share ** (1.0 / ORDER_OF_TOUCH) / math.sqrt(pace)
+    return first_step(work, clock, math.sqrt(pace), speed_of, later)
 
 
 def plan(clock, step, ratio, was_cut, switched):

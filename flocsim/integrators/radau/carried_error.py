@@ -106,6 +106,8 @@ ABOVE = 30.0
 def scatter_of(scene, work, clock, step, row):
     """How far the overlap of a contact at the end of a step lies off the line of those at the other
     stages, as far as the step does not resolve its vibrations [m]."""
+    if work.tally[at.SERIES_TERMS] > 0:
+        return 0.0
     g, span = work.geometry, NODES[1] - NODES[0]
     slope = (g[SECOND_STAGE, row, at.GAP] - g[at.FIRST_STAGE, row, at.GAP]) / span
     scatter = g[THIRD_STAGE, row, at.GAP] - g[SECOND_STAGE, row, at.GAP] - slope * (1.0 - NODES[1])

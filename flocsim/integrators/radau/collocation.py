@@ -118,6 +118,17 @@ def keep_accelerations(scene, work, step):
                 work.motion[at.FIRST_STAGE + stage, body, at.VELOCITY + axis] = speed
 
 
+def go_on_as_before(work, scale):
+    """First guess: the accelerations of the last step, which was so much shorter, as a mean."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+            speed = work.motion[at.NOW, body, axis]
+            gain = scale * (speed - work.motion[at.START, body, axis])
+            for stage in range(3):
+                guess = speed + NODES[stage] * gain
+                work.motion[at.FIRST_STAGE + stage, body, axis] = guess
+
+
 def is_soft(work, step):
     """Whether no pair of features acts, and drag takes little of a velocity in a step."""
     for row in range(work.tally[at.CANDIDATES]):
@@ -149,7 +160,9 @@ def carry_on(work, begin, scale):
 def guess_stages(scene, work, clock, step):
     """The stages' velocities to start from, and where this step starts."""
     staged = clock[at.STAGED_STEP]
-    if staged > 0.0 and step <= LONGEST_GUESS * staged:
+    if staged < 0.0:
+        go_on_as_before(work, -step / staged)
+    elif staged > 0.0 and step <= LONGEST_GUESS * staged:
         carry_on(work, (clock[at.TIME] - clock[at.STAGED_AT]) / staged, step / staged)
     elif is_soft(work, step):
         keep_accelerations(scene, work, step)

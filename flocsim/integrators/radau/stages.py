@@ -30,7 +30,7 @@ NEWTON_SHARE, FREE_NEWTON_SHARE = 1e-3, 1e-2
 """Newton's method goes on until what is left is below this share of what a step may be wrong by;
 and where nothing is near, which allows a hundred times less anyway."""
 
-DOUBTED_PACE = 10.0
+DOUBTED_PACE = 3.0
 """The second iteration is expected to shrink the first one's change by so many times less than it
 did when it was last made, its pace going with the square of the step, …"""
 
@@ -69,7 +69,7 @@ def place_stages(work, step):
                 )
 
 
-def slip_stages(scene, work, step, first):
+def slip_stages(scene, work, step, first, matrix):
     """Tangential displacements of the closed pairs in the stages from ``first`` on, which are
     located."""
     slip = work.slip
@@ -79,7 +79,7 @@ def slip_stages(scene, work, step, first):
                 besides = rolled_besides(scene, work, at.FIRST_STAGE + stage, row)
                 slip[at.SLIP_RATES + at.FIRST_STAGE + stage, row] = besides
             for stage in range(first, 3):
-                one, two, three = MATRIX[stage]
+                one, two, three = matrix[stage]
                 mean = one * slip[at.SLIP_RATES + at.FIRST_STAGE, row]
                 mean += two * slip[at.SLIP_RATES + SECOND_STAGE, row]
                 mean += three * slip[at.SLIP_RATES + THIRD_STAGE, row]
@@ -102,7 +102,7 @@ def evaluate_states(scene, work, time, step, first, last):
     for state in range(first, last):
         locate_state(scene, work, state)
     if first == at.FIRST_STAGE:
-        slip_stages(scene, work, step, 0)
+        slip_stages(scene, work, step, 0, MATRIX)
     for state in range(first, last):
         node = 0.0 if state == at.NOW else NODES[state - at.FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
@@ -167,7 +167,7 @@ def finish_stages(scene, work, step):
     """Places and tangential displacements that go with the last correction; the end is NEW."""
     place_stages(work, step)
     locate_state(scene, work, THIRD_STAGE)
-    slip_stages(scene, work, step, 2)
+    slip_stages(scene, work, step, 2, MATRIX)
     take_stage(work, THIRD_STAGE)
 
 

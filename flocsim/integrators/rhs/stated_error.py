@@ -258,6 +258,8 @@ def pressed_stiffness(scene, view, overlap):
 def unresolved(scene, work, clock, step, row):
     """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
     its vibration out, so that the load decides whether it is there."""
+    if work.tally[at.SERIES_TERMS] > 0:
+        return 0.0
     view = contact_view(scene, work, at.NOW, row)
     stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
     if not stiffness > 0.0:

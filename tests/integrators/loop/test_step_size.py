@@ -11,20 +11,20 @@ from flocsim.compiler.composer import compose
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators import Implicit
+from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.events.first_event import SAME
 from flocsim.integrators.loop.step_size import adaptive_factor, plan, reject, step_behind_touch
 
 R = 10e-6
 
 
-def first_step(speed, k_n=20.0, tolerance=1e-9):
+def first_step(speed, method=Implicit, k_n=20.0, tolerance=1e-9):
     """Behind the touch of two spheres at a speed [m/s], which is remembered for 0.1 ms."""
     bodies = [
         Body(Sphere(R), (0.0, 0.0), velocity=(speed, 0.0), density=2650.0),
         Body(Sphere(R), (2.0 * R - 1e-13, 0.0), density=2650.0),
     ]
-    integrator = Implicit(tolerance=tolerance)
+    integrator = method(tolerance=tolerance)
     system = System(bodies, [Contact(k_n=k_n)], integrator)
     linked = {
         each: compose(each, system.fillings(), jit=False)
@@ -43,14 +43,24 @@ def test_it_is_a_share_of_the_contacts_vibration():
     mass = 2650.0 * 4.0 / 3.0 * math.pi * R**3
     frequency = math.sqrt(20.0 / (0.5 * mass))
     # v T = 1 µm, of which the tolerance is a thousandth: (h ω0)⁴ = 1e-4
-    assert first_step(0.01) * frequency == pytest.approx(0.1, rel=1e-6)
+    assert first_step(0.01, DormandPrince54) * frequency == pytest.approx(0.1, rel=1e-6)
+    # A tenth of the tolerance over v/ω0: (h ω0)⁵.
+    turns = first_step(0.01) * frequency
+    assert turns**5 == pytest.approx(0.1 * 1e-9 * frequency / 0.01, rel=1e-6)
 
 
 def test_it_goes_with_the_root_of_the_stiffness_and_the_fourth_root_of_what_is_allowed():
+    step = first_step(0.01, DormandPrince54)
+    assert first_step(0.01, DormandPrince54, k_n=2000.0) == pytest.approx(0.1 * step)
+    assert first_step(0.16, DormandPrince54) == pytest.approx(0.5 * step)
+    assert first_step(0.01, DormandPrince54, tolerance=16e-9) == pytest.approx(2.0 * step)
+
+
+def test_behind_a_step_that_may_be_a_series_it_goes_with_the_fifth_root():
     step = first_step(0.01)
-    assert first_step(0.01, k_n=2000.0) == pytest.approx(0.1 * step)
-    assert first_step(0.16) == pytest.approx(0.5 * step)
-    assert first_step(0.01, tolerance=16e-9) == pytest.approx(2.0 * step)
+    assert first_step(0.01, k_n=2000.0) == pytest.approx(0.1 * 10.0**0.2 * step)
+    assert first_step(0.32) == pytest.approx(0.5 * step)
+    assert first_step(0.01, tolerance=32e-9) == pytest.approx(2.0 * step)
 
 
 def test_contacts_that_part_need_none():

@@ -1,0 +1,300 @@
+"""A step of exponential collocation: forces are what they are at Lobatto's points.
+
+The motion is the power series of series.py. Its R, by which forces differ from those linearised at
+the start, is the cubic that is 0 there and right at the three points behind; it is found by
+iteration, as R changes little with what it does to the motion. Of order 6 where R is smooth, and
+exact for linear forces, however often they swing in the step (Hochbruck & Ostermann, Acta Numerica
+19 (2010), section 2.3).
+"""
+
+import math
+
+import flocsim.arrays as at
+from flocsim.compiler.linker import apart
+from flocsim.integrators.exponential.series import (
+    STIFFEST,
+    amend,
+    begin_change,
+    expand,
+    write_at,
+    write_change,
+)
+from flocsim.integrators.radau.stages import (
+    change_of_forces,
+    expected_pace,
+    locate_state,
+    slip_stages,
+)
+from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
+from flocsim.integrators.radau.tableau import NODES as RADAU
+from flocsim.integrators.rhs.blocks import lower_block, upper_block
+from flocsim.integrators.rhs.error import error_size, rounding_size, step_tolerance
+from flocsim.integrators.rhs.forces import sum_forces, take_stage
+from flocsim.integrators.rhs.views import inertia, lever
+
+ROOT = 5.0**0.5
+
+NODES = ((5.0 - ROOT) / 10.0, (5.0 + ROOT) / 10.0, 1.0)
+"""Lobatto's points behind 0."""
+
+MATRIX = (
+    ((25.0 - ROOT) / 120.0, (25.0 - 13.0 * ROOT) / 120.0, (-1.0 + ROOT) / 120.0),
+    ((25.0 + 13.0 * ROOT) / 120.0, (25.0 + ROOT) / 120.0, (-1.0 - ROOT) / 120.0),
+    (5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0),
+)
+"""Weights of the rates at the three points in the increments up to them, by the cubic through these
+and the one at 0 (Lobatto IIIA)."""
+
+MOST_ITERATIONS = 6
+"""Iterations before the step is left to Radau IIA."""
+
+ITERATION_SHARE = 1e-2
+"""Iterations go on until what is left is below this share of what a step may be wrong by."""
+
+LEAVES, LEAP = 0.5, 2.0
+"""Steps become too long for a series only where Radau IIA is likely to be wrong by no more than
+so many times what it may be, contacts taking most of that up; and by so many times at once."""
+
+TINY = 1e-300
+"""Stands for no inertia."""
+
+
+def guess_remainder(work, clock, step, known):
+    """R as that of the last step goes on, if ``known``; else none."""
+    staged, remainder = clock[at.STAGED_STEP], work.remainder
+    scale = begin = 0.0
+    if known and staged > 0.0:
+        scale, begin = step / staged, (clock[at.TIME] - clock[at.STAGED_AT]) / staged
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            third = remainder[at.MOTION, 3, body, axis]
+            second = remainder[at.MOTION, 2, body, axis] + 3.0 * begin * third
+            remainder[at.MOTION, 1, body, axis] *= scale
+            remainder[at.MOTION, 2, body, axis] = second * scale * scale
+            remainder[at.MOTION, 3, body, axis] = third * scale * scale * scale
+
+
+def subtract_linear(work, stage, block, body, other):
+    """Subtract what a block makes of another body's motion to a point from the force on a body
+    there, in CHANGE."""
+    motion, jacobian = work.motion, work.jacobian
+    for i in range(3):
+        total = motion[at.CHANGE, body, at.VELOCITY + i]
+        for j in range(3):
+            moved = motion[stage, other, j] - motion[at.NOW, other, j]
+            faster = motion[stage, other, at.VELOCITY + j] - motion[at.NOW, other, at.VELOCITY + j]
+            total += jacobian[at.STIFFNESS, block, i, j] * moved
+            total += jacobian[at.DAMPING, block, i, j] * faster
+        motion[at.CHANGE, body, at.VELOCITY + i] = total
+
+
+def write_remainder(work, stage):
+    """R at a point, in the columns of velocities of CHANGE."""
+    motion, rates = work.motion, work.rates
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            force = rates[stage, body, at.FORCE + axis] - rates[at.NOW, body, at.FORCE + axis]
+            motion[at.CHANGE, body, at.VELOCITY + axis] = force
+        subtract_linear(work, stage, body, body, body)
+    for pair in range(work.tally[at.PAIRS]):
+        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        subtract_linear(work, stage, lower_block(work, pair), later, earlier)
+        subtract_linear(work, stage, upper_block(work, pair), earlier, later)
+
+
+def effect_of(scene, work, step, stage, goal):
+    """What the changes of R at the points, in their rates, change at one of them in places, now and
+    later, and in overlaps, over what may be wrong of those, in terms of the goal [m]."""
+    largest, rates = 0.0, work.rates
+    one, two, three = MATRIX[stage]
+    for body in range(work.motion.shape[1]):
+        memory = step + work.bodies[body, at.MEMORY]
+        for axis in range(3):
+            column = at.FORCE + axis
+            mean = one * rates[at.FIRST_STAGE, body, column]
+            mean += two * rates[at.FIRST_STAGE + 1, body, column]
+            mean += three * rates[at.FIRST_STAGE + 2, body, column]
+            speed = scene.bodies[body, at.FREE] * step / inertia(scene, body, axis) * mean
+            if not abs(speed) < math.inf:
+                return math.inf
+            work.motion[at.CHANGE, body, at.VELOCITY + axis] = speed
+            largest = max(largest, lever(scene, body, axis) * memory * abs(speed))
+    return max(largest, change_of_forces(scene, work, step, stage, goal))
+
+
+def amend_remainder(work, body, axis, one, two, three):
+    """Add to R the cubic that is 0 at 0 and has three values behind it, and keep that."""
+    by_one, by_two = one / NODES[0], two / NODES[1]
+    first = (by_two - by_one) / (NODES[1] - NODES[0])
+    second = (three - by_two) / (1.0 - NODES[1])
+    third = (second - first) / (1.0 - NODES[0])
+    square = first - third * (NODES[0] + NODES[1])
+    linear = by_one - NODES[0] * (square + NODES[0] * third)
+    remainder = work.remainder
+    remainder[at.CHANGED, 1, body, axis] = linear
+    remainder[at.CHANGED, 2, body, axis] = square
+    remainder[at.CHANGED, 3, body, axis] = third
+    remainder[at.MOTION, 1, body, axis] += linear
+    remainder[at.MOTION, 2, body, axis] += square
+    remainder[at.MOTION, 3, body, axis] += third
+
+
+def remainder_at(work, share, body, axis):
+    r, which = work.remainder, at.MOTION
+    cubic = r[which, 2, body, axis] + share * r[which, 3, body, axis]
+    return share * (r[which, 1, body, axis] + share * cubic)
+
+
+@apart
+def evaluate_points(scene, work, time, step):
+    """Forces at the three points."""
+    for stage in range(3):
+        locate_state(scene, work, at.FIRST_STAGE + stage)
+    slip_stages(scene, work, step, 0, MATRIX)
+    for stage in range(3):
+        sum_forces(scene, work, time + NODES[stage] * step, at.FIRST_STAGE + stage)
+
+
+def iterate(scene, work, time, terms, step, goal):
+    """Amend R by the motion that it leads to; what changes by that (see effect_of)."""
+    for stage in range(3):
+        write_all_at(work, terms, step, NODES[stage], at.FIRST_STAGE + stage)
+    evaluate_points(scene, work, time, step)
+    largest = 0.0
+    for stage in range(3):
+        write_remainder(work, at.FIRST_STAGE + stage)
+        for body in range(work.motion.shape[1]):
+            for axis in range(3):
+                change = work.motion[at.CHANGE, body, at.VELOCITY + axis]
+                change -= remainder_at(work, NODES[stage], body, axis)
+                # The force at the point is not needed any more.
+                work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis] = change
+    for stage in range(3):
+        largest = max(largest, effect_of(scene, work, step, stage, goal))
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            column = at.FORCE + axis
+            amend_remainder(
+                work, body, axis, work.rates[at.FIRST_STAGE, body, column],
+                work.rates[at.FIRST_STAGE + 1, body, column],
+                work.rates[at.FIRST_STAGE + 2, body, column],
+            )  # fmt: skip
+    return largest
+
+
+def write_all_at(work, terms, step, share, state):
+    write_at(work, at.NOW, terms, step, share, state, 0, work.motion.shape[1])
+
+
+def finish(scene, work, terms, step):
+    """The end of the step, and the tangential displacements there, are NEW; it began at START."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    last = at.FIRST_STAGE + 2
+    write_all_at(work, terms, step, 1.0, last)
+    locate_state(scene, work, last)
+    slip_stages(scene, work, step, 2, MATRIX)
+    take_stage(work, last)
+
+
+@apart
+def solve_series(scene, work, clock, step, known):
+    """Find the motion of a step as a series; how many terms it has, 0 where the step is too long
+    for one, or R does not settle. ``known``: whether that of the last step is there."""
+    allowed = step_tolerance(work, clock)
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            mass = max(inertia(scene, body, axis), TINY)
+            spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
+            damping = abs(work.jacobian[at.DAMPING, body, axis, axis])
+            if step * (step * spring + damping) > STIFFEST * mass:
+                return 0
+    guess_remainder(work, clock, step, known)
+    expected, before = expected_pace(clock, step), math.inf
+    terms = expand(scene, work, clock, step, allowed)
+    if terms > 0:
+        clock[at.STAGED_STEP] = 0.0
+    for _ in range(MOST_ITERATIONS):
+        if terms == 0:
+            return 0
+        change = iterate(scene, work, clock[at.TIME], terms, step, ITERATION_SHARE * allowed)
+        goal = max(ITERATION_SHARE * allowed, rounding_size(scene, work, at.FIRST_STAGE + 2, step))
+        pace = expected if before == math.inf else change / before
+        if not (change < math.inf and pace < 1.0):
+            break
+        terms = amend(work, terms, step, allowed)
+        if terms > 0 and change * pace <= goal * (1.0 - pace):
+            finish(scene, work, terms, step)
+            clock[at.STAGED_STEP], clock[at.STAGED_AT] = step, clock[at.TIME]
+            clock[at.SERIES_STEP] = step
+            clock[at.PACE] = 0.0 if before == math.inf else pace
+            if before < math.inf:
+                clock[at.SEEN_PACE], clock[at.SEEN_STEP] = pace, step
+            return terms
+        before = change
+    clock[at.SEEN_PACE] = 0.0
+    return 0
+
+
+def error_of_radau(scene, work, terms, step):
+    """What a step of Radau IIA would be wrong by in this motion [m], by its estimate
+    (radau/estimate.py) but for what contacts take up of that."""
+    motion, series = work.motion, work.series
+    for body in range(motion.shape[1]):
+        for axis in range(at.MOTION_COLUMNS):
+            motion[at.DEVIATION, body, axis] = 0.0
+    before, damped = 0.0, step / EIGENVALUES[REAL].real
+    one, two = RADAU[0] ** 3, RADAU[1] ** 3
+    for k in range(4, terms):
+        one, two = one * RADAU[0], two * RADAU[1]
+        here = (ESTIMATE[0] * one + ESTIMATE[1] * two + ESTIMATE[2]) / step
+        for body in range(motion.shape[1]):
+            for axis in range(3):
+                term = damped * series[at.MOTION, k, body, axis]
+                motion[at.DEVIATION, body, axis] += here * term
+                motion[at.DEVIATION, body, at.VELOCITY + axis] += before * k / step * term
+        before = here
+    return error_size(scene, work)
+
+
+def estimate(scene, work, step):
+    """What leaving out the second point would change, in DEVIATION; its size [m]."""
+    remainder = work.remainder
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            cubic = remainder[at.MOTION, 3, body, axis]
+            remainder[at.CHANGED, 0, body, axis] = 0.0
+            remainder[at.CHANGED, 1, body, axis] = NODES[0] * cubic
+            remainder[at.CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
+            remainder[at.CHANGED, 3, body, axis] = cubic
+    begin_change(work)
+    write_change(work, 1, step, 1.0, at.DEVIATION)
+    return error_size(scene, work)
+
+
+@apart
+def judge_series(scene, work, clock, step):
+    """Estimate the error of a step, in DEVIATION; its size [m]."""
+    longer = clock[at.LONGEST_SERIES] / step
+    if longer < math.inf:
+        error = error_of_radau(scene, work, work.tally[at.SERIES_TERMS], step)
+        if error * longer**4 <= LEAVES * step_tolerance(work, clock):
+            clock[at.LONGEST_SERIES] *= LEAP
+    return estimate(scene, work, step)
+
+
+@apart
+def carry_known(work, step, share):
+    """Carry the error over a share of a step that is a series, into CHANGE: as what changes its
+    start changes its end, under what forces it besides."""
+    motion, series, remainder = work.motion, work.series, work.remainder
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            speed = motion[at.CARRIED, body, at.VELOCITY + axis]
+            series[at.CHANGED, 0, body, axis] = motion[at.CARRIED, body, axis]
+            series[at.CHANGED, 1, body, axis] = step * speed
+            remainder[at.CHANGED, 0, body, axis] = motion[at.FORCING, body, at.VELOCITY + axis]
+            for k in range(1, 4):
+                remainder[at.CHANGED, k, body, axis] = 0.0
+    write_change(work, 0, step, share, at.CHANGE)
