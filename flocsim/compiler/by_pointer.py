@@ -13,6 +13,7 @@ that are always the same are said where a tuple with names is declared, as
 ``motion: Annotated[np.ndarray, ("rows", "n", 6)]``, and become constants.
 """
 
+import ctypes
 import functools
 import operator
 import struct
@@ -28,10 +29,21 @@ LAYOUTS: dict[tuple[Any, ...], str] = {}
 """{what the arguments are: how struct.pack makes a table of them}."""
 
 
+def address_of(array):
+    """Where the numbers of an array begin; as its buffer tells, which takes a fifth of the time,
+    or, where that cannot be had (empty, read-only, with gaps), as numpy does."""
+    if array.size:
+        try:
+            return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        except (TypeError, ValueError, BufferError):
+            pass
+    return array.__array_interface__["data"][0]
+
+
 def flatten(value, words, kinds):
     """Append an argument to the words of a table, and what it is to ``kinds``."""
     if isinstance(value, np.ndarray):
-        words.append(value.__array_interface__["data"][0])
+        words.append(address_of(value))
         words.extend(value.shape)
         if value.flags.c_contiguous:
             kinds.append((value.dtype.char, value.ndim))

@@ -92,6 +92,16 @@ def may_dip(work, step, row, level):
     return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
 
 
+def speed_against(scene, work, state, row):
+    """A bound of how fast any points of a pair's two bodies move against each other [m/s]."""
+    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    v = work.motion
+    speed = abs(v[state, a, at.VX] - v[state, b, at.VX])
+    speed += abs(v[state, a, at.VY] - v[state, b, at.VY])
+    speed += abs(v[state, a, at.SPIN]) * scene.bodies[a, at.BOUNDING_RADIUS]
+    return speed + abs(v[state, b, at.SPIN]) * scene.bodies[b, at.BOUNDING_RADIUS]
+
+
 def lowest_share(scene, work, step, row, level):
     """Where in the step the margin is least, if that lies inside it and may be below a level [m],
     the pair being located there in TRIAL; else NEVER."""
@@ -219,9 +229,15 @@ def first_switch(scene, work, step, resolution, depth):
     Expects the geometry of NOW and of NEW. A violation by less than ``depth`` [m] counts as none;
     one that counts is located to ``resolution`` [m].
     """
-    earliest = NEVER
+    earliest, before, way, back = NEVER, -1, 0.0, 0.0
     for row in range(work.tally[at.CANDIDATES]):
-        earliest = switch_of(scene, work, step, row, earliest, resolution, depth)
+        pair = work.candidates[row, at.PAIR]
+        if pair != before:
+            before = pair
+            way = 0.5 * step * speed_against(scene, work, at.NOW, row)
+            back = 0.5 * step * speed_against(scene, work, at.NEW, row)
+        if not (margin(work, at.NOW, row) > way and margin(work, at.NEW, row) > back):
+            earliest = switch_of(scene, work, step, row, earliest, resolution, depth)
     return earliest
 
 

@@ -17,15 +17,18 @@ from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
 from flocsim.integrators.rhs.views import contact_view, lever
 
 PLAIN_TERMS, TERMS_A_PART = 15, 5
-"""Series of so many terms swing by no more than half a turn; of so many more, by a quarter more."""
+"""Series of so many terms swing by no more than half a turn, so that gaps at both ends tell whether
+a pair has switched; of so many more, by a quarter more."""
 
 TRIES = 6
 """Places at which the least margin in a part of the step is looked for."""
 
 
-def parts_of(terms):
-    """Into how many parts a step is divided."""
-    return max((terms - PLAIN_TERMS) // TERMS_A_PART + 1, 1)
+def parts_of(scene, terms):
+    """Into how many parts a step is divided; friction, and a law's kinks, may come and go within
+    half a turn."""
+    parts = max((terms - PLAIN_TERMS) // TERMS_A_PART + 1, 1)
+    return parts + 1 if has(scene, SLIP_LIMIT) or scene.events > 0 else parts
 
 
 def write_ways(scene, work, terms):
@@ -40,7 +43,9 @@ def write_ways(scene, work, terms):
 
 
 def may_meet(work, row):
-    """Whether a pair may come to where it switches in the step."""
+    """Whether a pair may come to where it switches in the step, or rub otherwise."""
+    if work.candidates[row, at.CLOSED] == at.TOUCHES:
+        return True
     a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
     return margin(work, at.NOW, row) <= work.bodies[a, at.WAY] + work.bodies[b, at.WAY]
 
@@ -97,7 +102,7 @@ def rubs_otherwise(scene, work, row, resolution):
 def first_seen(scene, work, terms, step, resolution):
     """The first share of a step at which something is seen to have switched; 1 where nothing is
     before its end."""
-    parts = parts_of(terms)
+    parts = parts_of(scene, terms)
     write_ways(scene, work, terms)
     for row in range(work.tally[at.CANDIDATES]):
         work.slip[at.SAMPLED, row] = margin(work, at.NOW, row)
@@ -143,7 +148,7 @@ def cut(scene, work, clock, step, resolution):
     if terms == 0:
         return 1.0
     share = first_too_deep(scene, work)
-    if share == 1.0 and terms > PLAIN_TERMS:
+    if share == 1.0 and parts_of(scene, terms) > 1:
         share = first_seen(scene, work, terms, step, resolution)
     if share < 1.0:
         shorten(work, terms, share)
