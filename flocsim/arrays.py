@@ -442,8 +442,9 @@ SOFT_GAP = 6
     CYCLE_ERROR,  # the stated error at the last [m]
     LONGEST_SERIES,  # the longest step whose motion may be a series; inf: others do as well [s]
     SERIES_STEP,  # that of the series in ``Work.series`` [s]
+    SERIES_TURNS,  # that times a bound of its fastest rate
     CLOCK_SIZE,
-) = range(32)
+) = range(33)
 
 # Places in the ``counts`` of a run.
 (

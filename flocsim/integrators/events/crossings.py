@@ -180,6 +180,9 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
         if lowest > high:
             return earliest
         high = lowest
+        if work.tally[at.SERIES_TERMS] > 0 and work.geometry[at.NOW, row, at.GAP] < 0.0:
+            # It has opened, and what pulls it shut again is a law that ends there.
+            limit = resolution
     at_high = look_at(scene, work, step, high, row)
     if at_high >= -limit:
         return earliest

@@ -16,19 +16,22 @@ from flocsim.integrators.exponential.series import shorten, write_at
 from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
 from flocsim.integrators.rhs.views import contact_view, lever
 
-PLAIN_TERMS, TERMS_A_PART = 15, 5
-"""Series of so many terms swing by no more than half a turn, so that gaps at both ends tell whether
-a pair has switched; of so many more, by a quarter more."""
+A_PART = 1.6
+"""Rates times the length of a part: what vibrates swings by a quarter of a turn in it."""
+
+PLAIN = 3.0
+"""In a step so long it swings by half a turn, and gaps at both ends tell whether a pair has
+switched."""
 
 TRIES = 6
 """Places at which the least margin in a part of the step is looked for."""
 
 
-def parts_of(scene, terms):
-    """Into how many parts a step is divided; friction, and a law's kinks, may come and go within
-    half a turn."""
-    parts = max((terms - PLAIN_TERMS) // TERMS_A_PART + 1, 1)
-    return parts + 1 if has(scene, SLIP_LIMIT) or scene.events > 0 else parts
+def parts_of(scene, turns):
+    """Into how many parts a step is divided in which the fastest rate comes so far; friction, and a
+    law's kinks, may come and go within half a turn."""
+    plain = 1.0 if has(scene, SLIP_LIMIT) or scene.events > 0 else PLAIN
+    return 1 if turns <= plain else int(turns / A_PART) + 1
 
 
 def write_ways(scene, work, terms):
@@ -99,10 +102,10 @@ def rubs_otherwise(scene, work, row, resolution):
 
 
 @apart
-def first_seen(scene, work, terms, step, resolution):
+def first_seen(scene, work, parts, step, resolution):
     """The first share of a step at which something is seen to have switched; 1 where nothing is
     before its end."""
-    parts = parts_of(scene, terms)
+    terms = work.tally[at.SERIES_TERMS]
     write_ways(scene, work, terms)
     for row in range(work.tally[at.CANDIDATES]):
         work.slip[at.SAMPLED, row] = margin(work, at.NOW, row)
@@ -148,8 +151,9 @@ def cut(scene, work, clock, step, resolution):
     if terms == 0:
         return 1.0
     share = first_too_deep(scene, work)
-    if share == 1.0 and parts_of(scene, terms) > 1:
-        share = first_seen(scene, work, terms, step, resolution)
+    parts = parts_of(scene, clock[at.SERIES_TURNS])
+    if share == 1.0 and parts > 1:
+        share = first_seen(scene, work, parts, step, resolution)
     if share < 1.0:
         shorten(work, terms, share)
         clock[at.STAGED_STEP] *= share

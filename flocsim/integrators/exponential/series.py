@@ -108,17 +108,32 @@ def begin(scene, work, step):
             series[at.MOTION, 2, body, axis] = work.weights[at.MOVED, body, axis] * force
 
 
-def reach(last, size, before, earlier, goal):
-    """By how much a step may be longer so that its series still comes to an end, given its last
-    terms, of which every other is h²λ²/(k (k − 1)) times the one before."""
-    if not (min(max(size, before), max(before, earlier)) > 0.0 and earlier < math.inf):
+def reach(last, late, early, goal):
+    """By how much a step may be longer so that its series still comes to an end, every term being
+    h²λ²/(k (k − 1)) times the one two before; given the larger ones of the last two terms, and of
+    those before."""
+    if not (late > 0.0 and 0.0 < early < math.inf):
         return math.inf
-    squared = max(size, before) / max(before, earlier) * last * (last - 1.0)
-    term, k = max(size, before), last
+    squared, term, k = late / early * last * (last - 1.0), late, last
     while k < at.TERMS - 2:
         term *= squared / ((k + 1.0) * (k + 2.0))
         k += 2
     return (goal / max(term, TINY * goal)) ** (1.0 / k)
+
+
+def turns_of(work):
+    """A bound of how far the fastest vibration turns in a step, h ω: by the rows of K, in metres of
+    outlines."""
+    largest, weights = 0.0, work.weights
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            total = 0.0
+            for other in range(work.motion.shape[1]):
+                for j in range(3):
+                    size = abs(work.linear[at.STIFFNESS, body, other, axis, j])
+                    total += size / weights[at.LEVER, other, j]
+            largest = max(largest, total * weights[at.LEVER, body, axis])
+    return math.sqrt(largest)
 
 
 def expand(scene, work, clock, step, goal):
@@ -126,13 +141,14 @@ def expand(scene, work, clock, step, goal):
     Terms count from SHARE of the goal [m] on."""
     begin(scene, work, step)
     goal, small, later = SHARE * goal, 0, longest_memory(work) / step
-    before, earlier, size = math.inf, math.inf, math.inf
+    one, two, three, size = math.inf, math.inf, math.inf, math.inf
     for k in range(1, at.TERMS - 2):
-        earlier, before = before, size
+        three, two, one = two, one, size
         size = write_term(work, at.MOTION, k) * (1.0 + later * (k + 2.0))
         small = small + 1 if size <= goal else 0
         if small >= 2 and k + 3 >= LEAST_TERMS:
-            clock[at.LONGEST_SERIES] = step * reach(k + 2, size, before, earlier, goal)
+            longer = reach(k + 2, max(size, one), max(two, three), goal)
+            clock[at.LONGEST_SERIES], clock[at.SERIES_TURNS] = step * longer, turns_of(work)
             return k + 3
         if not size < math.inf:
             break

@@ -18,7 +18,7 @@ from flocsim.integrators import Implicit, Overdamped
 from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.exponential.collocation import NODES
-from flocsim.integrators.exponential.samples import PLAIN_TERMS, parts_of
+from flocsim.integrators.exponential.samples import parts_of
 from flocsim.integrators.exponential.series import shorten
 from flocsim.integrators.rhs.stated_error import carry_vector
 from tests.helpers.trial_scenes import Spring, Trap
@@ -187,9 +187,9 @@ TANGENTIAL_RATE = math.sqrt(6.0 * K_T / MASS)
 
 def test_parts_are_short_against_what_swings():
     scene = Linked(overlapping()).scene
-    assert parts_of(scene, PLAIN_TERMS) == 1
-    assert parts_of(scene, at.TERMS) >= 6  # of two turns
-    assert parts_of(Linked(overlapping(friction=0.4)).scene, PLAIN_TERMS) == 2
+    assert [parts_of(scene, turns) for turns in (0.0, 1.5, 3.0)] == [1, 1, 1]
+    assert [parts_of(scene, turns) for turns in (3.2, 6.3, 12.6)] == [3, 4, 8]
+    assert parts_of(Linked(overlapping(friction=0.4)).scene, 2.9) == 2
 
 
 @pytest.mark.parametrize("turns", [4.0, 8.0])
@@ -198,7 +198,8 @@ def test_a_step_is_cut_where_contacts_have_swung_open_in_it(turns):
     scene, step = Linked(overlapping()), turns / NORMAL_RATE
     assert scene.work.candidates[0, at.CLOSED] == at.TOUCHES
     scene.step(step)
-    parts = parts_of(scene.scene, scene.terms)
+    parts = parts_of(scene.scene, scene.clock[at.SERIES_TURNS])
+    assert scene.clock[at.SERIES_TURNS] == pytest.approx(turns, rel=0.2)
     share = scene.call(cut, scene.clock, step, 1e-12)
     assert 0.5 * math.pi < share * turns < 0.5 * math.pi + turns / parts
     gap = scene.work.motion[at.NEW, 1, at.X] - scene.work.motion[at.NEW, 0, at.X] - 2.0 * R
