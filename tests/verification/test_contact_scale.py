@@ -49,7 +49,7 @@ def study_of(name, k_n):
         # Two contacts throw each other open in turn, thousands of times.
         ("III", 16, 0.0, 2000.0, 29, "B", 1500),
         ("III", 64, 0.0, 2000.0, 46, "B", 8000),
-        ("III", 64, 0.0, 2e5, 44, "B", 4000),
+        ("III", 64, 0.0, 2e5, 44, "B", 8000),
         ("III", 64, 0.0, 2e5, 54, "B", 4000),
     ],
 )
