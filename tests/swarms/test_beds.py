@@ -125,6 +125,14 @@ def test_a_frictionless_bed_of_two_sizes_is_packed_at_random():
     assert np.mean(found) == pytest.approx(0.84, abs=0.015)
 
 
+def test_thin_floors_hold_what_falls_in_long_steps_across_switches():
+    """A polygon that sinks steadily beside one at rest: within a step its vertices went from one
+    side of the floor to the other, and nothing stopped it."""
+    run = pile_of(10, 0.4, False, 1e-9).run(0.25, max_steps=20_000)
+    assert run.status == Status.FINISHED
+    assert run.position[-1, 1, 1] > 5e-6
+
+
 def test_friction_keeps_a_heap_from_flattening():
     """A triangle of three rows on a floor: without friction it falls apart, with it it stays."""
     ends = {}
@@ -155,6 +163,7 @@ def test_polygons_pile_up_as_cheaply_as_those_that_stick(friction):
         run = pile_of(10, friction, attraction, 1e-9).run(3.0, max_steps=20_000)
         assert run.status == Status.FINISHED
         assert np.abs(run.velocity[-1, :, :2]).max() < 1e-9
+        assert run.position[-1, 1:, 1].min() > 0.0  # none has fallen through the floor
         steps[attraction] = run.effort.steps
     assert steps[False] <= 3.0 * steps[True]
 
@@ -165,6 +174,7 @@ def test_fifty_polygons_come_to_rest_though_nothing_holds_them(friction):
     run = pile_of(50, friction, False, 1e-9).run(2.5, max_steps=20_000)
     assert run.status == Status.FINISHED
     assert np.abs(run.velocity[-1, :, :2]).max() < 1e-5
+    assert run.position[-1, 1:, 1].min() > 0.0
     assert run.effort.steps < 60_000
 
 

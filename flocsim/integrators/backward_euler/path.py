@@ -35,7 +35,7 @@ from flocsim.integrators.rhs.forces import sum_other_forces
 from flocsim.integrators.rhs.jacobian import normal_rows
 from flocsim.integrators.rhs.views import effective_mass
 
-MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 45, 20, 15
+MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 40
 """Iterations at most: along gaps that are frozen, along true ones from then on, and along these
 where pairs are taken to close and slide as in the step before."""
 

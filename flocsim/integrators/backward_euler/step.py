@@ -35,8 +35,11 @@ from flocsim.integrators.rhs.views import contact_view, inertia, memory_of
 FEW = 2
 """Behind a step with so few switches at most, contacts are taken to be as they were, first."""
 
-SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 5.0, 0.1
+SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
 """The next step is that much shorter than would just do; bounds of the change."""
+
+SHORT = 0.5
+"""A step of less than this share of what it might have been has been cut short."""
 
 FIRST_SHARE = 0.1
 """The first step with located switches behind one across them, over that."""
@@ -102,8 +105,10 @@ def euler_step(scene, work, clock, step, lasting):
 
 def note_rates(scene, work, clock, step):
     """Write down what a step that has been accepted says of the next one."""
-    write_rates(work, step)
-    clock[at.RATES_KNOWN] = 1.0
+    # A short one, in which a pair has landed, says nothing of how rates go on.
+    clock[at.RATES_KNOWN] = 1.0 if step > SHORT * clock[at.STEP] else 0.0
+    if clock[at.RATES_KNOWN] == 1.0:
+        write_rates(work, step)
     switches = 0
     for row in range(work.tally[at.CANDIDATES]):
         before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]

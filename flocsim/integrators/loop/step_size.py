@@ -95,12 +95,34 @@ def imminent_switch(scene, work, clock, step):
     return step
 
 
+SHORT_OF_IT, LANDING = 0.05, 0.5
+"""A step across switches ends so many tolerances before a pair lands in it; the landing itself
+lasts as long as this share of one takes."""
+
+
+def step_to_landing(work, clock, step):
+    """The step, or that which ends just before the first pair lands in it, or in which it does: by
+    its end alone a step does not tell when in it that was, and would be wrong by half the way.
+    Pairs that come nearer by less than the tolerance may land anywhere in it."""
+    tolerance = clock[at.TOLERANCE]
+    for row in range(work.tally[at.CANDIDATES]):
+        gap, speed = work.geometry[at.NOW, row, at.GAP], -normal_rate(work, at.NOW, row)
+        if gap > 0.0 and speed * step > max(gap, tolerance):
+            way = gap - SHORT_OF_IT * tolerance
+            lands = way <= 0.5 * SHORT_OF_IT * tolerance
+            step = (LANDING * tolerance if lands else way) / speed
+    return step
+
+
 def choose_step(scene, work, clock, lists):
     step = min(clock[at.STEP], clock[at.LARGEST_STEP])
     if lists:
         step = min(step, time_within(scene, work, share_ahead(scene, work)))
-        if clock[at.TOLERANCE] < math.inf and clock[at.ACROSS] == 0.0:
-            step = imminent_switch(scene, work, clock, step)
+        if clock[at.TOLERANCE] < math.inf:
+            if clock[at.ACROSS] == 0.0:
+                step = imminent_switch(scene, work, clock, step)
+            else:
+                step = step_to_landing(work, clock, step)
     left = min(clock[at.UNTIL], kick_end(scene, work)) - clock[at.TIME]
     # Two even steps at the end instead of a long one and a sliver.
     if step < left < 2.0 * step and clock[at.TOLERANCE] < math.inf:

@@ -13,7 +13,14 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.events.first_event import SAME
-from flocsim.integrators.loop.step_size import adaptive_factor, plan, reject, step_behind_touch
+from flocsim.integrators.loop.step_size import (
+    adaptive_factor,
+    plan,
+    reject,
+    step_behind_touch,
+    step_to_landing,
+)
+from tests.helpers.one_step import Stage
 
 R = 10e-6
 
@@ -65,6 +72,25 @@ def test_behind_a_step_that_may_be_a_series_it_goes_with_the_fifth_root():
 
 def test_contacts_that_part_need_none():
     assert first_step(-0.01) == math.inf
+
+
+def landing(gap, speed, step):
+    """The step across switches of two spheres a gap [m] apart that meet at a speed [m/s]."""
+    bodies = [
+        Body(Sphere(R), (0.0, 0.0), velocity=(speed, 0.0), density=2650.0),
+        Body(Sphere(R), (2.0 * R + gap, 0.0), density=2650.0),
+    ]
+    stage = Stage(bodies, [Contact()])
+    return stage.linked(step_to_landing)(stage.work, stage.clock, step)
+
+
+def test_a_step_across_switches_ends_just_before_a_pair_lands_and_lands_it_at_once():
+    assert landing(1e-6, 1e-3, 1e-4) == 1e-4
+    assert landing(1e-6, -1e-3, 1e-2) == 1e-2
+    assert landing(1e-6, 1e-3, 1e-2) == pytest.approx((1e-6 - 0.05e-9) / 1e-3, rel=1e-6)
+    assert landing(0.05e-9, 1e-3, 1e-2) == pytest.approx(0.5e-9 / 1e-3, rel=1e-6)
+    # Slower than the tolerance a step.
+    assert landing(1e-10, 1e-8, 1e-2) == 1e-2
 
 
 def approach(order=5.0):
