@@ -25,7 +25,12 @@ from flocsim.integrators.events.crossings import interpolate
 from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
 from flocsim.integrators.events.first_event import leave_at_once, settle_grazes
 from flocsim.integrators.events.grazes import leave_early, settle
-from flocsim.integrators.exponential.collocation import carry_known, judge_series, solve_series
+from flocsim.integrators.exponential.collocation import (
+    A_SWING,
+    carry_known,
+    judge_series,
+    solve_series,
+)
 from flocsim.integrators.exponential.samples import cut as cut_series
 from flocsim.integrators.exponential.series import write_at
 from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
@@ -39,7 +44,12 @@ from flocsim.integrators.radau.stages import evaluate_states, solve_stages
 from flocsim.integrators.radau.systems import factorise_systems, is_dense
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.integrators.rhs.stated_error import bound_carried, carry_vector, overlap_error
+from flocsim.integrators.rhs.stated_error import (
+    bound_carried,
+    carry_vector,
+    grow_sums,
+    overlap_error,
+)
 from flocsim.integrators.rhs.views import inertia
 
 ORDER_OF_ESTIMATE = 4.0
@@ -76,7 +86,9 @@ def carry_over_step(scene, work, clock, step):
         return carry_error(scene, work, clock, step)
     bound_carried(scene, work)
     whole = clock[at.SERIES_STEP]
-    carry_known(work, whole, step / whole)
+    carry_known(work, clock, whole, step / whole)
+    if clock[at.SERIES_TURNS] <= A_SWING:
+        grow_sums(scene, work, step)
     add_step(work)
     return bound_carried(scene, work)
 

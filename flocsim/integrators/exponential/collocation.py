@@ -28,7 +28,11 @@ from flocsim.integrators.radau.stages import (
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.radau.tableau import NODES as RADAU
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
-from flocsim.integrators.rhs.error import error_size, rounding_size, step_tolerance
+from flocsim.integrators.rhs.error import (
+    error_size,
+    rounding_size,
+    step_tolerance,
+)
 from flocsim.integrators.rhs.forces import sum_forces, take_stage
 from flocsim.integrators.rhs.views import inertia, lever
 
@@ -54,6 +58,12 @@ ITERATION_SHARE = 1e-2
 LEAVES, LEAP = 0.5, 2.0
 """Steps become too long for a series only where Radau IIA is likely to be wrong by no more than
 so many times what it may be, contacts taking most of that up; and by so many times at once."""
+
+A_SWING = 1.0
+"""In a step so long, in terms of the fastest rate, nothing swings, so that it has one way; …"""
+
+LEAST_ALONG = 0.1
+"""… it does not go the way of R where less than this share of what bodies do there is left."""
 
 TINY = 1e-300
 """Stands for no inertia."""
@@ -258,8 +268,8 @@ def error_of_radau(scene, work, terms, step):
     return error_size(scene, work)
 
 
-def estimate(scene, work, step):
-    """What leaving out the second point would change, in DEVIATION; its size [m]."""
+def estimate(work, step):
+    """What leaving out the second point would change, in DEVIATION."""
     remainder = work.remainder
     for body in range(work.motion.shape[1]):
         for axis in range(3):
@@ -270,31 +280,82 @@ def estimate(scene, work, step):
             remainder[at.CHANGED, 3, body, axis] = cubic
     begin_change(work)
     write_change(work, 1, step, 1.0, at.DEVIATION)
-    return error_size(scene, work)
+
+
+def add_last_term(work, step):
+    """Add the last term of the motion to its error: all that is left out comes to less."""
+    last = work.tally[at.SERIES_TERMS] - 1
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            term = work.series[at.MOTION, last, body, axis]
+            work.motion[at.DEVIATION, body, axis] += term
+            work.motion[at.DEVIATION, body, at.VELOCITY + axis] += last / step * term
 
 
 @apart
 def judge_series(scene, work, clock, step):
-    """Estimate the error of a step, in DEVIATION; its size [m]."""
+    """Estimate the error of a step, in DEVIATION."""
     longer = clock[at.LONGEST_SERIES] / step
     if longer < math.inf:
         error = error_of_radau(scene, work, work.tally[at.SERIES_TERMS], step)
         if error * longer**4 <= LEAVES * step_tolerance(work, clock):
             clock[at.LONGEST_SERIES] *= LEAP
-    return estimate(scene, work, step)
+    estimate(work, step)
+    add_last_term(work, step)
+
+
+def errors_over_ways(work, share):
+    """How large the carried error is, at the start of a step and as CHANGE has it at its end, over
+    the way from there to here, both along what R is in the end: 0 where the step does not go that
+    way."""
+    motion, remainder = work.motion, work.remainder
+    before = after = along = every = 0.0
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            force = remainder[at.MOTION, 1, body, axis] + remainder[at.MOTION, 2, body, axis]
+            force += remainder[at.MOTION, 3, body, axis]
+            way = force * (motion[at.NOW, body, axis] - motion[at.START, body, axis])
+            along, every = along + way, every + abs(way)
+            before += force * motion[at.CARRIED, body, axis]
+            after += force * motion[at.CHANGE, body, axis]
+    if abs(along) <= LEAST_ALONG * every:
+        return 0.0, 0.0
+    return before * share / along, after * share / along
+
+
+def begin_carrying(work, step, before, after):
+    """Write the first terms of the carried error, and what pushes it on besides: FORCING, and as
+    much as R changes with the way."""
+    motion, series, remainder = work.motion, work.series, work.remainder
+    more = after - before
+    for body in range(motion.shape[1]):
+        for axis in range(3):
+            series[at.CHANGED, 0, body, axis] = motion[at.CARRIED, body, axis]
+            series[at.CHANGED, 1, body, axis] = step * motion[at.CARRIED, body, at.VELOCITY + axis]
+            one = remainder[at.MOTION, 1, body, axis]
+            two = 2.0 * remainder[at.MOTION, 2, body, axis]
+            three = 3.0 * remainder[at.MOTION, 3, body, axis]
+            forcing = motion[at.FORCING, body, at.VELOCITY + axis]
+            remainder[at.CHANGED, 0, body, axis] = forcing + before * one
+            remainder[at.CHANGED, 1, body, axis] = before * two + more * one
+            remainder[at.CHANGED, 2, body, axis] = before * three + more * two
+            remainder[at.CHANGED, 3, body, axis] = more * three
 
 
 @apart
-def carry_known(work, step, share):
+def carry_known(work, clock, step, share):
     """Carry the error over a share of a step that is a series, into CHANGE: as what changes its
-    start changes its end, under what forces it besides."""
-    motion, series, remainder = work.motion, work.series, work.remainder
-    for body in range(motion.shape[1]):
-        for axis in range(3):
-            speed = motion[at.CARRIED, body, at.VELOCITY + axis]
-            series[at.CHANGED, 0, body, axis] = motion[at.CARRIED, body, axis]
-            series[at.CHANGED, 1, body, axis] = step * speed
-            remainder[at.CHANGED, 0, body, axis] = motion[at.FORCING, body, at.VELOCITY + axis]
-            for k in range(1, 4):
-                remainder[at.CHANGED, k, body, axis] = 0.0
+    start changes its end, under what forces it besides.
+
+    As bodies come close their attraction gets steeper within a step, and an error of when they do
+    grows as their speed does: with R, as far as the error lies on their way.
+    """
+    begin_carrying(work, step, 0.0, 0.0)
     write_change(work, 0, step, share, at.CHANGE)
+    if clock[at.SERIES_TURNS] <= A_SWING:
+        for _ in range(2):
+            before, after = errors_over_ways(work, share)
+            if before == 0.0 and after == 0.0:
+                return
+            begin_carrying(work, step, before, before + (after - before) / share)
+            write_change(work, 0, step, share, at.CHANGE)

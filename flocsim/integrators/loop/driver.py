@@ -255,6 +255,9 @@ def advance(scene, work, observed, clock, counts, record):
             until = min(clock[at.UNTIL], kick_end(scene, work))
             leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
+        if trials > 0 and switched == SAME:
+            # Behind a kink of a law its derivatives may still be those before.
+            clock[at.SEEN_PACE] = 0.0
         if switched != SAME:
             clock[at.STEP] = max(clock[at.STEP], shortest_needed(scene, work))
             clock[at.STEP] = min(clock[at.STEP], step_behind_touch(scene, work, clock))

@@ -30,6 +30,7 @@ from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mob
 from flocsim.integrators.rhs.views import (
     along_normal,
     contact_view,
+    lever,
     memory_of,
     normal_rate,
     pressed_view,
@@ -68,6 +69,35 @@ def carried(work, body, place, speed, step):
     way = step if lasting > LONG * step else lasting * (1.0 - left)
     errors[body, place] += errors[body, speed] * way
     errors[body, speed] *= left
+
+
+def rate_of_growth(scene, work):
+    """By how much the velocity of the error changes over a step, along its place and over that
+    [1/s]: CHANGE is what CARRIED has become; above 0 where forces drive bodies apart, or together,
+    the more, the farther they are off. 0 where tangential displacements are wrong, too: the error
+    does not follow from what it was, then."""
+    pushed = size = 0.0
+    for body in range(work.motion.shape[1]):
+        for axis in range(3):
+            if work.motion[at.FORCING, body, at.VELOCITY + axis] != 0.0:
+                return 0.0
+            square = lever(scene, body, axis) ** 2
+            now, later = work.motion[at.CARRIED, body, axis], work.motion[at.CHANGE, body, axis]
+            more = work.motion[at.CHANGE, body, at.VELOCITY + axis]
+            more -= work.motion[at.CARRIED, body, at.VELOCITY + axis]
+            pushed += 0.5 * square * (now + later) * more
+            size += square * 0.25 * (now + later) ** 2
+    return pushed / size if pushed > 0.0 and size > 0.0 else 0.0
+
+
+def grow_sums(scene, work, step):
+    """Make the sums of errors grow as the vector of them does in a step in which nothing swings:
+    they know nothing else of an attraction that gets steeper."""
+    rate = min(rate_of_growth(scene, work), 1.0 / step)
+    for body in range(work.bodies.shape[0]):
+        work.bodies[body, at.ERROR_SPEED] += rate * work.bodies[body, at.ERROR_PLACE]
+        work.bodies[body, at.SWITCH_SPEED] += rate * work.bodies[body, at.SWITCH_PLACE]
+        work.bodies[body, at.DOUBT_SPEED] += rate * work.bodies[body, at.DOUBT_PLACE]
 
 
 @hook

@@ -2,6 +2,7 @@
 
 import math
 
+import attrs
 import numpy as np
 import pytest
 
@@ -10,7 +11,7 @@ from flocsim import Body, Sphere, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.forces import Contact, StokesDrag
+from flocsim.forces import BodyForce, Contact, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt, cut
@@ -20,6 +21,7 @@ from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.exponential.samples import parts_of
 from flocsim.integrators.exponential.series import shorten
+from flocsim.integrators.loop.driver import take_new_state
 from flocsim.integrators.rhs.stated_error import carry_vector
 from tests.helpers.trial_scenes import Spring, Trap
 
@@ -79,7 +81,7 @@ def swung(time, damping=0.0):
 @pytest.mark.parametrize("turns", [0.1, 1.0, 3.0, 8.0])
 def test_a_linear_swing_is_exact_however_far_it_goes(turns):
     scene = Linked(trapped())
-    assert scene.step(turns / RATE) < 1e-4
+    assert scene.step(turns / RATE) < 1e-3
     assert scene.terms > 0
     found = scene.work.motion[at.NEW, 0]
     place, speed = swung(turns / RATE)
@@ -158,6 +160,52 @@ def test_an_error_is_carried_as_it_would_swing(share):
     speed = 1e-7 * math.cos(turn) - 1e-10 * RATE * math.sin(turn)
     assert work.motion[at.CARRIED, 0, at.X] == pytest.approx(place, abs=2e-2 * 1e-10)
     assert work.motion[at.CARRIED, 0, at.VX] == pytest.approx(speed, abs=2e-2 * 1e-10 * RATE)
+
+
+@attrs.frozen
+class Pull(BodyForce):
+    """F_x = −PULL m (x/10 µm)⁻³: the steeper, the nearer."""
+
+    @staticmethod
+    def kernel(body):
+        return -PULL * body.mass * (1e5 * body.x) ** -3.0, 0.0, 0.0
+
+
+PULL = 10.0
+"""[m/s²] at 10 µm."""
+
+
+def pulled(place, until):
+    """Where a body is that was at rest at a place [m]: x ẍ = … has x² fall as the time's square."""
+    return math.sqrt(place**2 - PULL * 1e-15 * (until / place) ** 2)
+
+
+def test_an_error_grows_as_an_attraction_gets_steeper():
+    """By forty times here, the attraction getting up to twice as steep in a step; sums of
+    errors grow with it."""
+    system = System([Body(Sphere(R), (1e-5, 0.0), surface_density=2.0)], [Pull()], Implicit())
+    scene, clock = Linked(system), Implicit().fresh_clock()
+    scene.clock[:], work, nudge = clock, scene.work, 1e-13
+    scene.clock[at.UNTIL] = 1.0
+    work.motion[at.CARRIED, 0, at.X], work.bodies[0, at.ERROR_PLACE] = nudge, 10.0 * nudge
+    time, end = 0.0, 0.99875e-3
+    while time < end:
+        here = work.motion[at.NOW, 0]
+        step = min(0.15 * here[at.X] / max(-here[at.VX], 1e-2), end - time)
+        assert scene.step(step) >= 0.0
+        assert scene.terms > 0
+        scene.linked(take_new_state)(work)
+        scene.clock[at.TIME] = time = time + step
+        work.motion[at.DEVIATION] = 0.0
+        sums = work.bodies[0]
+        sums[at.ERROR_PLACE] += step * sums[at.ERROR_SPEED]
+        scene.call(carry_vector, scene.clock, step)
+    place = pulled(1e-5, time)
+    true = pulled(1e-5 + nudge, time) - place
+    assert work.motion[at.NOW, 0, at.X] == pytest.approx(place, rel=1e-3)
+    assert true > 30.0 * nudge
+    assert work.motion[at.CARRIED, 0, at.X] == pytest.approx(true, rel=0.2)
+    assert work.bodies[0, at.ERROR_PLACE] > 5.0 * true
 
 
 def overlapping(overlap=1e-9, speeds=(0.0, 0.0), pressed=False, **law):

@@ -286,6 +286,29 @@ def test_the_stated_error_of_a_bounce_is_above_the_true_one_and_not_far(damping,
     assert 0.0 < true <= run.error < 3e3 * true
 
 
+@pytest.mark.parametrize("number", rest_slow([34, 11, 39, 1], lambda number: number == 34))
+def test_it_covers_what_a_kink_of_a_law_leads_to(number):
+    """Discs that bounce with friction and without tension, and leave each other before they part:
+    the derivatives at the kink are those before it."""
+    rng = np.random.default_rng(number)
+    across = float(rng.uniform(-6e-6, 6e-6))
+    bodies = [
+        Body(
+            Sphere(size), (-side * 1.5e-5, y), float(rng.uniform(0, 6)), (side * 0.03, 0.0),
+            float(rng.normal() * 1e3), surface_density=2.0,
+        )
+        for side, size, y in ((1.0, 8e-6, 0.0), (-1.0, 5e-6, across))
+    ]  # fmt: skip
+    forces = [StokesDrag(), Contact(tension=False, friction=0.3)]
+    system = System(bodies, forces, Implicit(1e-9))
+    run, exact = (
+        attrs.evolve(system, integrator=Implicit(each)).run(1e-3, record=False)
+        for each in (1e-9, 1e-12)
+    )
+    true = end_distance(bodies, run.position[-1], exact.position[-1])
+    assert true <= run.error
+
+
 def test_what_a_contact_takes_up_is_no_longer_stated():
     """A ball falls on a fixed one and lies there: the sums alone go on for ever."""
     bodies = [
