@@ -174,7 +174,8 @@ def neighbours(bodies, one, other):
 def hand_over(bodies, every, row, receivers, xi):
     """Give the ξ of an opening pair to the pair of the same bodies that the contact rolls on to.
 
-    The nearest that stays closed, if it is of neighbouring features or within r_i + r_j. As a
+    The nearest that stays closed, if it is of neighbouring features or within r_i + r_j; of pairs
+    at one point that with the least displacement. As a
     vector ξ t on the vertex's body, projected on the receiver's tangent, and no more than leaves
     Σ ξ² as it was; without a receiver it vanishes.
     """
@@ -186,7 +187,8 @@ def hand_over(bodies, every, row, receivers, xi):
         and (apart[r] <= reach or neighbours(bodies, every.pair[row], every.pair[r]))
     ]  # fmt: skip
     if same:
-        nearest = same[int(np.argmin(apart[same]))]
+        as_near = [r for r in same if apart[r] <= apart[same].min() + 1e-6 * reach]
+        nearest = min(as_near, key=lambda r: abs(xi[r]))
         side = 1.0 if every.pair[nearest, 0] == every.pair[row, 0] else -1.0
         most = np.hypot(xi[row], xi[nearest])
         total = xi[nearest] + side * (every.tangent[row] @ every.tangent[nearest]) * xi[row]

@@ -30,6 +30,8 @@ is for the first."""
 TOO_WIDE = 4.0
 """Of few bodies they are made anew where they are so many times as wide as that."""
 
+ONE_POINT = 1e-6
+"""Contact points that are no farther apart than this share of r_i + r_j are one."""
 
 MOST_AHEAD, LEAST_USED = 0.8, 0.1
 """Shares of its budget that a pair of few bodies may have spent behind a step, and that it has to
@@ -343,10 +345,10 @@ def heir_of(scene, work, row):
     """The closed pair that a contact rolls on to when this one opens, −1 where it does not.
 
     The nearest contact point of the same two bodies, if it is of a neighbouring pair of features
-    or within r_i + r_j of the spheroradii.
+    or within r_i + r_j of the spheroradii. Where two corners meet, four pairs have one point: that
+    which is displaced least takes over, as rounding would else decide.
     """
-    found = -1
-    least = math.inf
+    found, least, displaced = -1, math.inf, math.inf
     low = min(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
     high = max(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
     near = scene.bodies[low, at.RADIUS] + scene.bodies[high, at.RADIUS]
@@ -360,9 +362,12 @@ def heir_of(scene, work, row):
         if work.geometry[at.NOW, other, at.GAP] < 0.0:
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
-            if distance < least and (distance <= near or rolls_on_to(scene, work, row, other)):
-                least = distance
-                found = other
+            own = abs(work.slip[at.NOW, other])
+            nearer = distance < least - ONE_POINT * near
+            if not (nearer or (distance <= least + ONE_POINT * near and own < displaced)):
+                continue
+            if distance <= near or rolls_on_to(scene, work, row, other):
+                found, least, displaced = other, min(distance, least), own
     return found
 
 

@@ -188,6 +188,28 @@ def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
     assert not work.slip[at.NOW].any()
 
 
+def test_where_two_corners_meet_the_pair_that_is_displaced_least_takes_over():
+    """Four pairs have one point there: which of them rounding puts nearest means nothing."""
+    tip = 4e-6 * np.array([[-1, 0], [-0.05, -0.975], [0, -1], [0.05, -0.975], [1, 0]])
+    shape = SpheroPolygon(np.vstack([tip, -tip[1:-1]]), RADIUS)
+    fixed, body = (Body(shape, surface_density=2.0) for _ in range(2))
+    height = 8e-6 + 2 * RADIUS - OVERLAP
+    for which in range(4):
+        scene = scene_of([fixed, body], Fluid(), [])
+        work = work_of(scene, np.array([[0.0, 0.0, 0.0], [0.0, height, 0.0]]), np.zeros((2, 3)))
+        assert list_candidates(scene, work)
+        locate_contacts(scene, work, at.NOW)
+        gap = work.geometry[at.NOW, : work.tally[at.CANDIDATES], at.GAP]
+        closed, opened = np.flatnonzero(gap < 0.0), int(np.flatnonzero(gap >= 0.0)[0])
+        assert len(closed) == 4
+        slips = np.full(4, 2e-9)
+        slips[which] = 1e-10
+        work.slip[at.NOW, closed], work.slip[at.NOW, opened] = slips, 1e-9
+        hand_over(scene, work)
+        changed = np.flatnonzero(work.slip[at.NOW, closed] != slips)
+        assert changed.tolist() == [which]
+
+
 def test_listing_anew_keeps_every_displacement():
     scene, work = square_on_slab(0.0)
     slide(scene, work, 1e-7, steps=10)
