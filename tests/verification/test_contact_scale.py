@@ -64,7 +64,7 @@ def test_what_decides_is_decided_at_its_own_scale(
 
 
 def test_rattles_are_rare_and_mostly_cut_short():
-    """A single one is chance: in the mean a collision took 5,000 steps with every cycle followed."""
+    """Single ones are chance; in the mean it was 5,200 steps while every cycle was followed."""
     study = study_of("III", 2e5)
     steps = [study.run(0, 64, 0.0, replicate)["steps"] for replicate in range(60)]
     assert np.mean(steps) < 2500
