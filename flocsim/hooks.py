@@ -96,8 +96,8 @@ def first_step(work, clock, frequency, speed, later):
 
 @hook
 def cut(scene, work, clock, step, resolution):
-    """End a step where something has switched in it that its ends do not show, in NEW; the share of
-    it that is left."""
+    """End a step that is a series where something has switched in it that its ends do not show, in
+    NEW; the share of it that is left."""
     return 1.0
 
 

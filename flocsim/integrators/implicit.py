@@ -26,9 +26,9 @@ from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
 from flocsim.integrators.events.first_event import leave_at_once, settle_grazes
 from flocsim.integrators.events.grazes import leave_early, settle
 from flocsim.integrators.exponential.collocation import (
-    A_SWING,
     carry_known,
     judge_series,
+    nothing_swings,
     solve_series,
 )
 from flocsim.integrators.exponential.samples import cut as cut_series
@@ -87,7 +87,7 @@ def carry_over_step(scene, work, clock, step):
     bound_carried(scene, work)
     whole = clock[at.SERIES_STEP]
     carry_known(work, clock, whole, step / whole)
-    if clock[at.SERIES_TURNS] <= A_SWING:
+    if nothing_swings(clock):
         grow_sums(scene, work, step)
     add_step(work)
     return bound_carried(scene, work)

@@ -29,7 +29,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler, solve_real
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import end_of_run, rounding_size
-from flocsim.integrators.rhs.forces import sum_other_forces
+from flocsim.integrators.rhs.forces import keep_start, sum_other_forces
 from flocsim.integrators.rhs.jacobian import assemble_others
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
@@ -43,9 +43,7 @@ MOST_ITERATIONS = 8
 
 def begin_step(work, clock):
     """Keep the start of the step."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    keep_start(work)
     for row in range(work.tally[at.CANDIDATES]):
         for column in range(at.GEOMETRY_COLUMNS):
             work.geometry[at.TRIAL, row, column] = work.geometry[at.NOW, row, column]

@@ -33,7 +33,7 @@ from flocsim.integrators.rhs.error import (
     rounding_size,
     step_tolerance,
 )
-from flocsim.integrators.rhs.forces import sum_forces, take_stage
+from flocsim.integrators.rhs.forces import keep_start, sum_forces, take_stage
 from flocsim.integrators.rhs.views import inertia, lever
 
 ROOT = 5.0**0.5
@@ -198,9 +198,7 @@ def write_all_at(work, terms, step, share, state):
 
 def finish(scene, work, terms, step):
     """The end of the step, and the tangential displacements there, are NEW; it began at START."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    keep_start(work)
     last = at.FIRST_STAGE + 2
     write_all_at(work, terms, step, 1.0, last)
     locate_state(scene, work, last)
@@ -304,16 +302,20 @@ def judge_series(scene, work, clock, step):
     add_last_term(work, step)
 
 
+def nothing_swings(clock):
+    """Whether the step is so short that nothing swings in it."""
+    return clock[at.SERIES_TURNS] <= A_SWING
+
+
 def errors_over_ways(work, share):
     """How large the carried error is, at the start of a step and as CHANGE has it at its end, over
     the way from there to here, both along what R is in the end: 0 where the step does not go that
     way."""
-    motion, remainder = work.motion, work.remainder
+    motion = work.motion
     before = after = along = every = 0.0
     for body in range(motion.shape[1]):
         for axis in range(3):
-            force = remainder[at.MOTION, 1, body, axis] + remainder[at.MOTION, 2, body, axis]
-            force += remainder[at.MOTION, 3, body, axis]
+            force = remainder_at(work, 1.0, body, axis)
             way = force * (motion[at.NOW, body, axis] - motion[at.START, body, axis])
             along, every = along + way, every + abs(way)
             before += force * motion[at.CARRIED, body, axis]
@@ -352,7 +354,7 @@ def carry_known(work, clock, step, share):
     """
     begin_carrying(work, step, 0.0, 0.0)
     write_change(work, 0, step, share, at.CHANGE)
-    if clock[at.SERIES_TURNS] <= A_SWING:
+    if nothing_swings(clock):
         for _ in range(2):
             before, after = errors_over_ways(work, share)
             if before == 0.0 and after == 0.0:

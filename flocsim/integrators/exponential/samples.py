@@ -148,8 +148,6 @@ def cut(scene, work, clock, step, resolution):
     """End a step that is a series where something is first seen to have switched; the share of it
     that is left."""
     terms = work.tally[at.SERIES_TERMS]
-    if terms == 0:
-        return 1.0
     share = first_too_deep(scene, work)
     parts = parts_of(scene, clock[at.SERIES_TURNS])
     if share == 1.0 and parts > 1:

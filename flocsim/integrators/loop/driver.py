@@ -235,7 +235,7 @@ def advance(scene, work, observed, clock, counts, record):
             trials += 1
             clock[at.STAGED_STEP] = 0.0
             continue
-        if lists and trials < MOST_TRIALS and clock[at.ACROSS] == 0.0:
+        if lists and trials < MOST_TRIALS and work.tally[at.SERIES_TERMS] > 0:
             kept = cut(scene, work, clock, step, resolutions_of(work, clock)[0])
             if kept < 1.0:
                 step *= kept

@@ -6,6 +6,7 @@ import math
 import flocsim.arrays as at
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
+from flocsim.integrators.rhs.forces import keep_start
 from flocsim.integrators.rhs.views import inertia
 
 GOOD_CUBIC = 0.1
@@ -168,7 +169,5 @@ def guess_stages(scene, work, clock, step):
         keep_accelerations(scene, work, step)
     else:
         keep_velocities(work)
-    for body in range(work.motion.shape[1]):
-        for axis in range(6):
-            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    keep_start(work)
     clock[at.STAGED_STEP], clock[at.STAGED_AT] = step, clock[at.TIME]

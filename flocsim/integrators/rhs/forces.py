@@ -32,6 +32,13 @@ from flocsim.integrators.rhs.views import (
 )
 
 
+def keep_start(work):
+    """Keep the motion at the start of the step, in START."""
+    for body in range(work.motion.shape[1]):
+        for axis in range(at.MOTION_COLUMNS):
+            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+
+
 def take_stage(work, stage):
     """Make a stage the new state: its motion, and what closed pairs need."""
     for body in range(work.motion.shape[1]):
