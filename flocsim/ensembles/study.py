@@ -213,8 +213,7 @@ class Study(StudyKind):
         """
         system = encounter.system
         method = method or system.integrator
-        reached = tuple(system.reached.items())
-        kind = system.family, reached, type(method), bool(encounter.kick_energy)
+        kind = *encounter.kind, type(method)
         if kind not in self.drivers:
             made = system.changed(integrator=method)
             self.drivers[kind] = made.compose(observer=encounter.observer)

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from flocsim.compiler.by_pointer import table_of, told_kinds
+from flocsim.compiler.by_pointer import KEPT, keep, table_of, told_kinds
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError
 
@@ -95,6 +95,21 @@ def both(function, *arguments):
         value = compose(function, {}, jit=jit)(state, *arguments)
         found.append((value, state))
     return found
+
+
+class Owner:
+    """Of what stays."""
+
+
+def test_what_stays_is_told_alike_until_its_owner_is_gone():
+    state, owner = outer(), Owner()
+    words, kinds = table_of((state, 1.5))
+    keep(state, owner)
+    kept_words, kept_kinds = table_of((state, 1.5))
+    assert np.array_equal(words, kept_words) and kinds == kept_kinds
+    assert id(state) in KEPT
+    del owner
+    assert id(state) not in KEPT
 
 
 @pytest.mark.parametrize("function", [reads, writes, rows])

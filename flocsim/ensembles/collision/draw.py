@@ -86,6 +86,7 @@ LONGEST_REASON = 300
 """Letters of an exception's words in a note."""
 
 
+@lru_cache(maxsize=4096)
 def draws(seed: int, replicate: int) -> np.ndarray:
     """Five uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc, and
     the direction of j in a brownian meeting.
@@ -95,7 +96,9 @@ def draws(seed: int, replicate: int) -> np.ndarray:
     number of vertices and type.
     """
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
-    return np.random.Generator(np.random.Philox(stream)).random(5)
+    found = np.random.Generator(np.random.Philox(stream)).random(5)
+    found.flags.writeable = False
+    return found
 
 
 def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
@@ -260,11 +263,9 @@ class Draw:
         """
         run = self.begin(driver, max_steps, integrator=integrator)
         status = run.to_end(halted)
-        room = self.encounter.room
-        room[0] = max(room[0], len(run.work.candidates))
-        if status == Status.PAUSED:
-            return None
-        return self.row(run, status)
+        row = None if status == Status.PAUSED else self.row(run, status)
+        self.encounter.take_back(run.work)
+        return row
 
     def row(self, run: Run, status: Status) -> dict:
         """The row of a Run that has ended so; failed where a force gives no number."""

@@ -9,10 +9,11 @@ import attrs
 import numpy as np
 
 from flocsim import hooks
-from flocsim.arrays import Scene, Work, work_of
+from flocsim.arrays import Scene, Work, begin_anew, work_of
 from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
+from flocsim.compiler.by_pointer import KEPT, keep
 from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision.draw import orientations
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
@@ -28,6 +29,7 @@ from flocsim.forces.settling import (
     least_mobility,
     terminal_motion,
 )
+from flocsim.geometry.contact.compounds import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
 from flocsim.hydrodynamics.pair import node_radii, slots
@@ -122,9 +124,23 @@ class Encounter:
         return self.first.room if self.first else [LEAST_ROOM]
 
     @functools.cached_property
+    def spare(self) -> list[Work]:
+        """Work arrays of runs that have ended, in which those to come begin."""
+        return self.first.spare if self.first else []
+
+    @functools.cached_property
     def scene(self) -> Scene:
         """The two bodies as arrays for the driver, their laws compiled."""
-        return self.system.scene(laws=self.laws)
+        scene = self.system.scene(laws=self.laws)
+        keep(scene, self)
+        return scene
+
+    @functools.cached_property
+    def outlines(self) -> Outlines:
+        """Those of i and j."""
+        outlines = outlines_of(self.shapes)
+        keep(outlines, self)
+        return outlines
 
     def keyed(self, *numbers: int) -> "Encounter":
         """The same for a replicate whose random forces go by these numbers (seed, replicate)."""
@@ -136,7 +152,13 @@ class Encounter:
         other.__dict__["scene"] = self.scene._replace(key=key_of(*numbers))
         return other
 
-    @property
+    @functools.cached_property
+    def kind(self) -> tuple:
+        """What tells compiled drivers apart, of one method."""
+        reached = tuple(self.system.reached.items())
+        return self.system.family, reached, bool(self.kick_energy)
+
+    @functools.cached_property
     def kick_energy(self) -> float:
         """k_B T of the thermal motion [J], 0 without."""
         return max((each.energy for each in thermal_in(self.system.forces)), default=0.0)
@@ -255,7 +277,7 @@ class Encounter:
         turn_i, turn_j = self.turning
         return turn_i(float(numbers[0])), turn_j(float(numbers[1]))
 
-    @property
+    @functools.cached_property
     def turn_time(self) -> float:
         """(r_i + r_j)/|drift| [s]."""
         return self.size / math.hypot(*self.drift)
@@ -308,6 +330,11 @@ class Encounter:
 
     def observed(self) -> np.ndarray:
         """Fresh numbers for the observer: what it is given, and room for what it finds."""
+        return self.given.copy()
+
+    @functools.cached_property
+    def given(self) -> np.ndarray:
+        """What the observer of every replicate is given."""
         options = self.options
         observed = np.zeros(outcomes.OBSERVED_SIZE)
         given = options.escape_gap
@@ -369,7 +396,7 @@ class Encounter:
             self.options.delta_max, shapes[0], angles[0], shapes[1], angles[1]
         )
         offset = share * largest * self.bent
-        place = place_pair(shapes, angles, offset, self.start_gap)
+        place = place_pair(shapes, angles, offset, self.start_gap, self.outlines)
         if isinstance(self.options.start_gap, str):
             # Forces between the centres do not know how thin the outlines are.
             clear = self.size + self.start_gap
@@ -381,7 +408,20 @@ class Encounter:
 
     def work_at(self, place: np.ndarray, velocity: np.ndarray) -> Work:
         """Work arrays of the two at places and velocities (2, 3)."""
+        while self.spare:
+            work = self.spare.pop()
+            pieces = work.near.shape[1] - 1
+            if len(work.candidates) == self.room[0] and pieces == len(self.scene.pieces):
+                begin_anew(work, self.scene, place, velocity)
+                return work
         return work_of(self.scene, place, velocity, self.room[0])
+
+    def take_back(self, work: Work) -> None:
+        """Let a run to come begin in the work arrays of one that has ended."""
+        self.room[0] = max(self.room[0], len(work.candidates))
+        if id(work) not in KEPT:
+            keep(work, self.first or self)
+        self.spare.append(work)
 
     def start_in_flow(self, angles: Sequence[float], share: float) -> Work:
         """Work arrays where both go along with the flow, j on the way of share · (R_i + R_j)."""

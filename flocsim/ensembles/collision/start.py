@@ -19,7 +19,7 @@ from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
 from flocsim.geometry.contact import compounds
-from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.contact.compounds import Outlines, outlines_of
 from flocsim.geometry.contact.near_pairs import core_distance
 from flocsim.geometry.shapes.shape import Shape
 
@@ -32,10 +32,11 @@ LARGEST_RATIO = 4.0 / math.e**2
 
 def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
     """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
-    parts = shape.placed_parts(angle=angle)
+    across = math.cos(angle), -math.sin(angle)
+    parts = [(part.radius, part.points @ across) for part in shape.parts]
     return (
-        max(part.radius - part.points[:, 0].min() for part in parts),
-        max(part.radius + part.points[:, 0].max() for part in parts),
+        max(radius - float(x.min()) for radius, x in parts),
+        max(radius + float(x.max()) for radius, x in parts),
     )
 
 
@@ -76,13 +77,15 @@ def compiled_height(compound):
 
 
 def place_pair(
-    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float
-) -> np.ndarray:
-    """Places (2, 3) [m, m, rad] of i at the origin and j above it."""
+    shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float,
+    outlines: Outlines | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Places (2, 3) [m, m, rad] of i at the origin and j above it; ``outlines``: those of the
+    shapes, where they are at hand."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
     height = compiled_height(any(shape.is_compound for shape in shapes))(
-        outlines_of(shapes), float(angles[0]), float(angles[1]),
+        outlines or outlines_of(shapes), float(angles[0]), float(angles[1]),
         contact, reach, float(displacement), gap,
     )  # fmt: skip
     return np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])

@@ -73,6 +73,17 @@ def test_a_replicate_repeats_to_the_bit_in_any_order(study):
     assert same_row(study.run(0, 16, 0.0, 2), first)
 
 
+def test_work_arrays_are_used_again_for_other_flocs_too(study, tmp_path):
+    """Those of one run serve the next; a study that has run nothing else finds the same."""
+    study.run(0, 16, 0.0, 0)
+    spare = study.draw(0, 16, 0.0, 1).encounter.spare
+    before = [id(work) for work in spare]
+    rows = [study.run(0, 16, share, replicate) for share in (0.0, 0.5) for replicate in (1, 2, 3)]
+    assert before and [id(work) for work in spare] == before
+    fresh = small_study(tmp_path)
+    assert same_row(fresh.run(0, 16, 0.5, 3), rows[-1])
+
+
 def recorded(study):
     """(row, arrays) of one replicate."""
     draw = study.draw(0, 16, 0.0, 0)
