@@ -120,14 +120,14 @@ def overlap_error(scene, work, clock, row):
 
 
 def doubt_of_release(scene, work, clock, step):
-    """By how much it is in doubt whether contacts that are relieved in a step still press, over
+    """By how much it is in doubt whether contacts that may be relieved in a step still press, over
     what is allowed; it goes with the square of the step."""
     largest, g = 0.0, work.geometry
     least = ABOVE * above_rounding(work, at.NOW, 0.0)
     for row in range(work.tally[at.CANDIDATES]):
         if work.candidates[row, at.CLOSED] == at.TOUCHES:
             before, after = -g[at.NOW, row, at.GAP], -g[THIRD_STAGE, row, at.GAP]
-            if after < before and before > 0.0:
-                scatter = scatter_of(scene, work, clock, step, row)
+            scatter = scatter_of(scene, work, clock, step, row)
+            if after - SHARE_OF_SCATTER * scatter < before and before > 0.0:
                 largest = max(largest, scatter / (MOST_SCATTER * max(before, -after, least)))
     return largest
