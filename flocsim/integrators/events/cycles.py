@@ -10,7 +10,8 @@ on by as many cycles as leave their form as it is (envelope following, or multir
 A pair is described as it is seen from its first body: by where the other one is and how both move,
 which a cycle gives back but for next to nothing, and by where the whole of it is, which it moves
 evenly. What a cycle changes is carried on along a line in the first, and along a parabola in the
-second.
+second: of the time, as a cycle is found to end a little earlier or later by chance. So do gaps and
+displacements at its end scatter; where they do no more than that, they stay as they are.
 """
 
 import math
@@ -38,6 +39,9 @@ PACE = 0.1
 
 MOST_TURN = 0.05
 """… which may turn by so much [rad]; what is wrong of it has to stay below the tolerance."""
+
+CHANCE = 3.0
+"""A trend changes by less than one part in so many of itself from one cycle to the next."""
 
 RETURNS = 2
 """So often the modes in which a cycle begins come again until it ends: what changes to and fro from
@@ -154,25 +158,46 @@ def known(change, least):
     return change if abs(change) > least else 0.0
 
 
+def is_chance(change, bend, size):
+    """Whether a change is due to where switches happen to be found: small, and another one each
+    time."""
+    return max(abs(change), abs(bend)) <= FORM_ERROR * size and abs(change) <= CHANCE * abs(bend)
+
+
+def trend(now, last, before, size, least):
+    """What a cycle changes of a length of such a size, which was so much behind the last ones;
+    nothing where that is rounding, or chance."""
+    change, bend = known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
+    return 0.0 if is_chance(change, bend, size) else change
+
+
 def allowed(most, now, last, before, size, least):
     """How many cycles may be left out where a length of such a size was so much behind the last
     ones; what is below ``least`` is rounding."""
     change, bend = known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
-    if abs(change) * most > FORM * size:
-        most = FORM * size / abs(change)
-    if abs(bend) * most * most > 2.0 * FORM_ERROR * size:
+    chance = is_chance(change, bend, size)
+    largest = max(abs(change), abs(bend)) if chance else abs(change)
+    if largest * most > FORM * size:
+        most = FORM * size / largest
+    if not chance and abs(bend) * most * most > 2.0 * FORM_ERROR * size:
         most = math.sqrt(2.0 * FORM_ERROR * size / abs(bend))
     return most
 
 
-def cycles_of_form(work):
-    """How many cycles leave gaps and displacements about as they are."""
-    gaps, slips, least = 0.0, 0.0, above_rounding(work, at.NOW, 0.0)
+def sizes_of(work):
+    """The largest (gap, tangential displacement) of the pairs that take part [m]."""
+    gaps = slips = 0.0
     for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
             gaps = max(gaps, abs(work.geometry[at.NOW, row, at.GAP]))
             slips = max(slips, abs(work.slip[at.NOW, row]))
-    most = MOST_AT_ONCE
+    return gaps, slips
+
+
+def cycles_of_form(work):
+    """How many cycles leave gaps and displacements about as they are."""
+    least, most = above_rounding(work, at.NOW, 0.0), MOST_AT_ONCE
+    gaps, slips = sizes_of(work)
     for row in range(work.tally[at.CANDIDATES]):
         now, last = work.geometry[at.NOW, row, at.GAP], work.slip[at.CYCLE_GAP, row]
         size = gaps if takes_part(work, row) else now
@@ -183,34 +208,51 @@ def cycles_of_form(work):
     return most
 
 
-def change_of(scene, work, which):
-    """(What the last cycle has changed of a coordinate, by how much more than the one before)."""
-    now, last = (
-        coordinate(scene, work, at.NOW, which),
-        coordinate(scene, work, at.CYCLE_LAST, which),
-    )
+def lasted(clock):
+    """How long the last cycle took, and the one before [s]."""
+    at_last, at_before = clock[at.CYCLE_AT], clock[at.CYCLE_AT_BEFORE]
+    return clock[at.TIME] - at_last, at_last - at_before
+
+
+def period_of(clock):
+    """(How long the next cycle takes [s], by how much longer each is than the one before)."""
+    last, before = lasted(clock)
+    if abs(last - before) <= FORM_ERROR * last:
+        return 0.5 * (last + before), 0.0
+    return last, last - before
+
+
+def rates_of(scene, work, clock, which):
+    """Rate of change of a coordinate over the last cycle [1/s], and of that rate [1/s²]: what moves
+    evenly does so in time, wherever in it a cycle has been found to end."""
+    late, early = lasted(clock)
+    now = coordinate(scene, work, at.NOW, which)
+    last = coordinate(scene, work, at.CYCLE_LAST, which)
     before = coordinate(scene, work, at.CYCLE_BEFORE, which)
-    return now - last, now - 2.0 * last + before
+    rate = (now - last) / late
+    return rate, 2.0 * (rate - (last - before) / early) / (late + early)
 
 
-def way_of(scene, work, first):
-    """(Largest change over the last cycle in three coordinates from ``first`` on, of which the
-    angle counts in the place of an outline, by how much it differed from the one before) [m]."""
+def way_of(scene, work, clock, first):
+    """(Largest change over a cycle in three coordinates from ``first`` on, of which the angle
+    counts in the place of an outline, by how much it differs from the one before) [m]."""
     size = scene.bodies[0, at.BOUNDING_RADIUS] + scene.bodies[1, at.BOUNDING_RADIUS]
     way = bend = 0.0
+    period, _ = period_of(clock)
     for which in range(first, first + 3):
         lever = size if which in (TURNED, WHOLE) else 1.0
-        change, more = change_of(scene, work, which)
-        way, bend = max(way, lever * abs(change)), max(bend, lever * abs(more))
+        rate, more = rates_of(scene, work, clock, which)
+        way = max(way, lever * abs(rate) * period)
+        bend = max(bend, lever * abs(more) * period * period)
     return way, bend
 
 
-def error_of(scene, work, many):
+def error_of(scene, work, clock, many):
     """What the place of a body is wrong by where so many cycles are left out [m]: the next term of
     the line that its place against the other one is carried on along, and of the parabola of
     both."""
-    _, creep = way_of(scene, work, 0)
-    way, bend = way_of(scene, work, WHOLE)
+    _, creep = way_of(scene, work, clock, 0)
+    way, bend = way_of(scene, work, clock, WHOLE)
     beyond = many * bend / max(way, TINY) / 3.0
     return 0.5 * many * many * (creep + beyond * bend)
 
@@ -218,46 +260,46 @@ def error_of(scene, work, many):
 def cycles_of_motion(scene, work, clock, until):
     """How many cycles leave the motion of the pair as a whole about as it is, and its error below
     the tolerance."""
-    way, bend = way_of(scene, work, WHOLE)
-    turn, _ = change_of(scene, work, WHOLE)
+    way, bend = way_of(scene, work, clock, WHOLE)
+    period, longer = period_of(clock)
+    turn = rates_of(scene, work, clock, WHOLE)[0] * period
     most = MOST_AT_ONCE
     if bend * most > PACE * way:
         most = PACE * way / bend
     if abs(turn) * most > MOST_TURN:
         most = MOST_TURN / abs(turn)
-    period = clock[at.TIME] - clock[at.CYCLE_AT]
-    longer = period - clock[at.CYCLE_AT] + clock[at.CYCLE_AT_BEFORE]
     if abs(longer) * most > PACE * period:
         most = PACE * period / abs(longer)
-    error = error_of(scene, work, most)
-    if error > clock[at.TOLERANCE]:
-        # It goes with the square of their number at least.
-        most *= math.sqrt(clock[at.TOLERANCE] / error)
+    for power in (3.0, 3.0, 2.0):
+        # It goes with the square of their number at least, and with its third power at most.
+        error = error_of(scene, work, clock, most)
+        if error > clock[at.TOLERANCE]:
+            most *= (clock[at.TOLERANCE] / error) ** (1.0 / power)
     return min(most, 0.5 * (until - clock[at.TIME]) / period)
 
 
 def leave_out(scene, work, clock, many):
     """Go on by so many cycles."""
-    half = 0.5 * many * (many + 1.0)
+    period, longer = period_of(clock)
+    time = many * period + 0.5 * many * (many + 1.0) * longer
+    bent = 0.5 * time * (time + lasted(clock)[0])
     for which in range(COORDINATES):
-        change, bend = change_of(scene, work, which)
-        more = half * bend if which >= WHOLE else 0.0
-        now = coordinate(scene, work, at.NOW, which)
+        rate, more = rates_of(scene, work, clock, which)
+        now = coordinate(scene, work, at.NOW, which) + rate * time
         work.motion[at.TRIAL, which // at.MOTION_COLUMNS, which % at.MOTION_COLUMNS] = (
-            now + many * change + more
+            now + bent * more if which >= WHOLE else now
         )
     place_by(scene, work)
+    gaps, slips = sizes_of(work)
     least = above_rounding(work, at.NOW, 0.0)
     for row in range(work.tally[at.CANDIDATES]):
         if takes_part(work, row):
             slip, gap = work.slip[at.NOW, row], work.geometry[at.NOW, row, at.GAP]
-            work.slip[at.NOW, row] += many * known(slip - work.slip[at.CYCLE_SLIP, row], least)
-            change = known(gap - work.slip[at.CYCLE_GAP, row], least)
-            work.slip[at.CYCLE_GAP, row] = gap + many * change
-    period = clock[at.TIME] - clock[at.CYCLE_AT]
-    clock[at.TIME] += many * period + half * (
-        period - clock[at.CYCLE_AT] + clock[at.CYCLE_AT_BEFORE]
-    )
+            last, before = work.slip[at.CYCLE_SLIP, row], work.slip[at.CYCLE_SLIP_BEFORE, row]
+            work.slip[at.NOW, row] += many * trend(slip, last, before, slips, least)
+            last, before = work.slip[at.CYCLE_GAP, row], work.slip[at.CYCLE_GAP_BEFORE, row]
+            work.slip[at.CYCLE_GAP, row] = gap + many * trend(gap, last, before, gaps, least)
+    clock[at.TIME] += time
     locate_contacts(scene, work, at.NOW)
 
 
@@ -308,7 +350,7 @@ def leave_out_cycles(scene, work, clock, counts, until):
             return
         many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
     if many >= FEWEST:
-        error = error_of(scene, work, many)
+        error = error_of(scene, work, clock, many)
         leave_out(scene, work, clock, many)
         restore_gaps(work)
         carry_on_errors(work, clock, many, error)

@@ -91,6 +91,33 @@ def test_so_many_cycles_are_left_out_as_leave_their_form():
     assert cycles.cycles_of_form(work) < 1.0
 
 
+def test_what_changes_by_chance_stays_as_it_is():
+    """Switches are found to a hundredth of an overlap: a displacement scatters by as much."""
+    size, least = 1e-13, 1e-20
+    for now, last, before in ((1.004, 1.0, 1.003), (1.003, 1.004, 1.0), (1.0, 1.003, 1.0)):
+        lengths = now * size, last * size, before * size
+        assert cycles.trend(*lengths, size, least) == 0.0
+        assert 20.0 < cycles.allowed(1e5, *lengths, size, least) < 100.0
+    even = 1.006 * size, 1.003 * size, size
+    assert cycles.trend(*even, size, least) == pytest.approx(0.003 * size)
+    assert cycles.allowed(1e5, *even, size, least) == pytest.approx(cycles.FORM / 0.003)
+    bent = 1.06 * size, 1.04 * size, 1.0 * size
+    assert cycles.trend(*bent, size, least) == pytest.approx(0.02 * size)
+
+
+@pytest.mark.parametrize(("last", "before"), [(1.008, 0.0), (0.99, -0.005), (1.0, 0.009)])
+def test_a_cycle_that_is_found_to_end_late_by_chance_leads_nowhere_else(last, before):
+    scene, work, clock = after_two_cycles()
+    clock[at.CYCLE_AT], clock[at.CYCLE_AT_BEFORE] = last * PERIOD, before * PERIOD
+    work.motion[at.CYCLE_LAST] = motion_of(last * TURN)
+    work.motion[at.CYCLE_BEFORE] = motion_of(before * TURN)
+    cycles.leave_out(scene, work, clock, 50.0)
+    exact = motion_of(clock[at.TIME] / PERIOD * TURN)
+    assert clock[at.TIME] == pytest.approx((2.0 + 50.0 * (2.0 - before) / 2.0) * PERIOD, rel=1e-9)
+    assert np.abs(work.motion[at.NOW, :, :2] - exact[:, :2]).max() <= 7e-6 * (52.0 * TURN) ** 3
+    assert work.motion[at.NOW, :, 2] == pytest.approx(exact[:, 2], rel=1e-9)
+
+
 def test_a_turn_and_the_end_of_the_run_bound_them():
     scene, work, clock = after_two_cycles()
     many = cycles.cycles_of_motion(scene, work, clock, math.inf)
