@@ -232,24 +232,14 @@ def takes_part(work, row):
     return work.candidates[row, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, row] > 0.0
 
 
-def is_alone(work, row):
-    """Whether its bodies touch, or have touched lately, at its contact point only."""
-    for other in range(work.tally[at.CANDIDATES]):
-        same = work.candidates[other, at.PAIR] == work.candidates[row, at.PAIR]
-        if same and takes_part(work, other) and not near(work, row, other):
-            return False
-    return True
-
-
 def count_flight(work, clock, step, row):
     """Count how often a pair, which has touched, was apart by far less than the tolerance.
 
     Where a single step has led from parting to touching again, no end of a step has seen it apart:
-    it has flown a quarter of the way that its rate would have led, as on a parabola. This counts
-    where the bodies touch nowhere else; contacts that throw each other open in turn are followed.
+    it has flown a quarter of the way that its rate would have led, as on a parabola.
     """
     flight = work.slip[at.FLIGHT, row]
-    if flight == 0.0 and is_alone(work, row):
+    if flight == 0.0:
         flight = 0.25 * step * abs(normal_rate(work, at.NOW, row))
     if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
         work.slip[at.FLIGHTS, row] = 0.0
@@ -259,10 +249,12 @@ def count_flight(work, clock, step, row):
     work.slip[at.FLIGHT, row] = 0.0
 
 
-def note_flight(work, row):
-    """Keep how far a pair that is apart has been since it parted."""
-    gap = work.geometry[at.NOW, row, at.GAP]
-    work.slip[at.FLIGHT, row] = max(work.slip[at.FLIGHT, row], gap)
+def note_flight(work, clock, row):
+    """Keep how far a pair that is apart has been since it parted; far enough, it hums no more."""
+    flight = max(work.slip[at.FLIGHT, row], work.geometry[at.NOW, row, at.GAP])
+    work.slip[at.FLIGHT, row] = flight
+    if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
+        work.slip[at.FLIGHTS, row] = 0.0
 
 
 def part(scene, work, clock, row):
@@ -285,7 +277,7 @@ def settle(scene, work, clock, step):
             changed = not go_on(scene, work, row) or changed
         elif mode == at.OPEN:
             forget_gap(work, row)
-            note_flight(work, row)
+            note_flight(work, clock, row)
             if work.geometry[at.NOW, row, at.GAP] < 0.0:
                 count_flight(work, clock, step, row)
     for row in range(work.tally[at.CANDIDATES]):
@@ -302,16 +294,26 @@ def settle(scene, work, clock, step):
     return changed or entered
 
 
+def force_needed(work, row):
+    """T of a pair that grazes at the end of a step; in its first one without what takes the rate
+    away with which the pair has parted."""
+    after = grazing_force(work, at.NEW, row)
+    if work.slip[at.FRESH, row] != 0.0:
+        resistance = work.slip[at.GRAZING_RESISTANCE, row]
+        after += resistance / STIFFER * normal_rate(work, at.NOW, row)
+    return after
+
+
 def share_left(work, clock, step, row):
     """The share of the step at which a pair that grazes ceases to; above 1 where it does not, or
-    where it matters little: its force goes through nothing there.
+    where it matters little: its force goes through nothing there, or it ceases to slide.
 
     T and the speed of sliding go along lines.
     """
     resistance = abs(work.slip[at.GRAZING_RESISTANCE, row])
-    if work.slip[at.FRESH, row] != 0.0 or resistance == 0.0:
+    if resistance == 0.0:
         return NEVER
-    before, after = work.slip[at.GRAZING_FORCE, row], grazing_force(work, at.NEW, row)
+    before, after = work.slip[at.GRAZING_FORCE, row], force_needed(work, row)
     # What a newton does to the gap in a step, and later.
     lever = STIFFER / resistance * (step + memory_of(work, row))
     if abs(after) * lever < LATE * clock[at.TOLERANCE]:
@@ -320,7 +322,10 @@ def share_left(work, clock, step, row):
     side = 1.0 if before > 0.0 else -1.0
     slow = -side * tangential_rate(work, at.NOW, row)
     slower = -side * tangential_rate(work, at.NEW, row)
-    if slow > 0.0 > slower:
+    if work.slip[at.FRESH, row] != 0.0 and -slower * step > LATE * clock[at.TOLERANCE]:
+        # It may have stuck before, and parted by rounding.
+        slow = max(slow, 0.0)
+    if slow >= 0.0 > slower:
         share = min(share, slow / (slow - slower))
     return share
 
@@ -333,7 +338,8 @@ def leave_early(scene, work, clock, step):
             work.candidates[row, at.CLOSED] == at.GRAZES
             and share_left(work, clock, step, row) < AT_ONCE
         ):
-            if work.slip[at.GRAZING_FORCE, row] * grazing_force(work, at.NEW, row) < 0.0:
+            fresh = work.slip[at.FRESH, row] != 0.0
+            if fresh or work.slip[at.GRAZING_FORCE, row] * force_needed(work, row) < 0.0:
                 leave(work, row, at.OPEN, 0.0)
             else:
                 leave(work, row, at.TOUCHES, TOUCHING_GAP)
