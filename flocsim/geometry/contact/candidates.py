@@ -193,18 +193,10 @@ def time_within(scene, work, share):
     return longest
 
 
-def is_apart(work):
-    """Whether few bodies are there, and none of them touch: their lists are soon made anew."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] != at.OPEN:
-            return False
-    return watches_all(work)
-
-
 def share_ahead(scene, work):
     """The share of the budgets that the next step may spend at constant speed: half of them or, of
-    few bodies that are apart, most of what is left."""
-    if not is_apart(work):
+    few bodies, whose lists are soon made anew, most of what is left."""
+    if not watches_all(work):
         return 0.5
     return max(MOST_AHEAD - spent(scene, work, at.NOW), 0.5)
 
@@ -214,8 +206,8 @@ def outlived(scene, work, ahead):
     used = spent(scene, work, at.NOW)
     if used > 0.5:
         return True
-    apart = used > LEAST_USED and is_apart(work)
-    return apart and time_within(scene, work, MOST_AHEAD - used) < ahead
+    few = used > LEAST_USED and watches_all(work)
+    return few and time_within(scene, work, MOST_AHEAD - used) < ahead
 
 
 def too_wide(scene, work, ahead):
