@@ -428,6 +428,7 @@ SOFT_GAP = 6
     REJECTED_RATIO,  # its error over the tolerance
     SETTLING,  # steps in a row that ended at a switch, until one has been taken that does not
     SETTLED_STEP,  # size of the last such step [s]
+    FLYING_STEP,  # size of the one that was planned where the last flight ended [s]
     ESTIMATE_SHARE,  # share of what the method estimates that counts in the stated error
     HORIZON,  # until when the run goes on, where UNTIL is a stop on the way; 0: it is not [s]
     SEEN_PACE,  # pace of the last second iteration that was made; 0: it is not known
@@ -444,7 +445,7 @@ SOFT_GAP = 6
     SERIES_STEP,  # that of the series in ``Work.series`` [s]
     SERIES_TURNS,  # that times a bound of its fastest rate
     CLOCK_SIZE,
-) = range(33)
+) = range(34)
 
 # Places in the ``counts`` of a run.
 (

@@ -77,6 +77,13 @@ def end_within(scene, work, step, ratio, share):
     return False
 
 
+@hook
+def step_to_switch(scene, work, step, share):
+    """The step to be tried behind one that was seen to pass a switch at a share of it, and could
+    not be ended there."""
+    return share * step
+
+
 SHARE_OF_TOUCH = 0.1
 """The error of the first step behind a touch is taken to be that which it leads to times (h ω0)⁴
 over this share."""
@@ -95,9 +102,9 @@ def first_step(work, clock, frequency, speed, later):
 
 
 @hook
-def cut(scene, work, clock, step, resolution):
+def cut(scene, work, clock, step, resolution, depth):
     """End a step that is a series where something has switched in it that its ends do not show, in
-    NEW; the share of it that is left."""
+    NEW; the share of it that is left. What touches by less than the depth [m] has not."""
     return 1.0
 
 

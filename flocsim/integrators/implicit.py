@@ -17,6 +17,7 @@ from flocsim.hooks import (
     note_step,
     resolving_step,
     step_across,
+    step_to_switch,
 )
 from flocsim.integrators.backward_euler.method import hand_over, step_or_give_back
 from flocsim.integrators.backward_euler.step import next_across, note_rates
@@ -33,7 +34,12 @@ from flocsim.integrators.exponential.collocation import (
 )
 from flocsim.integrators.exponential.samples import cut as cut_series
 from flocsim.integrators.exponential.series import write_at
-from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.loop.step_size import (
+    RESOLVED,
+    SMALLEST_FACTOR,
+    adaptive_factor,
+    shortest_needed,
+)
 from flocsim.integrators.radau.carried_error import add_step, carry_error, doubt_of_release
 from flocsim.integrators.radau.carried_error import overlap_error as step_overlap_error
 from flocsim.integrators.radau.collocation import collocate, end_on_the_cubic
@@ -109,6 +115,19 @@ def end_early(scene, work, step, ratio, share):
         write_at(work, at.START, terms, step, share, at.NEW, 0, work.motion.shape[1])
         return True
     return end_on_the_cubic(scene, work, step, ratio, share)
+
+
+RADIANS = 4.0
+"""What switches in a series is found even where contacts swing so far in it, by the fastest rate
+there is."""
+
+
+def resolve_switch(scene, work, step, share):
+    """The step to be tried behind one that was seen to pass a switch at a share of it: where that
+    was Radau IIA, which leaves vibrations out, a series that shows them."""
+    if work.tally[at.SERIES_TERMS] > 0 or not is_dense(work) or inertia(scene, 0, 0) == 0.0:
+        return share * step
+    return max(share * step, min(0.5 * step, RADIANS * shortest_needed(scene, work) / RESOLVED))
 
 
 def solve_as_series(scene, work, clock, step, known):
@@ -210,6 +229,7 @@ class Implicit(Integrator):
         return {
             interpolate: within,
             end_within: end_early,
+            step_to_switch: resolve_switch,
             cut: cut_series,
             first_step: step_behind_touch,
             settle_grazes: settle,

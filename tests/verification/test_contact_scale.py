@@ -18,14 +18,14 @@ from flocsim.io.results.schema import OUTCOMES
 
 STUDY = """\
 preset = "tang2014"
-seed = 12
+seed = {seed}
 [scene]
 types = ["{type}"]
-delta = [0.0, 0.5]
+delta = [0.0, 0.25, 0.5, 0.75]
 [shapes]
 source = "library"
 file = "synthetic"
-vertices = [16, 64]
+vertices = [4, 16, 64]
 [forces.contact]
 k_n = {k_n}
 k_t = {k_t}
@@ -33,10 +33,10 @@ k_t = {k_t}
 
 
 @functools.cache
-def study_of(name, k_n):
+def study_of(name, k_n, seed=12):
     with TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
-        path.write_text(STUDY.format(type=name, k_n=k_n, k_t=k_n / 10.0))
+        path.write_text(STUDY.format(type=name, k_n=k_n, k_t=k_n / 10.0, seed=seed))
         return Study(load_config(path))
 
 
@@ -63,11 +63,50 @@ def test_what_decides_is_decided_at_its_own_scale(
     assert row["steps"] < most
 
 
+@pytest.mark.parametrize(
+    ("name", "vertices", "share", "k_n", "replicate", "outcome"),
+    [
+        # In a long step they meet with their corners, and are apart again at its end.
+        ("I", 16, 0.0, 20.0, 10, "D"),
+        ("I", 16, 0.0, 200.0, 10, "D"),
+        # Of a row of bounces, each lower than the one before, one was not seen.
+        ("I", 4, 0.5, 200.0, 212, "D"),
+        ("I", 4, 0.25, 200.0, 169, "D"),
+        ("II", 4, 0.25, 200.0, 276, "C"),
+        ("II", 4, 0.75, 200.0, 187, "D"),
+        ("I", 16, 0.25, 200.0, 174, "D"),
+        ("I", 16, 0.75, 200.0, 218, "C"),
+    ],
+)
+def test_nothing_that_comes_and_goes_within_a_step_is_missed(
+    name, vertices, share, k_n, replicate, outcome
+):
+    row = study_of(name, k_n).run(0, vertices, share, replicate)
+    assert OUTCOMES[row["outcome"]] == outcome
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "replicate", "outcome"),
+    [
+        # A contact of which next to nothing is left was found pressed where it lets go, ...
+        ("II", 0.5, 14, "C"),
+        # ... or began to graze, and was held by a force that pulled, or where it rolls.
+        ("III", 0.0, 17, "B"),
+        ("III", 0.0, 26, "B"),
+    ],
+)
+def test_where_overlaps_are_at_rounding_contacts_let_go_when_they_do(
+    name, share, replicate, outcome
+):
+    row = study_of(name, 2e5, seed=1).run(0, 64, share, replicate)
+    assert OUTCOMES[row["outcome"]] == outcome
+
+
 def test_rattles_are_rare_and_mostly_cut_short():
     """Single ones are chance; in the mean it was 5,200 steps while every cycle was followed."""
     study = study_of("III", 2e5)
     steps = [study.run(0, 64, 0.0, replicate)["steps"] for replicate in range(60)]
-    assert np.mean(steps) < 2500
+    assert np.mean(steps) < 1500
     assert np.median(steps) < 500
 
 

@@ -6,6 +6,8 @@ end is cut to the first place at which something is seen, and found exactly from
 other (events/crossings.py).
 """
 
+import math
+
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import locate_polygons, turn_body
@@ -14,14 +16,24 @@ from flocsim.integrators.events.crossings import is_too_deep, margin, margin_rat
 from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.exponential.series import shorten, write_at
 from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
-from flocsim.integrators.rhs.views import contact_view, lever
+from flocsim.integrators.rhs.views import contact_view, lever, normal_rate
 
 A_PART = 1.6
 """Rates times the length of a part: what vibrates swings by a quarter of a turn in it."""
 
+A_WAY = 0.1
+"""Bodies come past each other by so much of the smaller one in a part."""
+
 PLAIN = 3.0
 """In a step so long it swings by half a turn, and gaps at both ends tell whether a pair has
 switched."""
+
+SOON = 1e-3
+"""How the rate changes with which a pair parts is seen in this share of a step."""
+
+BEHIND = 1.5
+"""Whether a pair that has parted is back is first looked for so many times as far in a step as it
+were if it was slowed down evenly."""
 
 TRIES = 6
 """Places at which the least margin in a part of the step is looked for."""
@@ -60,9 +72,15 @@ def look(scene, work, terms, step, share):
         turn_body(work, at.TRIAL, body)
 
 
-def lowest(scene, work, terms, step, low, high, row):
-    """Where between two shares of the step the margin of a row, which falls at the first and rises
-    at the second, is below 0; 2 where it is not."""
+def has_switched(work, row, depth):
+    """Whether a pair has in TRIAL: one that was apart where it is so deep there [m]."""
+    least = -depth if work.candidates[row, at.CLOSED] == at.OPEN else 0.0
+    return margin(work, at.TRIAL, row) < least
+
+
+def lowest(scene, work, terms, step, low, high, row, depth):
+    """Where between two shares of the step a row, the margin of which falls at the first and rises
+    at the second, has switched; 2 where it has not."""
     rate_low, rate_high = work.slip[at.SAMPLED_RATE, row], margin_rate(work, at.TRIAL, row)
     span = step * (high - low)
     if min(work.slip[at.SAMPLED, row] + 0.5 * span * rate_low,
@@ -72,7 +90,7 @@ def lowest(scene, work, terms, step, low, high, row):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
         look(scene, work, terms, step, share)
         locate_polygons(scene, work, at.TRIAL, row)
-        if margin(work, at.TRIAL, row) < 0.0:
+        if has_switched(work, row, depth):
             return share
         rate = margin_rate(work, at.TRIAL, row)
         if rate < 0.0:
@@ -102,7 +120,7 @@ def rubs_otherwise(scene, work, row, resolution):
 
 
 @apart
-def first_seen(scene, work, parts, step, resolution):
+def first_seen(scene, work, parts, step, resolution, depth):
     """The first share of a step at which something is seen to have switched; 1 where nothing is
     before its end."""
     terms = work.tally[at.SERIES_TERMS]
@@ -118,14 +136,14 @@ def first_seen(scene, work, parts, step, resolution):
                 continue
             locate_polygons(scene, work, at.TRIAL, row)
             value, rate = margin(work, at.TRIAL, row), margin_rate(work, at.TRIAL, row)
-            if value < 0.0:
+            if has_switched(work, row, depth):
                 return high
             if work.candidates[row, at.CLOSED] == at.TOUCHES and rubs_otherwise(
                 scene, work, row, resolution
             ):
                 return high
             if work.slip[at.SAMPLED_RATE, row] < 0.0 < rate:
-                share = lowest(scene, work, terms, step, low, high, row)
+                share = lowest(scene, work, terms, step, low, high, row, depth)
                 if share <= 1.0:
                     return share
                 look(scene, work, terms, step, high)
@@ -144,14 +162,77 @@ def first_too_deep(scene, work):
     return 1.0
 
 
-def cut(scene, work, clock, step, resolution):
+def parts_of_way(scene, work):
+    """Into how many parts a step is divided in which bodies come so far past each other: where
+    none touch, they may meet, and be apart again at its end."""
+    parts, before = 1, -1
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] != at.OPEN:
+            return 1
+        pair = work.candidates[row, at.PAIR]
+        if pair != before:
+            before = pair
+            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            way = abs(moved(work, a, at.X) - moved(work, b, at.X))
+            way += abs(moved(work, a, at.Y) - moved(work, b, at.Y))
+            way += abs(moved(work, a, at.ANGLE)) * scene.bodies[a, at.BOUNDING_RADIUS]
+            way += abs(moved(work, b, at.ANGLE)) * scene.bodies[b, at.BOUNDING_RADIUS]
+            size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
+            parts = max(parts, int(way / (A_WAY * size)) + 1)
+    return parts
+
+
+def moved(work, body, axis):
+    """By how much a body's place changes in the step [m or rad]."""
+    return work.motion[at.NEW, body, axis] - work.motion[at.NOW, body, axis]
+
+
+def has_parted(work, step, row):
+    """Whether a pair is apart, and goes further than it is in a step."""
+    way = step * normal_rate(work, at.NOW, row)
+    return work.candidates[row, at.CLOSED] == at.OPEN and way > work.geometry[at.NOW, row, at.GAP]
+
+
+def share_to_return(scene, work, step):
+    """The share of a step at which the first pair that has parted would be back if it was slowed
+    down evenly; inf where none would."""
+    earliest, looked = math.inf, False
+    for row in range(work.tally[at.CANDIDATES]):
+        if has_parted(work, step, row):
+            if not looked:
+                look(scene, work, work.tally[at.SERIES_TERMS], step, SOON)
+                looked = True
+            locate_polygons(scene, work, at.TRIAL, row)
+            rate = normal_rate(work, at.NOW, row)
+            slower = rate - normal_rate(work, at.TRIAL, row)
+            if slower > 0.0:
+                earliest = min(earliest, 2.0 * SOON * rate / slower)
+    return earliest
+
+
+def first_return(scene, work, step, depth):
+    """The first share of a step at which a pair that has parted is seen to be back; 1 where none
+    is. In a long step it may pass through the other body, and be apart at its end."""
+    share = BEHIND * share_to_return(scene, work, step)
+    while share < 1.0:
+        look(scene, work, work.tally[at.SERIES_TERMS], step, share)
+        for row in range(work.tally[at.CANDIDATES]):
+            if has_parted(work, step, row):
+                locate_polygons(scene, work, at.TRIAL, row)
+                if has_switched(work, row, depth):
+                    return share
+        share *= 2.0
+    return 1.0
+
+
+def cut(scene, work, clock, step, resolution, depth):
     """End a step that is a series where something is first seen to have switched; the share of it
     that is left."""
     terms = work.tally[at.SERIES_TERMS]
-    share = first_too_deep(scene, work)
-    parts = parts_of(scene, clock[at.SERIES_TURNS])
+    share = min(first_too_deep(scene, work), first_return(scene, work, step, depth))
+    parts = max(parts_of(scene, clock[at.SERIES_TURNS]), parts_of_way(scene, work))
     if share == 1.0 and parts > 1:
-        share = first_seen(scene, work, parts, step, resolution)
+        share = first_seen(scene, work, parts, step, resolution, depth)
     if share < 1.0:
         shorten(work, terms, share)
         clock[at.STAGED_STEP] *= share

@@ -18,6 +18,7 @@ from flocsim.hooks import (
     leave_out_cycles,
     note_step,
     observe,
+    step_to_switch,
 )
 from flocsim.integrators.events.crossings import (
     changes_sides,
@@ -108,6 +109,24 @@ def accept(scene, work, clock, counts, step, lists):
     if across:
         return SAME
     return OTHER_FRICTION if grazes and switched == SAME else switched
+
+
+def touches(work):
+    """Whether any listed pair does."""
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] != at.OPEN:
+            return True
+    return False
+
+
+def plan_flight(work, clock, planned, flew):
+    """Begin a flight with the step that was ``planned`` where the one before has ended, as
+    contacts have switched behind a series: what comes and goes in one is seen, however long it
+    is."""
+    if flew:
+        clock[at.FLYING_STEP] = planned
+    if not touches(work):
+        clock[at.STEP] = max(clock[at.STEP], clock[at.FLYING_STEP])
 
 
 def stands_still(clock, counts, step):
@@ -236,7 +255,8 @@ def advance(scene, work, observed, clock, counts, record):
             clock[at.STAGED_STEP] = 0.0
             continue
         if lists and trials < MOST_TRIALS and work.tally[at.SERIES_TERMS] > 0:
-            kept = cut(scene, work, clock, step, resolutions_of(work, clock)[0])
+            resolution, depth = resolutions_of(work, clock)
+            kept = cut(scene, work, clock, step, resolution, depth)
             if kept < 1.0:
                 step *= kept
                 trials += 1
@@ -246,15 +266,18 @@ def advance(scene, work, observed, clock, counts, record):
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
-                limit = share * step
+                limit = step_to_switch(scene, work, step, share)
                 counts[at.LOCATED] += 1
                 continue
             step *= share
+        planned, flew = clock[at.STEP], not touches(work)
         switched = accept(scene, work, clock, counts, step, lists)
         if switched == OTHER_CONTACTS:
             until = min(clock[at.UNTIL], kick_end(scene, work))
             leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
+        if switched == OTHER_CONTACTS and work.tally[at.SERIES_TERMS] > 0:
+            plan_flight(work, clock, planned, flew)
         if trials > 0 and switched == SAME:
             # Behind a kink of a law its derivatives may still be those before.
             clock[at.SEEN_PACE] = 0.0

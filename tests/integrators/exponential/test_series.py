@@ -248,7 +248,7 @@ def test_a_step_is_cut_where_contacts_have_swung_open_in_it(turns):
     scene.step(step)
     parts = parts_of(scene.scene, scene.clock[at.SERIES_TURNS])
     assert scene.clock[at.SERIES_TURNS] == pytest.approx(turns, rel=0.2)
-    share = scene.call(cut, scene.clock, step, 1e-12)
+    share = scene.call(cut, scene.clock, step, 1e-12, 1e-12)
     assert 0.5 * math.pi < share * turns < 0.5 * math.pi + turns / parts
     gap = scene.work.motion[at.NEW, 1, at.X] - scene.work.motion[at.NEW, 0, at.X] - 2.0 * R
     assert gap == pytest.approx(-1e-9 * math.cos(share * turns), abs=1e-14)
@@ -258,7 +258,7 @@ def test_a_step_is_cut_where_contacts_have_swung_open_in_it(turns):
 def test_one_in_which_nothing_switches_is_left_whole():
     scene, step = Linked(overlapping()), 1.2 / NORMAL_RATE
     scene.step(step)
-    assert scene.call(cut, scene.clock, step, 1e-12) == 1.0
+    assert scene.call(cut, scene.clock, step, 1e-12, 1e-12) == 1.0
 
 
 def test_one_that_presses_too_deep_ends_there():
@@ -268,7 +268,7 @@ def test_one_that_presses_too_deep_ends_there():
     step = 2.5 / NORMAL_RATE
     scene.step(step)
     assert scene.terms > 0
-    assert scene.call(cut, scene.clock, step, 1e-12) == NODES[0]
+    assert scene.call(cut, scene.clock, step, 1e-12, 1e-12) == NODES[0]
 
 
 @pytest.mark.parametrize(("reach", "seen"), [(3.0, True), (1.05, True), (0.9, False)])
@@ -280,5 +280,5 @@ def test_a_contact_that_would_slide_for_a_while_is_seen(reach, seen):
     scene = Linked(overlapping(speeds=speeds, pressed=True, friction=1e-3))
     step = 2.9 / TANGENTIAL_RATE
     ratio = scene.step(step)
-    whole = 0.0 <= ratio <= 1.0 and scene.call(cut, scene.clock, step, 1e-2 * holds) == 1.0
+    whole = 0.0 <= ratio <= 1.0 and scene.call(cut, scene.clock, step, 1e-2 * holds, 0.0) == 1.0
     assert whole != seen

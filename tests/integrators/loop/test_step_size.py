@@ -11,8 +11,10 @@ from flocsim.compiler.composer import compose
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.hooks import step_to_switch
 from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.events.first_event import SAME
+from flocsim.integrators.loop.driver import plan_flight
 from flocsim.integrators.loop.step_size import (
     adaptive_factor,
     plan,
@@ -20,6 +22,7 @@ from flocsim.integrators.loop.step_size import (
     step_behind_touch,
     step_to_landing,
 )
+from tests.helpers.fast_scene import flagged
 from tests.helpers.one_step import Stage
 
 R = 10e-6
@@ -72,6 +75,36 @@ def test_behind_a_step_that_may_be_a_series_it_goes_with_the_fifth_root():
 
 def test_contacts_that_part_need_none():
     assert first_step(-0.01) == math.inf
+
+
+@pytest.mark.parametrize("terms", [0, 20])
+@pytest.mark.parametrize("method", [Implicit, DormandPrince54])
+def test_a_switch_in_a_step_that_leaves_vibrations_out_is_sought_in_one_that_shows_them(
+    method, terms
+):
+    bodies = [Body(Sphere(R), (x, 0.0), density=2650.0) for x in (0.0, 2.0 * R - 1e-12)]
+    system = System(bodies, [Contact()], method())
+    linked = compose(step_to_switch, system.fillings(), jit=False)
+    scene, work = system.scene(jit=False), work_of(system.scene(jit=False), *system.motion())
+    work.tally[at.SERIES_TERMS] = terms
+    for body in range(2):
+        work.jacobian[at.STIFFNESS, body, 0, 0] = 1e10 * scene.bodies[body, at.MASS]
+    series = method is Implicit and terms == 0
+    assert linked(scene, work, 1e-3, 1e-4) == pytest.approx(4e-5 if series else 1e-7)
+    assert linked(scene, work, 1e-3, 0.6) == pytest.approx(6e-4)
+    assert linked(scene, work, 6e-5, 1e-4) == pytest.approx(3e-5 if series else 6e-9)
+
+
+def test_a_flight_begins_with_the_step_that_was_planned_where_the_last_one_has_ended():
+    bodies = [Body(Sphere(R), (x, 0.0), density=2650.0) for x in (0.0, 2.0 * R - 1e-12)]
+    _, work = flagged(System(bodies, [Contact()]))
+    clock = Implicit().fresh_clock()
+    clock[at.STEP] = 1e-7
+    plan_flight(work, clock, 3e-5, flew=True)
+    assert clock[at.STEP] == 1e-7
+    work.candidates[0, at.CLOSED] = at.OPEN
+    plan_flight(work, clock, 2e-6, flew=False)
+    assert clock[at.STEP] == 3e-5
 
 
 def landing(gap, speed, step):
