@@ -1,5 +1,6 @@
 """The binary collision scene: two shapes that meet, and where a replicate of them starts."""
 
+import contextlib
 import copy
 import functools
 import math
@@ -408,12 +409,13 @@ class Encounter:
 
     def work_at(self, place: np.ndarray, velocity: np.ndarray) -> Work:
         """Work arrays of the two at places and velocities (2, 3)."""
-        while self.spare:
-            work = self.spare.pop()
-            pieces = work.near.shape[1] - 1
-            if len(work.candidates) == self.room[0] and pieces == len(self.scene.pieces):
-                begin_anew(work, self.scene, place, velocity)
-                return work
+        fits = self.room[0], len(self.scene.pieces) + 1
+        with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
+            while True:
+                work = self.spare.pop()
+                if (len(work.candidates), work.near.shape[1]) == fits:
+                    begin_anew(work, self.scene, place, velocity)
+                    return work
         return work_of(self.scene, place, velocity, self.room[0])
 
     def take_back(self, work: Work) -> None:
