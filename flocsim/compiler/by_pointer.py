@@ -47,7 +47,9 @@ KEPT: dict[int, tuple[Any, list[Any], list[Any]]] = {}
 
 def keep(value: tuple, owner: Any) -> None:
     """Let tables be made of a tuple in a fraction of the time as long as its owner lives; its
-    arrays stay where they are."""
+    arrays stay where they are. One that is kept stays with its first owner."""
+    if id(value) in KEPT:
+        return
     words: list[Any] = []
     kinds: list[Any] = []
     flatten(value, words, kinds)

@@ -122,10 +122,15 @@ RADIANS = 4.0
 there is."""
 
 
+def may_be_series(scene, work):
+    """Whether steps of these bodies can be series."""
+    return is_dense(work) and inertia(scene, 0, 0) != 0.0
+
+
 def resolve_switch(scene, work, step, share):
     """The step to be tried behind one that was seen to pass a switch at a share of it: where that
     was Radau IIA, which leaves vibrations out, a series that shows them."""
-    if work.tally[at.SERIES_TERMS] > 0 or not is_dense(work) or inertia(scene, 0, 0) == 0.0:
+    if work.tally[at.SERIES_TERMS] > 0 or not may_be_series(scene, work):
         return share * step
     return max(share * step, min(0.5 * step, RADIANS * shortest_needed(scene, work) / RESOLVED))
 
@@ -133,7 +138,7 @@ def resolve_switch(scene, work, step, share):
 def solve_as_series(scene, work, clock, step, known):
     """Take a step as a series, if that can be: its error over the tolerance, or −1. ``known``:
     whether the last one was."""
-    if not is_dense(work) or inertia(scene, 0, 0) == 0.0:
+    if not may_be_series(scene, work):
         return -1.0
     work.tally[at.SERIES_TERMS] = solve_series(scene, work, clock, step, known)
     if work.tally[at.SERIES_TERMS] == 0:

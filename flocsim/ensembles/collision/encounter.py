@@ -14,7 +14,7 @@ from flocsim.arrays import Scene, Work, begin_anew, work_of
 from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
-from flocsim.compiler.by_pointer import KEPT, keep
+from flocsim.compiler.by_pointer import keep
 from flocsim.ensembles.collision import meetings, outcomes
 from flocsim.ensembles.collision.draw import orientations
 from flocsim.ensembles.collision.start import largest_displacement, place_pair
@@ -421,8 +421,7 @@ class Encounter:
     def take_back(self, work: Work) -> None:
         """Let a run to come begin in the work arrays of one that has ended."""
         self.room[0] = max(self.room[0], len(work.candidates))
-        if id(work) not in KEPT:
-            keep(work, self.first or self)
+        keep(work, self.first or self)
         self.spare.append(work)
 
     def start_in_flow(self, angles: Sequence[float], share: float) -> Work:

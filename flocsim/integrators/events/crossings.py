@@ -214,6 +214,14 @@ def passes_within(scene, work, step, depth):
     return False
 
 
+def touches(work):
+    """Whether any listed pair does."""
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.candidates[row, at.CLOSED] != at.OPEN:
+            return True
+    return False
+
+
 def changes_sides(work):
     """Whether a vertex has come from one side of an edge to the other in a step across switches,
     which is told of a touch by its end alone."""

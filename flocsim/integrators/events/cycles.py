@@ -158,6 +158,12 @@ def known(change, least):
     return change if abs(change) > least else 0.0
 
 
+def changes_of(now, last, before, least):
+    """By how much a length differs from what it was a cycle ago, and that from the same of the
+    cycle before; what may be rounding is nothing."""
+    return known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
+
+
 def is_chance(change, bend, size):
     """Whether a change is due to where switches happen to be found: small, and another one each
     time."""
@@ -167,14 +173,14 @@ def is_chance(change, bend, size):
 def trend(now, last, before, size, least):
     """What a cycle changes of a length of such a size, which was so much behind the last ones;
     nothing where that is rounding, or chance."""
-    change, bend = known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
+    change, bend = changes_of(now, last, before, least)
     return 0.0 if is_chance(change, bend, size) else change
 
 
 def allowed(most, now, last, before, size, least):
     """How many cycles may be left out where a length of such a size was so much behind the last
     ones; what is below ``least`` is rounding."""
-    change, bend = known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
+    change, bend = changes_of(now, last, before, least)
     chance = is_chance(change, bend, size)
     largest = max(abs(change), abs(bend)) if chance else abs(change)
     if largest * most > FORM * size:

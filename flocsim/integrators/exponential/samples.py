@@ -12,7 +12,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import SLIP_LIMIT, contact_event, has
-from flocsim.integrators.events.crossings import is_too_deep, margin, margin_rate
+from flocsim.integrators.events.crossings import is_too_deep, margin, margin_rate, touches
 from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.exponential.series import shorten, write_at
 from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
@@ -166,9 +166,9 @@ def parts_of_way(scene, work):
     """Into how many parts a step is divided in which bodies come so far past each other: where
     none touch, they may meet, and be apart again at its end."""
     parts, before = 1, -1
+    if touches(work):
+        return parts
     for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] != at.OPEN:
-            return 1
         pair = work.candidates[row, at.PAIR]
         if pair != before:
             before = pair

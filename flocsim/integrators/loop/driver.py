@@ -26,6 +26,7 @@ from flocsim.integrators.events.crossings import (
     may_switch,
     overtakes,
     passes_within,
+    touches,
 )
 from flocsim.integrators.events.first_event import (
     OTHER_CONTACTS,
@@ -109,14 +110,6 @@ def accept(scene, work, clock, counts, step, lists):
     if across:
         return SAME
     return OTHER_FRICTION if grazes and switched == SAME else switched
-
-
-def touches(work):
-    """Whether any listed pair does."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] != at.OPEN:
-            return True
-    return False
 
 
 def plan_flight(work, clock, planned, flew):
@@ -270,7 +263,8 @@ def advance(scene, work, observed, clock, counts, record):
                 counts[at.LOCATED] += 1
                 continue
             step *= share
-        planned, flew = clock[at.STEP], not touches(work)
+        flew = work.tally[at.SERIES_TERMS] > 0 and not touches(work)
+        planned = clock[at.STEP]
         switched = accept(scene, work, clock, counts, step, lists)
         if switched == OTHER_CONTACTS:
             until = min(clock[at.UNTIL], kick_end(scene, work))
