@@ -109,6 +109,7 @@ SLIP_RATES = STATES
     OVERLAP,  # by which friction goes while a step's end is looked for [m]
     PART,  # the part of the step by which it goes then
     FADES,  # the gap within which that of a pair that opens falls to half [m]
+    BEARING,  # the overlap that is held, and the part with it; 0: none is [m]
     LEFT,  # of an interior-point method: what is left of the gap [m]
     HARDNESS,  # the normal stiffness that the rest are over [N/m]
     LIMIT,  # what friction can hold [m]
@@ -130,7 +131,7 @@ SLIP_RATES = STATES
     SAMPLED,  # its margin (events.crossings) at the last place looked at in a step [m]
     SAMPLED_RATE,  # and the rate of that [m/s]
     SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 31)
+) = range(2 * STATES, 2 * STATES + 32)
 
 TERMS = 44
 """Terms of a step's series at most."""
@@ -435,7 +436,6 @@ SOFT_GAP = 6
     SEEN_STEP,  # size of its step [s]
     ACROSS,  # 1 where steps go on across switches, 0 where they end there
     RATES_KNOWN,  # of steps across them: 1 where LAST_RATES are known
-    BUSY,  # 1 where so many contacts switch that a step does not begin with them as they were
     SWITCHES,  # how many there were since a method last looked how far it has come
     LOOKED_AT,  # when that was [s]; inf: it is to do so anew
     CYCLE_AT,  # the end of the last cycle of switches [s]
@@ -445,7 +445,7 @@ SOFT_GAP = 6
     SERIES_STEP,  # that of the series in ``Work.series`` [s]
     SERIES_TURNS,  # that times a bound of its fastest rate
     CLOCK_SIZE,
-) = range(34)
+) = range(33)
 
 # Places in the ``counts`` of a run.
 (

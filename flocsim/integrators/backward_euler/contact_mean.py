@@ -21,6 +21,7 @@ import flocsim.arrays as at
 from flocsim.arrays import ContactView
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
+from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
     add_product,
@@ -87,10 +88,17 @@ def sticking_slopes(scene, view, limit, step):
     return by_slip, -contact_force(scene, dragged)[1] / rate
 
 
+def bearing_of(work, row):
+    """The overlap that the friction of a pair goes by [m]: its own, unless another one is held, and
+    PART with it."""
+    held = work.slip[at.BEARING, row]
+    return held if held > 0.0 else work.slip[at.OVERLAP, row]
+
+
 def friction_view(scene, work, row, step):
     """The ContactView of a pair over the step of the overlap that its friction goes by; ξ₁ goes to
     NEW, whether it slides to SLIDING."""
-    bearing, rate = work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
+    bearing, rate = bearing_of(work, row), tangential_rate(work, at.NOW, row)
     slip, side = work.slip[at.NOW, row] + work.slip[at.PART, row] * step * rate, 0
     if has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view_with(scene, work, row, step, bearing, 0.0, 0.0))
@@ -123,12 +131,30 @@ def add_mean_forces(scene, work, step):
     its end."""
     for row in range(work.tally[at.CANDIDATES]):
         work.slip[at.OVERLAP, row] = end_overlap(work, row)
-        work.slip[at.PART, row] = closed_share(work, row)
+        if work.slip[at.BEARING, row] == 0.0:
+            work.slip[at.PART, row] = closed_share(work, row)
         if takes_part(work, row):
             normal = normal_force(scene, work, row, step, work.slip[at.OVERLAP, row])
             push_pair(work, at.NOW, row, normal, friction_force(scene, work, row, step))
         else:
             work.slip[at.NEW, row], work.candidates[row, at.SLIDING] = 0.0, 0
+
+
+@apart
+def add_held_friction(scene, work, step):
+    """Add to the loads what friction that goes by what is held lacks of that at the end."""
+    for row in range(work.tally[at.CANDIDATES]):
+        held, part = work.slip[at.BEARING, row], work.slip[at.PART, row]
+        if held > 0.0 and takes_part(work, row):
+            work.slip[at.BEARING, row], work.slip[at.PART, row] = 0.0, closed_share(work, row)
+            missing = friction_force(scene, work, row, step)
+            work.slip[at.BEARING, row], work.slip[at.PART, row] = held, part
+            missing -= friction_force(scene, work, row, step)
+            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            of_a, of_b = tangent_rows(work, row)
+            for axis in range(3):
+                work.loads[REAL, 3 * a + axis] += missing * of_a[axis]
+                work.loads[REAL, 3 * b + axis] += missing * of_b[axis]
 
 
 def add_slopes(scene, work, row, normal, tangential, coupled):
@@ -172,6 +198,8 @@ def add_all_derivatives(scene, work, step):
             if after > 0.0:
                 stiffness = normal_stiffness(scene, work, row, step, after)
                 coupled += by_overlap
+            if work.slip[at.BEARING, row] > 0.0:
+                coupled = 0.0
             add_slopes(scene, work, row, stiffness, slope, coupled)
             force = normal_force(scene, work, row, step, after)
             add_turning(scene, work, row, force, friction_force(scene, work, row, step))

@@ -9,11 +9,18 @@ et al. 1998). The systems are those of Newton's method, the stiffness of a pair 
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
-So with friction, whose limit L goes by δ: what there is of it, f = φ L, what there would be if the
-pair stuck, e, and how far it slides ahead and behind, p and q, all over the normal stiffness [m],
-follow e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
+So with friction, whose limit L goes by δ: what there is of it, f, what there would be if the pair
+stuck, e, and how far it slides ahead and behind, p and q, all over the normal stiffness [m], follow
+e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
 
-    df = w (e − f − τ/(L − f) + τ/(L + f) + de),   1/w = 1 + p/(L − f) + q/(L + f)
+    df = w (e − f − τ/(L − f) + τ/(L + f) + de) + w (p/(L − f) − q/(L + f)) dL,
+    1/w = 1 + p/(L − f) + q/(L + f)
+
+RUBBING holds f/L. L follows δ within an iteration as well as from one to the next: p and q that are
+not told of it are soon far from where they belong, and half of all searches end nowhere. With L a
+system has no symmetry, and there may be no way to a solution (a pair wedged between others that
+slide), or none at all: iterations then go less and less far. There limits are held, BEARING: with
+them all of this is convex, and a step has one end.
 
 Along the way a pair of such a limit counts as closed for the whole step if it was at its start:
 where it opens L is 0. By the gap, which is far from its end until δ and s are, it would be without
@@ -27,6 +34,7 @@ from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.backward_euler.contact_mean import (
     add_slopes,
+    bearing_of,
     friction_force,
     friction_slopes,
     sticking_slopes,
@@ -37,6 +45,9 @@ from flocsim.integrators.rhs.views import pressed_view, push_pair, tangential_ra
 
 FAR_FROM_WALL = 0.99
 """What is to stay above 0 goes so far towards it at most in an iteration."""
+
+WITHIN = 0.9
+"""A pair that has brought iterations to a halt begins again at this share of its limit at most."""
 
 LEAST_LIMIT = 1e-3
 """Friction holds this share of what the spring alone would let it, at least: L stays above 0."""
@@ -76,29 +87,37 @@ def part_of_step(work, row, limited):
     return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
 
 
-def press(scene, work, row, step):
+def press(scene, work, row, step, turns):
     """(N of a pair of the overlap δ [N], how it grows with that [N/m]).
 
     Of its friction is written down, over a normal stiffness, HARDNESS [N/m]: by how much it grows
     with v_t, YIELDS [s], what it would be if the pair stuck, STUCK, and at most, LIMIT [m]; 0 where
-    nothing limits it, or there is none."""
+    nothing limits it, or there is none. Along gaps that do not ``turns`` it is limited by springs
+    alone, which is smooth: together with dashpots they are clipped."""
     slip, overlap, rate = work.slip, work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
     view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
     found, limit = contact_derivatives(scene, view), 0.0
     stiffness = hardness = found[2] + found[4] / step
     spring, drag = -found[7], -found[9]
     if has(scene, SLIP_LIMIT):
+        bearing = bearing_of(work, row)
         if not hardness > 0.0:
             # The law has clipped what pulls.
             pressed = contact_derivatives(scene, pressed_view(view, overlap, 0.0))
             hardness = pressed[2] + pressed[4] / step
-        held = slip_limit(scene, view)
+        borne = view_with(scene, work, row, step, bearing, 0.0, 0.0)
+        held = slip_limit(scene, borne)
         if 0.0 < held < math.inf:
-            spring, drag = sticking_slopes(scene, view, held, step)
-            most = view_with(scene, work, row, step, overlap, held, abs(rate))
-            limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * spring * held) / hardness
-    part, _, _ = part_of_step(work, row, limit > 0.0)
-    slip[at.PART, row], slip[at.HARDNESS, row], slip[at.LIMIT, row] = part, hardness, limit
+            spring, drag = sticking_slopes(scene, borne, held, step)
+            limit = spring * held
+            if turns:
+                most = view_with(scene, work, row, step, bearing, held, abs(rate))
+                limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * limit)
+            limit /= hardness
+    if slip[at.BEARING, row] == 0.0:
+        slip[at.PART, row], _, _ = part_of_step(work, row, limit > 0.0)
+    part = slip[at.PART, row]
+    slip[at.HARDNESS, row], slip[at.LIMIT, row] = hardness, limit
     slip[at.YIELDS, row] = (spring * part * step + drag) / hardness
     slip[at.STUCK, row] = spring / hardness * slip[at.NOW, row] + slip[at.YIELDS, row] * rate
     return found[0], stiffness
@@ -127,29 +146,36 @@ def pull(work, row, target):
 
 
 def drag(work, row, target):
-    """(w, by how much a pair's friction f is to change where v_t stays [m])."""
+    """(w, by how much a pair's friction f is to change where v_t and L stay [m], by how much it
+    grows with L)."""
     limit = work.slip[at.LIMIT, row]
     force = work.slip[at.RUBBING, row] * limit
     above, below = limit - force, limit + force
-    weight = 1.0 / (1.0 + work.slip[at.AHEAD, row] / above + work.slip[at.BEHIND, row] / below)
-    return weight, weight * (work.slip[at.STUCK, row] - force - target / above + target / below)
+    ahead, behind = work.slip[at.AHEAD, row] / above, work.slip[at.BEHIND, row] / below
+    weight = 1.0 / (1.0 + ahead + behind)
+    change = weight * (work.slip[at.STUCK, row] - force - target / above + target / below)
+    return weight, change, weight * (ahead - behind)
 
 
-def limited_friction(work, row, target, turns):
-    """(s T, how it falls with v_t, how it falls for a metre of the gap) of a pair with a limit; the
-    last one, by L, only if forces are to turn."""
+def limit_by_overlap(work, row):
+    """By how much the limit of a pair's friction grows with δ; not at all where it is held."""
+    if work.slip[at.BEARING, row] > 0.0:
+        return 0.0
+    return work.slip[at.LIMIT, row] / work.slip[at.OVERLAP, row]
+
+
+def limited_friction(work, row, target):
+    """(s T, how it falls with v_t, how it grows with the gap) of a pair with a limit."""
     slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
-    weight, change = drag(work, row, target)
-    whole = slip[at.PART, row] * slip[at.HARDNESS, row]
-    force, slope = (
-        slip[at.RUBBING, row] * slip[at.LIMIT, row],
-        whole * weight * slip[at.YIELDS, row],
+    weight, change, by_limit = drag(work, row, target)
+    whole, by_limit = (
+        slip[at.PART, row] * slip[at.HARDNESS, row],
+        by_limit * limit_by_overlap(work, row),
     )
-    if not turns:
-        return -whole * (force + change), slope, 0.0
-    by_limit = (1.0 - weight) * force
-    change += by_limit * pull(work, row, target) / slip[at.OVERLAP, row]
-    return -whole * (force + change), slope, -whole * by_limit / both
+    force = slip[at.RUBBING, row] * slip[at.LIMIT, row] + change
+    force += by_limit * pull(work, row, target)
+    falls = by_limit * slip[at.OVERLAP, row] / both
+    return -whole * force, whole * weight * slip[at.YIELDS, row], -whole * falls
 
 
 def other_friction(scene, work, row, step, target):
@@ -157,6 +183,8 @@ def other_friction(scene, work, row, step, target):
     slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
     force = friction_force(scene, work, row, step)
     slope, _, by_part = friction_slopes(scene, work, row, step)
+    if slip[at.BEARING, row] > 0.0:
+        return force, slope, 0.0
     _, grows, falls = part_of_step(work, row, False)
     closing = pull(work, row, target)
     leaving = closing - (
@@ -174,15 +202,15 @@ def other_friction(scene, work, row, step, target):
 def write_forces(scene, work, step, target, turns):
     """Forces and derivatives of the pairs in play, δ and f changed as far as their gaps and v_t are
     not; if they turn, with what that does, which is too large before they fit, and can make systems
-    indefinite: without it they are those of a convex problem."""
+    indefinite."""
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             overlap, left = work.slip[at.OVERLAP, row], work.slip[at.LEFT, row]
-            normal, stiffness = press(scene, work, row, step)
+            normal, stiffness = press(scene, work, row, step, turns)
             normal += stiffness * pull(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
             if work.slip[at.LIMIT, row] > 0.0:
-                tangential, slope, coupled = limited_friction(work, row, target, turns)
+                tangential, slope, coupled = limited_friction(work, row, target)
             elif work.slip[at.YIELDS, row] > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
             push_pair(work, at.NOW, row, normal, tangential)
@@ -197,30 +225,37 @@ def room(share, size, change):
     return min(share, -FAR_FROM_WALL * size / change) if change < 0.0 else share
 
 
-def change_friction(work, row, target, share, go):
+def change_friction(work, row, target, grown, share, go):
     """The share of the changes of p, q and f that keeps them where they belong, not above the one
-    that is given; if they are to ``go``, they go that far."""
+    that is given; if they are to ``go``, they go that far. L is ``grown`` by so much [m]."""
     known, limit = work.slip, work.slip[at.LIMIT, row]
-    weight, change = drag(work, row, target)
+    weight, change, by_limit = drag(work, row, target)
     rate = rate_along(work, row, at.CHANGE, tangent_rows(work, row))
     stuck = known[at.YIELDS, row] * rate
-    change += weight * stuck
+    change += weight * stuck + by_limit * grown
     ahead, behind, force = (
         known[at.AHEAD, row],
         known[at.BEHIND, row],
         known[at.RUBBING, row] * limit,
     )
     above, below = limit - force, limit + force
-    more = (target + ahead * change) / above - ahead
-    less = (target - behind * change) / below - behind
+    slides = known[at.STUCK, row] + stuck - force - change
+    # The nearer side of the limit is not divided by: next to nothing is left there.
+    if above > below:
+        more = (target - ahead * (grown - change)) / above - ahead
+        less = ahead + more - slides - behind
+    else:
+        less = (target - behind * (grown + change)) / below - behind
+        more = behind + less + slides - ahead
     if go:
         known[at.STUCK, row] += share * stuck
-        known[at.RUBBING, row] += share * change / limit
+        known[at.LIMIT, row] = limit + share * grown
+        known[at.RUBBING, row] = (force + share * change) / known[at.LIMIT, row]
         known[at.AHEAD, row] += share * more
         known[at.BEHIND, row] += share * less
         return share
     share = room(room(share, ahead, more), behind, less)
-    return room(room(share, above, -change), below, change)
+    return room(room(share, above, grown - change), below, grown + change)
 
 
 def change_pair(work, row, step, target, share, go):
@@ -231,30 +266,46 @@ def change_pair(work, row, step, target, share, go):
     closing = pull(work, row, target) - overlap / (overlap + left) * opening
     leaving = opening + closing - (left - work.geometry[at.NOW, row, at.GAP] - overlap)
     if known[at.LIMIT, row] > 0.0:
-        share = change_friction(work, row, target, share, go)
+        grown = closing * limit_by_overlap(work, row)
+        share = change_friction(work, row, target, grown, share, go)
     if go:
         known[at.OVERLAP, row] += share * closing
         known[at.LEFT, row] += share * leaving
-        # The limit of friction goes with δ, and p and q the other way, as their products stay.
-        grown = known[at.OVERLAP, row] / overlap
-        known[at.LIMIT, row] *= grown
-        known[at.AHEAD, row] /= grown
-        known[at.BEHIND, row] /= grown
         return share
     return room(room(share, overlap, closing), left, leaving)
 
 
 @apart
 def change_pairs(work, step, target):
-    """Change all pairs in play as the velocities in CHANGE do, as far as they may: the share."""
-    share = 1.0
+    """Change all pairs in play as the velocities in CHANGE do, as far as they may: (the share, the
+    pair that has allowed no more, −1 for none)."""
+    share, first = 1.0, -1
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            share = change_pair(work, row, step, target, share, False)
+            less = change_pair(work, row, step, target, share, False)
+            if less < share:
+                share, first = less, row
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             change_pair(work, row, step, target, share, True)
-    return share
+    return share, first
+
+
+@apart
+def hold_friction(work, first):
+    """Hold what friction goes by from now on, and let the pair that is in the way of the others
+    begin again well within its limit; False where there is none left to be held."""
+    known, newly = work.slip, False
+    for row in range(work.tally[at.CANDIDATES]):
+        if in_play(work, row) and known[at.YIELDS, row] > 0.0 and known[at.BEARING, row] == 0.0:
+            known[at.BEARING, row], newly = known[at.OVERLAP, row], True
+    if newly and known[at.LIMIT, first] > 0.0:
+        limit, target = known[at.LIMIT, first], mean_product(work)
+        share = min(max(known[at.RUBBING, first], -WITHIN), WITHIN)
+        known[at.RUBBING, first] = share
+        known[at.AHEAD, first] = target / (limit * (1.0 - share))
+        known[at.BEHIND, first] = target / (limit * (1.0 + share))
+    return newly
 
 
 def in_doubt(work, row, least):

@@ -47,7 +47,7 @@ def begin_step(work, clock):
     for row in range(work.tally[at.CANDIDATES]):
         for column in range(at.GEOMETRY_COLUMNS):
             work.geometry[at.TRIAL, row, column] = work.geometry[at.NOW, row, column]
-        work.candidates[row, at.CLOSED] = at.OPEN
+        work.candidates[row, at.CLOSED], work.slip[at.BEARING, row] = at.OPEN, 0.0
         least = FADING * clock[at.TOLERANCE]
         work.slip[at.FADES, row] = max(-work.geometry[at.NOW, row, at.GAP], least)
 

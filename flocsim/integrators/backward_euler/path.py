@@ -13,6 +13,7 @@ from flocsim.compiler.linker import apart
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
     change_pairs,
+    hold_friction,
     in_play,
     mean_product,
     press,
@@ -35,13 +36,14 @@ from flocsim.integrators.rhs.forces import sum_other_forces
 from flocsim.integrators.rhs.jacobian import normal_rows
 from flocsim.integrators.rhs.views import effective_mass
 
-MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 40
+MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 30
 """Iterations at most: along gaps that are frozen, along true ones from then on, and along these
 where pairs are taken to close and slide as in the step before."""
 
-FALLING, LEAST_WAY, STANDING, CAREFUL = 0.003, 0.7, 0.03, 0.3
+FALLING, LEAST_WAY, STANDING, CAREFUL = 0.01, 0.7, 0.03, 0.2
 """τ is the first share of the mean of all products behind an iteration that went so far at least;
-behind others it is one of the other two, the larger where the smaller one has led nowhere."""
+behind others it is one of the other two: the larger along true gaps, and where the smaller one has
+led nowhere."""
 
 THAWS, LEAST_TARGET = 0.1, 1e-10
 """Gaps are true ones from where the mean of all products is below this share of the square of a
@@ -51,15 +53,29 @@ FOUND = 0.01
 """It is known whether a pair is open or closed where the smaller one of δ and s is below this share
 of a usual δ."""
 
-NEAR = 10.0
-"""The method is done at a change of so many times what Newton's method may leave."""
+NEAR_CHANGE = 10.0
+"""Newton's method finds the end, where all of that is known, from a change of so many times what it
+may leave itself."""
+
+STILL_CHANGE, WHOLE, CENTRED = 0.1, 0.9, 1e-4
+"""The end is there at a change of so many times that, which went so far at least, and a mean of all
+products below this share of the square of a usual overlap: what is not known moves nothing."""
 
 AWAY = 0.1
 """What is to fall begins at this share of its usual size at least."""
 
-AS_BEFORE, CUT_OFF = 0.1, 0.1
+LEAST_SHARE = 1e-3
+"""A limit of friction counts as this share of a usual overlap at least there."""
+
+AS_BEFORE, CUT_OFF = 0.03, 0.02
 """Taken as in the step before, δ s begins at the square of this share of a usual overlap; an
 iteration that goes less far than the other one says that it is not so."""
+
+JAMMED, SOON = 0.05, 2
+"""Iterations that go less far have come to a halt, after so many in a row."""
+
+NOWHERE, NEAR, THERE = range(3)
+"""Where a search leads: Newton's method has to go on from NEAR."""
 
 
 def usual_force(scene, work):
@@ -95,15 +111,14 @@ def begin_anywhere(scene, work, step, usual, way):
     """δ, s and friction of all pairs in play to begin with, of which nothing is known."""
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            known = work.slip
+            known, gap = work.slip, work.geometry[at.NOW, row, at.GAP]
             known[at.OVERLAP, row] = max(-work.geometry[at.TRIAL, row, at.GAP], AWAY * usual)
-            known[at.LEFT, row] = max(
-                work.geometry[at.NOW, row, at.GAP] + known[at.OVERLAP, row], AWAY * way
-            )
-            press(scene, work, row, step)
+            known[at.LEFT, row] = max(gap + known[at.OVERLAP, row], AWAY * way, -gap)
+            press(scene, work, row, step, False)
             known[at.RUBBING, row] = 0.0
-            known[at.AHEAD, row] = max(known[at.STUCK, row], AWAY * usual)
-            known[at.BEHIND, row] = max(-known[at.STUCK, row], AWAY * usual)
+            slides = AWAY * usual * AWAY * way / max(known[at.LIMIT, row], LEAST_SHARE * usual)
+            known[at.AHEAD, row] = max(known[at.STUCK, row], slides)
+            known[at.BEHIND, row] = max(-known[at.STUCK, row], slides)
 
 
 def begin_as_before(scene, work, step, usual):
@@ -117,7 +132,7 @@ def begin_as_before(scene, work, step, usual):
             else:
                 known[at.LEFT, row] = max(work.geometry[at.NOW, row, at.GAP], FOUND * usual)
                 known[at.OVERLAP, row] = target / known[at.LEFT, row]
-            press(scene, work, row, step)
+            press(scene, work, row, step, True)
             limit, side = known[at.LIMIT, row], work.candidates[row, at.SLIDING]
             if limit > 0.0:
                 share = float(side) if side != 0 else known[at.STUCK, row] / limit
@@ -140,16 +155,16 @@ def advance_gaps(work, share, step):
 
 @apart
 def iterate(scene, work, clock, step, target, turns):
-    """One iteration towards products τ: (the share of the change that was gone, the change [m]),
-    −1 where it fails."""
+    """One iteration towards products τ: (the share of the change that was gone, the pair that
+    allowed no more, the change [m]); −1 where it fails."""
     assemble_rest(scene, work, clock, step)
     write_forces(scene, work, step, target, turns)
     if not factorise_euler(scene, work, step):
-        return -1.0, math.inf
+        return -1.0, -1, math.inf
     change = solve_change(scene, work, step)
     if not change < math.inf:
-        return -1.0, math.inf
-    share = change_pairs(work, step, target)
+        return -1.0, -1, math.inf
+    share, first = change_pairs(work, step, target)
     go_along(work, share)
     if turns:
         evaluate_others(scene, work, clock[at.TIME], step)
@@ -157,64 +172,80 @@ def iterate(scene, work, clock, step, target, turns):
         advance_gaps(work, share, step)
         place_ends(work, step)
         sum_other_forces(scene, work, clock[at.TIME] + step, at.NOW)
-    return share, change
+    return share, first, change
 
 
 @apart
 def arrive(scene, work, clock, step, usual, most, least):
-    """Iterate along true gaps, with τ about as small as it is to be; whether that leads to the end.
-    It is given up where an iteration does not go far enough."""
-    share = 1.0
+    """Iterate along true gaps, with τ about as small as it is to be; where that leads to. It is
+    given up where an iteration does not go far enough."""
+    share, halted = 1.0, 0
     for _ in range(most):
-        target = (FALLING if share >= LEAST_WAY else CAREFUL) * mean_product(work)
+        mean = mean_product(work)
+        target = (FALLING if share >= LEAST_WAY else CAREFUL) * mean
         target = max(target, LEAST_TARGET * usual * usual)
-        share, change = iterate(scene, work, clock, step, target, True)
+        share, first, change = iterate(scene, work, clock, step, target, True)
+        halted = halted + 1 if share < JAMMED else 0
+        if halted == SOON:
+            halted = -SOON
+            if not hold_friction(work, first):
+                return NOWHERE
         if share < least:
-            return False
-        near = share > LEAST_WAY and change <= NEAR * goal_of(scene, work, clock, step)
+            return NOWHERE
+        goal = goal_of(scene, work, clock, step)
+        near = share > LEAST_WAY and change <= NEAR_CHANGE * goal
         if near and settled(work, FOUND * usual, True):
-            return True
-    return False
+            return NEAR
+        if share > WHOLE and change <= STILL_CHANGE * goal and mean <= CENTRED * usual * usual:
+            return THERE
+    return NOWHERE
 
 
 @apart
 def come_from_afar(scene, work, clock, step, usual, way, standing):
-    """Go to the end of the step from where nothing is known of it; whether that leads there."""
+    """Go to the end of the step from where nothing is known of it; where that leads to."""
+    put_back(work)
+    for row in range(work.tally[at.CANDIDATES]):
+        work.slip[at.BEARING, row] = 0.0
+    evaluate_others(scene, work, clock[at.TIME], step)
     begin_anywhere(scene, work, step, usual, way)
-    share = 0.0
+    share, halted = 0.0, 0
     for _ in range(MOST_ITERATIONS):
         target = (FALLING if share >= LEAST_WAY else standing) * mean_product(work)
-        share, _ = iterate(scene, work, clock, step, target, False)
+        share, first, _ = iterate(scene, work, clock, step, target, False)
         if share < 0.0:
-            return False
+            return NOWHERE
+        halted = halted + 1 if share < JAMMED else 0
+        if halted == SOON:
+            halted = -SOON
+            if not hold_friction(work, first):
+                return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
             evaluate_others(scene, work, clock[at.TIME], step)
             return arrive(scene, work, clock, step, usual, MOST_TURNING, 0.0)
-    return False
+    return NOWHERE
 
 
-def start_anew(scene, work, clock, step):
-    """Go back to the velocities at the start of the step."""
-    put_back(work)
-    evaluate_others(scene, work, clock[at.TIME], step)
+@apart
+def search_afar(scene, work, clock, step, usual, way):
+    """The same, once more and more carefully where it leads nowhere at first."""
+    led = come_from_afar(scene, work, clock, step, usual, way, STANDING)
+    if led == NOWHERE:
+        led = come_from_afar(scene, work, clock, step, usual, way, CAREFUL)
+    return led
 
 
 @apart
 def find_closed(scene, work, clock, step):
-    """Bring the velocities near those of the step's end; False where that fails."""
+    """Bring the velocities to those of the step's end, or near them: NOWHERE, NEAR or THERE."""
     evaluate_others(scene, work, clock[at.TIME], step)
     flag_close(scene, work)
     gather_clusters(scene, work)
     usual, way = usual_sizes(scene, work, step)
     if usual == 0.0:
-        return True
-    if clock[at.BUSY] == 0.0:
-        begin_as_before(scene, work, step, usual)
-        if arrive(scene, work, clock, step, usual, MOST_KNOWN, CUT_OFF):
-            return True
-        start_anew(scene, work, clock, step)
-    clock[at.BUSY] = 1.0
-    if come_from_afar(scene, work, clock, step, usual, way, STANDING):
-        return True
-    start_anew(scene, work, clock, step)
-    return come_from_afar(scene, work, clock, step, usual, way, CAREFUL)
+        return NEAR
+    begin_as_before(scene, work, step, usual)
+    led = arrive(scene, work, clock, step, usual, MOST_KNOWN, CUT_OFF)
+    if led == NOWHERE:
+        led = search_afar(scene, work, clock, step, usual, way)
+    return led

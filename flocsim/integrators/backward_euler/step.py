@@ -20,9 +20,14 @@ import math
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import CONTACT_FORCE, has
-from flocsim.integrators.backward_euler.contact_mean import takes_part
-from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
-from flocsim.integrators.backward_euler.path import find_closed
+from flocsim.integrators.backward_euler.contact_mean import add_held_friction, takes_part
+from flocsim.integrators.backward_euler.newton import (
+    begin_step,
+    end_step,
+    evaluate_end,
+    solve_end,
+)
+from flocsim.integrators.backward_euler.path import NEAR, THERE, find_closed
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.resolution import bounces
 from flocsim.integrators.radau.systems import solve_for_free
@@ -31,9 +36,6 @@ from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, memory_of
-
-FEW = 2
-"""Behind a step with so few switches at most, contacts are taken to be as they were, first."""
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
 """The next step is that much shorter than would just do; bounds of the change."""
@@ -57,8 +59,10 @@ def next_across(clock, step, ratio):
 
 def solve_step(scene, work, clock, step):
     """Find the end of the step; False where it is not found."""
-    if has(scene, CONTACT_FORCE) and not find_closed(scene, work, clock, step):
-        return False
+    if has(scene, CONTACT_FORCE):
+        led = find_closed(scene, work, clock, step)
+        if led != NEAR:
+            return led == THERE and evaluate_end(scene, work, clock[at.TIME], step)
     return solve_end(scene, work, clock, step)
 
 
@@ -109,19 +113,15 @@ def note_rates(scene, work, clock, step):
     clock[at.RATES_KNOWN] = 1.0 if step > SHORT * clock[at.STEP] else 0.0
     if clock[at.RATES_KNOWN] == 1.0:
         write_rates(work, step)
-    switches = 0
     for row in range(work.tally[at.CANDIDATES]):
         before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
-        switches += 1 if (before < 0.0) != (after < 0.0) else 0
-    clock[at.SWITCHES] += switches
-    if switches <= FEW:
-        clock[at.BUSY] = 0.0
+        clock[at.SWITCHES] += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
 
 
 def go_across(clock, step):
     """From now on, steps go on across switches; the size of the first one."""
     clock[at.ACROSS], clock[at.STEP] = 1.0, step
-    clock[at.RATES_KNOWN] = clock[at.BUSY] = clock[at.STAGED_STEP] = 0.0
+    clock[at.RATES_KNOWN] = clock[at.STAGED_STEP] = 0.0
     clock[at.BEARABLE_STEP] = math.inf
 
 
@@ -168,6 +168,8 @@ def estimate_step(scene, work, clock, step):
             slower = motion[at.LAST_RATES, body, place] + less / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
             motion[at.CHANGE, body, axis] = less
+    if has(scene, CONTACT_FORCE):
+        add_held_friction(scene, work, step)
     solve_loads(scene, work, 0.5 * step)
     for body in range(motion.shape[1]):
         free = scene.bodies[body, at.FREE]

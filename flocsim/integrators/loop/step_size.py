@@ -154,8 +154,8 @@ def reject(clock, counts, step, ratio, too_far):
     clock[at.STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
     clock[at.REJECTED_STEP] = 0.0 if failed else step
     clock[at.REJECTED_RATIO] = ratio
-    # Steps across switches fail by chance, at any size: they find more ends where they grow.
-    if ratio < 0.0 and clock[at.ACROSS] == 0.0:
+    # What switches late in a step across switches makes its error a jump: it comes again.
+    if ratio < 0.0 or (clock[at.ACROSS] == 1.0 and not too_far):
         clock[at.BEARABLE_STEP] = SHARE_OF_FAILED * step
     return moves(clock, step)
 
