@@ -49,8 +49,9 @@ carried error does not know that contacts end sooner or later by it, …"""
 OF_BOUNDS = OF_LOST / OF_VECTOR
 """… and has it by this share, for it is a bound, and no estimate that the vector has to cover."""
 
-LEAST = 0.006
-"""… which, for its parts may cancel by chance, counts as this share of the tolerance at least."""
+LEAST, OF_SUMS = 0.006, 0.1 / OF_VECTOR
+"""… which, for its parts may cancel by chance, counts as this share of the tolerance at least, and
+as that of the sum of what switches have added: a dozen grazes kick it to and fro."""
 
 DOUBT = 2.0
 """A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
@@ -138,7 +139,11 @@ def carry_errors(scene, work, clock, step):
     for body in range(work.bodies.shape[0]):
         stated = largest
         if vector < math.inf:
-            own = max(carried_size(scene, work, body), LEAST * clock[at.TOLERANCE])
+            least = max(
+                LEAST * clock[at.TOLERANCE],
+                OF_SUMS * errors[body, at.SWITCH_PLACE],
+            )
+            own = max(carried_size(scene, work, body), least)
             stated = min(stated, OF_VECTOR * own)
         errors[body, at.STATED] = stated
         clock[at.ERROR] = max(clock[at.ERROR], stated)
