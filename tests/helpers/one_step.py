@@ -6,14 +6,9 @@ from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
-from flocsim.integrators.backward_euler import path
 from flocsim.integrators.backward_euler.contact_mean import flag_close
-from flocsim.integrators.backward_euler.newton import (
-    begin_step,
-    evaluate_end,
-    evaluate_others,
-    solve_end,
-)
+from flocsim.integrators.backward_euler.newton import begin_step, evaluate_others
+from flocsim.integrators.backward_euler.path import search_afar, usual_sizes
 from flocsim.integrators.backward_euler.step import euler_step, solve_step
 from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 from flocsim.integrators.radau.contact_frames import gather_clusters
@@ -31,11 +26,8 @@ def from_anywhere(scene, work, clock, step):
     evaluate_others(scene, work, clock[at.TIME], step)
     flag_close(scene, work)
     gather_clusters(scene, work)
-    usual, way = path.usual_sizes(scene, work, step)
-    led = path.search_afar(scene, work, clock, step, usual, way) if usual > 0.0 else path.NEAR
-    if led == path.THERE:
-        return evaluate_end(scene, work, clock[at.TIME], step)
-    return led == path.NEAR and solve_end(scene, work, clock, step)
+    usual, way = usual_sizes(scene, work, step)
+    return search_afar(scene, work, clock, step, usual, way)
 
 
 def whole_step(scene, work, clock, counts, step):

@@ -205,7 +205,7 @@ def add_all_derivatives(scene, work, step):
             add_turning(scene, work, row, force, friction_force(scene, work, row, step))
 
 
-CLOSE = 0.02
+CLOSE = 0.01
 """Pairs nearer than this share of r_i + r_j are in the pattern of the systems, closed or not: most
 of those that close in a step need no other one."""
 

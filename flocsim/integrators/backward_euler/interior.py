@@ -291,20 +291,28 @@ def change_pairs(work, step, target):
     return share, first
 
 
+def begin_again(work, row, target):
+    """Let a pair begin again well within its limit, with products τ."""
+    known, limit = work.slip, work.slip[at.LIMIT, row]
+    if limit > 0.0:
+        share = min(max(known[at.RUBBING, row], -WITHIN), WITHIN)
+        known[at.RUBBING, row] = share
+        known[at.AHEAD, row] = target / (limit * (1.0 - share))
+        known[at.BEHIND, row] = target / (limit * (1.0 + share))
+
+
 @apart
-def hold_friction(work, first):
-    """Hold what friction goes by from now on, and let the pair that is in the way of the others
-    begin again well within its limit; False where there is none left to be held."""
+def hold_friction(work, first, limited):
+    """Hold what friction goes by from now on, of the pairs alone that have a limit if ``limited``,
+    and let the one begin again that is in the way of the others; False where there is none left to
+    be held."""
     known, newly = work.slip, False
     for row in range(work.tally[at.CANDIDATES]):
-        if in_play(work, row) and known[at.YIELDS, row] > 0.0 and known[at.BEARING, row] == 0.0:
+        rubs = known[at.LIMIT if limited else at.YIELDS, row] > 0.0
+        if in_play(work, row) and rubs and known[at.BEARING, row] == 0.0:
             known[at.BEARING, row], newly = known[at.OVERLAP, row], True
-    if newly and known[at.LIMIT, first] > 0.0:
-        limit, target = known[at.LIMIT, first], mean_product(work)
-        share = min(max(known[at.RUBBING, first], -WITHIN), WITHIN)
-        known[at.RUBBING, first] = share
-        known[at.AHEAD, first] = target / (limit * (1.0 - share))
-        known[at.BEHIND, first] = target / (limit * (1.0 + share))
+    if newly:
+        begin_again(work, first, mean_product(work))
     return newly
 
 

@@ -23,12 +23,14 @@ from flocsim.integrators.backward_euler.interior import (
 )
 from flocsim.integrators.backward_euler.newton import (
     assemble_rest,
+    evaluate_end,
     evaluate_others,
     go_along,
     goal_of,
     place_ends,
     put_back,
     solve_change,
+    solve_end,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler
@@ -40,10 +42,12 @@ MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 30
 """Iterations at most: along gaps that are frozen, along true ones from then on, and along these
 where pairs are taken to close and slide as in the step before."""
 
-FALLING, LEAST_WAY, STANDING, CAREFUL = 0.01, 0.7, 0.03, 0.2
-"""τ is the first share of the mean of all products behind an iteration that went so far at least;
-behind others it is one of the other two: the larger along true gaps, and where the smaller one has
-led nowhere."""
+FALLING, LEAST_WAY = 0.01, 0.7
+"""τ is that share of the mean of all products behind an iteration that went so far at least; …"""
+
+STANDING, CAREFUL, CLOSER = 0.03, 0.5, 0.2
+"""… and behind others one of these: along gaps that are frozen, there where the first one has led
+nowhere, and along true ones."""
 
 THAWS, LEAST_TARGET = 0.1, 1e-10
 """Gaps are true ones from where the mean of all products is below this share of the square of a
@@ -67,7 +71,7 @@ AWAY = 0.1
 LEAST_SHARE = 1e-3
 """A limit of friction counts as this share of a usual overlap at least there."""
 
-AS_BEFORE, CUT_OFF = 0.03, 0.02
+AS_BEFORE, CUT_OFF = 0.01, 0.001
 """Taken as in the step before, δ s begins at the square of this share of a usual overlap; an
 iteration that goes less far than the other one says that it is not so."""
 
@@ -175,29 +179,38 @@ def iterate(scene, work, clock, step, target, turns):
     return share, first, change
 
 
+def leaves_out(work):
+    """Whether a pair has closed that was not in play."""
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.geometry[at.NOW, row, at.GAP] < 0.0 and not in_play(work, row):
+            return True
+    return False
+
+
 @apart
-def arrive(scene, work, clock, step, usual, most, least):
-    """Iterate along true gaps, with τ about as small as it is to be; where that leads to. It is
-    given up where an iteration does not go far enough."""
+def arrive(scene, work, clock, step, usual, most, known):
+    """Iterate along true gaps, with τ about as small as it is to be; where that leads to. Where
+    pairs are taken to be as they were, it is given up if an iteration hardly goes any way."""
     share, halted = 1.0, 0
     for _ in range(most):
         mean = mean_product(work)
-        target = (FALLING if share >= LEAST_WAY else CAREFUL) * mean
+        target = (FALLING if share >= LEAST_WAY else CLOSER) * mean
         target = max(target, LEAST_TARGET * usual * usual)
         share, first, change = iterate(scene, work, clock, step, target, True)
         halted = halted + 1 if share < JAMMED else 0
+        if known and share < CUT_OFF:
+            return NOWHERE
         if halted == SOON:
             halted = -SOON
-            if not hold_friction(work, first):
+            if not hold_friction(work, first, known):
                 return NOWHERE
-        if share < least:
-            return NOWHERE
         goal = goal_of(scene, work, clock, step)
         near = share > LEAST_WAY and change <= NEAR_CHANGE * goal
         if near and settled(work, FOUND * usual, True):
             return NEAR
-        if share > WHOLE and change <= STILL_CHANGE * goal and mean <= CENTRED * usual * usual:
-            return THERE
+        still = share > WHOLE and change <= STILL_CHANGE * goal
+        if still and mean <= CENTRED * usual * usual:
+            return NEAR if leaves_out(work) else THERE
     return NOWHERE
 
 
@@ -218,34 +231,45 @@ def come_from_afar(scene, work, clock, step, usual, way, standing):
         halted = halted + 1 if share < JAMMED else 0
         if halted == SOON:
             halted = -SOON
-            if not hold_friction(work, first):
+            if not hold_friction(work, first, False):
                 return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
             evaluate_others(scene, work, clock[at.TIME], step)
-            return arrive(scene, work, clock, step, usual, MOST_TURNING, 0.0)
+            return arrive(scene, work, clock, step, usual, MOST_TURNING, False)
     return NOWHERE
+
+
+def ends(scene, work, clock, step, led):
+    """Whether the end of the step is there, or Newton's method finds it from where a search has
+    led."""
+    if led == THERE:
+        return evaluate_end(scene, work, clock[at.TIME], step)
+    return led == NEAR and solve_end(scene, work, clock, step)
 
 
 @apart
 def search_afar(scene, work, clock, step, usual, way):
-    """The same, once more and more carefully where it leads nowhere at first."""
+    """Find the end of the step from where nothing is known of it; once more and more carefully
+    where that fails."""
     led = come_from_afar(scene, work, clock, step, usual, way, STANDING)
-    if led == NOWHERE:
-        led = come_from_afar(scene, work, clock, step, usual, way, CAREFUL)
-    return led
+    if ends(scene, work, clock, step, led):
+        return True
+    led = come_from_afar(scene, work, clock, step, usual, way, CAREFUL)
+    return ends(scene, work, clock, step, led)
 
 
 @apart
-def find_closed(scene, work, clock, step):
-    """Bring the velocities to those of the step's end, or near them: NOWHERE, NEAR or THERE."""
+def find_end(scene, work, clock, step):
+    """Find the end of the step, of which begin_step has kept the start; False where it is not
+    found."""
     evaluate_others(scene, work, clock[at.TIME], step)
     flag_close(scene, work)
     gather_clusters(scene, work)
     usual, way = usual_sizes(scene, work, step)
     if usual == 0.0:
-        return NEAR
+        return solve_end(scene, work, clock, step)
     begin_as_before(scene, work, step, usual)
-    led = arrive(scene, work, clock, step, usual, MOST_KNOWN, CUT_OFF)
-    if led == NOWHERE:
-        led = search_afar(scene, work, clock, step, usual, way)
-    return led
+    led = arrive(scene, work, clock, step, usual, MOST_KNOWN, True)
+    if ends(scene, work, clock, step, led):
+        return True
+    return search_afar(scene, work, clock, step, usual, way)

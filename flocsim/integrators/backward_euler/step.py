@@ -21,13 +21,8 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import add_held_friction, takes_part
-from flocsim.integrators.backward_euler.newton import (
-    begin_step,
-    end_step,
-    evaluate_end,
-    solve_end,
-)
-from flocsim.integrators.backward_euler.path import NEAR, THERE, find_closed
+from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
+from flocsim.integrators.backward_euler.path import find_end
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.resolution import bounces
 from flocsim.integrators.radau.systems import solve_for_free
@@ -60,9 +55,7 @@ def next_across(clock, step, ratio):
 def solve_step(scene, work, clock, step):
     """Find the end of the step; False where it is not found."""
     if has(scene, CONTACT_FORCE):
-        led = find_closed(scene, work, clock, step)
-        if led != NEAR:
-            return led == THERE and evaluate_end(scene, work, clock[at.TIME], step)
+        return find_end(scene, work, clock, step)
     return solve_end(scene, work, clock, step)
 
 

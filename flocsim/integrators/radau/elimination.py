@@ -41,16 +41,17 @@ def weights_of(step):
     return step / EIGENVALUES[REAL].real, pair.real, pair.imag
 
 
-def write_into(target, slot, work, block, first_row, last_row, weights):
-    """Write rows of DAMPING + (h/µ) STIFFNESS of a block."""
+def write_into(target, slot, work, block, first_row, last_row, weights, both):
+    """Write rows of DAMPING + (h/µ) STIFFNESS of a block, for the real system or for both."""
     of_real, re, im = weights
     for i in range(first_row, last_row):
         for j in range(3):
             damping = work.jacobian[at.DAMPING, block, i, j]
             stiffness = work.jacobian[at.STIFFNESS, block, i, j]
             target[slot, REAL_PART, i, j] = damping + of_real * stiffness
-            target[slot, PAIR_RE, i, j] = damping + re * stiffness
-            target[slot, PAIR_IM, i, j] = im * stiffness
+            if both:
+                target[slot, PAIR_RE, i, j] = damping + re * stiffness
+                target[slot, PAIR_IM, i, j] = im * stiffness
 
 
 def add_inertia(scene, target, slot, body, first_axis, last_axis, step):
@@ -62,35 +63,35 @@ def add_inertia(scene, target, slot, body, first_axis, last_axis, step):
         target[slot, PAIR_IM, axis, axis] += EIGENVALUES[PAIR].imag * mass
 
 
-def write_momentum(scene, work, body, weights, step):
+def write_momentum(scene, work, body, weights, step, both):
     """Write a body's share of the momentum balance of its cluster."""
     e = work.elimination
     leader, place = e.place[work.cluster[body]], e.place[body]
     own = own_block(work, body)
     if leader == place:
-        write_into(e.pivot, place, work, own, 0, 2, weights)
+        write_into(e.pivot, place, work, own, 0, 2, weights, both)
         add_inertia(scene, e.pivot, place, body, 0, 2, step)
     else:
         slot = slot_of(e, leader, place)
-        write_into(e.blocks, slot, work, own, 0, 2, weights)
+        write_into(e.blocks, slot, work, own, 0, 2, weights, both)
         add_inertia(scene, e.blocks, slot, body, 0, 2, step)
 
 
-def write_coupling(work, body, other, block, weights):
+def write_coupling(work, body, other, block, weights, both):
     """Write the derivatives of a body's forces by another one's coordinates."""
     e = work.elimination
     row, column = e.place[body], e.place[other]
     if row != NONE and column != NONE:
         first = 2 if is_leader(work, body) else 0
-        write_into(e.blocks, slot_of(e, row, column), work, block, first, 3, weights)
+        write_into(e.blocks, slot_of(e, row, column), work, block, first, 3, weights, both)
 
 
-def write_systems(scene, work, step):
-    """(µ/h) M + DAMPING + (h/µ) STIFFNESS of both systems, in the pattern."""
+def write_systems(scene, work, step, both):
+    """(µ/h) M + DAMPING + (h/µ) STIFFNESS of the real system, or of both, in the pattern."""
     e, weights = work.elimination, weights_of(step)
     n = work.bodies.shape[0]
     for slot in range(e.lower[n]):
-        for part in range(3):
+        for part in range(3 if both else 1):
             for i in range(3):
                 for j in range(3):
                     e.blocks[slot, part, i, j] = 0.0
@@ -98,14 +99,14 @@ def write_systems(scene, work, step):
         place = e.place[body]
         if place != NONE:
             first = 2 if is_leader(work, body) else 0
-            write_into(e.pivot, place, work, body, first, 3, weights)
+            write_into(e.pivot, place, work, body, first, 3, weights, both)
             add_inertia(scene, e.pivot, place, body, first, 3, step)
-            write_momentum(scene, work, body, weights, step)
+            write_momentum(scene, work, body, weights, step, both)
     for pair in range(work.tally[at.PAIRS]):
         if e.pairs[pair] == 1:
             a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-            write_coupling(work, a, b, lower_block(work, pair), weights)
-            write_coupling(work, b, a, upper_block(work, pair), weights)
+            write_coupling(work, a, b, lower_block(work, pair), weights, both)
+            write_coupling(work, b, a, upper_block(work, pair), weights, both)
 
 
 def copy_block(target, to, source, slot, both):
@@ -204,7 +205,7 @@ def factorise_sparse(scene, work, step, both):
     no room."""
     if not find_pattern(scene, work):
         return False
-    write_systems(scene, work, step)
+    write_systems(scene, work, step, both)
     e = work.elimination
     for row in range(work.bodies.shape[0]):
         if e.body[row] != NONE and not factorise_row(e, row, both):
