@@ -765,15 +765,13 @@ def work_of(
     so many pairs of features and of bodies, and blocks of sparse systems; ``all_pairs``: whether
     all pairs of few bodies are watched."""
     n = len(scene.bodies)
-    motion = np.zeros((MOTION_ROWS, n, MOTION_COLUMNS))
-    motion[NOW] = np.hstack([position, velocity])
     dense = n if n <= DENSE else 0
     if n <= ALL_PAIRS and all_pairs:
         pairs = n * (n - 1) // 2
     elif pairs is None:
         pairs = PAIRS_A_BODY * n
     work = Work(
-        motion=motion,
+        motion=np.zeros((MOTION_ROWS, n, MOTION_COLUMNS)),
         rates=np.zeros((STATES, n, MOTION_COLUMNS)),
         series=np.zeros((2, TERMS, dense, 3)),
         remainder=np.zeros((2, 4, dense, 3)),
@@ -791,35 +789,42 @@ def work_of(
         geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
         kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
         near=np.zeros((4, len(scene.pieces) + 1), dtype=np.int64),
-        listed=np.full(LISTED_SIZE, -1.0),
+        listed=np.zeros(LISTED_SIZE),
         feet=np.zeros(MOST_FEET),
         nodes=np.zeros((NODE_ROWS, MOST_NODES)),
         rules=gauss_rules(),
         squares=np.zeros((SQUARES + 1, 7)),
         pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
-        budget=np.full(pairs, -1.0),
+        budget=np.zeros(pairs),
         along=np.zeros((pairs, 4)),
         discs=np.zeros((n, 8)),
-        order=np.arange(n, dtype=np.int64),
+        order=np.zeros(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
         tally=np.zeros(TALLY_SIZE, dtype=np.int64),
     )
-    if n <= ALL_PAIRS and all_pairs:
-        work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
+    begin(work, scene, position, velocity, all_pairs)
     return work
 
 
-def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
-    """Make work arrays what work_of makes them of a scene of as many bodies, all pairs of which are
-    watched: that takes less time than to make new ones."""
-    for name in Work._fields:
-        if name not in ("elimination", "rules"):
-            getattr(work, name).fill(0)
+def begin(
+    work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray, all_pairs: bool = True
+) -> None:
+    """Write into work arrays that are 0 where a run of a scene begins."""
     work.listed.fill(-1.0)
     work.budget.fill(-1.0)
     work.order[:] = range(len(work.order))
     work.motion[NOW, :, :VELOCITY], work.motion[NOW, :, VELOCITY:] = position, velocity
-    work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
+    if len(scene.bodies) <= ALL_PAIRS and all_pairs:
+        work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
+
+
+def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
+    """Make work arrays what work_of makes them of a scene of as many bodies: that takes less time
+    than to make new ones."""
+    for name in Work._fields:
+        if name not in ("elimination", "rules"):
+            getattr(work, name).fill(0)
+    begin(work, scene, position, velocity)
 
 
 def copy_of(work: Work) -> Work:

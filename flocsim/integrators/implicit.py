@@ -35,10 +35,9 @@ from flocsim.integrators.exponential.collocation import (
 from flocsim.integrators.exponential.samples import cut as cut_series
 from flocsim.integrators.exponential.series import write_at
 from flocsim.integrators.loop.step_size import (
-    RESOLVED,
     SMALLEST_FACTOR,
     adaptive_factor,
-    shortest_needed,
+    fastest_vibration,
 )
 from flocsim.integrators.radau.carried_error import add_step, carry_error, doubt_of_release
 from flocsim.integrators.radau.carried_error import overlap_error as step_overlap_error
@@ -130,9 +129,10 @@ def may_be_series(scene, work):
 def resolve_switch(scene, work, step, share):
     """The step to be tried behind one that was seen to pass a switch at a share of it: where that
     was Radau IIA, which leaves vibrations out, a series that shows them."""
-    if work.tally[at.SERIES_TERMS] > 0 or not may_be_series(scene, work):
+    fastest = fastest_vibration(scene, work)
+    if work.tally[at.SERIES_TERMS] > 0 or not may_be_series(scene, work) or fastest == 0.0:
         return share * step
-    return max(share * step, min(0.5 * step, RADIANS * shortest_needed(scene, work) / RESOLVED))
+    return max(share * step, min(0.5 * step, RADIANS / fastest))
 
 
 def solve_as_series(scene, work, clock, step, known):

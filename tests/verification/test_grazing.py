@@ -72,10 +72,25 @@ def test_the_limit_is_what_the_cycles_come_to_in_a_fraction_of_their_steps(scene
     run, grazing, _ = carried(system)
     exact, never, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
     assert grazing > 0 and never == 0
-    assert 2.0 * run.steps < exact.steps
+    assert 2.4 * run.steps < exact.steps
     ends = [each.work.motion[at.NOW, :, :3] for each in (run, exact)]
-    # Errors of a dozen grazes in turn may cancel in what is stated, and not all of them in truth.
-    assert end_distance(system.bodies, *ends) < max(run.error, system.integrator.tolerance)
+    assert end_distance(system.bodies, *ends) < run.error
+
+
+@pytest.mark.slow
+def test_what_a_dozen_grazes_are_wrong_by_does_not_cancel_in_what_is_stated():
+    """As it did in one of fifteen such scenes, by up to four times."""
+    rng, beyond, grazing = np.random.default_rng(1), 0, 0
+    for _ in range(60):
+        gravity, speed = 10.0 ** rng.uniform(-0.5, 1.3), 10.0 ** rng.uniform(-4.5, -2.7)
+        system = rod_on_a_bar(rng.uniform(0.3, 1.3), gravity, float(rng.choice([-speed, speed])))
+        run, grazes, _ = carried(system)
+        if grazes > 0:
+            exact, _, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
+            ends = [each.work.motion[at.NOW, :, :3] for each in (run, exact)]
+            beyond += end_distance(system.bodies, *ends) > run.error
+            grazing += 1
+    assert grazing > 30 and beyond <= 0.01 * grazing
 
 
 @pytest.mark.parametrize("scene", SCENES)

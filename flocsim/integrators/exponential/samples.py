@@ -173,16 +173,16 @@ def parts_of_way(scene, work):
         if pair != before:
             before = pair
             a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-            way = abs(moved(work, a, at.X) - moved(work, b, at.X))
-            way += abs(moved(work, a, at.Y) - moved(work, b, at.Y))
-            way += abs(moved(work, a, at.ANGLE)) * scene.bodies[a, at.BOUNDING_RADIUS]
-            way += abs(moved(work, b, at.ANGLE)) * scene.bodies[b, at.BOUNDING_RADIUS]
+            way = abs(way_of(work, a, at.X) - way_of(work, b, at.X))
+            way += abs(way_of(work, a, at.Y) - way_of(work, b, at.Y))
+            way += abs(way_of(work, a, at.ANGLE)) * scene.bodies[a, at.BOUNDING_RADIUS]
+            way += abs(way_of(work, b, at.ANGLE)) * scene.bodies[b, at.BOUNDING_RADIUS]
             size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
             parts = max(parts, int(way / (A_WAY * size)) + 1)
     return parts
 
 
-def moved(work, body, axis):
+def way_of(work, body, axis):
     """By how much a body's place changes in the step [m or rad]."""
     return work.motion[at.NEW, body, axis] - work.motion[at.NOW, body, axis]
 

@@ -160,15 +160,21 @@ def reject(clock, counts, step, ratio, too_far):
     return moves(clock, step)
 
 
-def shortest_needed(scene, work):
-    """The step behind a switch that resolves the fastest vibration there is; 0 without any [s]."""
+def fastest_vibration(scene, work):
+    """ω of the fastest vibration that there is [1/s]; 0 without any."""
     stiffest = 0.0
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, at.FREE] == 1.0:
             for axis in range(3):
                 mass = max(inertia(scene, body, axis), TINY)
                 stiffest = max(stiffest, work.jacobian[at.STIFFNESS, body, axis, axis] / mass)
-    return RESOLVED / math.sqrt(stiffest) if stiffest > 0.0 else 0.0
+    return math.sqrt(stiffest)
+
+
+def shortest_needed(scene, work):
+    """The step behind a switch that resolves it; 0 without any [s]."""
+    fastest = fastest_vibration(scene, work)
+    return RESOLVED / fastest if fastest > 0.0 else 0.0
 
 
 def step_behind_touch(scene, work, clock):
