@@ -49,7 +49,7 @@ carried error does not know that contacts end sooner or later by it, …"""
 OF_BOUNDS = OF_LOST / OF_VECTOR
 """… and has it by this share, for it is a bound, and no estimate that the vector has to cover."""
 
-LEAST, OF_SUMS = 0.006, 0.1 / OF_VECTOR
+LEAST, OF_SUMS = 0.006, 0.15 / OF_VECTOR
 """… which, for its parts may cancel by chance, counts as this share of the tolerance at least, and
 as that of the sum of what switches have added: a dozen grazes kick it to and fro."""
 
