@@ -164,7 +164,8 @@ def add_slopes(scene, work, row, normal, tangential, coupled):
     pair = work.candidates[row, at.PAIR]
     along, across = normal_rows(work, row), tangent_rows(work, row)
     add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal)
-    add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, coupled)
+    if coupled != 0.0:
+        add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, coupled)
     add_product(scene, work, at.DAMPING, pair, a, b, across, across, tangential)
 
 

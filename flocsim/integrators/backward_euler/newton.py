@@ -16,7 +16,7 @@ import math
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.geometry.contact.points import locate_contacts
+from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import (
     FADING,
@@ -89,6 +89,17 @@ def evaluate_others(scene, work, time, step):
     locate_contacts(scene, work, at.NOW)
     if scene.surface_reach > 0.0:
         flag_near(scene, work, at.NOW, 0.0)
+    sum_other_forces(scene, work, time + step, at.NOW)
+
+
+def evaluate_in_play(scene, work, time, step):
+    """The same, of the pairs alone that are in play located; of all where forces from further away
+    ask for them."""
+    if scene.surface_reach > 0.0:
+        evaluate_others(scene, work, time, step)
+        return
+    place_ends(work, step)
+    locate_acting(scene, work, at.NOW)
     sum_other_forces(scene, work, time + step, at.NOW)
 
 

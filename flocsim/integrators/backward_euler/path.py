@@ -24,6 +24,7 @@ from flocsim.integrators.backward_euler.interior import (
 from flocsim.integrators.backward_euler.newton import (
     assemble_rest,
     evaluate_end,
+    evaluate_in_play,
     evaluate_others,
     go_along,
     goal_of,
@@ -171,20 +172,12 @@ def iterate(scene, work, clock, step, target, turns):
     share, first = change_pairs(work, step, target)
     go_along(work, share)
     if turns:
-        evaluate_others(scene, work, clock[at.TIME], step)
+        evaluate_in_play(scene, work, clock[at.TIME], step)
     else:
         advance_gaps(work, share, step)
         place_ends(work, step)
         sum_other_forces(scene, work, clock[at.TIME] + step, at.NOW)
     return share, first, change
-
-
-def leaves_out(work):
-    """Whether a pair has closed that was not in play."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.geometry[at.NOW, row, at.GAP] < 0.0 and not in_play(work, row):
-            return True
-    return False
 
 
 @apart
@@ -210,7 +203,7 @@ def arrive(scene, work, clock, step, usual, most, known):
             return NEAR
         still = share > WHOLE and change <= STILL_CHANGE * goal
         if still and mean <= CENTRED * usual * usual:
-            return NEAR if leaves_out(work) else THERE
+            return THERE
     return NOWHERE
 
 
@@ -239,12 +232,23 @@ def come_from_afar(scene, work, clock, step, usual, way, standing):
     return NOWHERE
 
 
+def leaves_out(work):
+    """Whether a pair has closed that was not in play."""
+    for row in range(work.tally[at.CANDIDATES]):
+        if work.geometry[at.NOW, row, at.GAP] < 0.0 and not in_play(work, row):
+            return True
+    return False
+
+
 def ends(scene, work, clock, step, led):
     """Whether the end of the step is there, or Newton's method finds it from where a search has
     led."""
     if led == THERE:
-        return evaluate_end(scene, work, clock[at.TIME], step)
-    return led == NEAR and solve_end(scene, work, clock, step)
+        if not evaluate_end(scene, work, clock[at.TIME], step):
+            return False
+        if not leaves_out(work):
+            return True
+    return led != NOWHERE and solve_end(scene, work, clock, step)
 
 
 @apart
