@@ -165,8 +165,9 @@ def discs(arguments):
     table.print(arguments.markdown)
 
 
-FALLING, POLYGON = 3.0, 6e-6
-"""How long a pile settles and rests [s], and the mean radius of its polygons [m]."""
+FALLING, LYING, POLYGON = 3.0, 8.0, 6e-6
+"""How long a pile of few polygons settles and rests, and a large one [s], and their mean radius
+[m]."""
 
 
 def pile_of(number, friction, attraction, tolerance, seed=0):
@@ -190,9 +191,9 @@ def pile_of(number, friction, attraction, tolerance, seed=0):
     return Swarm([bottom, *bodies], forces, Implicit(tolerance), WATER, box=(width, None))
 
 
-def rest_of_pile(tolerance, case, seconds, tell):
+def rest_of_pile(tolerance, until, case, seconds, tell):
     """The Rest of a pile: (number, friction, attraction)."""
-    return settle(pile_of(*case, tolerance), FALLING, seconds, tell)
+    return settle(pile_of(*case, tolerance), until, seconds, tell)
 
 
 def said(attraction):
@@ -202,11 +203,12 @@ def said(attraction):
 def pile(arguments):
     """Print the table of a large pile with friction."""
     columns = ("polygons", "friction", "attraction", *REST_COLUMNS)
-    table = Table(f"A pile of polygons settles and rests, {FALLING:g} s", columns)
+    table = Table(f"A pile of polygons settles and rests, {LYING:g} s", columns)
     number = 50 if arguments.quick else 500
     cases = [(number, 0.4, attraction) for attraction in (True, False)]
     seconds = arguments.pile_seconds
-    for case, found in rests(partial(rest_of_pile, arguments.tolerance), cases, seconds):
+    ours = partial(rest_of_pile, arguments.tolerance, LYING)
+    for case, found in rests(ours, cases, seconds):
         table.add(*case[:2], said(case[2]), *found.cells)
     table.print(arguments.markdown)
 
@@ -228,7 +230,7 @@ def attraction(arguments):
     title = f"{number} polygons settle and rest, {FALLING:g} s, with attraction and without"
     table, known = Table(title, columns), {}
     cases = [(number, friction, having) for friction in FRICTIONS for having in (True, False)]
-    ours = partial(rest_of_pile, arguments.tolerance)
+    ours = partial(rest_of_pile, arguments.tolerance, FALLING)
     for (_, friction, having), found in rests(ours, cases, arguments.seconds):
         known[friction, having] = found
         other = known[friction, True]
@@ -373,7 +375,7 @@ def main():
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--tolerance", type=float, default=1e-9)
     parser.add_argument("--seconds", type=float, default=20.0, help="CPU time of a heap or pile")
-    parser.add_argument("--pile-seconds", type=float, default=120.0, help="of the large pile")
+    parser.add_argument("--pile-seconds", type=float, default=500.0, help="of the large pile")
     parser.add_argument("--scene-seconds", type=float, default=5.0, help="of a scene of pressed")
     parser.add_argument("--scenes", type=int, default=96, help="of polygons pressed together")
     arguments = parser.parse_args()

@@ -21,6 +21,10 @@ from flocsim.swarms.arrays import Found, Swarm, found_of
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
 """Room at first for pairs of features, for every body of so few, and of more."""
 
+PAIRS, BLOCKS, LINKS = 4, 8, 8
+"""Room at first for pairs of bodies, for blocks of sparse systems, and for what contacts leave
+behind, for every body."""
+
 CHUNK = 64
 """Bodies of islands that a thread takes at once."""
 
@@ -57,6 +61,7 @@ class ThreadArrays:
     def __init__(self, template: Scene) -> None:
         self.template, self.most_points = template, int(np.diff(template.first).max())
         self.by_size: dict[int, IslandArrays] = {}
+        self.room_of_many: tuple[int, ...] = (ROOM_OF_MANY, PAIRS, BLOCKS)
         self.found: Found = found_of(256)
         self.running: IslandArrays | None = None
         self.halted = False
@@ -84,13 +89,33 @@ class ThreadArrays:
                 tree=np.zeros((2 * points, 3)),
             )
             zeros = np.zeros((size, 3))
-            room = size * (ROOM_OF_FEW if 1 < size <= FEW else ROOM_OF_MANY)
-            work = work_of(scene, zeros, zeros, room, pairs=4 * size, blocks=8 * size)
+            few = 1 < size <= FEW
+            rooms = (ROOM_OF_FEW, PAIRS, BLOCKS) if few else self.room_of_many
+            room, pairs, blocks = (size * each for each in rooms)
+            work = work_of(scene, zeros, zeros, room, pairs=pairs, blocks=blocks)
             self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
                 integrator.fresh_clock(), integrator.fresh_counts(0),
             )  # fmt: skip
         return self.by_size[size]
+
+    def make_room(self, more: int) -> None:
+        """See to it that so many more contacts can be found."""
+        room = int(self.found.filled[0]) + more
+        if room > len(self.found.links):
+            larger = max(room, 2 * len(self.found.links))
+            self.found = wider(self.found, larger, links=0, slips=0)
+
+    def enlarge(self, size: int, work: Work) -> None:
+        """Use arrays with more room for islands of so many bodies, and of more than a few at once
+        for all to come: one that finds none begins its window again."""
+        self.by_size[size].work = work
+        if size > FEW:
+            have = len(work.candidates), len(work.pairs), len(work.elimination.column)
+            self.room_of_many = tuple(
+                max(room, -(-each // size))
+                for room, each in zip(self.room_of_many, have, strict=True)
+            )
 
 
 @attrs.define
@@ -179,6 +204,7 @@ class Runner:
         start_clock = self.integrator.fresh_clock()
         start_counts = self.integrator.fresh_counts(budget_of(self.max_steps, size))
         record = np.zeros((0, 1))
+        own.make_room(LINKS * size * (last - first))
         while not own.halted:
             first = self.driver(
                 swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
@@ -188,9 +214,10 @@ class Runner:
             if first == last:
                 return
             if place.work.tally[at.FULL] == at.NOTHING_FULL:
-                own.found = wider(own.found, 2 * len(own.found.links), links=0, slips=0)
+                own.make_room(len(own.found.links))
             else:
-                self.driver, place.work = with_more(self.driver, place.work)
+                self.driver, work = with_more(self.driver, place.work)
+                own.enlarge(size, work)
 
     def run(
         self, swarm: Swarm, islands: Islands, look: Look | None = None

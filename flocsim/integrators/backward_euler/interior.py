@@ -49,6 +49,9 @@ FAR_FROM_WALL = 0.99
 WITHIN = 0.9
 """A pair that has brought iterations to a halt begins again at this share of its limit at most."""
 
+NOTHING = 1e-14
+"""A pair of which less of its stiffness is at work stiffens nothing."""
+
 LEAST_LIMIT = 1e-3
 """Friction holds this share of what the spring alone would let it, at least: L stays above 0."""
 
@@ -214,10 +217,11 @@ def write_forces(scene, work, step, target, turns):
             elif work.slip[at.YIELDS, row] > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
             push_pair(work, at.NOW, row, normal, tangential)
-            works = overlap / (overlap + left) * stiffness
-            add_slopes(scene, work, row, works, slope, coupled)
-            if turns:
-                add_turning(scene, work, row, normal, tangential)
+            works = overlap / (overlap + left)
+            if works > NOTHING:
+                add_slopes(scene, work, row, works * stiffness, slope, coupled)
+                if turns:
+                    add_turning(scene, work, row, normal, tangential)
 
 
 def room(share, size, change):

@@ -83,6 +83,10 @@ AHEAD, FAR_AHEAD = 4.0, 40.0
 ENOUGH_TRIALS, FEW_SWITCHES = 60, 0.25
 """Behind so many trials with fewer switches than that for each, located switches cost no more."""
 
+MANY, LEAST_PROBE = 50, 10
+"""Of more bodies than that, steps that end at switches are tried so many times as rarely, and for
+so many times fewer steps, down to LEAST_PROBE: each costs as much as ten across them."""
+
 
 def largest_change(scene, work):
     """How much the velocity of an outline has changed since the last look [m/s]."""
@@ -104,6 +108,11 @@ def pays(scene, work, clock, trials, passed):
     return ahead * steps <= trials
 
 
+def crowd(work):
+    """How many times the bodies are MANY, or 1."""
+    return max(1.0, work.bodies.shape[0] / MANY)
+
+
 def hand_over(scene, work, clock, counts):
     """Hand over to backward Euler, or take back, where that is due."""
     if not has(scene, CONTACT_FORCE) and clock[at.ACROSS] == 0.0:
@@ -111,7 +120,7 @@ def hand_over(scene, work, clock, counts):
     tried = counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED]
     trials = tried - counts[at.LOOKED_TRIED]
     if clock[at.ACROSS] == 1.0:
-        enough = trials >= ENOUGH_TRIALS
+        enough = trials >= ENOUGH_TRIALS * crowd(work)
         quiet = enough and clock[at.SWITCHES] < FEW_SWITCHES * trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
@@ -123,7 +132,8 @@ def hand_over(scene, work, clock, counts):
         passed = clock[at.TIME] - clock[at.LOOKED_AT]
         if pays(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             go_across(clock, passed)
-    counts[at.LOOK_AT], counts[at.LOOKED_TRIED] = counts[at.STEPS] + PROBE, tried
+    probe = max(LEAST_PROBE, int(PROBE / crowd(work)))
+    counts[at.LOOK_AT], counts[at.LOOKED_TRIED] = counts[at.STEPS] + probe, tried
     clock[at.LOOKED_AT], clock[at.SWITCHES] = clock[at.TIME], 0.0
     for body in range(work.motion.shape[1]):
         for axis in range(at.VELOCITY, at.VELOCITY + 3):
