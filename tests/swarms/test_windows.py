@@ -7,7 +7,7 @@ import pytest
 
 import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import work_of
+from flocsim.arrays import with_capacity, work_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.swarms.arrays import (
     EARLIER_BODY,
@@ -185,3 +185,30 @@ def test_what_a_contact_goes_by_besides_places_goes_on_behind_a_window():
     assert put_slips(arrays, scene, work, members, 0)
     touch_plainly(work)
     assert work.kept[0, at.KEPT_MODE] == at.OPEN
+
+
+def test_islands_have_the_room_that_others_have_needed():
+    """Or each new size begins its window again, for what has been known since the last one."""
+    bodies, side = crowd(30, 0)
+    swarm = Swarm(bodies, forces(), fluid=WATER, box=(side, side))
+    progress = swarm.begin(1e-3)
+    own = progress.runner.threads[0]
+    own.enlarge(20, with_capacity(own.of_size(20, swarm.integrator).work, 1000))
+    assert len(own.of_size(20, swarm.integrator).work.candidates) == 1000
+    assert len(own.of_size(30, swarm.integrator).work.candidates) == 1500
+    few = len(own.of_size(4, swarm.integrator).work.candidates)
+    own.enlarge(4, with_capacity(own.by_size[4].work, 1000))
+    assert len(own.of_size(5, swarm.integrator).work.candidates) == few * 5 // 4
+
+
+def test_there_is_room_for_what_islands_leave_behind_before_they_run():
+    """That runs out at their very end: they would be run again from the beginning."""
+    bodies, side = crowd(30, 0)
+    own = Swarm(bodies, forces(), fluid=WATER, box=(side, side)).begin(1e-3).runner.threads[0]
+    own.make_room(1000)
+    assert len(own.found.links) == len(own.found.slips) == 1000
+    own.found.filled[0] = 900
+    own.make_room(50)
+    assert len(own.found.links) == 1000
+    own.make_room(200)
+    assert len(own.found.links) == 2000
