@@ -191,7 +191,7 @@ def arrive(scene, work, clock, step, usual, most, known):
         target = max(target, LEAST_TARGET * usual * usual)
         share, first, change = iterate(scene, work, clock, step, target, True)
         halted = halted + 1 if share < JAMMED else 0
-        if known and share < CUT_OFF:
+        if share < (CUT_OFF if known else 0.0):
             return NOWHERE
         if halted == SOON:
             halted = -SOON
