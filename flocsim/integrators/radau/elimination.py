@@ -136,6 +136,27 @@ def take_product(target, to, left, one, right, other, both, subtracts):
             put_number(target, to, PAIR_IM, i, j, im, subtracts)
 
 
+def subtract_row(e, slot, above, both):
+    """Subtract from the row that is worked on the block of a slot times the row above it, of the
+    real system or of both."""
+    if both:
+        for each in range(e.upper[above], e.lower[above + 1]):
+            take_product(e.row, e.column[each], e.blocks, slot, e.blocks, each, both, True)
+        return
+    # The same of the real one, with its block read once: the most of what a large island costs.
+    m = e.blocks[slot, REAL_PART]
+    a, b, c = m[0, 0], m[0, 1], m[0, 2]
+    d, f, g = m[1, 0], m[1, 1], m[1, 2]
+    p, q, r = m[2, 0], m[2, 1], m[2, 2]
+    for each in range(e.upper[above], e.lower[above + 1]):
+        right, target = e.blocks[each, REAL_PART], e.row[e.column[each], REAL_PART]
+        for j in range(3):
+            x, y, z = right[0, j], right[1, j], right[2, j]
+            target[0, j] -= a * x + b * y + c * z
+            target[1, j] -= d * x + f * y + g * z
+            target[2, j] -= p * x + q * y + r * z
+
+
 def put_number(target, to, part, i, j, number, subtracts):
     target[to, part, i, j] = target[to, part, i, j] - number if subtracts else number
 
@@ -191,8 +212,7 @@ def factorise_row(e, row, both):
     for slot in range(e.lower[row], e.upper[row]):
         above = e.column[slot]
         take_product(e.blocks, slot, e.row, above, e.pivot, above, both, False)
-        for each in range(e.upper[above], e.lower[above + 1]):
-            take_product(e.row, e.column[each], e.blocks, slot, e.blocks, each, both, True)
+        subtract_row(e, slot, above, both)
     for slot in range(e.upper[row], e.lower[row + 1]):
         copy_block(e.blocks, slot, e.row, e.column[slot], both)
     copy_block(e.pivot, row, e.row, row, both)
