@@ -37,7 +37,6 @@ from flocsim.integrators.backward_euler.contact_mean import (
     bearing_of,
     friction_force,
     friction_slopes,
-    normal_force,
     sticking_slopes,
     view_with,
 )
@@ -49,9 +48,6 @@ FAR_FROM_WALL = 0.99
 
 WITHIN = 0.9
 """A pair that has brought iterations to a halt begins again at this share of its limit at most."""
-
-LITTLE = 1e-4
-"""An overlap larger by this share of it tells how its force grows."""
 
 NOTHING = 1e-14
 """A pair of which less of its stiffness is at work stiffens nothing."""
@@ -102,38 +98,32 @@ def press(scene, work, row, step, turns):
     nothing limits it, or there is none. Along gaps that do not ``turns`` it is limited by springs
     alone, which is smooth: together with dashpots they are clipped."""
     slip, overlap, rate = work.slip, work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
-    view, held, limit = view_with(scene, work, row, step, overlap, 0.0, 0.0), math.inf, 0.0
-    borne = view
+    view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
+    found, limit = contact_derivatives(scene, view), 0.0
+    stiffness = hardness = found[2] + found[4] / step
+    spring, drag = -found[7], -found[9]
     if has(scene, SLIP_LIMIT):
-        borne = view_with(scene, work, row, step, bearing_of(work, row), 0.0, 0.0)
+        bearing = bearing_of(work, row)
+        if not hardness > 0.0:
+            # The law has clipped what pulls.
+            pressed = contact_derivatives(scene, pressed_view(view, overlap, 0.0))
+            hardness = pressed[2] + pressed[4] / step
+        borne = view_with(scene, work, row, step, bearing, 0.0, 0.0)
         held = slip_limit(scene, borne)
-    if 0.0 < held < math.inf:
-        # By a difference: all derivatives take five times as long, and of these two are asked for.
-        normal, more = contact_force(scene, view)[0], (1.0 + LITTLE) * overlap
-        stiffness = normal_force(scene, work, row, step, more) - normal
-        stiffness /= more - overlap
-        spring, drag = sticking_slopes(scene, borne, held, step)
-    else:
-        found = contact_derivatives(scene, view)
-        normal, stiffness, spring, drag = found[0], found[2] + found[4] / step, -found[7], -found[9]
-    hardness = stiffness
-    if has(scene, SLIP_LIMIT) and not hardness > 0.0:
-        # The law has clipped what pulls.
-        pressed = contact_derivatives(scene, pressed_view(view, overlap, 0.0))
-        hardness = pressed[2] + pressed[4] / step
-    if 0.0 < held < math.inf:
-        limit = spring * held
-        if turns:
-            most = view_with(scene, work, row, step, bearing_of(work, row), held, abs(rate))
-            limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * limit)
-        limit /= hardness
+        if 0.0 < held < math.inf:
+            spring, drag = sticking_slopes(scene, borne, held, step)
+            limit = spring * held
+            if turns:
+                most = view_with(scene, work, row, step, bearing, held, abs(rate))
+                limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * limit)
+            limit /= hardness
     if slip[at.BEARING, row] == 0.0:
         slip[at.PART, row], _, _ = part_of_step(work, row, limit > 0.0)
     part = slip[at.PART, row]
     slip[at.HARDNESS, row], slip[at.LIMIT, row] = hardness, limit
     slip[at.YIELDS, row] = (spring * part * step + drag) / hardness
     slip[at.STUCK, row] = spring / hardness * slip[at.NOW, row] + slip[at.YIELDS, row] * rate
-    return normal, stiffness
+    return found[0], stiffness
 
 
 def mean_product(work):
