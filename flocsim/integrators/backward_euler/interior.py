@@ -19,8 +19,8 @@ e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
 RUBBING holds f/L. L follows δ within an iteration as well as from one to the next: p and q that are
 not told of it are soon far from where they belong, and half of all searches end nowhere. With L a
 system has no symmetry, and there may be no way to a solution (a pair wedged between others that
-slide), or none at all: iterations then go less and less far. There limits are held, BEARING: with
-them all of this is convex, and a step has one end.
+slide), or none at all: iterations then go less and less far. There what friction goes by is held,
+BEARING and PART: all of this is convex then, and a step has one end.
 
 Along the way a pair of such a limit counts as closed for the whole step if it was at its start:
 where it opens L is 0. By the gap, which is far from its end until δ and s are, it would be without
@@ -171,10 +171,8 @@ def limited_friction(work, row, target):
     """(s T, how it falls with v_t, how it grows with the gap) of a pair with a limit."""
     slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
     weight, change, by_limit = drag(work, row, target)
-    whole, by_limit = (
-        slip[at.PART, row] * slip[at.HARDNESS, row],
-        by_limit * limit_by_overlap(work, row),
-    )
+    whole = slip[at.PART, row] * slip[at.HARDNESS, row]
+    by_limit *= limit_by_overlap(work, row)
     force = slip[at.RUBBING, row] * slip[at.LIMIT, row] + change
     force += by_limit * pull(work, row, target)
     falls = by_limit * slip[at.OVERLAP, row] / both
@@ -295,14 +293,12 @@ def change_pairs(work, step, target):
     return share, first
 
 
-def begin_again(work, row, target):
-    """Let a pair begin again well within its limit, with products τ."""
+def begin_friction(work, row, share, target):
+    """Let the friction of a pair begin at a share of its limit, with products τ."""
     known, limit = work.slip, work.slip[at.LIMIT, row]
-    if limit > 0.0:
-        share = min(max(known[at.RUBBING, row], -WITHIN), WITHIN)
-        known[at.RUBBING, row] = share
-        known[at.AHEAD, row] = target / (limit * (1.0 - share))
-        known[at.BEHIND, row] = target / (limit * (1.0 + share))
+    known[at.RUBBING, row] = share
+    known[at.AHEAD, row] = target / (limit * (1.0 - share))
+    known[at.BEHIND, row] = target / (limit * (1.0 + share))
 
 
 @apart
@@ -315,8 +311,9 @@ def hold_friction(work, first, limited):
         rubs = known[at.LIMIT if limited else at.YIELDS, row] > 0.0
         if in_play(work, row) and rubs and known[at.BEARING, row] == 0.0:
             known[at.BEARING, row], newly = known[at.OVERLAP, row], True
-    if newly:
-        begin_again(work, first, mean_product(work))
+    if newly and known[at.LIMIT, first] > 0.0:
+        share = min(max(known[at.RUBBING, first], -WITHIN), WITHIN)
+        begin_friction(work, first, share, mean_product(work))
     return newly
 
 

@@ -12,6 +12,7 @@ import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
+    begin_friction,
     change_pairs,
     hold_friction,
     in_play,
@@ -69,14 +70,14 @@ products below this share of the square of a usual overlap: what is not known mo
 AWAY = 0.1
 """What is to fall begins at this share of its usual size at least."""
 
-LEAST_SHARE = 1e-3
+SMALL_LIMIT = 1e-3
 """A limit of friction counts as this share of a usual overlap at least there."""
 
 AS_BEFORE, CUT_OFF = 0.01, 0.001
 """Taken as in the step before, δ s begins at the square of this share of a usual overlap; an
 iteration that goes less far than the other one says that it is not so."""
 
-JAMMED, SOON = 0.05, 2
+HALTING, SOON = 0.05, 2
 """Iterations that go less far have come to a halt, after so many in a row."""
 
 NOWHERE, NEAR, THERE = range(3)
@@ -113,15 +114,16 @@ def usual_sizes(scene, work, step):
 
 
 def begin_anywhere(scene, work, step, usual, way):
-    """δ, s and friction of all pairs in play to begin with, of which nothing is known."""
+    """δ, s and friction of all pairs in play to begin with, of which nothing is known, or held."""
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
             known, gap = work.slip, work.geometry[at.NOW, row, at.GAP]
             known[at.OVERLAP, row] = max(-work.geometry[at.TRIAL, row, at.GAP], AWAY * usual)
             known[at.LEFT, row] = max(gap + known[at.OVERLAP, row], AWAY * way, -gap)
+            known[at.BEARING, row] = 0.0
             press(scene, work, row, step, False)
             known[at.RUBBING, row] = 0.0
-            slides = AWAY * usual * AWAY * way / max(known[at.LIMIT, row], LEAST_SHARE * usual)
+            slides = AWAY * usual * AWAY * way / max(known[at.LIMIT, row], SMALL_LIMIT * usual)
             known[at.AHEAD, row] = max(known[at.STUCK, row], slides)
             known[at.BEHIND, row] = max(-known[at.STUCK, row], slides)
 
@@ -143,9 +145,7 @@ def begin_as_before(scene, work, step, usual):
                 share = float(side) if side != 0 else known[at.STUCK, row] / limit
                 share = min(max(share, FOUND - 1.0), 1.0 - FOUND)
                 slides = side * (known[at.STUCK, row] - share * limit)
-                known[at.RUBBING, row] = share
-                known[at.AHEAD, row] = target / (limit * (1.0 - share))
-                known[at.BEHIND, row] = target / (limit * (1.0 + share))
+                begin_friction(work, row, share, target)
                 moves = at.AHEAD if side > 0 else at.BEHIND
                 if side != 0:
                     known[moves, row] = max(known[moves, row], slides)
@@ -180,6 +180,16 @@ def iterate(scene, work, clock, step, target, turns):
     return share, first, change
 
 
+def count_halts(work, halted, share, first, limited):
+    """(How many iterations in a row have hardly gone any way, whether it makes sense to go on):
+    behind SOON of them friction is held, where it has not been; see hold_friction."""
+    if share >= HALTING:
+        return 0, True
+    if halted + 1 < SOON:
+        return halted + 1, True
+    return -SOON, hold_friction(work, first, limited)
+
+
 @apart
 def arrive(scene, work, clock, step, usual, most, known):
     """Iterate along true gaps, with τ about as small as it is to be; where that leads to. Where
@@ -190,13 +200,11 @@ def arrive(scene, work, clock, step, usual, most, known):
         target = (FALLING if share >= LEAST_WAY else CLOSER) * mean
         target = max(target, LEAST_TARGET * usual * usual)
         share, first, change = iterate(scene, work, clock, step, target, True)
-        halted = halted + 1 if share < JAMMED else 0
         if share < (CUT_OFF if known else 0.0):
             return NOWHERE
-        if halted == SOON:
-            halted = -SOON
-            if not hold_friction(work, first, known):
-                return NOWHERE
+        halted, goes_on = count_halts(work, halted, share, first, known)
+        if not goes_on:
+            return NOWHERE
         goal = goal_of(scene, work, clock, step)
         near = share > LEAST_WAY and change <= NEAR_CHANGE * goal
         if near and settled(work, FOUND * usual, True):
@@ -211,8 +219,6 @@ def arrive(scene, work, clock, step, usual, most, known):
 def come_from_afar(scene, work, clock, step, usual, way, standing):
     """Go to the end of the step from where nothing is known of it; where that leads to."""
     put_back(work)
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.BEARING, row] = 0.0
     evaluate_others(scene, work, clock[at.TIME], step)
     begin_anywhere(scene, work, step, usual, way)
     share, halted = 0.0, 0
@@ -221,11 +227,9 @@ def come_from_afar(scene, work, clock, step, usual, way, standing):
         share, first, _ = iterate(scene, work, clock, step, target, False)
         if share < 0.0:
             return NOWHERE
-        halted = halted + 1 if share < JAMMED else 0
-        if halted == SOON:
-            halted = -SOON
-            if not hold_friction(work, first, False):
-                return NOWHERE
+        halted, goes_on = count_halts(work, halted, share, first, False)
+        if not goes_on:
+            return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
             evaluate_others(scene, work, clock[at.TIME], step)
             return arrive(scene, work, clock, step, usual, MOST_TURNING, False)
