@@ -85,7 +85,8 @@ ENOUGH_TRIALS, FEW_SWITCHES = 60, 0.25
 
 MANY, LEAST_PROBE = 50, 10
 """Of more bodies than that, steps that end at switches are tried so many times as rarely, and for
-so many times fewer steps, down to LEAST_PROBE: each costs as much as ten across them."""
+so many times fewer steps, down to LEAST_PROBE: they never paid in a pile of 495, at a tenth of the
+time."""
 
 
 def largest_change(scene, work):
