@@ -56,7 +56,7 @@ INNER_ROWS = {
         ["swarm"],
         ["progress"],
         ["placement", "runner"],
-        ["islands", "together"],
+        ["islands", "grouping", "together"],
         ["arrays"],
     ],
     "hydrodynamics": [["encounters", "rigid_bodies"], ["pair"], ["two_spheres"]],

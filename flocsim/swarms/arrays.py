@@ -40,17 +40,29 @@ SLIP_COLUMNS = 5
     COST_COLUMNS,
 ) = range(4)
 
+STRETCHES = 16
+"""Stretches of a window, for each of which it is noted where bodies have been."""
+
+LEFT, RIGHT, LOW, HIGH, BOX_COLUMNS = range(5)
+"""Columns of ``ways``, for every stretch: between where a body has been [m]."""
+
 # Columns of what an island's observer sees, of every body.
 (
     START_X,  # where the straight path begins that it is expected to go [m]
     START_Y,  # [m]
     PATH_VX,  # [m/s]
     PATH_VY,  # [m/s]
-    SINCE,  # from when [s]
     FURTHEST,  # how far it has strayed from it [m]
-    HALT,  # of the first body: 1 where another thread wants the island to stop at once
-    TRACK_COLUMNS,
-) = range(8)
+    SEEN_X,  # where it was last seen [m]
+    SEEN_Y,  # [m]
+    SEEN_AT,  # of the first body, as what follows: when that was [s]
+    SINCE,  # when the window began [s]
+    LENGTH,  # of the window [s]
+    HALT,  # 1 where another thread wants the island to stop at once
+    BOXES,  # from here on, for every stretch: where it has been, as ``ways``
+) = range(12)
+
+TRACK_COLUMNS = BOXES + STRETCHES * BOX_COLUMNS
 
 
 class Swarm(NamedTuple):
@@ -76,6 +88,7 @@ class Swarm(NamedTuple):
     new_methods: np.ndarray
     stated: np.ndarray  # (n,): the stated error of every body [m]
     strayed: np.ndarray  # (n,): how far it strayed [m]
+    ways: Annotated[np.ndarray, ("n", STRETCHES, BOX_COLUMNS)]  # where it has been
     discs: Annotated[np.ndarray, ("n", DISC_COLUMNS)]  # what the sweep for neighbours works on
     order: np.ndarray  # (n,): the same
     starts: np.ndarray  # (n + 1,): the same
@@ -108,6 +121,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         new_methods=np.full(n, clock[at.ACROSS]),
         stated=np.zeros(n),
         strayed=np.zeros(n),
+        ways=np.zeros((n, STRETCHES, BOX_COLUMNS)),
         discs=np.zeros((n, DISC_COLUMNS)),
         order=np.arange(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),

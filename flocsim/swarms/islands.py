@@ -1,15 +1,9 @@
-"""Islands of a swarm: which bodies form one in a window, and how one is advanced over it.
+"""Islands of a swarm: how one is advanced over a window.
 
-The bodies of an island are copied into arrays of their own, in their order, run from the window's
-beginning to its end by the loop that all runs go through, and copied back: nothing of the swarm
-changes before, so that a window can be tried again. Islands know nothing of each other; in which
-order they run, and in how many threads, changes no number.
-
-Of one island are those that can reach each other before the window ends. Each body is expected to
-go straight on, and allowed to stray from that path by so much (``wander``): discs of its bounding
-radius, that way, and half of what acts reaches, which move along their paths (sweep.py). Where two
-of them meet, the bodies are of one island. Fixed bodies do not pass on what acts on them: each is a
-part of all islands that can reach it.
+The bodies of an island (grouping.py) are copied into arrays of their own, in their order, run from
+the window's beginning to its end by the loop that all runs go through, and copied back: nothing of
+the swarm changes before, so that a window can be tried again. Islands know nothing of each other;
+in which order they run, and in how many threads, changes no number.
 """
 
 import math
@@ -17,41 +11,50 @@ import math
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.arrays import all_counting
-from flocsim.geometry.contact.body_pairs import (
-    MOVES,
-    PLACE_X,
-    PLACE_Y,
-    REACH,
-    WAY_X,
-    WAY_Y,
-    near_pairs,
-    watches_all,
-)
+from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import keep_slips
-from flocsim.geometry.contact.compounds import ONWARD, SWELL
-from flocsim.geometry.contact.points import nearest_way
-from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
-from flocsim.integrators.radau.contact_frames import unite
+
+
+def widen(observed, body, stretch, x, y):
+    """Let the box of a stretch of a body's way hold a place as well."""
+    box = sw.BOXES + sw.BOX_COLUMNS * stretch
+    observed[body, box + sw.LEFT] = min(observed[body, box + sw.LEFT], x)
+    observed[body, box + sw.RIGHT] = max(observed[body, box + sw.RIGHT], x)
+    observed[body, box + sw.LOW] = min(observed[body, box + sw.LOW], y)
+    observed[body, box + sw.HIGH] = max(observed[body, box + sw.HIGH], y)
+
+
+def stretch_at(observed, time):
+    """In which stretch of the window a time is."""
+    share = (time - observed[0, sw.SINCE]) / observed[0, sw.LENGTH]
+    return min(max(int(sw.STRETCHES * share), 0), sw.STRETCHES - 1)
 
 
 def watch_paths(scene, work, observed, time):
-    """Note how far bodies stray from the paths on which others count; 1 where the island is to
+    """Note where bodies have been in every stretch of the window, straight on from step to step,
+    and how far they stray from the paths that they were expected to go; 1 where the island is to
     stop."""
+    before, since = observed[0, sw.SEEN_AT], time - observed[0, sw.SINCE]
+    first, last = stretch_at(observed, before), stretch_at(observed, time)
     for body in range(work.bodies.shape[0]):
         if scene.bodies[body, at.FREE] == 1.0:
-            since = time - observed[body, sw.SINCE]
-            x = (
-                work.motion[at.NOW, body, at.X]
-                - observed[body, sw.START_X]
-                - since * observed[body, sw.PATH_VX]
-            )
-            y = (
-                work.motion[at.NOW, body, at.Y]
-                - observed[body, sw.START_Y]
-                - since * observed[body, sw.PATH_VY]
-            )
+            x, y = work.motion[at.NOW, body, at.X], work.motion[at.NOW, body, at.Y]
+            for stretch in range(first, last):
+                border = (
+                    observed[0, sw.SINCE] + observed[0, sw.LENGTH] * (stretch + 1) / sw.STRETCHES
+                )
+                share = min(max((border - before) / (time - before), 0.0), 1.0)
+                between_x = observed[body, sw.SEEN_X] + share * (x - observed[body, sw.SEEN_X])
+                between_y = observed[body, sw.SEEN_Y] + share * (y - observed[body, sw.SEEN_Y])
+                widen(observed, body, stretch, between_x, between_y)
+                widen(observed, body, stretch + 1, between_x, between_y)
+            widen(observed, body, last, x, y)
+            observed[body, sw.SEEN_X], observed[body, sw.SEEN_Y] = x, y
+            x -= observed[body, sw.START_X] + since * observed[body, sw.PATH_VX]
+            y -= observed[body, sw.START_Y] + since * observed[body, sw.PATH_VY]
             observed[body, sw.FURTHEST] = max(observed[body, sw.FURTHEST], math.hypot(x, y))
+    observed[0, sw.SEEN_AT] = time
     return 1 if observed[0, sw.HALT] != 0.0 else 0
 
 
@@ -171,6 +174,8 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
         counts[place] = start_counts[place]
     clock[at.TIME], clock[at.UNTIL] = swarm.times[sw.BEGIN], swarm.times[sw.END]
     clock[at.HORIZON] = swarm.times[sw.HORIZON_AT]
+    observed[0, sw.SINCE] = observed[0, sw.SEEN_AT] = swarm.times[sw.BEGIN]
+    observed[0, sw.LENGTH] = swarm.times[sw.END] - swarm.times[sw.BEGIN]
     step, across = math.inf, 0.0
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
@@ -179,13 +184,17 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
             if other > across:
                 step, across = math.inf, other
             step = min(step, swarm.steps[member]) if other == across else step
-        observed[body, sw.START_X], observed[body, sw.START_Y] = (
-            swarm.motion[member, at.X],
-            swarm.motion[member, at.Y],
-        )
+        x, y = swarm.motion[member, at.X], swarm.motion[member, at.Y]
+        observed[body, sw.START_X] = observed[body, sw.SEEN_X] = x
+        observed[body, sw.START_Y] = observed[body, sw.SEEN_Y] = y
         observed[body, sw.PATH_VX] = swarm.motion[member, at.VX]
         observed[body, sw.PATH_VY] = swarm.motion[member, at.VY]
-        observed[body, sw.SINCE], observed[body, sw.FURTHEST] = swarm.times[sw.BEGIN], 0.0
+        observed[body, sw.FURTHEST] = 0.0
+        for stretch in range(sw.STRETCHES):
+            box = sw.BOXES + sw.BOX_COLUMNS * stretch
+            observed[body, box + sw.LEFT] = observed[body, box + sw.LOW] = math.inf
+            observed[body, box + sw.RIGHT] = observed[body, box + sw.HIGH] = -math.inf
+        widen(observed, body, 0, x, y)
     clock[at.ACROSS] = across
     clock[at.STEP] = step if step < math.inf else start_clock[at.STEP]
 
@@ -219,6 +228,10 @@ def take_state(swarm, work, observed, clock, members, first):
     for body in range(work.bodies.shape[0]):
         member = members[first + body]
         swarm.strayed[member] = observed[body, sw.FURTHEST]
+        for stretch in range(sw.STRETCHES):
+            for column in range(sw.BOX_COLUMNS):
+                place = sw.BOXES + sw.BOX_COLUMNS * stretch + column
+                swarm.ways[member, stretch, column] = observed[body, place]
         if swarm.bodies[member, at.FREE] == 0.0:
             continue
         for axis in range(at.MOTION_COLUMNS):
@@ -262,89 +275,3 @@ def run_islands(
         costs[island, sw.FORCES_SUMMED] = work.tally[at.EVALUATIONS]
         take_state(swarm, work, observed, clock, members, begin)
     return last
-
-
-def set_discs(swarm, span, reach):
-    """The discs of a window of so many seconds."""
-    for body in range(swarm.bodies.shape[0]):
-        disc = swarm.discs[body]
-        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, at.X], swarm.motion[body, at.Y]
-        disc[WAY_X], disc[WAY_Y] = (
-            span * swarm.motion[body, at.VX],
-            span * swarm.motion[body, at.VY],
-        )
-        disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.wander[body]
-        disc[REACH] += 0.5 * reach
-        disc[MOVES] = swarm.bodies[body, at.FREE]
-        if disc[MOVES] == 0.0:
-            # Found below, by its outline: its circle may be as wide as the box.
-            disc[WAY_X] = disc[WAY_Y] = disc[REACH] = 0.0
-            disc[PLACE_X] = disc[PLACE_Y] = 0.0
-
-
-def core_distance2(swarm, wall, x, y):
-    """Squared distance of a point from the core of a fixed body [m²]; the point as seen from it."""
-    cosine, sine = math.cos(swarm.motion[wall, at.ANGLE]), math.sin(swarm.motion[wall, at.ANGLE])
-    x, y = cosine * x + sine * y, cosine * y - sine * x
-    first, v, least = swarm.first[wall], swarm.vertices, math.inf
-    points = swarm.first[wall + 1] - first
-    rings = v.shape[1] > ONWARD
-    for start in range(first, first + (points if rings else max(edge_count(points), 1))):
-        end = edge_end(first, points, start) if points > 1 else start
-        if rings:
-            end = start + int(v[start, ONWARD])
-        distance2 = segment_distance2(
-            x, y, v[start, at.X], v[start, at.Y], v[end, at.X], v[end, at.Y]
-        )
-        least = min(least, distance2)
-    return least
-
-
-def widest_swell(swarm, wall):
-    """By how much the widest disk of a fixed body is wider than its narrowest [m]."""
-    widest = 0.0
-    if swarm.vertices.shape[1] > SWELL:
-        for point in range(swarm.first[wall], swarm.first[wall + 1]):
-            widest = max(widest, swarm.vertices[point, SWELL])
-    return widest
-
-
-def reaches_wall(swarm, body, wall, span, reach, width, height):
-    """Whether a body can come to act on a fixed one in a window."""
-    m = swarm.motion
-    x = nearest_way(m[body, at.X] - m[wall, at.X], width)
-    y = nearest_way(m[body, at.Y] - m[wall, at.Y], height)
-    way = span * math.hypot(m[body, at.VX] - m[wall, at.VX], m[body, at.VY] - m[wall, at.VY])
-    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall, at.BOUNDING_RADIUS]
-    near = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.bodies[wall, at.RADIUS] + reach
-    near += way + swarm.wander[body] + widest_swell(swarm, wall)
-    return core_distance2(swarm, wall, x, y) < near * near
-
-
-def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
-    """Name every free body by the first one of its island, fixed ones by −1, and note in
-    ``touches`` (n, k) which of the fixed bodies ``walls`` (k,) it can reach.
-
-    Returns the number of near pairs: more than ``pairs`` has room for where that was too few.
-    """
-    n = swarm.bodies.shape[0]
-    set_discs(swarm, span, reach)
-    total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
-    if total > pairs.shape[0]:
-        return total
-    for body in range(n):
-        labels[body] = body
-    for pair in range(total):
-        a, b = pairs[pair, 0], pairs[pair, 1]
-        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
-            unite(labels, a, b)
-    for body in range(n):
-        labels[body] = labels[labels[body]]
-        free = swarm.bodies[body, at.FREE] == 1.0
-        for each in range(walls.shape[0]):
-            touches[body, each] = free and reaches_wall(
-                swarm, body, walls[each], span, reach, width, height
-            )
-    for each in range(walls.shape[0]):
-        labels[walls[each]] = -1
-    return total

@@ -1,10 +1,9 @@
 """A swarm in progress: from one common time to the next.
 
-A window is tried until no body of it strays further from its straight path than others have counted
-on: where one did, islands are found anew with paths as wide as it went, those that merge by that
-are run anew, and after some tries the window is made shorter. What islands have come to is taken
-over all at once, so that a window leaves nothing behind that is half done. An island of the same
-bodies as before is not run again (`Finished`).
+A window is tried until no body of it has been in reach of one of another island: where one has,
+both islands are run anew as one, and after some tries the window is made shorter. What islands have
+come to is taken over all at once, so that a window leaves nothing behind that is half done. An
+island of the same bodies as before is not run again (`Finished`).
 """
 
 import itertools
@@ -81,6 +80,14 @@ MOST_TRIES = 4
 CROWDED, SPARSE = 1.2, 1.05
 """Windows get shorter where their islands take more than so many times the work of the least ones,
 those of no time at all, longer where they take less."""
+
+AGAIN = 1.2
+"""Shorter as well where more than so many times that work has been done: islands that meet within a
+window are run again."""
+
+ENOUGH_STEPS = 20
+"""Windows in which bodies take so many steps, in the mean, get no longer: that would save nothing.
+"""
 
 SHORTER, LONGER = 0.6, 1.4
 
@@ -216,27 +223,29 @@ class Progress:
         if not self.free.any():
             self.time = stop
             return Status.FINISHED
-        swarm, way = self.swarm, LONGEST_WAY * min(self.box)
+        swarm, way, began = self.swarm, LONGEST_WAY * min(self.box), self.effort.body_steps
         if self.shielding is not None:
             way = min(way, WAY * self.mean_radius)
             self.shielding.apply(swarm.bodies, swarm.motion[:, :3])
         span = min(self.span, self.time_to_go(way))
         least = swarm._replace(wander=self.least_wander)
-        clusters = self.runner.islands_of(least, 0.0, self.reach, self.box)
-        finished = Finished(self.free)
+        clusters = Islands.of(self.runner.reached(least, 0.0, self.reach, self.box))
+        finished, reached, done = Finished(self.free), None, 0.0
         for tried in itertools.count(1):
             whole = span >= ALL_BUT * (stop - self.time)
             swarm.times[sw.BEGIN] = self.time
             swarm.times[sw.END] = stop if whole else self.time + span
             length = swarm.times[sw.END] - self.time
-            islands = self.runner.islands_of(swarm, length, self.reach, self.box)
+            reached = self.runner.reached(swarm, length, self.reach, self.box, reached)
+            islands = Islands.of(reached)
             fresh = islands.chosen(finished.missing(islands))
             if not len(fresh.sizes):
                 break
             if tried % MOST_TRIES == 0:
                 self.span = span = 0.5 * length
-                finished = Finished(self.free)
+                finished, reached = Finished(self.free), None
                 continue
+            done += fresh.work
             status = self.run_fresh(fresh, finished, look)
             if status != Status.FINISHED:
                 return status
@@ -245,9 +254,10 @@ class Progress:
         if whole:
             return Status.FINISHED
         crowd = islands.work / clusters.work
-        if crowd > CROWDED:
+        steps = self.effort.body_steps - began
+        if crowd > CROWDED or done > AGAIN * islands.work:
             self.span = SHORTER * span
-        elif crowd < SPARSE:
+        elif crowd < SPARSE and steps < ENOUGH_STEPS * self.free.sum():
             self.span = LONGER * span
         return Status.PAUSED
 

@@ -7,6 +7,7 @@ whether to go on: compiled code hears nothing by itself, and one window may take
 import itertools
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -118,6 +119,15 @@ class ThreadArrays:
             )
 
 
+class Reached(NamedTuple):
+    """Who can reach whom in a window: ``labels`` (n,), the first body of every body's island;
+    ``walls`` (k,), fixed bodies; ``touches`` (n, k), which of them each body can reach."""
+
+    labels: np.ndarray
+    walls: np.ndarray
+    touches: np.ndarray
+
+
 @attrs.define
 class Islands:
     """The islands of a window: members of each, sorted, fixed bodies among them."""
@@ -128,8 +138,9 @@ class Islands:
     costs: np.ndarray
 
     @classmethod
-    def of(cls, labels: np.ndarray, walls: np.ndarray, touches: np.ndarray) -> "Islands":
-        """From the name of every body's island, and which fixed bodies it can reach."""
+    def of(cls, reached: Reached) -> "Islands":
+        """From who can reach whom."""
+        labels, walls, touches = reached
         bodies = np.flatnonzero(labels >= 0)
         names = labels[bodies]
         if touches[bodies].any():
@@ -173,6 +184,7 @@ class Runner:
     """Finds and runs islands: the compiled functions, and each thread's arrays."""
 
     finder: Callable[..., int]
+    joiner: Callable[..., int]
     driver: Callable[..., int]
     integrator: Integrator
     threads: list[ThreadArrays]
@@ -180,20 +192,23 @@ class Runner:
     pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
     pool: ThreadPoolExecutor | None = None
 
-    def islands_of(
-        self, swarm: Swarm, span: float, reach: float, box: tuple[float, float]
-    ) -> Islands:
-        """The islands of a window of so many seconds."""
-        gone = swarm.bodies[:, at.MASS] == 0.0
+    def reached(
+        self, swarm: Swarm, span: float, reach: float, box: tuple[float, float],
+        before: Reached | None = None,
+    ) -> Reached:  # fmt: skip
+        """Who can reach whom in a window of so many seconds; with what was known ``before`` it was
+        run: who has."""
+        n, gone = len(swarm.bodies), swarm.bodies[:, at.MASS] == 0.0
         walls = np.flatnonzero((swarm.bodies[:, at.FREE] == 0.0) & ~gone)
-        labels = np.zeros(len(swarm.bodies), dtype=np.int64)
-        touches = np.zeros((len(swarm.bodies), len(walls)), dtype=np.bool_)
-        while True:
-            found = self.finder(swarm, span, reach, *box, self.pairs, labels, walls, touches)
-            labels[gone] = -1
-            if found <= len(self.pairs):
-                return Islands.of(labels, walls, touches)
+        labels = np.zeros(n, dtype=np.int64) if before is None else before.labels
+        touches = np.zeros((n, len(walls)), dtype=np.bool_)
+        find = self.finder if before is None else self.joiner
+        while (
+            found := find(swarm, span, reach, *box, self.pairs, labels, walls, touches)
+        ) > len(self.pairs):  # fmt: skip
             self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
+        labels[gone] = -1
+        return Reached(labels, walls, touches)
 
     def run_chunk(
         self, own: ThreadArrays, swarm: Swarm, islands: Islands, first: int, last: int

@@ -25,7 +25,8 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.islands import find_islands, run_islands, watch_paths
+from flocsim.swarms.grouping import find_islands, join_islands
+from flocsim.swarms.islands import run_islands, watch_paths
 from flocsim.swarms.placement import Leaving
 from flocsim.swarms.progress import Effort, Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
@@ -212,7 +213,8 @@ class Swarm:
         fillings = {**self.system.compiled_calls, **self.fillings()}
         what = f"the engine for swarms of {self.system.family}"
         runner = Runner(
-            compose(find_islands, {}), compose(run_islands, fillings, what=what), self.integrator,
+            compose(find_islands, {}), compose(join_islands, {}),
+            compose(run_islands, fillings, what=what), self.integrator,
             [ThreadArrays(scene) for _ in range(threads)], max_steps,
         )  # fmt: skip
         swarm = swarm_of(scene, *self.system.motion(), self.integrator.fresh_clock())

@@ -12,7 +12,8 @@ from flocsim.errors import UsageError
 from flocsim.forces import Contact, DoubleLayer, StokesDrag, Thermal
 from flocsim.integrators import Overdamped
 from flocsim.swarms.arrays import swarm_of
-from flocsim.swarms.islands import find_islands, run_islands
+from flocsim.swarms.grouping import find_islands, join_islands
+from flocsim.swarms.islands import run_islands
 from flocsim.swarms.progress import Progress
 from flocsim.swarms.runner import Runner, ThreadArrays
 
@@ -29,8 +30,9 @@ def progress_of(swarm, until):
     """Swarm.begin without a compiler."""
     scene = swarm.system.scene(jit=False)._replace(box=swarm.box)
     runner = Runner(
-        compose(find_islands, {}, jit=False), compose(run_islands, swarm.fillings(), jit=False),
-        swarm.integrator, [ThreadArrays(scene)], 10**6,
+        compose(find_islands, {}, jit=False), compose(join_islands, {}, jit=False),
+        compose(run_islands, swarm.fillings(), jit=False), swarm.integrator,
+        [ThreadArrays(scene)], 10**6,
     )  # fmt: skip
     arrays = swarm_of(scene, *swarm.system.motion(), swarm.integrator.fresh_clock())
     return Progress(runner, arrays, swarm.box, swarm.reach, until)

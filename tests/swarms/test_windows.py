@@ -18,8 +18,8 @@ from flocsim.swarms.arrays import (
     with_links,
 )
 from flocsim.swarms.islands import put_slips, take_slips, touch_plainly
-from flocsim.swarms.progress import Finished, Progress
-from flocsim.swarms.runner import CHUNK, Islands, chunks_of
+from flocsim.swarms.progress import Finished
+from flocsim.swarms.runner import CHUNK, Islands, Reached, chunks_of
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces
 
@@ -40,7 +40,7 @@ def drawn(seed, n=60, walls=3):
 @pytest.mark.parametrize("seed", range(20))
 def test_islands_are_bodies_of_a_name_and_the_walls_that_these_reach(seed):
     labels, fixed, touches = drawn(seed, walls=seed % 4)
-    islands = Islands.of(labels, fixed, touches)
+    islands = Islands.of(Reached(labels, fixed, touches))
     expected = []
     for label in sorted({*labels.tolist()} - {-1}):
         members = np.flatnonzero(labels == label)
@@ -86,7 +86,7 @@ def test_what_has_been_run_is_not_run_again_and_contacts_are_those_of_the_last_i
     free = labels >= 0
     finished, ran = Finished(free), {}
     for _ in range(4):
-        islands = Islands.of(labels, fixed, touches)
+        islands = Islands.of(Reached(labels, fixed, touches))
         fresh = islands.chosen(finished.missing(islands))
         members = {tuple(islands.members_of(k)) for k in range(len(islands.sizes))}
         assert {tuple(fresh.members_of(k)) for k in range(len(fresh.sizes))} == members - ran.keys()
@@ -105,33 +105,6 @@ def test_what_has_been_run_is_not_run_again_and_contacts_are_those_of_the_last_i
         one, other = rng.choice(np.unique(labels[free]), 2)
         labels[labels == max(one, other)] = min(one, other)
         touches = touches | (rng.random(touches.shape) < 0.01)
-
-
-def test_paths_are_as_wide_as_bodies_stray_and_islands_those_of_the_paths():
-    """What makes a window right: whoever strayed did so within what its neighbours counted on."""
-    bodies, side = crowd(30, 2)
-    swarm = Swarm(bodies, forces(), fluid=WATER, box=(side, side))
-    progress, seen, widened = swarm.begin(0.05), 0, 0
-    # So far that bodies meet whom straight paths would have missed.
-    progress.span *= 30.0
-    take_over = progress.take_over
-
-    def watched(finished):
-        nonlocal seen, widened
-        arrays = progress.swarm
-        assert (arrays.strayed <= arrays.wander).all()
-        length = arrays.times[1] - arrays.times[0]
-        islands = progress.runner.islands_of(arrays, length, progress.reach, progress.box)
-        assert len(finished.missing(islands)) == 0
-        seen += 1
-        widened += bool((arrays.strayed > 0.05 * R).any())
-        take_over(finished)
-
-    progress.take_over = watched
-    while progress.advance(0.05).name == "PAUSED":
-        assert isinstance(progress, Progress)
-    assert seen > 3 and widened > 0
-    assert progress.effort.tries > progress.effort.windows
 
 
 def test_links_are_named_by_a_body_that_moves():

@@ -1,0 +1,225 @@
+"""Which bodies of a swarm form an island in a window: those that can reach each other in it.
+
+Before it is run, each body is expected to go straight on, and allowed to stray from that path by so
+much (``wander``): discs of its bounding radius, that way, and half of what acts reaches, which move
+along their paths (geometry/contact/body_pairs.py). Where two of them meet, the bodies are of one
+island.
+
+Afterwards it is known where they have been, stretch by stretch of the window. Islands of which two
+bodies have been in each other's reach are one, and to be run again; one that lands on a bed stays
+behind the path that it was expected to go, with whom it may have met on either.
+
+Fixed bodies do not pass on what acts on them: each is a part of all islands that can reach it.
+"""
+
+import math
+
+import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
+from flocsim.geometry.contact.body_pairs import (
+    MOVES,
+    PLACE_X,
+    PLACE_Y,
+    REACH,
+    WAY_X,
+    WAY_Y,
+    near_pairs,
+)
+from flocsim.geometry.contact.compounds import ONWARD, SWELL
+from flocsim.geometry.contact.points import nearest_way
+from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.integrators.radau.contact_frames import unite
+
+
+def set_discs(swarm, span, reach):
+    """The discs of a window of so many seconds."""
+    for body in range(swarm.bodies.shape[0]):
+        disc = swarm.discs[body]
+        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, at.X], swarm.motion[body, at.Y]
+        disc[WAY_X], disc[WAY_Y] = (
+            span * swarm.motion[body, at.VX],
+            span * swarm.motion[body, at.VY],
+        )
+        disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.wander[body]
+        disc[REACH] += 0.5 * reach
+        disc[MOVES] = swarm.bodies[body, at.FREE]
+        if disc[MOVES] == 0.0:
+            # Found below, by its outline: its circle may be as wide as the box.
+            disc[WAY_X] = disc[WAY_Y] = disc[REACH] = 0.0
+            disc[PLACE_X] = disc[PLACE_Y] = 0.0
+
+
+def core_distance2(swarm, wall, x, y):
+    """Squared distance of a point from the core of a fixed body [m²]; the point as seen from it."""
+    cosine, sine = math.cos(swarm.motion[wall, at.ANGLE]), math.sin(swarm.motion[wall, at.ANGLE])
+    x, y = cosine * x + sine * y, cosine * y - sine * x
+    first, v, least = swarm.first[wall], swarm.vertices, math.inf
+    points = swarm.first[wall + 1] - first
+    rings = v.shape[1] > ONWARD
+    for start in range(first, first + (points if rings else max(edge_count(points), 1))):
+        end = edge_end(first, points, start) if points > 1 else start
+        if rings:
+            end = start + int(v[start, ONWARD])
+        distance2 = segment_distance2(
+            x, y, v[start, at.X], v[start, at.Y], v[end, at.X], v[end, at.Y]
+        )
+        least = min(least, distance2)
+    return least
+
+
+def widest_swell(swarm, wall):
+    """By how much the widest disk of a fixed body is wider than its narrowest [m]."""
+    widest = 0.0
+    if swarm.vertices.shape[1] > SWELL:
+        for point in range(swarm.first[wall], swarm.first[wall + 1]):
+            widest = max(widest, swarm.vertices[point, SWELL])
+    return widest
+
+
+def reaches_wall(swarm, body, wall, span, reach, width, height):
+    """Whether a body can come to act on a fixed one in a window."""
+    m = swarm.motion
+    x = nearest_way(m[body, at.X] - m[wall, at.X], width)
+    y = nearest_way(m[body, at.Y] - m[wall, at.Y], height)
+    way = span * math.hypot(m[body, at.VX] - m[wall, at.VX], m[body, at.VY] - m[wall, at.VY])
+    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall, at.BOUNDING_RADIUS]
+    near = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.bodies[wall, at.RADIUS] + reach
+    near += way + swarm.wander[body] + widest_swell(swarm, wall)
+    return core_distance2(swarm, wall, x, y) < near * near
+
+
+def unite_pairs(swarm, pairs, total, labels):
+    """Make one of the islands of two free bodies of each pair, named by their first body."""
+    for pair in range(total):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
+            unite(labels, a, b)
+    for body in range(labels.shape[0]):
+        if labels[body] >= 0:
+            labels[body] = labels[labels[body]]
+
+
+def note_walls(swarm, span, reach, width, height, labels, walls, touches):
+    """Note which of the fixed bodies ``walls`` each body can reach; these are of no island."""
+    for body in range(labels.shape[0]):
+        free = swarm.bodies[body, at.FREE] == 1.0
+        for each in range(walls.shape[0]):
+            touches[body, each] = free and reaches_wall(
+                swarm, body, walls[each], span, reach, width, height
+            )
+    for each in range(walls.shape[0]):
+        labels[walls[each]] = -1
+
+
+def share_to_touch(swarm, a, b, span, width, height):
+    """The share of a window after which the circles of two bodies touch, on their straight paths; 1
+    where they do not in it."""
+    m, bodies = swarm.motion, swarm.bodies
+    x = nearest_way(m[a, at.X] - m[b, at.X], width)
+    y = nearest_way(m[a, at.Y] - m[b, at.Y], height)
+    way_x, way_y = span * (m[a, at.VX] - m[b, at.VX]), span * (m[a, at.VY] - m[b, at.VY])
+    near = bodies[a, at.BOUNDING_RADIUS] + bodies[b, at.BOUNDING_RADIUS]
+    apart, closing = max(x * x + y * y - near * near, 0.0), -(x * way_x + y * way_y)
+    left = closing * closing - apart * (way_x * way_x + way_y * way_y)
+    if closing <= 0.0 or left <= 0.0:
+        return 1.0
+    return min(apart / (closing + math.sqrt(left)), 1.0)
+
+
+def widen_landing(swarm, span, width, height, pairs, total, reach):
+    """Widen the path of the faster one of two bodies that touch by what is left of it, which it
+    may not go: who comes behind may meet it. Whether there is one."""
+    m, found = swarm.motion, False
+    for pair in range(total):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
+            share = share_to_touch(swarm, a, b, span, width, height)
+            if share < 1.0:
+                faster = a
+                if math.hypot(m[b, at.VX], m[b, at.VY]) > math.hypot(m[a, at.VX], m[a, at.VY]):
+                    faster = b
+                way = math.hypot(m[a, at.VX] - m[b, at.VX], m[a, at.VY] - m[b, at.VY])
+                least = (1.0 - share) * span * way
+                wide = swarm.bodies[faster, at.BOUNDING_RADIUS] + 0.5 * reach + least
+                if wide > swarm.discs[faster, REACH]:
+                    swarm.discs[faster, REACH], found = wide, True
+    return found
+
+
+def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
+    """Name every free body by the first one of its island, fixed ones by −1, and note in
+    ``touches`` (n, k) which of the fixed bodies ``walls`` (k,) it can reach.
+
+    Returns the number of near pairs: more than ``pairs`` has room for where that was too few.
+    """
+    n = swarm.bodies.shape[0]
+    set_discs(swarm, span, reach)
+    total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+    if total > pairs.shape[0]:
+        return total
+    if widen_landing(swarm, span, width, height, pairs, total, reach):
+        total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+        if total > pairs.shape[0]:
+            return total
+    for body in range(n):
+        labels[body] = body
+    unite_pairs(swarm, pairs, total, labels)
+    note_walls(swarm, span, reach, width, height, labels, walls, touches)
+    return total
+
+
+def set_boxes(swarm, reach):
+    """The discs round all of where bodies have been in the window."""
+    for body in range(swarm.bodies.shape[0]):
+        disc, ways = swarm.discs[body], swarm.ways
+        moves = swarm.bodies[body, at.FREE]
+        disc[WAY_X] = disc[WAY_Y] = disc[REACH] = disc[PLACE_X] = disc[PLACE_Y] = 0.0
+        disc[MOVES] = moves
+        if moves == 1.0:
+            left = low = math.inf
+            right = high = -math.inf
+            for stretch in range(sw.STRETCHES):
+                left = min(left, ways[body, stretch, sw.LEFT])
+                right = max(right, ways[body, stretch, sw.RIGHT])
+                low = min(low, ways[body, stretch, sw.LOW])
+                high = max(high, ways[body, stretch, sw.HIGH])
+            disc[PLACE_X], disc[PLACE_Y] = 0.5 * (left + right), 0.5 * (low + high)
+            disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + 0.5 * reach
+            disc[REACH] += 0.5 * math.hypot(right - left, high - low)
+
+
+def gap_along(low, high, other_low, other_high, period):
+    """How far two stretches of an axis are apart [m], by their nearest images."""
+    between = abs(nearest_way(0.5 * (low + high - other_low - other_high), period))
+    return max(between - 0.5 * (high - low + other_high - other_low), 0.0)
+
+
+def have_met(swarm, a, b, reach, width, height):
+    """Whether two bodies have been in each other's reach in any stretch of the window."""
+    near = swarm.bodies[a, at.BOUNDING_RADIUS] + swarm.bodies[b, at.BOUNDING_RADIUS] + reach
+    for stretch in range(sw.STRETCHES):
+        one, other = swarm.ways[a, stretch], swarm.ways[b, stretch]
+        x = gap_along(one[sw.LEFT], one[sw.RIGHT], other[sw.LEFT], other[sw.RIGHT], width)
+        y = gap_along(one[sw.LOW], one[sw.HIGH], other[sw.LOW], other[sw.HIGH], height)
+        if x * x + y * y < near * near:
+            return True
+    return False
+
+
+def join_islands(swarm, span, reach, width, height, pairs, labels, walls, touches):
+    """Make one of islands of which two bodies have been in each other's reach; the number of near
+    pairs, as find_islands."""
+    set_boxes(swarm, reach)
+    total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
+    if total > pairs.shape[0]:
+        return total
+    met = 0
+    for pair in range(total):
+        a, b = pairs[pair, 0], pairs[pair, 1]
+        apart = swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0
+        if apart and labels[a] != labels[b] and have_met(swarm, a, b, reach, width, height):
+            pairs[met, 0], pairs[met, 1] = a, b
+            met += 1
+    unite_pairs(swarm, pairs, met, labels)
+    note_walls(swarm, span, reach, width, height, labels, walls, touches)
+    return total
