@@ -648,9 +648,8 @@ class Elimination(NamedTuple):
     lower: np.ndarray  # (n + 1,): where a row's blocks left of the diagonal begin in ``column``
     upper: np.ndarray  # (n,): where those right of it begin
     column: np.ndarray  # (room,): places of the blocks
-    blocks: Annotated[np.ndarray, ("room", 3, 3, 3)]  # parts (REAL_PART …), rows, columns
-    pivot: Annotated[np.ndarray, ("n", 3, 3, 3)]  # inverses of the diagonal blocks
-    row: Annotated[np.ndarray, ("n", 3, 3, 3)]  # the row that is worked on
+    blocks: Annotated[np.ndarray, (3, "n + room", 3, 4)]  # see elimination.REAL_PART
+    where: np.ndarray  # (n,): the block of the row that is worked on in every column
     pairs: np.ndarray  # (pairs,): 1 where a pair of bodies is in the pattern
     graph: np.ndarray  # (room,): scratch of the ordering
     nodes: np.ndarray  # (8, n + 1): scratch of the ordering
@@ -733,9 +732,8 @@ def elimination_of(n: int, pairs: int, room: int) -> Elimination:
         lower=np.zeros(n + 1, dtype=np.int64),
         upper=np.zeros(n, dtype=np.int64),
         column=np.zeros(room, dtype=np.int64),
-        blocks=np.zeros((room, 3, 3, 3)),
-        pivot=np.zeros((n, 3, 3, 3)),
-        row=np.zeros((n, 3, 3, 3)),
+        blocks=np.zeros((3, n + room, 3, 4)),
+        where=np.zeros(n, dtype=np.int64),
         pairs=np.zeros(pairs, dtype=np.int64),
         graph=np.zeros(room, dtype=np.int64),
         nodes=np.zeros((8, n + 1), dtype=np.int64),
@@ -861,7 +859,8 @@ def with_room(work: Work) -> Work:
         return work._replace(elimination=wider(elimination, pairs, pairs=0))
     if full == BLOCKS_FULL:
         room = 2 * len(elimination.column)
-        return work._replace(elimination=wider(elimination, room, column=0, blocks=0, graph=0))
+        elimination = wider(elimination, len(elimination.body) + room, blocks=1)
+        return work._replace(elimination=wider(elimination, room, column=0, graph=0))
     return with_capacity(work, 2 * len(work.candidates))
 
 

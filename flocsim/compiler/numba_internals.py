@@ -280,7 +280,7 @@ def libraries():
                     each.linkage = "internal"
             with replaced(self._codegen, _tm=self.machine):
                 passes, builder = self._codegen._module_pass_manager(
-                    loop_vectorize=self.loops, slp_vectorize=False
+                    loop_vectorize=self.loops, slp_vectorize=self.loops
                 )
             passes.run(module, builder)
 
