@@ -22,6 +22,13 @@ system has no symmetry, and there may be no way to a solution (a pair wedged bet
 slide), or none at all: iterations then go less and less far. There what friction goes by is held,
 BEARING and PART: all of this is convex then, and a step has one end.
 
+How far an iteration goes is bounded by the pair that would first leave where it belongs. Among
+hundreds one always does: begun near the last step's end, with most of them right, nothing moves
+then. There each pair goes as far as it itself may, and bodies go all the way (`change_pairs`): what
+is left of a pair no longer fits its gap, as in a search that begins where it does not (Wright, ch.
+6), and is mended by the next one. That takes a third of the systems, or leads astray, which shows
+within four; so it is how a search begins, and how it ends.
+
 Along the way a pair of such a limit counts as closed for the whole step if it was at its start:
 where it opens L is 0. By the gap, which is far from its end until δ and s are, it would be without
 friction nearly everywhere.
@@ -54,7 +61,6 @@ NOTHING = 1e-14
 
 LEAST_LIMIT = 1e-3
 """Friction holds this share of what the spring alone would let it, at least: L stays above 0."""
-
 
 SMALL = 0.01
 """What is off by this share of its parts is nearly right."""
@@ -278,9 +284,9 @@ def change_pair(work, row, step, target, share, go):
 
 
 @apart
-def change_pairs(work, step, target):
-    """Change all pairs in play as the velocities in CHANGE do, as far as they may: (the share, the
-    pair that has allowed no more, −1 for none)."""
+def change_pairs(work, step, target, own):
+    """Change all pairs in play as the velocities in CHANGE do, each as far as all of them may, or
+    as its ``own`` parts may: (the least share, the pair that has allowed no more, −1 for none)."""
     share, first = 1.0, -1
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
@@ -289,8 +295,20 @@ def change_pairs(work, step, target):
                 share, first = less, row
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            change_pair(work, row, step, target, share, True)
+            goes = change_pair(work, row, step, target, 1.0, False) if own else share
+            change_pair(work, row, step, target, goes, True)
     return share, first
+
+
+@apart
+def let_open(work):
+    """Let the s of pairs follow their gaps where these have opened by more: next to δ = 0 it would
+    but double in an iteration."""
+    known = work.slip
+    for row in range(work.tally[at.CANDIDATES]):
+        if in_play(work, row):
+            wide = work.geometry[at.NOW, row, at.GAP] + known[at.OVERLAP, row]
+            known[at.LEFT, row] = max(known[at.LEFT, row], wide)
 
 
 def begin_friction(work, row, share, target):
@@ -302,14 +320,13 @@ def begin_friction(work, row, share, target):
 
 
 @apart
-def hold_friction(work, first, limited):
-    """Hold what friction goes by from now on, of the pairs alone that have a limit if ``limited``,
-    and let the one begin again that is in the way of the others; False where there is none left to
-    be held."""
+def hold_friction(work, first):
+    """Hold what friction goes by from now on, and let the pair begin again that is in the way of
+    the others; False where there is none left to be held."""
     known, newly = work.slip, False
     for row in range(work.tally[at.CANDIDATES]):
-        rubs = known[at.LIMIT if limited else at.YIELDS, row] > 0.0
-        if in_play(work, row) and rubs and known[at.BEARING, row] == 0.0:
+        rubs = known[at.YIELDS, row] > 0.0 and known[at.BEARING, row] == 0.0
+        if in_play(work, row) and rubs:
             known[at.BEARING, row], newly = known[at.OVERLAP, row], True
     if newly and known[at.LIMIT, first] > 0.0:
         share = min(max(known[at.RUBBING, first], -WITHIN), WITHIN)

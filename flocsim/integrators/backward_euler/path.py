@@ -16,6 +16,7 @@ from flocsim.integrators.backward_euler.interior import (
     change_pairs,
     hold_friction,
     in_play,
+    let_open,
     mean_product,
     press,
     rate_along,
@@ -40,16 +41,16 @@ from flocsim.integrators.rhs.forces import sum_other_forces
 from flocsim.integrators.rhs.jacobian import normal_rows
 from flocsim.integrators.rhs.views import effective_mass
 
-MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 30
+MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 24
 """Iterations at most: along gaps that are frozen, along true ones from then on, and along these
 where pairs are taken to close and slide as in the step before."""
 
 FALLING, LEAST_WAY = 0.01, 0.7
 """τ is that share of the mean of all products behind an iteration that went so far at least; …"""
 
-STANDING, CAREFUL, CLOSER = 0.03, 0.5, 0.2
+STANDING, CAREFUL, CLOSER, APART = 0.03, 0.5, 0.2, 0.05
 """… and behind others one of these: along gaps that are frozen, there where the first one has led
-nowhere, and along true ones."""
+nowhere, along true ones, and where each pair goes its own share."""
 
 THAWS, LEAST_TARGET = 0.1, 1e-10
 """Gaps are true ones from where the mean of all products is below this share of the square of a
@@ -73,9 +74,11 @@ AWAY = 0.1
 SMALL_LIMIT = 1e-3
 """A limit of friction counts as this share of a usual overlap at least there."""
 
-AS_BEFORE, CUT_OFF = 0.01, 0.001
-"""Taken as in the step before, δ s begins at the square of this share of a usual overlap; an
-iteration that goes less far than the other one says that it is not so."""
+AS_BEFORE = 0.03
+"""Taken as in the step before, δ s begins at the square of this share of a usual overlap."""
+
+ASTRAY = 30.0
+"""Where each pair goes its own share, a change of so many times the first one leads nowhere."""
 
 HALTING, SOON = 0.05, 2
 """Iterations that go less far have come to a halt, after so many in a row."""
@@ -136,6 +139,8 @@ def begin_as_before(scene, work, step, usual):
             known, before = work.slip, work.geometry[at.TRIAL, row, at.GAP]
             if before < 0.0:
                 known[at.OVERLAP, row], known[at.LEFT, row] = -before, -target / before
+            elif work.geometry[at.NOW, row, at.GAP] < 0.0:
+                known[at.OVERLAP, row], known[at.LEFT, row] = usual, target / usual
             else:
                 known[at.LEFT, row] = max(work.geometry[at.NOW, row, at.GAP], FOUND * usual)
                 known[at.OVERLAP, row] = target / known[at.LEFT, row]
@@ -159,9 +164,10 @@ def advance_gaps(work, share, step):
 
 
 @apart
-def iterate(scene, work, clock, step, target, turns):
+def iterate(scene, work, clock, step, target, turns, own):
     """One iteration towards products τ: (the share of the change that was gone, the pair that
-    allowed no more, the change [m]); −1 where it fails."""
+    allowed no more, the change [m]); −1 where it fails. Where each pair goes its ``own`` share,
+    that of its last one, and bodies go all the way."""
     assemble_rest(scene, work, clock, step)
     write_forces(scene, work, step, target, turns)
     if not factorise_euler(scene, work, step):
@@ -169,10 +175,12 @@ def iterate(scene, work, clock, step, target, turns):
     change = solve_change(scene, work, step)
     if not change < math.inf:
         return -1.0, -1, math.inf
-    share, first = change_pairs(work, step, target)
-    go_along(work, share)
+    share, first = change_pairs(work, step, target, own)
+    go_along(work, 1.0 if own else share)
     if turns:
         evaluate_in_play(scene, work, clock[at.TIME], step)
+        if own:
+            let_open(work)
     else:
         advance_gaps(work, share, step)
         place_ends(work, step)
@@ -180,31 +188,33 @@ def iterate(scene, work, clock, step, target, turns):
     return share, first, change
 
 
-def count_halts(work, halted, share, first, limited):
+def count_halts(work, halted, share, first):
     """(How many iterations in a row have hardly gone any way, whether it makes sense to go on):
     behind SOON of them friction is held, where it has not been; see hold_friction."""
     if share >= HALTING:
         return 0, True
     if halted + 1 < SOON:
         return halted + 1, True
-    return -SOON, hold_friction(work, first, limited)
+    return -SOON, hold_friction(work, first)
 
 
 @apart
-def arrive(scene, work, clock, step, usual, most, known):
+def arrive(scene, work, clock, step, usual, most, own):
     """Iterate along true gaps, with τ about as small as it is to be; where that leads to. Where
-    pairs are taken to be as they were, it is given up if an iteration hardly goes any way."""
-    share, halted = 1.0, 0
+    each pair goes its ``own`` way, it is given up if that leads further and further off."""
+    share, halted, first_change = 1.0, 0, math.inf
     for _ in range(most):
         mean = mean_product(work)
-        target = (FALLING if share >= LEAST_WAY else CLOSER) * mean
+        target = (FALLING if share >= LEAST_WAY else APART if own else CLOSER) * mean
         target = max(target, LEAST_TARGET * usual * usual)
-        share, first, change = iterate(scene, work, clock, step, target, True)
-        if share < (CUT_OFF if known else 0.0):
+        share, first, change = iterate(scene, work, clock, step, target, True, own)
+        if share < 0.0 or (own and change > ASTRAY * first_change):
             return NOWHERE
-        halted, goes_on = count_halts(work, halted, share, first, known)
-        if not goes_on:
-            return NOWHERE
+        first_change = change if first_change == math.inf else first_change
+        if not own:
+            halted, goes_on = count_halts(work, halted, share, first)
+            if not goes_on:
+                return NOWHERE
         goal = goal_of(scene, work, clock, step)
         near = share > LEAST_WAY and change <= NEAR_CHANGE * goal
         if near and settled(work, FOUND * usual, True):
@@ -216,23 +226,23 @@ def arrive(scene, work, clock, step, usual, most, known):
 
 
 @apart
-def come_from_afar(scene, work, clock, step, usual, way, standing):
+def come_from_afar(scene, work, clock, step, usual, way, careful):
     """Go to the end of the step from where nothing is known of it; where that leads to."""
     put_back(work)
     evaluate_others(scene, work, clock[at.TIME], step)
     begin_anywhere(scene, work, step, usual, way)
-    share, halted = 0.0, 0
+    share, halted, standing = 0.0, 0, CAREFUL if careful else STANDING
     for _ in range(MOST_ITERATIONS):
         target = (FALLING if share >= LEAST_WAY else standing) * mean_product(work)
-        share, first, _ = iterate(scene, work, clock, step, target, False)
+        share, first, _ = iterate(scene, work, clock, step, target, False, False)
         if share < 0.0:
             return NOWHERE
-        halted, goes_on = count_halts(work, halted, share, first, False)
+        halted, goes_on = count_halts(work, halted, share, first)
         if not goes_on:
             return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
             evaluate_others(scene, work, clock[at.TIME], step)
-            return arrive(scene, work, clock, step, usual, MOST_TURNING, False)
+            return arrive(scene, work, clock, step, usual, MOST_TURNING, not careful)
     return NOWHERE
 
 
@@ -259,11 +269,11 @@ def ends(scene, work, clock, step, led):
 def search_afar(scene, work, clock, step, usual, way):
     """Find the end of the step from where nothing is known of it; once more and more carefully
     where that fails."""
-    led = come_from_afar(scene, work, clock, step, usual, way, STANDING)
-    if ends(scene, work, clock, step, led):
-        return True
-    led = come_from_afar(scene, work, clock, step, usual, way, CAREFUL)
-    return ends(scene, work, clock, step, led)
+    for careful in (False, True):
+        led = come_from_afar(scene, work, clock, step, usual, way, careful)
+        if ends(scene, work, clock, step, led):
+            return True
+    return False
 
 
 @apart

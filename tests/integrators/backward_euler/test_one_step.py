@@ -246,11 +246,11 @@ def test_friction_is_held_once_of_the_pairs_in_play_that_rub():
     slip[at.OVERLAP, row] = slip[at.LEFT, row] = 1e-12
     stage.work.candidates[row, at.CLOSED] = 1
     hold = stage.linked(hold_friction)
-    assert hold(stage.work, row, True) and slip[at.BEARING, row] == 1e-12
+    assert hold(stage.work, row) and slip[at.BEARING, row] == 1e-12
     assert slip[at.RUBBING, row] == -0.9  # it begins again within its limit
-    assert not hold(stage.work, row, True)
-    slip[at.BEARING], slip[at.LIMIT, row] = 0.0, 0.0
-    assert not hold(stage.work, row, True) and hold(stage.work, row, False)
+    assert not hold(stage.work, row)
+    slip[at.BEARING], slip[at.YIELDS, row] = 0.0, 0.0
+    assert not hold(stage.work, row)
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.6])
