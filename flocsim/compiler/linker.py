@@ -148,8 +148,9 @@ def apart(function: Callable) -> Callable:
 
 
 def loops_apart(function: Callable) -> Callable:
-    """Mark a function that is compiled by itself, and is a loop over many numbers without a branch:
-    it takes several of them at once, to the same bits."""
+    """Mark a function that is compiled by itself, and is a loop over many numbers without a branch,
+    or does to four numbers side by side what it does to one: it takes several of them at once, to
+    the same bits."""
     function.loops = True  # type: ignore[attr-defined]
     return apart(function)
 

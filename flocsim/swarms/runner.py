@@ -145,8 +145,8 @@ class Islands:
         names = labels[bodies]
         if touches[bodies].any():
             rows, columns = np.nonzero(touches[bodies])
-            reached = np.unique(np.column_stack([names[rows], walls[columns]]), axis=0)
-            names, bodies = np.append(names, reached[:, 0]), np.append(bodies, reached[:, 1])
+            both = np.unique(np.column_stack([names[rows], walls[columns]]), axis=0)
+            names, bodies = np.append(names, both[:, 0]), np.append(bodies, both[:, 1])
         order = np.lexsort((bodies, names))
         starts = np.flatnonzero(np.diff(names[order], prepend=-1))
         starts = np.append(starts, len(names)).astype(np.int64)
