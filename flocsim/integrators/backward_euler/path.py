@@ -10,6 +10,7 @@ import math
 
 import flocsim.arrays as at
 from flocsim.compiler.linker import apart
+from flocsim.hooks import SLIP_LIMIT, has
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
     begin_friction,
@@ -188,6 +189,18 @@ def iterate(scene, work, clock, step, target, turns, own):
     return share, first, change
 
 
+def may_go_apart(scene, work):
+    """Whether each pair may go its own share of an iteration. Friction without a limit goes by the
+    part of the step for which a pair is closed, and so by δ and s themselves: there the bodies'
+    ends would be others than those that pairs know of, and steps are rejected for it."""
+    if has(scene, SLIP_LIMIT):
+        return True
+    for row in range(work.tally[at.CANDIDATES]):
+        if in_play(work, row) and work.slip[at.YIELDS, row] > 0.0:
+            return False
+    return True
+
+
 def count_halts(work, halted, share, first):
     """(How many iterations in a row have hardly gone any way, whether it makes sense to go on):
     behind SOON of them friction is held, where it has not been; see hold_friction."""
@@ -242,7 +255,8 @@ def come_from_afar(scene, work, clock, step, usual, way, careful):
             return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
             evaluate_others(scene, work, clock[at.TIME], step)
-            return arrive(scene, work, clock, step, usual, MOST_TURNING, not careful)
+            own = not careful and may_go_apart(scene, work)
+            return arrive(scene, work, clock, step, usual, MOST_TURNING, own)
     return NOWHERE
 
 
@@ -287,7 +301,8 @@ def find_end(scene, work, clock, step):
     if usual == 0.0:
         return solve_end(scene, work, clock, step)
     begin_as_before(scene, work, step, usual)
-    led = arrive(scene, work, clock, step, usual, MOST_KNOWN, True)
-    if ends(scene, work, clock, step, led):
-        return True
+    if may_go_apart(scene, work):
+        led = arrive(scene, work, clock, step, usual, MOST_KNOWN, True)
+        if ends(scene, work, clock, step, led):
+            return True
     return search_afar(scene, work, clock, step, usual, way)

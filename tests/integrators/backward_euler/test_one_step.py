@@ -15,6 +15,7 @@ from flocsim.integrators.backward_euler.contact_mean import (
     normal_force,
 )
 from flocsim.integrators.backward_euler.interior import hold_friction
+from flocsim.integrators.backward_euler.path import may_go_apart
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import FREE_SHARE
 from flocsim.swarms.placement import floor
@@ -251,6 +252,16 @@ def test_friction_is_held_once_of_the_pairs_in_play_that_rub():
     assert not hold(stage.work, row)
     slip[at.BEARING], slip[at.YIELDS, row] = 0.0, 0.0
     assert not hold(stage.work, row)
+
+
+@pytest.mark.parametrize(
+    ("law", "may"), [({"friction": 0.3}, True), ({"k_t": 0.0}, True), ({}, False)]
+)
+def test_pairs_go_their_own_shares_but_where_friction_has_no_limit(law, may):
+    stage = Stage(heap(0), [Gravity(), StokesDrag(), Contact(**law)], WATER)
+    assert stage.end(1e-5, from_anywhere)
+    assert (stage.work.candidates[:, at.CLOSED] == at.TOUCHES).any()
+    assert stage.linked(may_go_apart)(stage.scene, stage.work) == may
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.6])
