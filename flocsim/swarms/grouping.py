@@ -3,11 +3,11 @@
 Before it is run, each body is expected to go straight on, and allowed to stray from that path by so
 much (``wander``): discs of its bounding radius, that way, and half of what acts reaches, which move
 along their paths (geometry/contact/body_pairs.py). Where two of them meet, the bodies are of one
-island.
+island. One whose path leads into another body may stop there: it may stray by all that is left of
+its path, so that whoever follows it is of its island from the first.
 
-Afterwards it is known where they have been, stretch by stretch of the window. Islands of which two
-bodies have been in each other's reach are one, and to be run again; one that lands on a bed stays
-behind the path that it was expected to go, with whom it may have met on either.
+Afterwards it is known where bodies have been, stretch by stretch of the window. Islands of which
+two bodies have been in each other's reach become one, which is run again.
 
 Fixed bodies do not pass on what acts on them: each is a part of all islands that can reach it.
 """
@@ -127,8 +127,8 @@ def share_to_touch(swarm, a, b, span, width, height):
 
 
 def widen_landing(swarm, span, width, height, pairs, total, reach):
-    """Widen the path of the faster one of two bodies that touch by what is left of it, which it
-    may not go: who comes behind may meet it. Whether there is one."""
+    """Widen the path of the faster one of two bodies that will touch by what is left of it; whether
+    there are any."""
     m, found = swarm.motion, False
     for pair in range(total):
         a, b = pairs[pair, 0], pairs[pair, 1]
