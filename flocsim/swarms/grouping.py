@@ -31,22 +31,33 @@ from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance
 from flocsim.integrators.radau.contact_frames import unite
 
 
+def set_disc(swarm, body, x, y, way_x, way_y, wide):
+    """The disc of a body that begins at a place, goes a way, and reaches so far [m]."""
+    disc, free = swarm.discs[body], swarm.bodies[body, at.FREE]
+    if free == 0.0:
+        # Found by its outline: its circle may be as wide as the box.
+        x = y = way_x = way_y = wide = 0.0
+    disc[PLACE_X], disc[PLACE_Y] = x, y
+    disc[WAY_X], disc[WAY_Y] = way_x, way_y
+    disc[REACH], disc[MOVES] = wide, free
+
+
+def disc_reach(swarm, body, reach, stray):
+    """How far a disc reaches in which a body may stray by so much [m]."""
+    return swarm.bodies[body, at.BOUNDING_RADIUS] + stray + 0.5 * reach
+
+
+def both_free(swarm, a, b):
+    return swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0
+
+
 def set_discs(swarm, span, reach):
     """The discs of a window of so many seconds."""
+    m = swarm.motion
     for body in range(swarm.bodies.shape[0]):
-        disc = swarm.discs[body]
-        disc[PLACE_X], disc[PLACE_Y] = swarm.motion[body, at.X], swarm.motion[body, at.Y]
-        disc[WAY_X], disc[WAY_Y] = (
-            span * swarm.motion[body, at.VX],
-            span * swarm.motion[body, at.VY],
-        )
-        disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.wander[body]
-        disc[REACH] += 0.5 * reach
-        disc[MOVES] = swarm.bodies[body, at.FREE]
-        if disc[MOVES] == 0.0:
-            # Found below, by its outline: its circle may be as wide as the box.
-            disc[WAY_X] = disc[WAY_Y] = disc[REACH] = 0.0
-            disc[PLACE_X] = disc[PLACE_Y] = 0.0
+        wide = disc_reach(swarm, body, reach, swarm.wander[body])
+        way_x, way_y = span * m[body, at.VX], span * m[body, at.VY]
+        set_disc(swarm, body, m[body, at.X], m[body, at.Y], way_x, way_y, wide)
 
 
 def core_distance2(swarm, wall, x, y):
@@ -88,12 +99,8 @@ def reaches_wall(swarm, body, wall, span, reach, width, height):
     return core_distance2(swarm, wall, x, y) < near * near
 
 
-def unite_pairs(swarm, pairs, total, labels):
-    """Make one of the islands of two free bodies of each pair, named by their first body."""
-    for pair in range(total):
-        a, b = pairs[pair, 0], pairs[pair, 1]
-        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
-            unite(labels, a, b)
+def name_islands(labels):
+    """Name all bodies of islands that have been united by the first one, in place of a chain."""
     for body in range(labels.shape[0]):
         if labels[body] >= 0:
             labels[body] = labels[labels[body]]
@@ -132,17 +139,14 @@ def widen_landing(swarm, span, width, height, pairs, total, reach):
     m, found = swarm.motion, False
     for pair in range(total):
         a, b = pairs[pair, 0], pairs[pair, 1]
-        if swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0:
-            share = share_to_touch(swarm, a, b, span, width, height)
-            if share < 1.0:
-                faster = a
-                if math.hypot(m[b, at.VX], m[b, at.VY]) > math.hypot(m[a, at.VX], m[a, at.VY]):
-                    faster = b
-                way = math.hypot(m[a, at.VX] - m[b, at.VX], m[a, at.VY] - m[b, at.VY])
-                least = (1.0 - share) * span * way
-                wide = swarm.bodies[faster, at.BOUNDING_RADIUS] + 0.5 * reach + least
-                if wide > swarm.discs[faster, REACH]:
-                    swarm.discs[faster, REACH], found = wide, True
+        share = share_to_touch(swarm, a, b, span, width, height) if both_free(swarm, a, b) else 1.0
+        if share < 1.0:
+            b_goes = math.hypot(m[b, at.VX], m[b, at.VY])
+            faster = b if b_goes > math.hypot(m[a, at.VX], m[a, at.VY]) else a
+            way = span * math.hypot(m[a, at.VX] - m[b, at.VX], m[a, at.VY] - m[b, at.VY])
+            wide = disc_reach(swarm, faster, reach, (1.0 - share) * way)
+            if wide > swarm.discs[faster, REACH]:
+                swarm.discs[faster, REACH], found = wide, True
     return found
 
 
@@ -163,29 +167,26 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
             return total
     for body in range(n):
         labels[body] = body
-    unite_pairs(swarm, pairs, total, labels)
+    for pair in range(total):
+        if both_free(swarm, pairs[pair, 0], pairs[pair, 1]):
+            unite(labels, pairs[pair, 0], pairs[pair, 1])
+    name_islands(labels)
     note_walls(swarm, span, reach, width, height, labels, walls, touches)
     return total
 
 
 def set_boxes(swarm, reach):
     """The discs round all of where bodies have been in the window."""
+    ways = swarm.ways
     for body in range(swarm.bodies.shape[0]):
-        disc, ways = swarm.discs[body], swarm.ways
-        moves = swarm.bodies[body, at.FREE]
-        disc[WAY_X] = disc[WAY_Y] = disc[REACH] = disc[PLACE_X] = disc[PLACE_Y] = 0.0
-        disc[MOVES] = moves
-        if moves == 1.0:
-            left = low = math.inf
-            right = high = -math.inf
-            for stretch in range(sw.STRETCHES):
-                left = min(left, ways[body, stretch, sw.LEFT])
-                right = max(right, ways[body, stretch, sw.RIGHT])
-                low = min(low, ways[body, stretch, sw.LOW])
-                high = max(high, ways[body, stretch, sw.HIGH])
-            disc[PLACE_X], disc[PLACE_Y] = 0.5 * (left + right), 0.5 * (low + high)
-            disc[REACH] = swarm.bodies[body, at.BOUNDING_RADIUS] + 0.5 * reach
-            disc[REACH] += 0.5 * math.hypot(right - left, high - low)
+        left, right, low, high = math.inf, -math.inf, math.inf, -math.inf
+        for stretch in range(sw.STRETCHES):
+            left = min(left, ways[body, stretch, sw.LEFT])
+            right = max(right, ways[body, stretch, sw.RIGHT])
+            low = min(low, ways[body, stretch, sw.LOW])
+            high = max(high, ways[body, stretch, sw.HIGH])
+        wide = disc_reach(swarm, body, reach, 0.5 * math.hypot(right - left, high - low))
+        set_disc(swarm, body, 0.5 * (left + right), 0.5 * (low + high), 0.0, 0.0, wide)
 
 
 def gap_along(low, high, other_low, other_high, period):
@@ -213,13 +214,11 @@ def join_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     total = near_pairs(swarm.discs, swarm.order, width, height, swarm.starts, pairs)
     if total > pairs.shape[0]:
         return total
-    met = 0
     for pair in range(total):
         a, b = pairs[pair, 0], pairs[pair, 1]
-        apart = swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0
-        if apart and labels[a] != labels[b] and have_met(swarm, a, b, reach, width, height):
-            pairs[met, 0], pairs[met, 1] = a, b
-            met += 1
-    unite_pairs(swarm, pairs, met, labels)
+        others = both_free(swarm, a, b) and labels[a] != labels[b]
+        if others and have_met(swarm, a, b, reach, width, height):
+            unite(labels, a, b)
+    name_islands(labels)
     note_walls(swarm, span, reach, width, height, labels, walls, touches)
     return total

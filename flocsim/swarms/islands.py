@@ -16,9 +16,14 @@ from flocsim.geometry.contact.candidates import keep_slips
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
 
 
+def box_at(stretch):
+    """The first column of the box of a stretch, of what the observer sees."""
+    return sw.BOXES + sw.BOX_COLUMNS * stretch
+
+
 def widen(observed, body, stretch, x, y):
     """Let the box of a stretch of a body's way hold a place as well."""
-    box = sw.BOXES + sw.BOX_COLUMNS * stretch
+    box = box_at(stretch)
     observed[body, box + sw.LEFT] = min(observed[body, box + sw.LEFT], x)
     observed[body, box + sw.RIGHT] = max(observed[body, box + sw.RIGHT], x)
     observed[body, box + sw.LOW] = min(observed[body, box + sw.LOW], y)
@@ -191,7 +196,7 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
         observed[body, sw.PATH_VY] = swarm.motion[member, at.VY]
         observed[body, sw.FURTHEST] = 0.0
         for stretch in range(sw.STRETCHES):
-            box = sw.BOXES + sw.BOX_COLUMNS * stretch
+            box = box_at(stretch)
             observed[body, box + sw.LEFT] = observed[body, box + sw.LOW] = math.inf
             observed[body, box + sw.RIGHT] = observed[body, box + sw.HIGH] = -math.inf
         widen(observed, body, 0, x, y)
@@ -230,8 +235,7 @@ def take_state(swarm, work, observed, clock, members, first):
         swarm.strayed[member] = observed[body, sw.FURTHEST]
         for stretch in range(sw.STRETCHES):
             for column in range(sw.BOX_COLUMNS):
-                place = sw.BOXES + sw.BOX_COLUMNS * stretch + column
-                swarm.ways[member, stretch, column] = observed[body, place]
+                swarm.ways[member, stretch, column] = observed[body, box_at(stretch) + column]
         if swarm.bodies[member, at.FREE] == 0.0:
             continue
         for axis in range(at.MOTION_COLUMNS):

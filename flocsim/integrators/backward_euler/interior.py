@@ -290,13 +290,15 @@ def change_pairs(work, step, target, own):
     share, first = 1.0, -1
     for row in range(work.tally[at.CANDIDATES]):
         if in_play(work, row):
-            less = change_pair(work, row, step, target, share, False)
-            if less < share:
-                share, first = less, row
-    for row in range(work.tally[at.CANDIDATES]):
-        if in_play(work, row):
-            goes = change_pair(work, row, step, target, 1.0, False) if own else share
-            change_pair(work, row, step, target, goes, True)
+            goes = change_pair(work, row, step, target, 1.0, False)
+            if own:
+                change_pair(work, row, step, target, goes, True)
+            if goes < share:
+                share, first = goes, row
+    if not own:
+        for row in range(work.tally[at.CANDIDATES]):
+            if in_play(work, row):
+                change_pair(work, row, step, target, share, True)
     return share, first
 
 

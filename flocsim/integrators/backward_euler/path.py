@@ -190,9 +190,9 @@ def iterate(scene, work, clock, step, target, turns, own):
 
 
 def may_go_apart(scene, work):
-    """Whether each pair may go its own share of an iteration. Friction without a limit goes by the
-    part of the step for which a pair is closed, and so by δ and s themselves: there the bodies'
-    ends would be others than those that pairs know of, and steps are rejected for it."""
+    """Whether each pair, all having begun, may go its own share of an iteration. Friction without a
+    limit goes by the part of the step for which a pair is closed, and so by δ and s themselves:
+    there the bodies' ends would be others than those that pairs know of, and steps are rejected."""
     if has(scene, SLIP_LIMIT):
         return True
     for row in range(work.tally[at.CANDIDATES]):

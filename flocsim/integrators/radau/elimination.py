@@ -146,10 +146,10 @@ def multiply(m, to, block, keeps, left, one, right, other, sign):
 def add_row(e, slot, to, left, right, sign):
     """Add ``sign`` times the block of a slot times the row above, which it stands below, to its own
     row, of some of their parts: what most of a large island's time goes to."""
-    n, above = e.body.shape[0], e.column[slot]
+    above, one = e.column[slot], block_of(e, slot)
     for each in range(e.upper[above], e.lower[above + 1]):
         block = e.where[e.column[each]]
-        multiply(e.blocks, to, block, 1.0, left, n + slot, right, n + each, sign)
+        multiply(e.blocks, to, block, 1.0, left, one, right, block_of(e, each), sign)
     return 0.0
 
 
@@ -157,7 +157,7 @@ def add_row(e, slot, to, left, right, sign):
 def divide_real(e, slot):
     """Divide the block of a slot by the one on the diagonal above it, which is inverted, of the
     real system."""
-    block = e.body.shape[0] + slot
+    block = block_of(e, slot)
     multiply(e.blocks, REAL_PART, block, 0.0, REAL_PART, block, REAL_PART, e.column[slot], 1.0)
     return 0.0
 
