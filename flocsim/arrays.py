@@ -588,7 +588,9 @@ class ContactView(NamedTuple):
     """One contact point, as a ContactForce kernel sees it.
 
     ``overlap`` [m] > 0 and its rate; ``slip`` [m] the tangential elastic displacement ξ and its
-    rate; ``effective_mass`` M = m_i m_j/(m_i + m_j) [kg] of the pair.
+    rate; ``effective_mass`` M = m_i m_j/(m_i + m_j) [kg] of the pair; ``radius_i`` and
+    ``radius_j`` [m] are those of the outlines that touch (spheroradii), ``smaller_radius`` the
+    equivalent radius of the smaller body.
     """
 
     overlap: float
@@ -598,6 +600,17 @@ class ContactView(NamedTuple):
     effective_mass: float
     radius_i: float
     radius_j: float
+    smaller_radius: float
+
+
+def moved_contact(
+    view: ContactView, overlap: float, overlap_rate: float, slip: float, slip_rate: float
+) -> ContactView:
+    """Return the view of the same contact with another overlap, slip, and rates of them."""
+    return ContactView(
+        overlap, overlap_rate, slip, slip_rate,
+        view.effective_mass, view.radius_i, view.radius_j, view.smaller_radius,
+    )  # fmt: skip
 
 
 # What a Scene has where there are no such forces, and where nothing repeats.

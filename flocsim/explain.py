@@ -317,7 +317,8 @@ def all_scales(system):
         if force := laws.get("contact_force"):
             radii = a.shape.radius, b.shape.radius
             overlap = OVERLAP_SHARE * sum(radii)
-            view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii)
+            smaller = min(a.shape.equivalent_radius, b.shape.equivalent_radius)
+            view = ContactView(overlap, 0.0, 0.0, 0.0, mass, *radii, smaller)
             stiffness = slope_of(force, view, "overlap", 1e-3 * overlap, known, 0)
             damping = slope_of(force, view, "overlap_rate", 1e-9, known, 0)
             found["contact 1/omega0"].append(vibration_time(mass, stiffness))

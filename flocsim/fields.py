@@ -24,6 +24,7 @@ KINDS = {
     "J": ("an energy", "1e-18 J"),
     "V": ("an electric potential", "15 mV"),
     "N/m": ("a stiffness", "20 N/m"),
+    "Pa": ("an elastic modulus", "1 MPa"),
     "Pa s": ("a viscosity", "0.89 mPa s"),
     "kg/m^2": ("a mass per area", "2 kg/m^2"),
     "kg/m^3": ("a density", "2650 kg/m^3"),
@@ -87,7 +88,10 @@ def list_words(words: Iterable[str]) -> str:
 
 
 def number_range(
-    above: float | None = None, at_least: float | None = None, at_most: float | None = None
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    below: float | None = None,
 ) -> tuple[Callable[[Any], bool], str]:
     """(check, words): whether a value is a finite number within the limits, and those in words."""
 
@@ -97,9 +101,12 @@ def number_range(
             and (above is None or value > above)
             and (at_least is None or value >= at_least)
             and (at_most is None or value <= at_most)
+            and (below is None or value < below)
         )
 
-    limits = [("above", above), ("at least", at_least), ("at most", at_most)]
+    limits = [
+        ("above", above), ("at least", at_least), ("at most", at_most), ("below", below)
+    ]  # fmt: skip
     words = " and ".join(f"{word} {limit:g}" for word, limit in limits if limit is not None)
     return check, f"a finite number {words}".strip()
 
@@ -176,6 +183,7 @@ def quantity(
     above: float | None = None,
     at_least: float | None = None,
     at_most: float | None = None,
+    below: float | None = None,
     default: Any = attrs.NOTHING,
     help: str = "",
     word: str | None = None,
@@ -186,7 +194,7 @@ def quantity(
     It takes numbers in that unit, and texts with any of the same dimension: 5e-21 or "5 zJ"; and
     one special ``word``, where there is one.
     """
-    check, allowed = number_range(above, at_least, at_most)
+    check, allowed = number_range(above, at_least, at_most, below)
     more = {"unit": unit, "help": help, **metadata}
     if word is None:
         return checked_field(check, allowed, default, **more)

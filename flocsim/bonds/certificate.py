@@ -25,7 +25,7 @@ import math
 from typing import NamedTuple
 
 import flocsim.arrays as at
-from flocsim.arrays import ContactView
+from flocsim.arrays import moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point, least_listed_gap, separation
 from flocsim.hooks import (
@@ -134,9 +134,7 @@ def way_between(scene, i, j, pose, before):
 
 def resting_contact(view, slip):
     """The ContactView of the same contact at rest, its tangential displacement given [m]."""
-    return ContactView(
-        view.overlap, 0.0, slip, 0.0, view.effective_mass, view.radius_i, view.radius_j
-    )
+    return moved_contact(view, view.overlap, 0.0, slip, 0.0)
 
 
 def energy_of(scene, work, bond):

@@ -59,7 +59,7 @@ DEPARTED = frozenset(CLASSES) - frozenset(AGGREGATED)
 """Classes of collisions that end apart."""
 
 HEADER = (
-    f"{'type':<12}{'N':>5}{'k_n [N/m]':>11}{'method':>18}{'setting':>11}{'delta':>7}{'repl.':>6}"
+    f"{'type':<12}{'N':>5}{'k_n or Y':>11}{'method':>18}{'setting':>11}{'delta':>7}{'repl.':>6}"
     f"{'steps':>8}{'CPU [ms]':>10}{'error [m]':>11}{'stated [m]':>12}  verdict"
 )
 
@@ -99,8 +99,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add("--stiffness", nargs=2, metavar=("LOW", "HIGH"),
-        help="extremes of forces.contact.k_n, e.g. '1 N/m' '1e3 N/m' (default: a decade below and "
-        "above that of the config)")  # fmt: skip
+        help="extremes of forces.contact.k_n, e.g. '1 N/m' '1e3 N/m', or of young, e.g. '1 kPa' "
+        "'1 MPa', where the config has that (default: a decade below and above it)")  # fmt: skip
     add("--size", nargs=2, metavar=("LOW", "HIGH"),
         help="extremes of the approaching body's radius, e.g. '1 um' '50 um', in pairs of the "
         "same size ratio as the first of the config (default: its smallest and its largest "
@@ -146,8 +146,9 @@ def sized(config: Config, sizes: tuple[float, float] | None) -> Config:
     return attrs.evolve(config, scene=scene.only(ends))
 
 
-def stiffnesses(config: Config, given: tuple[float, float] | None) -> list[float]:
-    """The ends of the stiffness [N/m]; where they are not stated, none that preflight refuses."""
+def stiffnesses(config: Config, given: list[str] | None) -> list[float]:
+    """The ends of k_n [N/m] or young [Pa]; where they are not stated, none that preflight
+    refuses."""
     law = law_of(config)
     if law is None:
         if given is not None:
@@ -155,13 +156,15 @@ def stiffnesses(config: Config, given: tuple[float, float] | None) -> list[float
                 "--stiffness needs forces.contact, which the config does not have: leave it out"
             )
         return [math.nan]
-    if given is not None:
-        return list(given)
+    key, unit = law.stiffness_key
+    if (stated := ends("--stiffness", given, unit)) is not None:
+        return list(stated)
+    now = getattr(law, key)
     try:
-        check_study(stiff(config, law.k_n / DECADE))
+        check_study(stiff(config, now / DECADE))
     except ConfigError:
-        return [law.k_n, law.k_n * DECADE]
-    return [law.k_n / DECADE, law.k_n * DECADE]
+        return [now, now * DECADE]
+    return [now / DECADE, now * DECADE]
 
 
 def methods(
@@ -188,12 +191,13 @@ def methods(
 
 def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
     """All runs, one tolerance beside the other."""
-    stated = ends("--stiffness", args.stiffness, "N/m")
     tolerances = ends("--tolerance", args.tolerance, "m")
     counts = sorted({min(config.shapes.vertices), max(config.shapes.vertices)})
     places, flocs = range(len(config.scene.names)), measured_flocs(config)
     number = itertools.count()
-    for place, vertices, k_n in itertools.product(places, counts, stiffnesses(config, stated)):
+    for place, vertices, k_n in itertools.product(
+        places, counts, stiffnesses(config, args.stiffness)
+    ):
         for _ in range(args.count):
             # Other displacements and other random numbers each time, as far as there are any.
             at = next(number)
@@ -203,16 +207,20 @@ def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
 
 
 def law_of(config: Config) -> Contact | None:
-    """The contact law that has a k_n; None where there is none."""
+    """The contact law that has a stiffness; None where there is none."""
     return next((force for force in config.forces if isinstance(force, Contact)), None)
 
 
 def stiff(config: Config, stiffness: float) -> Config:
-    """The config with another k_n [N/m], k_t in proportion; as it is for NaN."""
+    """The config with another k_n [N/m] or young [Pa], k_t in proportion; as it is for NaN."""
     law = law_of(config)
     if law is None or math.isnan(stiffness):
         return config
-    made = attrs.evolve(law, k_n=stiffness, k_t=law.k_t * stiffness / law.k_n)
+    key, _ = law.stiffness_key
+    changed: dict[str, Any] = {key: stiffness}
+    if law.k_t is not None:
+        changed["k_t"] = law.k_t * stiffness / getattr(law, key)
+    made = attrs.evolve(law, **changed)
     forces = tuple(made if force is law else force for force in config.forces)
     return attrs.evolve(config, forces=forces)
 

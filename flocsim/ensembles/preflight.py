@@ -33,6 +33,7 @@ from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force
 from flocsim.forces.codegen import laws_of
+from flocsim.forces.contact import impact_exponent
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.integrators.loop.driver import advance
@@ -50,14 +51,7 @@ PARTS = 16
 def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
     """Deepest overlap [m] of a mass [kg] at a speed [m/s] on a spring [N/m] and dashpot [N s/m]."""
     omega = math.sqrt(stiffness / mass)
-    share = 0.5 * damping / (mass * omega)
-    if abs(share - 1.0) < 1e-6:
-        exponent = 1.0
-    elif share < 1.0:
-        exponent = share * math.acos(share) / math.sqrt(1.0 - share * share)
-    else:
-        exponent = share * math.acosh(share) / math.sqrt(share * share - 1.0)
-    return speed / omega * math.exp(-exponent)
+    return speed / omega * math.exp(-impact_exponent(0.5 * damping / (mass * omega)))
 
 
 def spring_and_dashpot(
@@ -69,9 +63,10 @@ def spring_and_dashpot(
     """
     law, known = pair.system.pieces.laws["contact_force"], pair.system.pieces.parameters
     deepest = DEEPEST_OVERLAP * sum(radii)
+    smaller = min(body.shape.equivalent_radius for body in pair.system.bodies)
 
     def normal(overlap, rate):
-        return float(law(ContactView(overlap, rate, 0.0, 0.0, mass, *radii), known)[0])
+        return float(law(ContactView(overlap, rate, 0.0, 0.0, mass, *radii, smaller), known)[0])
 
     try:
         with np.errstate(all="ignore"):
@@ -130,13 +125,13 @@ def too_deep(
         return None
     forces = [each for each in pair.system.forces if isinstance(each, ContactForce)]
     alone = forces[0] if len(forces) == 1 else None
-    scales = isinstance(alone, Contact) and alone.damping_n == "critical"
+    scales = isinstance(alone, Contact) and alone.dashpots[0] > 0.0
     wanted = stiffness_for(deepest, speed, mass, *law, scales)
-    cure = (
-        f"give forces.contact.k_n {rounded_up(wanted):g} N/m or more"
-        if type(alone) is Contact
-        else f"make the contact {rounded_up(wanted / law[0]):g} times as stiff"
-    )
+    cure = f"make the contact {rounded_up(wanted / law[0]):g} times as stiff"
+    if type(alone) is Contact:
+        key, unit = alone.stiffness_key
+        given = getattr(alone, key) * wanted / law[0]
+        cure = f"give forces.contact.{key} {rounded_up(given):g} {unit} or more"
     return wanted / law[0], (
         f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * depth(speed, mass, *law):.3g} um "
         f"deep, more than the {1e6 * deepest:.3g} um for which the contact law is valid (half of "
@@ -251,7 +246,7 @@ def check_numbers(system: System) -> None:
         for gap in CLOSE_GAPS for rate in (-1e-4, 1e-4)
     ]  # fmt: skip
     contacts = [
-        ContactView(overlap, rate, 0.0, 0.0, mass, *radii)
+        ContactView(overlap, rate, 0.0, 0.0, mass, *radii, min(radii))
         for overlap in CLOSE_OVERLAPS for rate in (-1e-4, 1e-4)
     ]  # fmt: skip
     bodies = [body_view(scene, work, 0.0, at.NOW, body) for body in range(2)]

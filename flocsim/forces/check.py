@@ -31,7 +31,7 @@ SAMPLE_BODIES = (
     ),
 )  # fmt: skip
 SAMPLE_CONTACTS = tuple(
-    ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6)
+    ContactView(1e-8, rate, slip, -1e5 * slip, 1e-10, 1e-6, 2e-6, 1e-5)
     for rate in (1e-4, -1e-4) for slip in (1e-9, -1e-9)
 )  # fmt: skip
 

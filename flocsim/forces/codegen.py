@@ -13,7 +13,14 @@ from collections.abc import Callable, Iterable, Sequence
 
 import attrs
 
-from flocsim.arrays import NUMBERS_OF_SHAPES, BodyView, ContactView, PairView, PlainBodyView
+from flocsim.arrays import (
+    NUMBERS_OF_SHAPES,
+    BodyView,
+    ContactView,
+    PairView,
+    PlainBodyView,
+    moved_contact,
+)
 from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
@@ -56,10 +63,7 @@ def pressed_contact(view):
 
     Steps are tried beyond the end of a contact, where the two surfaces are apart.
     """
-    return ContactView(
-        max(view.overlap, 0.0), view.overlap_rate, view.slip, view.slip_rate,
-        view.effective_mass, view.radius_i, view.radius_j,
-    )  # fmt: skip
+    return moved_contact(view, max(view.overlap, 0.0), view.overlap_rate, view.slip, view.slip_rate)
 
 
 VIEWS = BodyView, PlainBodyView, ContactView, PairView

@@ -1,20 +1,70 @@
-"""Visco-elastic contact."""
+"""Visco-elastic contact: its law, and springs and dashpots from what is measured of a material."""
 
+import functools
 import math
+from typing import Any
 
 import attrs
 
+from flocsim.errors import RangeError
 from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import ContactForce
 
 
-def unclipped(contact, k_n, shear, critical, lambda_n, proportional, lambda_t):
+def stiffnesses(contact, springs):
+    """(k_n, k_t) [N/m] of a contact: as given, or from the modulus and the smaller body's size."""
+    k_n, modulus, k_t, ratio = springs
+    k_n = k_n + modulus * contact.smaller_radius
+    return k_n, k_t + ratio * k_n
+
+
+def unclipped(contact, springs, dashpots):
     """(normal, tangential) force of springs and dashpots alone [N]."""
-    damping = lambda_n + critical * 2.0 * math.sqrt(k_n / contact.effective_mass)
-    shear_damping = lambda_t + proportional * damping
+    k_n, k_t = stiffnesses(contact, springs)
+    damping_ratio, lambda_n, proportional, lambda_t = dashpots
+    damping = lambda_n + damping_ratio * 2.0 * math.sqrt(k_n / contact.effective_mass)
+    shear_damping = lambda_t + proportional * (k_t / k_n) * damping
     normal = k_n * contact.overlap + contact.effective_mass * damping * contact.overlap_rate
     drag = contact.effective_mass * shear_damping * contact.slip_rate
-    return normal, -shear * contact.slip - drag
+    return normal, -k_t * contact.slip - drag
+
+
+def impact_exponent(damping_ratio: float) -> float:
+    """Return z acos(z)/√(1 − z²) of a damping ratio z, continued beyond z = 1.
+
+    A mass of speed v gets v/ω0 times exp(−that) deep; clipped at tension, it leaves with a
+    restitution of exp(−2 that) (Schwager and Pöschel 2007, Granular Matter 9, 465).
+    """
+    z = damping_ratio
+    if abs(z - 1.0) < 1e-6:
+        return 1.0
+    if z < 1.0:
+        return z * math.acos(z) / math.sqrt(1.0 - z * z)
+    return z * math.acosh(z) / math.sqrt(z * z - 1.0)
+
+
+@functools.cache
+def damping_ratio_for(restitution: float, tension: bool) -> float:
+    """Return the damping ratio z = λ_n/(2ω0) at which two spheres part with this restitution."""
+    loss = -math.log(restitution)
+    if tension:
+        # e = exp(−πz/√(1 − z²)): a contact that pulls lasts half a damped vibration.
+        return loss / math.hypot(math.pi, loss)
+    from scipy.optimize import brentq
+
+    # The exponent exceeds ln z, so that z is below 1/√e.
+    return float(brentq(lambda z: 2.0 * impact_exponent(z) - loss, 0.0, restitution**-0.5))
+
+
+def unless(other: str, value: Any) -> Any:
+    """A default: the value, or None where the field ``other``, which replaces it, is given."""
+    return attrs.Factory(
+        lambda self: value if getattr(self, other) is None else None, takes_self=True
+    )
+
+
+INSTEAD = {"young": "k_n", "poisson": "k_t", "restitution": "damping_n"}
+"""Parameter of a material → the parameter of the law that follows from it."""
 
 
 @attrs.frozen
@@ -25,30 +75,58 @@ class Contact(ContactForce):
     M = m_i m_j/(m_i + m_j). Parameters: ``k_n``, ``k_t`` [N/m]; ``damping_n`` λ_n [1/s] or
     "critical" = 2√(k_n/M); ``damping_t`` λ_t [1/s] or "proportional" = λ_n k_t/k_n; ``friction``
     µ (inf: no sliding, as in the paper; 0: no tangential force at all); ``tension``: False clips
-    the normal force at zero (the paper's infinite contact time needs it unclipped).
+    the normal force at zero (the paper's infinite contact time needs it unclipped). Or, instead of
+    k_n, k_t and damping_n, what is measured of a material: ``young`` Y [Pa], ``poisson`` ν and the
+    coefficient of ``restitution``.
 
     At a corner up to four vertex–edge pairs touch at once, so that the effective stiffness there
     is a multiple of ``k_n``.  Source: Tang et al. (2014), eqs 7 and 8.
     """
 
-    k_n: float = quantity("N/m", above=0.0, default=20.0)
-    k_t: float = quantity("N/m", at_least=0.0, default=2.0)
-    damping_n: float | str = word_or_quantity("critical", "1/s", at_least=0.0, default="critical")
+    young: float | None = quantity(
+        "Pa", above=0.0, default=None, kw_only=True,
+        help="Young's modulus Y, instead of `k_n`: k_n = Y A_p/L = π Y r_eq/2 of the smaller body "
+        "of a pair, with L = 2 r_eq and A_p = π r_eq²",
+    )  # fmt: skip
+    poisson: float | None = quantity(
+        "", at_least=0.0, below=1.0 / 3.0, default=None, kw_only=True,
+        help="Poisson's ratio ν, instead of `k_t`: k_t = k_n (1 − 3ν)/(1 + ν), which is 0 at "
+        "ν = 1/3 and k_n at 0 (Wang and Mora 2008)",
+    )  # fmt: skip
+    restitution: float | None = quantity(
+        "", above=0.0, at_most=1.0, default=None, kw_only=True,
+        help="coefficient of restitution e of two spheres that meet head-on, instead of "
+        "`damping_n`, which follows from it with `tension` or without",
+    )  # fmt: skip
+    k_n: float = quantity(
+        "N/m", above=0.0, default=unless("young", 20.0), shown="20.0", help="normal stiffness"
+    )
+    k_t: float = quantity(
+        "N/m",
+        at_least=0.0,
+        default=unless("poisson", 2.0),
+        shown="2.0",
+        help="tangential stiffness",
+    )
+    damping_n: float | str = word_or_quantity(
+        "critical", "1/s", at_least=0.0, default=unless("restitution", "critical"),
+        shown='"critical"', help="normal damping λ_n",
+    )  # fmt: skip
     damping_t: float | str = word_or_quantity(
         "proportional", "1/s", at_least=0.0, default="proportional"
     )
     friction: float | str = word_or_quantity("none", "", at_least=0.0, default="none")
     tension: bool = flag(default=True, help="false: the normal force never pulls")
 
-    @property
-    def critical(self) -> float:
-        """1.0 where λ_n follows from critical damping, else 0.0."""
-        return float(self.damping_n == "critical")
+    def __attrs_post_init__(self):
+        for name, replaced in INSTEAD.items():
+            if (getattr(self, name) is None) == (getattr(self, replaced) is None):
+                raise RangeError(f"give either {name} or {replaced}, not both")
 
     @property
-    def lambda_n(self) -> float:
-        """λ_n [1/s] where it is given, else 0."""
-        return 0.0 if self.damping_n == "critical" else float(self.damping_n)
+    def stiffness_key(self) -> tuple[str, str]:
+        """The parameter that the stiffness is proportional to, and its unit."""
+        return ("k_n", "N/m") if self.young is None else ("young", "Pa")
 
     @property
     def frictionless(self) -> bool:
@@ -56,26 +134,34 @@ class Contact(ContactForce):
         return self.friction == 0.0
 
     @property
-    def shear(self) -> float:
-        """k_t [N/m], 0 without friction."""
-        return 0.0 if self.frictionless else self.k_t
+    def springs(self) -> tuple[float, float, float, float]:
+        """(k_n [N/m], ∂k_n/∂r_eq [Pa], k_t [N/m], ∂k_t/∂k_n), each 0 unless it is what is given."""
+        ratio = 0.0 if self.poisson is None else (1.0 - 3.0 * self.poisson) / (1.0 + self.poisson)
+        shear = (0.0, 0.0) if self.frictionless else (self.k_t or 0.0, ratio)
+        return self.k_n or 0.0, 0.5 * math.pi * (self.young or 0.0), *shear
 
     @property
-    def proportional(self) -> float:
-        """k_t/k_n where λ_t follows λ_n, else 0."""
-        return self.shear / self.k_n if self.damping_t == "proportional" else 0.0
+    def dashpots(self) -> tuple[float, float, float, float]:
+        """(z of critical damping, λ_n [1/s], 1.0 where λ_t follows λ_n, λ_t [1/s])."""
+        normal: tuple[float, Any] = (0.0, self.damping_n)
+        if self.restitution is not None:
+            normal = (damping_ratio_for(self.restitution, self.tension), 0.0)
+        elif self.damping_n == "critical":
+            normal = (1.0, 0.0)
+        if self.frictionless or self.damping_t == "proportional":
+            return *normal, float(not self.frictionless), 0.0
+        return *normal, 0.0, float(self.damping_t)
 
     @property
-    def lambda_t(self) -> float:
-        """λ_t [1/s] where it is given, else 0."""
-        given = self.damping_t != "proportional" and not self.frictionless
-        return float(self.damping_t) if given else 0.0
+    def sheared(self) -> bool:
+        """Whether there is a tangential spring."""
+        return max(self.springs[2:]) > 0.0
 
     @property
     def friction_limit(self) -> float:
         """µ as a number: inf where nothing can slide."""
-        sheared = self.shear > 0.0 or self.lambda_t > 0.0
-        return float(self.friction) if self.friction != "none" and sheared else math.inf
+        dragged = self.sheared or self.dashpots[3] > 0.0
+        return float(self.friction) if self.friction != "none" and dragged else math.inf
 
     @property
     def goes_on_apart(self) -> bool:
@@ -86,7 +172,7 @@ class Contact(ContactForce):
     def slides(self) -> bool:
         """Whether friction limits ξ, or a subclass with a limit of its own."""
         own = type(self).slip_limit is not Contact.slip_limit
-        return own or (self.friction_limit < math.inf and self.shear > 0.0)
+        return own or (self.friction_limit < math.inf and self.sheared)
 
     @property
     def has_events(self) -> bool:
@@ -94,13 +180,9 @@ class Contact(ContactForce):
         return not self.tension or self.friction_limit < math.inf
 
     @staticmethod
-    def kernel(
-        contact, k_n, shear, critical, lambda_n, proportional, lambda_t, friction_limit, tension
-    ):
+    def kernel(contact, springs, dashpots, friction_limit, tension):
         """(normal, tangential) force [N]."""
-        normal, tangential = unclipped(
-            contact, k_n, shear, critical, lambda_n, proportional, lambda_t
-        )
+        normal, tangential = unclipped(contact, springs, dashpots)
         if tension == 0.0:
             normal = max(normal, 0.0)
         if friction_limit < math.inf:
@@ -109,19 +191,18 @@ class Contact(ContactForce):
         return normal, tangential
 
     @staticmethod
-    def events(contact, k_n, shear, critical, lambda_n, proportional, lambda_t, friction_limit):
+    def events(contact, springs, dashpots, friction_limit):
         """(the normal force, which begins to pull where it is 0; how much more friction could hold,
         which begins to slide) [N]."""
-        normal, tangential = unclipped(
-            contact, k_n, shear, critical, lambda_n, proportional, lambda_t
-        )
+        normal, tangential = unclipped(contact, springs, dashpots)
         if friction_limit == math.inf:
             return normal, 1.0
         return normal, friction_limit * max(normal, 0.0) - abs(tangential)
 
     @staticmethod
-    def slip_limit(contact, k_n, shear, friction_limit):
+    def slip_limit(contact, springs, friction_limit):
         """The elastic displacement µ k_n Δ/k_t that friction can hold [m]."""
-        if friction_limit == math.inf or shear == 0.0:
+        k_n, k_t = stiffnesses(contact, springs)
+        if friction_limit == math.inf or k_t == 0.0:
             return math.inf
-        return friction_limit * k_n * max(contact.overlap, 0.0) / shear
+        return friction_limit * k_n * max(contact.overlap, 0.0) / k_t

@@ -44,6 +44,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.base import Force
+from flocsim.forces.contact import INSTEAD
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import (
     BackwardEuler,
@@ -536,5 +537,8 @@ FOLLOWING: dict[tuple[str, ...], Collection[str]] = {
 }
 """Place of a key → the keys of [fluid] that it follows from: these replace it from below."""
 
-INSTEAD_OF = {"integrator": {"accuracy": {"tolerance", "step"}}}
+INSTEAD_OF = {
+    "integrator": {"accuracy": {"tolerance", "step"}},
+    "forces.contact": {material: {key} for material, key in INSTEAD.items()},
+}
 """Table → key → further keys that it excludes, and that go with one another."""

@@ -18,7 +18,7 @@ nothing: a pair that opens is taken to be closed at the start by FADING of the t
 import math
 
 import flocsim.arrays as at
-from flocsim.arrays import ContactView
+from flocsim.arrays import ContactView, moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.radau.tableau import REAL
@@ -29,7 +29,7 @@ from flocsim.integrators.rhs.jacobian import (
     normal_rows,
     tangent_rows,
 )
-from flocsim.integrators.rhs.views import effective_mass, push_pair, tangential_rate
+from flocsim.integrators.rhs.views import effective_mass, push_pair, smaller_radius, tangential_rate
 
 FADING = 0.01
 """The tangential force of a pair that opens falls to half within a gap of this share of the
@@ -70,7 +70,7 @@ def view_with(scene, work, row, step, after, slip, rate):
     pressing = (after - max(-work.geometry[at.TRIAL, row, at.GAP], 0.0)) / step
     return ContactView(
         after, pressing, slip, rate, effective_mass(scene, a, b),
-        scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS],
+        scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS], smaller_radius(scene, a, b),
     )  # fmt: skip
 
 
@@ -78,12 +78,8 @@ def sticking_slopes(scene, view, limit, step):
     """By how much the friction of a pair falls with ξ [N/m] and with v_t [N s/m] while it sticks,
     by differences that are well below its ``limit`` [m]: that of a small load is tiny."""
     slip, rate = 0.5 * limit, 1e-3 * limit / step
-    sheared = ContactView(
-        view.overlap, 0.0, slip, 0.0, view.effective_mass, view.radius_i, view.radius_j
-    )
-    dragged = ContactView(
-        view.overlap, 0.0, 0.0, rate, view.effective_mass, view.radius_i, view.radius_j
-    )
+    sheared = moved_contact(view, view.overlap, 0.0, slip, 0.0)
+    dragged = moved_contact(view, view.overlap, 0.0, 0.0, rate)
     by_slip = -contact_force(scene, sheared)[1] / slip
     return by_slip, -contact_force(scene, dragged)[1] / rate
 

@@ -12,7 +12,7 @@ the torque changes by N σ.
 """
 
 import flocsim.arrays as at
-from flocsim.arrays import ContactView
+from flocsim.arrays import moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import row_radii, separation
 from flocsim.hooks import (
@@ -158,10 +158,9 @@ def sliding_slopes(scene, work, row, normal, tangential):
     view = contact_view(scene, work, at.NOW, row)
     by = 1e-3 * abs(view.overlap) + 1e-13
     more = work.candidates[row, at.SLIDING] * limit_slope(scene, work, at.NOW, row) * by
-    deeper = ContactView(
-        view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate,
-        view.effective_mass, view.radius_i, view.radius_j,
-    )  # fmt: skip
+    deeper = moved_contact(
+        view, view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate
+    )
     more_normal, more_tangential = contact_force(scene, deeper)
     return (more_normal - normal) / by, (more_tangential - tangential) / by
 

@@ -3,7 +3,7 @@
 import math
 
 import flocsim.arrays as at
-from flocsim.arrays import BodyView, ContactView, PairView, PlainBodyView
+from flocsim.arrays import BodyView, ContactView, PairView, PlainBodyView, moved_contact
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import length_of, row_radii, separation
 from flocsim.hooks import hook
@@ -52,6 +52,11 @@ def effective_mass(scene, a, b):
         return scene.bodies[a, at.MASS]
     mass_a, mass_b = scene.bodies[a, at.MASS], scene.bodies[b, at.MASS]
     return mass_a * mass_b / (mass_a + mass_b)
+
+
+def smaller_radius(scene, a, b):
+    """Equivalent radius of the smaller of two bodies [m]."""
+    return min(scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS])
 
 
 def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
@@ -113,15 +118,13 @@ def contact_view(scene, work, state, row):
     return ContactView(
         -work.geometry[state, row, at.GAP], -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
-        radius_a, radius_b,
+        radius_a, radius_b, smaller_radius(scene, a, b),
     )  # fmt: skip
 
 
 def pressed_view(view, overlap, overlap_rate):
     """The ContactView of the same contact pressed so far and so fast, without any slip."""
-    return ContactView(
-        overlap, overlap_rate, 0.0, 0.0, view.effective_mass, view.radius_i, view.radius_j
-    )
+    return moved_contact(view, overlap, overlap_rate, 0.0, 0.0)
 
 
 @hook
