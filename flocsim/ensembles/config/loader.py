@@ -3,7 +3,6 @@ is laid over it, preset, file, `--set key=value` of the command line; what keys 
 """
 
 import os
-import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -166,13 +165,9 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     if not equals or not all(keys):
         raise ConfigError(f"--set {text!r}: write KEY=VALUE, e.g. --set scene.delta='[0.0, 0.5]'")
     value = value.strip()
-    beyond = toml_text.text_problem(value)
-    if beyond is not None or len(keys) > toml_text.MOST_PARTS:
-        what = beyond[1] if beyond else f"a key of more than {toml_text.MOST_PARTS} parts"
-        raise ConfigError(f"--set {text[:40]!r}…: {what}: a config never needs that")
     try:
-        table = tomllib.loads(f"value = {value}\n")
-    except ValueError:
+        table = toml_text.parse("--set", f"value = {value}\n")
+    except ConfigError:
         return keys, value
     return keys, table["value"] if len(table) == 1 else value
 

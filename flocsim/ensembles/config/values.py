@@ -16,7 +16,7 @@ from typing import Any
 
 import attrs
 
-from flocsim.ensembles.config.toml_text import BARE_KEY, key_lines
+from flocsim.ensembles.config.toml_text import BARE_KEY, line_of_key
 from flocsim.errors import ConfigError, visible
 from flocsim.fields import (
     is_number,
@@ -69,7 +69,10 @@ def suggestion(word: str, words: Iterable[str]) -> str:
 
 def dotted(place: Iterable[str]) -> str:
     """The keys as TOML writes them, "forces.contact.k_n"."""
-    return ".".join(key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
+    words = (key if BARE_KEY.fullmatch(key) else repr(key) for key in place)
+    return ".".join(
+        f"{word[:LONGEST_SHOWN]}…" if len(word) > LONGEST_SHOWN else word for word in words
+    )
 
 
 Reader = Callable[[Any], Any]
@@ -306,25 +309,23 @@ class Problems:
     def raise_if_any(self) -> None:
         """ConfigError with one line per problem, in the order of the file."""
         if self.found:
-            lines = key_lines(self.text)
-            located = [(self.line_of(place, lines), text) for place, text in self.found]
+            located = [(self.line_of(place), text) for place, text in self.found[:MOST_SHOWN]]
             located.sort(key=lambda item: item[0])
             places = {-1: f"override of {self.file}", 0: self.file}
             shown = [
                 visible(f"{places.get(line, f'{self.file}:{line}')}: {text}", keep="")
-                for line, text in located[:MOST_SHOWN]
+                for line, text in located
             ]
-            if len(located) > MOST_SHOWN:
-                rest = len(located) - MOST_SHOWN
+            if rest := len(self.found) - len(located):
                 shown.append(visible(f"{self.file}: {rest} more unknown or wrong keys", keep=""))
             raise ConfigError("\n".join(shown))
 
-    def line_of(self, place, lines):
+    def line_of(self, place):
         """The line of the key or of the nearest table around it; else 0, and −1 if overridden."""
         table = self.overrides
         for key in place:
             table = table.get(key) if isinstance(table, dict) else None
         if place and table is not None:
             return -1
-        around = (lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in lines)
-        return next(around, 0)
+        around = (line_of_key(self.text, place[:n]) for n in range(len(place), 0, -1))
+        return next(filter(None, around), 0)
