@@ -61,6 +61,8 @@ class SciPyRun:
     def rate(self, time, vector):
         """The right-hand side."""
         self.evaluations += 1
+        # Radau hands over rows of a transposed array; the compiled code takes contiguous ones.
+        vector = np.ascontiguousarray(vector)
         rates = np.empty_like(vector)
         self.pieces[0](self.scene, self.work, time, vector, rates)
         return rates
