@@ -207,16 +207,16 @@ def against_size(results: Results) -> Figure:
     A point for each collision type, coloured by the size of the receiving floc; points of one
     receiving size are joined.
     """
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm
-    from matplotlib.ticker import LogLocator
-
     r_i, r_j = (1e6 * np.asarray(results.radii[name]) for name in ("r_i", "r_j"))
     known = (r_i > 0.0) & (r_j > 0.0)
     receivers = np.unique(r_i[known].round(9))
     titles = ["sphere" if count == 1 else f"$N$ = {count}" for count in results.vertices]
     x_label = "approaching $r_j$ [µm]"
     with panel_grid(titles, LABELS["pr_a"], x_label=x_label) as (figure, panels, _):
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import LogNorm
+        from matplotlib.ticker import LogLocator
+
         low, high = (receivers[0], receivers[-1]) if known.any() else (1.0, 1.0)
         shade = ScalarMappable(LogNorm(0.95 * low, 1.05 * high), SIZE_COLOURS)
         missing = "sizes unknown" if results.pooled else "not yet pooled"

@@ -221,14 +221,13 @@ def draw_overlay(
     the table; a colour stands for each reason, and the key says which.  Returns the figure, for
     flocsim.io.plots.style.save.
     """
-    from matplotlib import figure as matplotlib_figure
-    from matplotlib.lines import Line2D
-
     # The picture fills the figure, but for a strip for the title.
     height, width = (size * LONGEST_SIDE / max(grey.shape) for size in grey.shape)
     flocs, rejected = list(flocs), list(rejected)
-    with style.house_style():
-        figure = matplotlib_figure.Figure(figsize=(max(width, 4.0), max(height, 2.0) + STRIP))
+    with drawing(max(width, 4.0), max(height, 2.0) + STRIP) as figure:
+        from matplotlib.lines import Line2D
+
+        figure.set_layout_engine("none")
         top = 1.0 - STRIP / figure.get_figheight()
         axes = figure.add_axes((0.0, 0.0, 1.0, top))
         axes.imshow(stretched(grey), cmap="gray", interpolation="nearest", vmin=0.0, vmax=1.0)
@@ -336,17 +335,17 @@ ROUND_POINTS = 64
 def single_fit(mask: np.ndarray, fit: "Fit", name: str = "") -> Figure:
     """The fit of a mask (h, w) bool in four panels, as in the paper's Fig. 1: the mask; the core
     polygon; the disk along it and the outline that it sweeps; the pixels that differ."""
-    from matplotlib.colors import to_rgb
-    from matplotlib.patches import Circle, Polygon
-
     mask = np.asarray(mask, bool)
     # The fit's y counts upwards.
     cores = [ring * (1.0, -1.0) for ring in fit.parts[0].rings]
     outlines = [ring * (1.0, -1.0) for ring in swept_rings(fit.parts, ROUND_POINTS)]
-    inside = covered_by(outlines, mask.shape)
     count = len(fit.vertices)
     height = min(max(2.2 * mask.shape[0] / mask.shape[1], 1.2), 4.0)
     with drawing(9.2, height + 0.6) as figure:
+        from matplotlib.colors import to_rgb
+        from matplotlib.patches import Circle, Polygon
+
+        inside = covered_by(outlines, mask.shape)
         panels = figure.subplots(1, 4, sharex=True, sharey=True)
         for axes in panels:
             axes.imshow(np.where(mask, 0.78, 1.0), cmap="gray", vmin=0.0, vmax=1.0,

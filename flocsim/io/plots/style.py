@@ -3,9 +3,12 @@
 import contextlib
 import io
 import math
+import os
 import re
+import sys
 import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -91,10 +94,30 @@ FORMATS = tuple(METADATA)
 @contextlib.contextmanager
 def house_style() -> Iterator[None]:
     """Draw or save with the same settings whatever the user's matplotlibrc says."""
+    load_matplotlib()
     import matplotlib.style
 
     with matplotlib.style.context(["default", STYLE]):
         yield
+
+
+def load_matplotlib() -> None:
+    """Import matplotlib, also where MPLBACKEND names a backend that is not installed.
+
+    A command in a notebook's shell inherits the notebook's backend, without which matplotlib cannot
+    even be imported. The figures of flocsim are drawn on Agg canvases and need no backend.
+    """
+    if "matplotlib" in sys.modules:
+        return
+    backend = os.environ.pop("MPLBACKEND", "")
+    try:
+        import matplotlib
+    finally:
+        if backend:
+            os.environ["MPLBACKEND"] = backend
+    # A script's own pyplot uses the backend as if it had imported matplotlib first.
+    with contextlib.suppress(ValueError):
+        matplotlib.rcParams.update({"backend": backend} if backend else {})
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -104,7 +127,17 @@ def new_figure(width: float, height: float) -> Figure:
 
     figure = matplotlib_figure.Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
+    # IPython asks an object for this; it knows matplotlib's own figures only once pyplot is loaded.
+    figure._repr_png_ = partial(png_of, figure)  # type: ignore[attr-defined]
     return figure
+
+
+def png_of(figure: Figure) -> bytes:
+    """Return the figure as a PNG, as a notebook shows it."""
+    picture = io.BytesIO()
+    with house_style():
+        figure.savefig(picture, format="png", dpi="figure")
+    return picture.getvalue()
 
 
 @contextlib.contextmanager

@@ -1,7 +1,11 @@
 """Figures are saved whole, equal and undated, whatever the user's settings."""
 
+import copy
 import io
+import os
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -19,6 +23,7 @@ from flocsim.io.plots.style import keep_titles_whole, new_figure, plain, save, s
 from flocsim.io.results.sweep_file import SweepResults, Swept
 from flocsim.io.trajectory import StoredTrajectory
 from flocsim.trajectories.figures import drawn
+from tests.helpers.results_files import write_results
 from tests.helpers.swarm_study import make_swarm_results
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow
@@ -53,6 +58,21 @@ def test_other_suffixes_are_refused(tmp_path, name):
 def test_an_unwritable_figure_is_told(tmp_path):
     with pytest.raises(FileError, match="absent"):
         save(draw_distance([0.0, 1.0], [1e-5, 2e-5]), tmp_path / "absent" / "figure.png")
+
+
+def test_a_notebooks_backend_that_is_not_installed_is_no_obstacle(tmp_path):
+    """A command in a notebook's shell inherits the backend of the notebook."""
+    write_results(tmp_path / "r.h5", make_results(types=("I",), vertices=(1,), count=4))
+    env = os.environ | {"MPLBACKEND": "no_such_backend"}
+    command = [sys.executable, "-m", "flocsim", "plot", "r.h5", "--figures", "size"]
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "r-size.png\n"), done.stderr
+
+
+def test_a_figure_shows_itself_in_a_notebook():
+    figure = draw_distance([0.0, 1.0], [1e-5, 2e-5])
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert copy.deepcopy(figure).axes, "it can be copied"
 
 
 def test_the_users_matplotlibrc_changes_nothing():
