@@ -19,8 +19,9 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import INSTALLED, Sources
 from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_text
 from flocsim.ensembles.contents import open_any
-from flocsim.ensembles.kind import kind_of
+from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
+from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
@@ -203,7 +204,9 @@ class Study:
 
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""
-        kind_of(self.config).check(self.config)
+        kind = kind_of(self.config)
+        kind.check(self.config)
+        kind.prepare(study_of(self.config), Communicator())
 
     def replicate(
         self, replicate: int = 0, type: str | None = None, vertices: int | None = None,

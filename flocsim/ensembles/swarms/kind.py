@@ -43,6 +43,7 @@ BODY_BYTES = 8 * 6 + 4
 def dry_run(config: Config, ranks: int) -> str:
     """All that is known of a study before it is run."""
     study = SwarmStudy(config)
+    check_code(study)
     scene = study.scene
     swarm, drawn, (width, height) = study.swarm(0)
     radii = 1e6 * np.array([shape.equivalent_radius for shape in drawn.shapes])
@@ -92,13 +93,17 @@ CODE = (*identity.PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swa
 
 
 def check_study(config: Config) -> None:
-    """Raise the FlocsimError that the study would meet: forces, sizes, library, room in the box."""
+    """ConfigError for a swarm whose bodies have no contact force."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
             "bodies that meet need a contact force, found none among "
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
-    swarm = SwarmStudy(config).first
+
+
+def check_code(study: SwarmStudy) -> None:
+    """Raise the FlocsimError that the laws of forces would meet when they are compiled."""
+    swarm = study.first
     for law in swarm.system.pieces.laws.values():
         refuse_interpreter(law)
     refuse_interpreter(run_islands, swarm.fillings())
@@ -106,12 +111,13 @@ def check_study(config: Config) -> None:
 
 def check_room(study: SwarmStudy, comm: Communicator) -> None:
     """UsageError on rank 0 where the bodies of a replicate find no place, or its box is too small
-    for them: before the first runs for hours. Every rank looks at its share."""
-    first: tuple[int, str] | None = None
-    for replicate in range(comm.rank, study.config.replicates, comm.size):
+    for them: before the first runs for hours. Every rank looks at its share, but for the first
+    replicate, which all have placed by now."""
+    reach, first = study.first.reach, None
+    for replicate in range(comm.rank or comm.size, study.config.replicates, comm.size):
         try:
             drawn, box, _ = study.placed(replicate)
-            check_box(drawn.shapes, study.periods(box), study.first.reach)
+            check_box(drawn.shapes, study.periods(box), reach)
         except UsageError as error:
             first = replicate, str(error)
             break
@@ -121,6 +127,7 @@ def check_room(study: SwarmStudy, comm: Communicator) -> None:
     if faults := sorted(each for each in found if each is not None):
         replicate, why = faults[0]
         raise UsageError(f"swarm {replicate} of {study.config.replicates} (from 0): {why}")
+    check_code(study)
 
 
 def identity_of(study: SwarmStudy, machine: dict | None = None) -> dict:

@@ -96,9 +96,15 @@ class SwarmStudy(StudyKind):
         return [0.0, *stops_of(self.scene.duration, self.scene.interval, None)]
 
     @functools.cached_property
+    def beginning(self) -> tuple[Swarm, Drawn, tuple[float, float]]:
+        """The first replicate as `swarm` gives it: from it follows what the study is, by which it
+        is checked, and it is run as it is here, since resizing its flocs takes seconds."""
+        return self.make_swarm(0)
+
+    @property
     def first(self) -> Swarm:
         """The swarm of the first replicate at its start."""
-        return self.swarm(0)[0]
+        return self.beginning[0]
 
     @property
     def form(self) -> records.Form:
@@ -239,6 +245,10 @@ class SwarmStudy(StudyKind):
 
         UsageError where bodies find no place, or the box is too small for them.
         """
+        return self.beginning if replicate == 0 else self.make_swarm(replicate)
+
+    def make_swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
+        """Draw a replicate, place its bodies, and let them settle at their own speeds."""
         drawn, (width, height), places = self.placed(replicate)
         bodies = [
             Body(shape, (x, y), angle, **self.config.body_options(shape))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, norm
 
+from flocsim.ensembles.runner import run
 from flocsim.ensembles.swarms.kind import check_room
 from flocsim.ensembles.swarms.study import SPHERE, SwarmStudy, lognormal
 from flocsim.errors import ConfigError, UsageError
@@ -114,6 +115,17 @@ def test_every_replicate_is_placed_before_the_first_runs(tmp_path):
         known[0].others = [comm.given for comm in known[1:]]
         with pytest.raises(UsageError, match=f"swarm {faults[0]} of 30"):
             check_room(found, known[0])
+
+
+def test_the_first_replicate_is_drawn_once_before_it_is_run(tmp_path, monkeypatch):
+    """Resizing thousands of flocs takes longer than the start of the run."""
+    drawn, draw = [], SwarmStudy.draw
+    monkeypatch.setattr(SwarmStudy, "draw", lambda self, rng: drawn.append(1) or draw(self, rng))
+    config = swarm_config(
+        tmp_path, {"replicates": 1, "scene": {"duration": "0.1 ms", "every": "0.1 ms"}}
+    )
+    run(config)
+    assert len(drawn) == 1
 
 
 def without(key):
