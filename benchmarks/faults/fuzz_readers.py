@@ -57,12 +57,11 @@ def read_results_file(path):
 def read_kernel_file(path):
     """Read it, and make the tables for other models."""
     from flocsim.io.results.file import read_results
-    from flocsim.io.results.kernel_tables import kernel_csv, kernel_matrix
+    from flocsim.io.results.kernel_tables import kernel_matrix
 
     read_results_file(path)
     kernel = read_results(path).kernel
     if kernel is not None:
-        kernel_csv(kernel)
         for mechanism in kernel.mechanisms:
             for vertices in kernel.vertices.tolist():
                 kernel_matrix(kernel, mechanism, vertices)

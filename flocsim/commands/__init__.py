@@ -21,7 +21,7 @@ SUMMARIES = {
     "trajectory": "run one replicate of a config and draw it as a strip of frames",
     "plot": "draw the figures of a results file or a shape library",
     "report": "write one HTML page about a file",
-    "export": "write motion, or rates of encounters, in the format of another program",
+    "export": "write tables, motion or rates of encounters for other programs",
     "compare": "compare two results files: differences of probabilities with 95 %% intervals",
     "strength": "find the rate at which a flow opens the bonds of a study",
     "work-precision": "flips and errors against CPU time, for the methods and tolerances of a "

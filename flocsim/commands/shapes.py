@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 
 from flocsim.commands.fit import number
 from flocsim.ensembles.contents import Contents, Summary
@@ -23,10 +24,18 @@ from flocsim.io.fit_report import (
     plural,
     population_lines,
 )
+from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import Figure
-from flocsim.io.shape_library import ShapeEntry, read_library, read_settings, write_library
+from flocsim.io.shape_library import (
+    ShapeEntry,
+    columns_of_fits,
+    columns_of_flocs,
+    read_library,
+    read_settings,
+    write_library,
+)
 from flocsim.io.terminal import aligned
 
 DESCRIPTION = """\
@@ -209,11 +218,40 @@ def names_of(entry):
 
 
 @attrs.frozen(eq=False)
-class Library:
-    """The flocs of a library, and what their fits were made with."""
+class Library(Tables):
+    """The flocs of a library, and what their fits were made with.
+
+    Its tables: "flocs" with a row for each, and for every N "fits-N" with a row for each vertex.
+    """
 
     entries: list[ShapeEntry]
     settings: dict[str, Any]
+
+    @property
+    def indices(self) -> dict[str, tuple[str, ...]]:  # type: ignore[override]
+        """{table: axes of its rows}."""
+        fits = {f"fits-{count}": ("floc", "vertex") for count in self.entries[0].fits}
+        return {"flocs": ("floc",), **fits}
+
+    def labelled(self, group: str) -> Labelled:
+        """The columns of a table with their axes; UsageError for an unknown one."""
+        order: tuple[str, ...] = ("floc", "axis")
+        if self.known(group) == "flocs":
+            columns, count = columns_of_flocs(self.entries), 0
+        else:
+            order, count = ("floc", "vertex", "axis"), int(group.removeprefix("fits-"))
+            columns = columns_of_fits(self.entries, count)
+        values = {
+            "floc": np.array([entry.floc_id for entry in self.entries], object),
+            "vertex": np.arange(count), "axis": np.array(["x", "y"], object),
+        }  # fmt: skip
+        return Labelled(
+            {name: Column((name,), values[name]) for name in order},
+            {
+                name: Column(order[: each.values.ndim], each.values, each.about)
+                for name, each in columns.items()
+            },
+        )
 
 
 def read(path: str | os.PathLike) -> Library:

@@ -3,6 +3,7 @@ as figures; `compare`, what one study has more of than another; `export`, in the
 programs and models."""
 
 import argparse
+import io
 import math
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ from flocsim.ensembles.config import FILES, contents_of
 from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import compare, file_kind, studies, text_of, unfinished_text
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io.files import make_folder, write_file
+from flocsim.io.files import make_folder, unfinished, write_file
 from flocsim.io.journal import journal_of
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.results import MOST_ROWS
@@ -23,8 +24,8 @@ from flocsim.io.results import kernel_tables
 from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
-SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS} | {"csv": ".csv", "matrix": ".csv"}
-"""{format of an export: how its files end}."""
+SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS}
+"""{format of an exported motion: how its files end}."""
 
 
 def add_arguments_info(parser: argparse.ArgumentParser) -> None:
@@ -223,16 +224,20 @@ def add_arguments_export(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         "gsd: the motion saved by flocsim trajectory --save or Trajectory.save, or "
         "that of the first swarm of a study, for OVITO and HOOMD's tools, with lengths in um; "
-        "vtkhdf: the same as outlines for ParaView, in m. For results of a kernel study, csv: a "
-        "table of all pairs of size classes; matrix: a square matrix for each mechanism and "
-        "N, whose header says what it multiplies."
+        "vtkhdf: the same as outlines for ParaView, in m; csv: the tables of any file that "
+        "flocsim wrote, their columns as docs/results.md has them, in SI units. For results of a "
+        "kernel study, matrix: a square matrix for each mechanism and N, whose header says what it "
+        "multiplies."
     )
     add = parser.add_argument
-    add("format", choices=tuple(SUFFIXES))
-    add("source", help="file written by flocsim trajectory --save, swarm or kernel")
+    add("format", choices=(*SUFFIXES, "csv", "matrix"))
+    add("source", help="file that flocsim wrote")
     add("-o", "--output", metavar="FILE",
-        help="file to write (default: run.gsd for run.h5, in the current folder); for matrices, "
-        "the start of their names")  # fmt: skip
+        help="file to write (default: run.gsd for run.h5, run-TABLE.csv for a table, in the "
+        "current folder); for matrices, the start of their names")  # fmt: skip
+    add("--table", metavar="NAME",
+        help="for csv: the table to write (default: the main ones, or the first with --output)",
+    )  # fmt: skip
     add("--what", choices=kernel_tables.QUANTITIES, default="efficiency",
         help="for matrices: the quantity to write (default: %(default)s)")  # fmt: skip
     add("--model", choices=kernel_tables.MODELS, default="spheres",
@@ -254,19 +259,40 @@ def run_export(args: argparse.Namespace) -> int:
         raise UsageError(
             f"--curvilinear is for matrices, not {args.format}: export matrix, or leave it out"
         )
+    if args.format == "csv":
+        return run_tables(args)
     suffix = SUFFIXES[args.format]
     path = Path(args.output or f"{Path(args.source).stem}{suffix}")
     if path.suffix.lower() != suffix:
         raise UsageError(f"--output {path}: the name must end in {suffix}")
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.source])
-    if args.format == "csv":
-        write_file(path, kernel_tables.kernel_csv(kernel_in(args.source)).encode(), rule)
-    else:
-        kind = file_kind(source := held(args.source), "motion")
-        t, position, velocity, shapes = kind.motion(kind.read(source))
-        WRITERS[path.suffix.lower()](path, t, position, velocity, shapes, rule)
+    kind = file_kind(source := held(args.source), "motion")
+    t, position, velocity, shapes = kind.motion(kind.read(source))
+    WRITERS[path.suffix.lower()](path, t, position, velocity, shapes, rule)
     print(path)
+    return 0
+
+
+def run_tables(args):
+    """Write tables of a file of any kind as CSV and print their paths; the exit code."""
+    kind = file_kind(source := held(args.source))
+    tables = (kind.opened or kind.read)(source)
+    names = [tables.known(args.table)] if args.table else tables.exported or list(tables.indices)
+    found = {f"{Path(args.source).stem}-{name}.csv": name for name in names}
+    if args.output:
+        found = {args.output: names[0]}
+        if Path(args.output).suffix.lower() != ".csv":
+            raise UsageError(f"--output {args.output}: the name must end in .csv")
+    rule = data_rule(args.overwrite)
+    check_outputs([Output(path, rule) for path in found], [args.source])
+    for path, name in found.items():
+        labelled = tables.labelled(name)
+        with unfinished(path, rule) as (_, file):
+            text = io.TextIOWrapper(file, "utf-8", newline="")
+            labelled.write_csv(text, tables.indices[name])
+            text.detach()  # which writes what it still holds
+        print(path)
     return 0
 
 

@@ -42,7 +42,7 @@ from flocsim.io.groups import (
     write_groups,
 )
 from flocsim.io.hdf5 import Node
-from flocsim.io.labelled import Labelled
+from flocsim.io.labelled import Column, Labelled
 from flocsim.io.results.schema import BAND_ENDS
 
 if TYPE_CHECKING:
@@ -303,15 +303,14 @@ def write_library(
             "the size of one, as in '0.95 um'"
         )
 
-    compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
+    compound = is_any_compound(entries)
     groups = {"flocs": labelled(FLOC_COLUMNS, entries)}
     kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
     for kind, count in product(kinds, sorted(entries[0].fits)):
         fits = [getattr(entry, kind)[count] for entry in entries]
         groups[f"{kind}/{count}"] = labelled(fits_at(count, compound), fits)
     if any(entry.measures is not None for entry in entries):
-        measures = [entry.measures or UNMEASURED for entry in entries]
-        groups["measures"] = labelled(MEASURE_COLUMNS, measures)
+        groups["measures"] = labelled_measures(entries)
     if any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
         groups["population"] = labelled(POPULATION_COLUMNS, entries)
     version = COMPOUND_VERSION if compound else SCHEMA_VERSION
@@ -326,6 +325,29 @@ def labelled(columns, owners):
         value = attrgetter(ATTRIBUTES.get(name, name))
         found[name] = column_of(each, [value(owner) for owner in owners])
     return Labelled({}, found)
+
+
+def labelled_measures(entries):
+    """The measures of all flocs, NaN for one without."""
+    return labelled(MEASURE_COLUMNS, [entry.measures or UNMEASURED for entry in entries])
+
+
+def is_any_compound(entries):
+    """Return True if a fit has holes or several parts."""
+    return any(fit.table is not None for entry in entries for fit in entry.fits.values())
+
+
+def columns_of_flocs(entries: Sequence[ShapeEntry]) -> dict[str, Column]:
+    """Return all that is known of each floc but its name: (floc,), a place (floc, 2)."""
+    named = {name: each for name, each in FLOC_COLUMNS.items() if name != "id"}
+    columns = labelled(named | POPULATION_COLUMNS, entries).columns
+    return columns | labelled_measures(entries).columns
+
+
+def columns_of_fits(entries: Sequence[ShapeEntry], count: int) -> dict[str, Column]:
+    """Return the fits at N = ``count``: (floc,), (floc, vertex), places (floc, vertex, 2)."""
+    columns = fits_at(count, is_any_compound(entries))
+    return labelled(columns, [entry.fits[count] for entry in entries]).columns
 
 
 def reach_of(entry):

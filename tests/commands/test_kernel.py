@@ -42,7 +42,8 @@ def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
     assert main(["export", "matrix", "kernel.h5", "--model", "flocmod"]) == 0
     printed = capsys.readouterr().out.split()
     assert printed == [
-        "kernel-kernels.png", "kernel-efficiency.png", "kernel.csv",
+        "kernel-kernels.png", "kernel-efficiency.png",
+        "kernel-kernel.csv", "kernel-probabilities.csv", "kernel-replicates.csv",
         "kernel-settling-N1-efficiency-flocmod.csv", "kernel-shear-N1-efficiency-flocmod.csv",
     ]  # fmt: skip
     assert all((folder / name).stat().st_size > 200 for name in printed)
@@ -153,11 +154,11 @@ def test_what_is_no_kernel_study_is_refused(folder, capsys):
     assert "times a power of 2" in capsys.readouterr().err
 
 
-def test_a_file_without_rates_has_no_tables(folder, capsys):
+def test_a_file_without_rates_has_no_matrices(folder, capsys):
     text = 'preset = "si"\nreplicates = 1\n[scene]\ntypes = ["I"]\ndelta = [0.0]\n'
     (folder / "two.toml").write_text(text + "[shapes]\nvertices = [1]\n", "utf-8")
     assert main(["ensemble", "two.toml", "--quiet"]) == 0
-    assert main(["export", "csv", "two.h5"]) == 2
+    assert main(["export", "matrix", "two.h5"]) == 2
     assert "two.h5 is not from a kernel study" in capsys.readouterr().err
 
 

@@ -71,6 +71,7 @@ def test_it_is_one_folder_of_readable_size():
         ("info a.h5 --config", 'kind = "lone"'),
         ("plot a.h5", "a-speeds.png"),
         ("report a.h5", "a.html"),
+        ("export csv a.h5", ".csv"),
     ],
 )
 def test_its_files_are_shown(home, words, told):
@@ -83,7 +84,7 @@ def test_its_files_are_shown(home, words, told):
     ("words", "why"),
     [
         ("compare a.h5 a.h5", "holds a flocsim lone: name a file of flocsim results or"),
-        ("export csv a.h5", "holds a flocsim lone: name a file of flocsim results"),
+        ("export matrix a.h5", "holds a flocsim lone: name a file of flocsim results"),
         ("plot a.h5 --animation a.gif", "--animation is for results of a swarm study"),
         ("kernel s.toml", 's.toml has scene.kind = "lone"'),
     ],

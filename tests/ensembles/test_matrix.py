@@ -70,9 +70,6 @@ REFUSED = {
         "strengths",
     ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
     ("dry run", "strengths"): "unrecognized arguments: --dry-run",
-    ("export", "pairs"): "is not from a kernel study and has no rates",
-    ("export", "swarms"): "holds a flocsim swarm",
-    ("export", "strengths"): "holds a flocsim strength",
 }
 """What is refused, and the words that say why."""
 

@@ -33,6 +33,7 @@ from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, save
 from flocsim.io.results.file import first_of_each, read_results, read_row
+from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
 from flocsim.io.seals import held
@@ -146,6 +147,7 @@ class StudyResults(Tables):
     """
 
     indices = INDICES
+    exported: Sequence[str] = ("probabilities", "replicates")
     format = FORMAT
 
     def __init__(
@@ -161,6 +163,9 @@ class StudyResults(Tables):
         self.probabilities, self.pooled = results.probabilities, results.pooled
         self.differences, self.kernel = results.differences, results.kernel
         self.numerics, self.outlines = results.numerics, results.outlines
+        if self.kernel is not None:
+            self.indices = INDICES | {"kernel": KERNEL_GROUP.index}
+            self.exported = ("kernel", *self.exported)
         self.studies: dict[int, Study] = {}
 
     @functools.cached_property
@@ -209,6 +214,11 @@ class StudyResults(Tables):
     def labelled(self, group: str = "probabilities") -> Labelled:
         """The arrays of a group of the file with their axes; UsageError for an unknown one."""
         group = self.known(group)
+        if self.kernel is not None and group == "kernel":
+            found = self.kernel.labelled()
+            radii = found.axes.pop("r_eq")
+            by_size = {"r_i": radii, "r_j": attrs.evolve(radii, axes=("j",))}
+            return attrs.evolve(found, axes=found.axes | by_size)
         arrays: Mapping[str, np.ndarray] = getattr(self, group)
         if not arrays:
             raise UsageError(f"{self.path} has no group {group}: it was written without it")

@@ -1,4 +1,4 @@
-"""Rates of a kernel study as text: a long table, and square matrices for population balances.
+"""Rates of a kernel study as square matrices for population balances.
 
 An efficiency is that of a kernel: what it multiplies is named in every matrix. REFERENCES are the
 kernels of two models:
@@ -99,23 +99,6 @@ ABOUT_SPHERES = [
 def number(value: float) -> str:
     """A number with all its digits; nothing where it is not known."""
     return "" if math.isnan(value) else repr(float(value))
-
-
-def kernel_csv(kernel: Kernel) -> str:
-    """All estimates of all pairs, a row for each mechanism, N, i ≤ j."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    units = {name: about[1].replace(" ", ".") for name, about in KERNEL.items()}
-    names = [f"{name} [{unit}]" for name, unit in units.items()]
-    writer.writerow(["mechanism", "vertices", "i", "j", "r_i [m]", "r_j [m]", *names])
-    for m, v, i, j in np.ndindex(*kernel.arrays["alpha"].shape):
-        if i > j:
-            continue
-        values = [number(float(kernel.arrays[name][m, v, i, j])) for name in KERNEL]
-        sizes = [number(float(kernel.radii[place])) for place in (i, j)]
-        labels = [kernel.mechanisms[m], int(kernel.vertices[v]), kernel.labels[i], kernel.labels[j]]
-        writer.writerow([*labels, *sizes, *values])
-    return text.getvalue()
 
 
 def efficiency_for(

@@ -197,6 +197,7 @@ class SwarmResults(Tables):
     groups: dict[str, dict[str, np.ndarray]]
     run: dict[str, Any]
     indices = INDICES
+    exported = ("counts", "clusters", "events")
     format = FORMAT
 
     def __repr__(self) -> str:

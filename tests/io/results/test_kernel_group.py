@@ -1,4 +1,4 @@
-"""Group `kernel` of a results file: written, read, refused, and as tables."""
+"""Group `kernel` of a results file: written, read, refused, and as matrices."""
 
 import csv
 
@@ -12,7 +12,6 @@ from flocsim.io.results.kernel_group import Kernel, check_kernel, fractal_in
 from flocsim.io.results.kernel_tables import (
     curvilinear_factor,
     efficiency_for,
-    kernel_csv,
     kernel_matrix,
 )
 from tests.helpers.small_rates import some_kernel
@@ -48,15 +47,6 @@ def test_impossible_values_are_refused(wrong):
     arrays["beta3"][0, 0, 0, 0] = wrong
     with pytest.raises(ValueError, match="kernel/beta3"):
         check_kernel(arrays)
-
-
-def test_a_table_has_a_row_for_every_pair():
-    rows = list(csv.reader(kernel_csv(some_kernel()).splitlines()))
-    assert len(rows) == 1 + 2 * 2 * 3
-    first = dict(zip(rows[0], rows[1], strict=True))
-    assert (first["mechanism"], first["vertices"], first["i"]) == ("settling", "1", "5um")
-    assert float(first["r_i [m]"]) == 5e-6
-    assert first["efficiency3 [1]"] == "", "nothing is known"
 
 
 def test_a_matrix_names_what_it_multiplies():
