@@ -30,11 +30,24 @@ SUMMARIES = {
 }
 """{command: what it does}, in the order of the help, which needs no more of them than this."""
 
-FOLDER_HELP = (
-    "folder of the study's config, shape library and own modules; modules found there are run "
-    "whatever they contain (default: the folder of the results, and modules only if they are "
-    "those kept in the results)"
-)
+
+def add_allowed(parser: Any) -> None:
+    """Add the options that say which modules a file may name; `allowed_by` reads them."""
+    parser.add_argument("--folder", metavar="DIR",
+        help="folder of the study's shape library and of the modules of its own classes, which are "
+        "run (default: the library is looked for beside the results, and no module is "
+        "run)")  # fmt: skip
+    parser.add_argument("--own", action="append", default=[], metavar="MODULE",
+        help="installed module of the study's own classes, which is imported; may be "
+        "repeated")  # fmt: skip
+
+
+def allowed_by(arguments: Any) -> Any:
+    """Return the Allowed of the command line."""
+    from flocsim.ensembles.config.sources import Allowed
+
+    return Allowed(arguments.folder, arguments.own)
+
 
 ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""

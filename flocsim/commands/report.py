@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.commands import FOLDER_HELP
+from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.contents import Contents, Example, Table, overview_of, summary_of
 from flocsim.errors import UsageError, visible
 from flocsim.geometry.contact.points import placed_contacts
@@ -167,7 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="do not run replicates again: a page without motion",
     )
-    add("--folder", metavar="DIR", help=FOLDER_HELP)
+    add_allowed(parser)
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
 
 
@@ -180,13 +180,13 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([Output(path, rule)], [args.results])
     source = held(args.results)
     kind, found = overview_of(source)
-    examples = [] if args.no_motion else kind.examples(source, args.folder)
+    examples = [] if args.no_motion else kind.examples(source, allowed_by(args))
     found = kind.with_rows(source, found, MOST_ROWS)
     page = report_page(str(args.results), kind, found, examples)
     write_file(path, marked(page.encode(), ".html"), rule)
-    for example in examples:
-        if example.reason:
-            print(f"class {example.outcome} is not animated: {example.reason}")
+    for reason in dict.fromkeys(example.reason for example in examples if example.reason):
+        names = [example.outcome for example in examples if example.reason == reason]
+        print(f"class {' and '.join(names)} not animated: {reason}")
     print(path)
     return 0
 

@@ -276,7 +276,7 @@ def summary(found: Library) -> Summary:
     return Summary(facts)
 
 
-def water(path: str | os.PathLike) -> list[str]:
+def water(path: str | os.PathLike, allowed: object = None) -> list[str]:
     """What slow flow makes of the flocs of a library."""
     entries = read_library(path)
     rows: list[tuple[str, ...]] = [("floc", "sinks", "at least", "turns", "B", "+- %")]

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.config import FILES, contents_of
 from flocsim.ensembles.config.sources import read_sources
 from flocsim.ensembles.contents import compare, file_kind, studies, text_of, unfinished_text
@@ -48,6 +49,7 @@ def add_arguments_info(parser: argparse.ArgumentParser) -> None:
         "with and without the water that they push at each other (a second or two for each pair); "
         "of a shape library, how fast its flocs settle and turn",
     )  # fmt: skip
+    add_allowed(parser)
 
 
 def run_info(args: argparse.Namespace) -> int:
@@ -62,7 +64,7 @@ def run_info(args: argparse.Namespace) -> int:
         return 0
     if args.water:
         source = held(args.results)
-        print("\n".join(file_kind(source, "water").water(source)))
+        print("\n".join(file_kind(source, "water").water(source, allowed_by(args))))
     elif args.config or args.modules:
         kind = file_kind(source := held(args.results), "run")
         print_kept(args, kind.run(kind.read(source)))
@@ -248,6 +250,7 @@ def add_arguments_export(parser: argparse.ArgumentParser) -> None:
         "water that they push aside. spheres: computed for the study's spheres and forces, a "
         "second or two for each pair; others: formulas from the literature. Not known for "
         "flocs (default: none, an upper bound)")  # fmt: skip
+    add_allowed(parser)
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
 
 
@@ -309,12 +312,12 @@ def kernel_in(path):
     return kernel
 
 
-def water_factors(path):
+def water_factors(path, allowed):
     """{mechanism: (i, j)}: how often the equivalent spheres of a study touch with the water between
     them, over how often they do without."""
     from flocsim.ensembles.pairs.opened import open_results
 
-    results = open_results(path)
+    results = open_results(path, allowed)
     scene, found = results.config.scene, {}
     for facts, (m, i, j) in zip(results.in_water(), scene.conditions, strict=True):
         count = len(scene.labels)
@@ -332,7 +335,7 @@ def run_matrices(args):
     ending = (args.model, args.curvilinear) if args.what in kernel_tables.OF_MODELS else ()
     texts, without = {}, []
     wanted = args.curvilinear == kernel_tables.SPHERES and args.what in kernel_tables.OF_MODELS
-    exact = water_factors(args.source) if wanted else {}
+    exact = water_factors(args.source, allowed_by(args)) if wanted else {}
     for mechanism in kernel.mechanisms:
         if args.what in kernel_tables.OF_MODELS and args.model not in kernel_tables.REFERENCES.get(
             mechanism, {}

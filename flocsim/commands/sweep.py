@@ -11,7 +11,7 @@ from shlex import quote
 from types import FrameType
 from typing import Any
 
-from flocsim.commands import FOLDER_HELP
+from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.cli import run as run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.ensembles.parallel.communicator import SECONDS
@@ -157,7 +157,7 @@ def add_arguments_strength(parser: ArgumentParser) -> None:
         help="continue a stopped survey, or test more (--count); starts one if there is "
         "none")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="default: NAME-strength.h5")
-    add("--folder", metavar="DIR", help=FOLDER_HELP)
+    add_allowed(parser)
     add("--figure", metavar="FILE", help="default: NAME-strength.png")
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add("--quiet", action="store_true", help="print warnings and errors only")
@@ -191,9 +191,8 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
         rules = data_rule(args.overwrite or args.mode == "resume"), figure_rule(args.overwrite)
         check_outputs([Output(output, rules[0], SUFFIX, WAYS), Output(figure, rules[1])],
                       [args.results])  # fmt: skip
-    bonds = Bonds(
-        open_results(args.results, args.folder, sources), args.flow, args.count, args.precision
-    )
+    results = open_results(args.results, allowed_by(args), sources)
+    bonds = Bonds(results, args.flow, args.count, args.precision)
     return config_of(bonds, str(output))
 
 

@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
+from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
@@ -113,12 +114,12 @@ class Contents:
     """Names of figures that draw single replicates."""
     tables: Callable[[Any], list[Table | str]] = lambda found: []
     """(found) → the tables and texts of its page, in the place of the table as text."""
-    examples: Callable[[Any, Any], list[Example]] = lambda path, folder: []
-    """(path, folder of its config or None) → replicates that are worth watching."""
+    examples: Callable[[Any, Allowed], list[Example]] = lambda path, allowed: []
+    """(path, allowed modules) → replicates that are worth watching."""
     mark: Callable[[Any], str] = lambda found: ""
     """(found) → what each figure has to say, as that it is not complete."""
     opened: Any = None
-    """(path, folder, sources) → what a script has of it; its ``format`` is that of the file."""
+    """(path, allowed modules) → what a script has of it; its ``format`` is that of the file."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     compared: Mapping[str, str] = attrs.Factory(dict)
@@ -132,7 +133,7 @@ class Contents:
     rates: Any = None
     """(found) → Kernel; None where it has none."""
     water: Any = None
-    """(path) → lines on what slow flow makes of it."""
+    """(path, allowed modules) → lines on what slow flow makes of it."""
     run: Any = None
     """(found) → scalars of the group ``run``."""
     so_far: Any = None
@@ -235,16 +236,20 @@ def in_words(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def open_any(path: str | os.PathLike, folder: str | os.PathLike | None = None) -> Any:
+def open_any(
+    path: str | os.PathLike, folder: str | os.PathLike | None = None, own: Collection[str] = ()
+) -> Any:
     """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked;
     the table of replicates of pairs stays on the disk until it is asked for.
 
-    ``folder``: where the config of a study lay, its shape library and its own modules, which are
-    run then whatever they are (default: where the results lie). FileError for a file that is
-    absent, damaged, or of another kind.
+    A file runs no code: for a study with a class of one's own, ``folder`` is where its module
+    lies (and the study's shape library; default: that is looked for beside the results, and no
+    module is imported), ``own`` has the names of installed modules that may be imported, as
+    ``own=["mine"]``. FileError for a file that is absent, damaged, or of another kind.
     """
-    source = held(path)
-    return file_kind(source, "opened").opened(source, folder)
+    own = [own] if isinstance(own, str) else own
+    allowed, source = Allowed(folder, own), held(path)
+    return file_kind(source, "opened").opened(source, allowed)
 
 
 @attrs.frozen(eq=False, repr=False)

@@ -16,11 +16,11 @@ from typing import Any
 from flocsim.ensembles.config.loader import lay_over, load_any_config, nested
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.config.sources import INSTALLED, Sources
+from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_text
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of, study_of
-from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
+from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
@@ -41,6 +41,9 @@ WORDS = {
 
 
 WARNING = "flocsim: warning: "
+
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders in which installed packages lie."""
 
 STACK = 4
 """From `listen` to the script that called Study.run."""
@@ -200,7 +203,11 @@ class Study:
         for key, value in settings_of(self.overrides):
             words += ["--set", f"{key}={value}"]
         run_command(words, self.text, self.path.parent, quiet)
-        return open_any(target, self.path.parent)
+        # Modules are those that this very study has imported, whatever the file names.
+        found = open_any(target, own=self.sources.named)
+        if isinstance(found, StudyResults):
+            found.folder = self.path.parent
+        return found
 
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""

@@ -169,7 +169,7 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
 def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Any:
     """The results at a part's path; UsageError where they are not what was planned, or cannot
     become so by more rows (``whole``: where they have less)."""
-    found = open_any(path, study.path.parent)
+    found = open_any(path)
     if joined_of(found) is None:
         raise UsageError(f"{path} is not a part of a sweep: name another output")
     if wrong := apart(facts_in(found), planned, whole):
@@ -325,7 +325,7 @@ def elasticities(
         sweep(study, {key: both}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
               tell=tell, ways=ways)  # fmt: skip
         ends = (parts_folder(path) / f"{number:04d}.h5" for number in (0, 1))
-        found.append(compare(*(open_results(each, study.path.parent) for each in ends)))
+        found.append(compare(*map(open_results, ends)))
     arrays = {
         name: np.stack([each.arrays["pr_a"][column] for each in found]) / math.log(ratio)
         for name, column in COLUMNS.items()
@@ -401,5 +401,5 @@ CONTENTS = Contents(
     figures=figures,
     drawn={"the joined file of flocsim sweep":
            {name: draw for each in kinds_joined() for name, draw in each.figures.items()}},
-    opened=lambda path, folder=None, sources=None: read_joined(path),
+    opened=lambda path, allowed=None: read_joined(path),
 )  # fmt: skip

@@ -340,7 +340,7 @@ def commands(path, rng):
     figure = rng.choice(["4", "overview", "sizes", "clusters", "strip", "kernel", "rate", "bonds"])
     return [
         ["info", path],
-        ["info", path, rng.choice(["--config", "--modules"])],
+        ["info", path, rng.choice(["--config", "--modules", "--water"])],
         ["report", path, "-o", "out.html", "--overwrite"],
         ["strength", path, "-o", "out.h5", "--overwrite", "--count", "1", "--precision", "0.5"],
         ["trajectory", path, "-o", "out.png", "--overwrite"],

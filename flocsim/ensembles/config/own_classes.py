@@ -5,7 +5,6 @@ The module lies beside the config file or is installed; the attrs fields of the 
 
 import contextlib
 import importlib
-import importlib.util
 import inspect
 import os
 import sys
@@ -24,8 +23,6 @@ from flocsim.fields import is_number
 from flocsim.forces import BodyForce, ContactForce, PairForce
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import Integrator
-
-SOURCE = "__flocsim_source__"
 
 
 @attrs.frozen
@@ -72,9 +69,7 @@ def load_class(name: object, folder: Path, kind: Kind, sources: Sources) -> type
     module_name, _, class_name = name.partition(":")
     if not all(part.isidentifier() for part in [*module_name.split("."), class_name]):
         raise misfit(f"'module:Class' such as {kind.example!r}", name)
-    if sources.consent is not None and not sources.has(folder / f"{module_name}.py", folder):
-        sources.consent.check_module(module_name, class_name, folder)
-    module = load_module(module_name, folder, sources)
+    module = load_module(name, folder, sources)
     where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
     if not hasattr(module, class_name):
         known = [
@@ -136,74 +131,58 @@ def check_shape(shape: Shape) -> None:
 
 
 def load_module(name, folder, sources):
-    """The module, from ``folder`` where a file of its name lies there, else as installed.
+    """Import the module of a class: of ``folder`` where it has a file of that name, else as
+    installed. A stored config imports only what is allowed, or ConfigError.
 
-    While it loads it may import its neighbours; sys.path is left as it was. ``sources`` has all
-    that it read afterwards, also where it, or a neighbour, had been loaded before.
+    Files are run anew where they have changed. sys.path is left as it was; ``sources`` has all
+    that was read.
     """
-    before = sys.modules.get(name)
-    path, entry = folder / f"{name}.py", str(folder.resolve())
-    sys.path.insert(0, entry)
-    neighbours = Neighbours(sources, folder)
-    # Where Python looks into folders: what is built in comes before.
-    finders = [getattr(each, "__name__", "") for each in sys.meta_path]
-    sys.meta_path.insert(finders.index("PathFinder") if "PathFinder" in finders else 0, neighbours)
+    named, (name, _, _) = name, name.partition(":")
+    allowed, before = sources.allowed, sys.path[:]
+    finder = Neighbours(sources, folder.resolve())
     importlib.invalidate_caches()
     try:
-        if sources.has(path, folder):
-            module = run_file(name, path, sources.module(path, folder))
-        else:
-            module = importlib.import_module(name)
-            # The source of what lies elsewhere is known by its name.
-            source = getattr(module, "__file__", None) or ""
-            if source.endswith(".py") and place(source, folder) not in sources.modules:
-                with contextlib.suppress(OSError):
-                    sources.modules[module.__name__] = Path(source).read_bytes()
-        if module is not before:
-            # Neighbours that an older one had imported are not run again.
-            READ[name] = (READ.get(name, {}) if before else {}) | sources.modules
-        sources.modules |= {k: v for k, v in READ.get(name, {}).items() if k not in sources.modules}
+        if allowed is None or name not in allowed.own:
+            file = finder.file_of(name)
+            if allowed is not None and (allowed.folder is None or file is None):
+                raise ConfigError(refusal(named, allowed.folder))
+            finder.forget_changed()
+            if file is not None:
+                refuse_namesake(name.partition(".")[0], finder)
+            sys.meta_path.insert(0, finder)
+            # Extension modules and folders without __init__.py are found by Python itself.
+            sys.path[:0] = [str(finder.folder)] if allowed is None else []
+        module = importlib.import_module(name)
+        # The source of what lies elsewhere is known by its name.
+        source = getattr(module, "__file__", None) or ""
+        if source.endswith(".py") and place(source, folder) not in sources.modules:
+            with contextlib.suppress(OSError):
+                sources.modules[module.__name__] = Path(source).read_bytes()
+        sources.named.add(name)
         return module
     except (Exception, SystemExit) as error:
         raise ConfigError(why_not(name, folder, error)) from error
     finally:
+        sys.path[:] = before
         with contextlib.suppress(ValueError):
-            sys.path.remove(entry)
-        with contextlib.suppress(ValueError):
-            sys.meta_path.remove(neighbours)
+            sys.meta_path.remove(finder)
 
 
-READ: dict[str, dict[str, bytes]] = {}
-"""Module of the user's own → what it and its neighbours were when they were run."""
+def refusal(name, folder):
+    """Why a class of a stored config was not loaded, and how to allow it, in one line."""
+    module, lacking = name.partition(":")[0], f"{folder} does not have it; " if folder else ""
+    return (
+        f"{name} was not loaded, because a file does not decide which code is run: {lacking}"
+        'name the folder that its module is in (--folder DIR, or folder="DIR") or, if it is '
+        f'installed, the module (--own {module}, or own=["{module}"])'
+    )
 
 
-def run_file(name, path, source):
-    """Run a module's source, under its name in sys.modules so that pickle and inspect find it.
-
-    A file that has not changed is not run again. It is compiled here: Python's cache tells
-    versions by a time in whole seconds and could bring back the physics before the last edit.
-    ConfigError where a module of this name, but not of this file, is loaded already.
-    """
-    file = str(path.resolve())
-    known = sys.modules.get(name)
-    if known is not None and not hasattr(known, SOURCE):
-        if os.path.realpath(getattr(known, "__file__", None) or "") != file:
-            raise ConfigError(
-                f"{file} has the same name as a module that is already loaded: rename it"
-            )
-        return known
-    if known is not None and getattr(known, SOURCE) == (file, source):
-        return known
-    spec = importlib.util.spec_from_file_location(name, file)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        exec(compile(source, file, "exec"), vars(module))
-    except BaseException:
-        del sys.modules[name]
-        raise
-    setattr(module, SOURCE, (file, source))
-    return module
+def refuse_namesake(top, finder):
+    """ConfigError where a module of this name, but not of this file, is loaded already."""
+    file, known = finder.file_of(top), getattr(sys.modules.get(top), "__file__", None) or ""
+    if top in sys.modules and os.path.realpath(known) != os.path.realpath(file):
+        raise ConfigError(f"{file} has the same name as a module that is already loaded: rename it")
 
 
 def why_not(name, folder, error):

@@ -309,5 +309,5 @@ CONTENTS = Contents(
         lambda swept: report.graze_lines(swept.labelled("probabilities").axes["delta"].values),
     ),
     rates=lambda found: found.kernel,
-    water=lambda path: [run_group.water_words(each) for each in OPENED(path).in_water()],
+    water=lambda path, allowed: list(map(run_group.water_words, OPENED(path, allowed).in_water())),
 )  # fmt: skip

@@ -16,7 +16,7 @@ import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import METHODS, Config
-from flocsim.ensembles.config.sources import Consent, Sources, read_sources
+from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, file_kind, stored_in
 from flocsim.ensembles.dry_run import water_facts
 from flocsim.ensembles.kernels import study_of
@@ -151,12 +151,12 @@ class StudyResults(Tables):
     format = FORMAT
 
     def __init__(
-        self, results: Results, source: str | os.PathLike, folder: Path | None,
+        self, results: Results, source: str | os.PathLike, allowed: Allowed,
         sources: Sources | None = None,
     ) -> None:  # fmt: skip
         self.results, self.source = results, source
-        self.folder = Path(source).parent if folder is None else folder
-        self.trusted, self.sources = folder is not None, sources or Sources()
+        self.folder = allowed.folder or Path(source).parent
+        self.allowed, self.sources = allowed, sources or Sources()
         self.path = Path(source)
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
@@ -183,8 +183,7 @@ class StudyResults(Tables):
         if not text:
             raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
         if self.sources.config is None:
-            self.sources.config = text
-            self.sources.consent = None if self.trusted else Consent(str(self.path), self.modules)
+            self.sources.config, self.sources.allowed = text, self.allowed
         try:
             return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
         except ConfigError as error:
@@ -193,15 +192,6 @@ class StudyResults(Tables):
             raise ConfigError(
                 f"the config in {self.path} cannot be used: {line}{further}"
             ) from error
-
-    @property
-    def modules(self) -> dict[str, dict[str, str]]:
-        """{place: {digest, source}} of the user's own modules that were run; none in files of
-        before."""
-        try:
-            return read_sources(self.run)
-        except ValueError as error:
-            raise FileError(f"{self.path} has no readable results: {error}") from error
 
     def stored(self, name: str) -> dict:
         """What the group ``run`` has as JSON."""
@@ -246,10 +236,10 @@ class StudyResults(Tables):
         """Run one replicate of the file again, and keep its motion.
 
         Of a collision type (default: the first), with so many vertices (the last) at a displacement
-        (the first). UsageError where the file does not have it, where the config's library or own
-        modules are not where the results lie (``flocsim.open(path, folder=…)`` says where), and
-        where this flocsim computes something else than the file holds. Own modules that are not
-        what the file was made with are run only where ``folder`` is given.
+        (the first). UsageError where the file does not have it, where the config's library is not
+        where the results lie (``flocsim.open(path, folder=…)`` says where), and where this flocsim
+        computes something else than the file holds. ConfigError for a class of one's own whose
+        module was not allowed (``folder`` or ``own`` of `flocsim.open`).
         """
         if not is_whole(replicate) or not 0 <= replicate < self.count:
             raise UsageError(
@@ -349,20 +339,19 @@ class StudyResults(Tables):
 
 
 def open_results(
-    path: str | os.PathLike, folder: str | os.PathLike | None = None,
-    sources: Sources | None = None,
-) -> StudyResults:  # fmt: skip
+    path: str | os.PathLike, allowed: Allowed | None = None, sources: Sources | None = None
+) -> StudyResults:
     """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
     modules and libraries."""
     source = held(path)
     file_kind(source, "rates")
     found = read_results(source, replicates=False)
-    return StudyResults(found, source, None if folder is None else Path(folder), sources)
+    return StudyResults(found, source, allowed or Allowed(), sources)
 
 
-def examples_of(path: str | os.PathLike, folder: str | os.PathLike | None) -> list[Example]:
+def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     """The first replicate of each class that the file has, of its flocs with the most vertices."""
-    opened = open_results(path, folder)
+    opened = open_results(path, allowed)
     found = first_of_each(opened.source)
     return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
 

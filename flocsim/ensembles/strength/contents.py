@@ -28,5 +28,5 @@ CONTENTS = Contents(
     figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
     mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",
     so_far=lambda found: facts_of(found.results),
-    opened=lambda path, folder=None, sources=None: read_strengths(path),
+    opened=lambda path, allowed=None: read_strengths(path),
 )  # fmt: skip

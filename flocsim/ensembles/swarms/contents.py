@@ -218,7 +218,7 @@ CONTENTS = Contents(
     table=swarm_file.table_of, tables=tables,
     figures=figures, drawn={"a swarm study": SWARM_FIGURES},
     so_far=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
-    opened=lambda path, folder=None, sources=None: swarm_file.read_swarm(path),
+    opened=lambda path, allowed=None: swarm_file.read_swarm(path),
     compare=compare,
     compared={name: words for name, (_, _, words) in swarm_file.COUNTS.items()},
     joined=Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),

@@ -64,6 +64,6 @@ CONTENTS = Contents(
     summary=lambda found: Summary(facts_of(found), origin(found.run)), table=table,
     figures=lambda found: FIGURES, drawn={"a study of single flocs": FIGURES},
     so_far=lambda found: facts_of(found.results), run=lambda found: found.run,
-    opened=lambda path, folder=None, sources=None: read_lone(path),
+    opened=lambda path, allowed=None: read_lone(path),
     joined=Joined({"flocs": GROUP}, sweep_rows, {}, asked),
 )  # fmt: skip
