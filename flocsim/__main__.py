@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from flocsim import __version__
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
-from flocsim.process import check_memory, install, is_limited
+from flocsim.process import check_memory, forget_left_over_launch, install, is_limited
 
 if {"ensemble", "kernel", "swarm", "strength"}.intersection(sys.argv[1:2]):
     fill_descriptors()
@@ -17,14 +17,14 @@ if is_limited():
 from flocsim.commands import SUMMARIES, add_command
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.processes import launched_rank, launched_size
-from flocsim.errors import FileError, FlocsimError
+from flocsim.errors import FileError, FlocsimError, UsageError
 
 STUDIES = {"ensemble", "kernel", "swarm", "strength"}
 """Commands that run studies, also under mpirun."""
 
 ALONE = (
     "flocsim: {} runs on one rank only, and the other ranks of this job have ended: start it "
-    "without a launcher, with --jobs where it takes that"
+    "without mpirun or srun, with --jobs where it takes that"
 )
 
 
@@ -49,6 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand; the exit code. Errors are one line on stderr."""
     with plain_streams():
         plain_warnings()
+        forget_left_over_launch()
         words = sys.argv[1:] if argv is None else argv
         if STUDIES.intersection(words[:1]):
             arguments = parse_on_all_ranks(make_parser(words), argv)
@@ -59,6 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 return 0  # what is no study is one rank's work
             if (launched_size() or 0) > 1:
                 print(ALONE.format(arguments.command), file=sys.stderr)
+                if arguments.command == "sweep" and not arguments.dry_run:
+                    return UsageError.exit_code  # it starts processes of its own
         code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

@@ -1,7 +1,8 @@
 """What the system asks of a process: to stop in time, and to do with the memory that it may take.
 
 Signals are noted at once, and answered by ending cleanly in time. SIGTERM, SIGINT and SIGUSR1
-(Slurm's warnings, Ctrl-C) only set a flag, which the run reads between replicates. Python calls its
+(Slurm's warnings, Ctrl-C), SIGHUP (a terminal that closes) and SIGXCPU (a limit of CPU time) only
+set a flag, which the run reads between replicates. Python calls its
 own handlers between two bytecodes of the main thread only, so a thread that waits on a pipe, to
 which the C handler writes, ends the process where the main thread stays in compiled code: all that
 was computed before is in the journal already.
@@ -13,6 +14,7 @@ nothing slow: it is asked before numpy is loaded.
 import contextlib
 import os
 import signal
+import stat
 import sys
 import threading
 import time
@@ -48,8 +50,13 @@ PARENT_SECONDS = 0.5
 """Seconds between two looks at whether the launcher still lives."""
 
 SIGNALS = tuple(
-    getattr(signal, name) for name in ("SIGTERM", "SIGINT", "SIGUSR1") if hasattr(signal, name)
-)
+    getattr(signal, name)
+    for name in ("SIGTERM", "SIGINT", "SIGUSR1", "SIGHUP", "SIGXCPU") if hasattr(signal, name)
+)  # fmt: skip
+"""Signals that end a run in good order, its state saved."""
+
+OTHER_LAUNCHERS = ("PMI_PORT", "PMI_CONTROL_PORT", "PMIX_", "OMPI_", "PALS_", "ALPS_")
+"""Starts of environment variables by which launchers connect their ranks, but for PMI_FD."""
 
 LOADING = 700 * 10**6
 """Address space [bytes] for Python, numpy, numba and their libraries, with a study's data."""
@@ -67,6 +74,7 @@ class Interruption:
 
     ``held``: the process has yet to join the other ranks of its job, who would wait for it for
     ever if it went now; ``leave(code)`` ends it, and under MPI them; ``speaks``: it may say so.
+    ``kept()`` says what has been saved, ``command`` is the command line that continues the run.
     """
 
     def __init__(self) -> None:
@@ -75,6 +83,8 @@ class Interruption:
         self.installed = False
         self.speaks = True
         self.held = False
+        self.kept: Callable[[], str] = str
+        self.command = ""
         self.leave: Callable[[int], Any] = os._exit
 
     @property
@@ -86,10 +96,18 @@ class Interruption:
         """Name of the signal, "SIGTERM"."""
         return signal.Signals(self.signal).name if self.signal else "no signal"
 
+    def farewell(self) -> str:
+        """Return why the run stops, what is saved and, as the last line, how it goes on."""
+        who, kept = self.name if self.requested else "a signal to another rank", self.kept()
+        line = f"flocsim: stopped by {who}" + (f": {kept}" if kept else "")
+        return f"{line}\n{self.command}" if self.command else line
+
     def note(self, number: int) -> None:
         """A signal has come: remember it, or end at once where it is the second."""
         now = time.monotonic()
-        if self.signal and now - self.since > INSISTENCE:
+        # Beyond its limit of CPU time a process gets SIGXCPU every second: nobody insists.
+        insists = number != getattr(signal, "SIGXCPU", 0)
+        if self.signal and insists and now - self.since > INSISTENCE:
             os._exit(INTERRUPTED)
         if not self.signal:
             self.signal, self.since = number, now
@@ -103,17 +121,46 @@ def stop_requested() -> bool:
     return INTERRUPTION.requested
 
 
+def forget_left_over_launch() -> None:
+    """Remove PMI_RANK and PMI_SIZE from the environment where no launcher can have set them.
+
+    MPICH's launchers, and those that speak its protocol, connect a rank by a socket, whose number
+    is PMI_FD, or by a port. Without one, the variables are left over from another job, and MPI
+    would count this process alone: so does flocsim, which says so.
+    """
+    names = [name for name in ("PMI_RANK", "PMI_SIZE") if name in os.environ]
+    if not names or os.name == "nt" or any(name.startswith(OTHER_LAUNCHERS) for name in os.environ):
+        return
+    with contextlib.suppress(KeyError, ValueError, OSError):
+        if stat.S_ISSOCK(os.fstat(int(os.environ["PMI_FD"])).st_mode):
+            return
+    found = " and ".join(f"{name}={os.environ.pop(name)}" for name in names)
+    os.environ.pop("MPI_LOCALNRANKS", None)
+    print(
+        f"flocsim: {found} in the environment are left over from another job, since no launcher "
+        f"is connected (PMI_FD): one rank runs; to silence this: unset {' '.join(names)}",
+        file=sys.stderr,
+    )  # fmt: skip
+
+
+def handle(action: Any) -> None:
+    """Handle all SIGNALS by an action; a SIGHUP that nohup ignores stays ignored."""
+    for number in SIGNALS:
+        if signal.Signals(number).name != "SIGHUP" or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, action)
+
+
 def install() -> None:
     """Take over the signals; only in the main thread of a program, and only once."""
     if INTERRUPTION.installed or threading.current_thread() is not threading.main_thread():
         return
+    forget_left_over_launch()
     INTERRUPTION.installed = True
     INTERRUPTION.held = any(name in os.environ for name in LAUNCHER_RANKS)
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    for number in SIGNALS:
-        signal.signal(number, lambda *_: None)
+    handle(lambda *_: None)
     threading.Thread(target=watch, args=(reading,), daemon=True).start()
 
 
@@ -138,7 +185,7 @@ def end_in_time() -> None:
     with contextlib.suppress(Exception):
         sys.stdout.flush()
         if INTERRUPTION.speaks:
-            print(f"flocsim: stopped by {INTERRUPTION.name}", file=sys.stderr, flush=True)
+            print(INTERRUPTION.farewell(), file=sys.stderr, flush=True)
     INTERRUPTION.leave(STOPPED)
 
 

@@ -34,12 +34,33 @@ def started(code):
     return process
 
 
-@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1])
+@pytest.mark.parametrize(
+    "sign", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR1, signal.SIGHUP, signal.SIGXCPU]
+)
 def test_a_signal_is_a_request(sign):
     process = started(WAITS)
     process.send_signal(sign)
     output, errors = process.communicate(timeout=20)
     assert (process.returncode, output, errors) == (75, f"{sign.name}\n", "")
+
+
+def test_a_limit_of_cpu_time_that_is_passed_again_is_no_insistence():
+    process = started(DEAF)
+    for _ in range(3):
+        process.send_signal(signal.SIGXCPU)
+        time.sleep(0.4)
+    _, errors = process.communicate(timeout=20)
+    assert (process.returncode, errors) == (75, "flocsim: stopped by SIGXCPU\n")
+
+
+def test_nohup_is_heeded():
+    ignores = "import signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+    process = started(ignores + WAITS)
+    process.send_signal(signal.SIGHUP)
+    time.sleep(0.3)
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=20)
+    assert (process.returncode, output) == (75, "SIGTERM\n")
 
 
 def test_a_process_that_does_not_answer_is_ended_in_time():

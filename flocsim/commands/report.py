@@ -34,7 +34,7 @@ from flocsim.io.plots.collision import (
     time_unit,
 )
 from flocsim.io.plots.results import MOST_ROWS
-from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS, METADATA, house_style
+from flocsim.io.plots.style import BODY_COLOURS, CLASS_WORDS, METADATA, add_foot, house_style
 from flocsim.io.seals import held
 from flocsim.trajectories.figures import instants_along, seen_from_first
 
@@ -74,8 +74,11 @@ def list_of(lines: Iterable[str], kind: str) -> str:
     return f"<ul class='{kind}'>{items}</ul>" if items else ""
 
 
-def page_of(title: str, sections: Sequence[tuple[str, str, str]], script: str) -> str:
-    """The whole page of (anchor, heading, HTML) sections; ``script`` is the only one that runs."""
+def page_of(
+    title: str, sections: Sequence[tuple[str, str, str]], script: str, source: str = ""
+) -> str:
+    """The whole page of (anchor, heading, HTML) sections; ``script`` is the only one that runs,
+    ``source`` a line below the title."""
     allowed = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = (
         "default-src 'none'; img-src data:; style-src 'unsafe-inline'; "
@@ -91,7 +94,7 @@ def page_of(title: str, sections: Sequence[tuple[str, str, str]], script: str) -
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         "<meta name='viewport' content='width=device-width, initial-scale=1'>\n"
         f"<title>{text(title)}</title>\n<style>\n{STYLE}</style></head>\n<body>\n"
-        f"<h1>{text(title)}</h1>\n<nav>{links}</nav>\n{body}\n"
+        f"<h1>{text(title)}</h1>\n<p>{text(source)}</p>\n<nav>{links}</nav>\n{body}\n"
         f"<script>{script}</script>\n</body></html>\n"
     )
 
@@ -109,7 +112,7 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
     # Outcomes and the figure of everything come first.
     figures, first = kind.figures(found), ("outcomes", "overview")
     names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
-    drawn = "\n".join(figure_of(name, figures[name], found) for name in names)
+    drawn = "\n".join(figure_of(name, figures[name], found, kind.source(found)) for name in names)
     sections.append(("figures", "Figures", drawn))
     tables = "\n".join(map(numbers_of, kind.tables(found) or filter(None, [kind.table(found)])))
     if tables:
@@ -126,7 +129,7 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
     if said.origin or config:
         came = facts_of(said.origin) + (f"<h3>Config</h3>{verbatim(str(config))}" if config else "")
         sections.append(("provenance", "Origin", came))
-    return page_of(f"{path}: {kind.title}", sections, SCRIPT)
+    return page_of(f"{path}: {kind.title}", sections, SCRIPT, kind.source(found))
 
 
 def numbers_of(table: Table | str) -> str:
@@ -143,11 +146,13 @@ def verbatim(words: str) -> str:
     return f"<pre>{lines}</pre>"
 
 
-def figure_of(name: str, draw: Callable[..., Any], results: Any) -> str:
+def figure_of(name: str, draw: Callable[..., Any], results: Any, foot: str) -> str:
     """A figure of `flocsim plot` inside the page, its caption being the help of it."""
     picture = io.BytesIO()
     with house_style():
-        draw(results).savefig(picture, format="svg", metadata=METADATA["svg"])
+        figure = draw(results)
+        add_foot(figure, foot)
+        figure.savefig(picture, format="svg", metadata=METADATA["svg"])
     data = base64.b64encode(picture.getvalue()).decode()
     title = f"Figure {name}" if name.isdigit() else name.capitalize()
     caption = text(f"{title}: {(draw.__doc__ or '').partition(chr(10))[0]}")

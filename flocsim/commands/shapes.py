@@ -308,6 +308,10 @@ LIBRARY = Contents(
     summary=summary,
     table=lambda found: format_errors(found.entries),
     figures=lambda found: FIGURES,
+    source=lambda found: (
+        f"{plural(len(found.entries), 'floc')} of "
+        f"{plural(len({each.image for each in found.entries}), 'picture')}"
+    ),
     drawn={"a shape library written by flocsim fit": FIGURES},
     water=water,
 )

@@ -128,7 +128,7 @@ def run_plot(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
     names = None if args.figures is None else figure_names(args.figures)
     source = held(args.results)
-    kind, content, remark = read_content(source)
+    kind, content, remark, foot = read_content(source)
     figures = kind.figures(content)
     foreign = [name for name in names or () if name not in figures]
     if foreign:
@@ -145,7 +145,7 @@ def run_plot(args: argparse.Namespace) -> int:
         figure = figures[name](content)
         if remark:
             mark_figure(figure, remark)
-        save(figure, path, rule)
+        save(figure, path, rule, foot)
         print(path)
     for path in animation:
         kind.animate(path, content, rule=rule)
@@ -172,15 +172,16 @@ def label(name):
 
 
 def read_content(path):
-    """(Contents, what a file holds, what each figure of it has to say)."""
+    """(Contents, what a file holds, what each figure of it has to say, and its source)."""
     if (journal := journal_of(path)) is not None:
         from flocsim.ensembles.storage.unfinished import read_unfinished
 
         begun = read_unfinished(journal)
-        return contents_of(begun.kind), begun.results, begun.progress
+        last = begun.sessions[-1]
+        return contents_of(begun.kind), begun.results, begun.progress, str(last.get("source", ""))
     kind = file_kind(path)
     found = kind.read(path)
-    return kind, found, kind.mark(found)
+    return kind, found, kind.mark(found), kind.source(found)
 
 
 def figure_names(text):
@@ -215,8 +216,11 @@ def add_arguments_compare(parser: argparse.ArgumentParser) -> None:
 
 def run_compare(args: argparse.Namespace) -> int:
     """Print the comparison; the exit code."""
-    both = [file_kind(source := held(path), "compare").opened(source)
-            for path in (args.first, args.second)]  # fmt: skip
+    both = []
+    for path in (args.first, args.second):
+        kind = file_kind(source := held(path), "compare")
+        both.append(kind.opened(source))
+        print(f"{path}: {kind.source(both[-1]) or 'its source is not stated'}")
     comparison = compare(*both)
     print(comparison.table(*filter(None, [args.quantity])))
     return 0

@@ -5,6 +5,7 @@
 import os
 import re
 import signal
+import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from shlex import quote
@@ -12,14 +13,15 @@ from types import FrameType
 from typing import Any
 
 from flocsim.commands import add_allowed, allowed_by
+from flocsim.ensembles.cli import continuing
 from flocsim.ensembles.cli import run as run_command
 from flocsim.ensembles.config.loader import nested, parse_setting
-from flocsim.ensembles.parallel.communicator import SECONDS
+from flocsim.ensembles.parallel.communicator import SECONDS, StopRequested
 from flocsim.ensembles.parallel.processes import launched_rank
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.terminal import tell
-from flocsim.process import STOPPED
+from flocsim.process import STOPPED, handle
 
 DESCRIPTION = """\
 Run a study at every value of a key, or of several (all combinations), and join the results in
@@ -64,6 +66,18 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 def run(args: Namespace) -> int:
     """Run what is missing and join it, or find elasticities; the exit code."""
+    handle(interrupt)
+    try:
+        return run_study(args)
+    except (KeyboardInterrupt, StopRequested) as error:
+        # The process of a part may have been stopped alone, and has said by what.
+        who = str(error).partition(":")[0] or "stopped by SIGINT"
+        tell(f"flocsim: {who}: what was finished is kept\n{continuing()}", sys.stderr)
+        return STOPPED
+
+
+def run_study(args: Namespace) -> int:
+    """Do what the arguments ask for; the exit code."""
     from flocsim.ensembles.script_study import Study
     from flocsim.ensembles.storage.resume import WAYS
 
@@ -76,12 +90,7 @@ def run(args: Namespace) -> int:
         "jobs": args.jobs, "mode": "resume" if args.resume else "new",
         "overwrite": args.overwrite, "tell": tell, "ways": WAYS,
     }  # fmt: skip
-    signal.signal(signal.SIGTERM, interrupt)
-    try:
-        return (run_elasticities if args.elasticities else run_sweep)(args, study, how)
-    except KeyboardInterrupt:
-        tell("flocsim: stopped; finished replicates are kept: continue with --resume")
-        return STOPPED
+    return (run_elasticities if args.elasticities else run_sweep)(args, study, how)
 
 
 def run_sweep(args, study, how):
@@ -123,14 +132,15 @@ def run_elasticities(args, study, how):
     ratio = RATIO if args.ratio is None else args.ratio
     found = elasticities(study, keys, picture, ratio=ratio, **how)
     tell(found.table())
-    save(figure_of(found), picture, rule)
+    tell(found.source)
+    save(figure_of(found), picture, rule, found.source)
     tell(os.fspath(picture))
     return 0
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """What a batch system's SIGTERM does: as Ctrl-C, so that the part that runs saves its rows."""
-    raise KeyboardInterrupt
+    """Do as at Ctrl-C, so that the part that runs saves its rows."""
+    raise KeyboardInterrupt(f"stopped by {signal.Signals(number).name}")
 
 
 def add_arguments_strength(parser: ArgumentParser) -> None:
@@ -200,12 +210,14 @@ def run_strength(args: Namespace) -> int:
     """Survey, write, print, and draw; the exit code."""
     from flocsim.io.plots.curves import over_rate
     from flocsim.io.plots.style import save
+    from flocsim.io.results.run_group import source_line
     from flocsim.io.results.strength_file import read_strengths
 
     code = run_command(args)
     if code == 0 and launched_rank() == 0:
         output, figure = places(args)
-        save(over_rate(read_strengths(output)), figure, figure_rule(args.overwrite))
+        found = read_strengths(output)
+        save(over_rate(found), figure, figure_rule(args.overwrite), source_line(found.about))
         if not args.quiet:
             tell(str(figure))
     return code

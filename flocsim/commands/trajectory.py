@@ -15,6 +15,7 @@ from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format, save
+from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
     StoredTrajectory,
     centre_distance,
@@ -96,14 +97,14 @@ def outcome_line(config, place, replicate, row):
     )
 
 
-def draw(args, trajectory, title):
+def draw(args, trajectory, title, source):
     """Draw and save what was asked for; the paths written."""
     rule, written = figure_rule(args.overwrite), []
     asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
     for figure, names in asked.items():
         made = drawn(trajectory, figure, args.frames, title) if names else None
         for path in map(Path, names):
-            save(made, path, rule)
+            save(made, path, rule, source)
             written.append(path)
     if args.animation:
         animated(trajectory, Path(args.animation), ANIMATION_FRAMES, title, rule)
@@ -131,14 +132,16 @@ def run(args: Namespace) -> int:
     outputs = [Output(path, figure_rule(args.overwrite)) for path in drawn]
     motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
     check_outputs([*outputs, *motion], inputs_of(config, args.config))
-    found = replicate_of(args.replicate, place, one_count_study(config, place[1]))
+    study = one_count_study(config, place[1])
+    found = replicate_of(args.replicate, place, study)
     assert found.row is not None, "a replicate of a study"
     title = outcome_line(config, place, args.replicate, found.row)
     print(title)
-    for path in draw(args, found, title.split(";")[0]):
+    print(source_line(study.source))
+    for path in draw(args, found, title.split(";")[0], source_line(study.source)):
         print(path)
     if args.save:
-        facts = {"config": config.text, "replicate": args.replicate}
+        facts = {"config": config.text, "replicate": args.replicate} | study.source
         facts["zone_distance"] = found.row["D_0"]
         write_trajectory(
             args.save, found.t, found.position, found.velocity, found.shapes, facts,
@@ -164,7 +167,7 @@ def summary_of_motion(found: StoredTrajectory) -> Summary:
              f"{apart[-1]:.4g} at last")
         )  # fmt: skip
     for name, value in found.facts.items():
-        if name != "config":
+        if name not in ("config", *SOURCE):
             told = f"{value:.6g}" if isinstance(value, float) else str(value)
             facts.append((name.replace("_", " "), told))
     return Summary(facts)
@@ -189,5 +192,6 @@ TRAJECTORY = Contents(
     table=lambda found: "",
     figures=lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
     drawn={"a trajectory file (flocsim trajectory --save, Trajectory.save)": MOTION_FIGURES},
+    source=lambda found: source_line(found.facts),
     motion=lambda found: (found.t, found.position, found.velocity, found.shapes),
 )

@@ -40,7 +40,15 @@ from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
 from flocsim.io.confidence import wilson
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
-from flocsim.io.plots.style import Figure, checked_format, drawing, save, set_log_axis, type_titles
+from flocsim.io.plots.style import (
+    Figure,
+    checked_format,
+    drawing,
+    save,
+    set_log_axis,
+    type_titles,
+)
+from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import OUTCOMES, UNKNOWN
 from flocsim.io.terminal import tell
 from flocsim.run import Run
@@ -390,6 +398,6 @@ def run_ladder(args: Namespace) -> int:
     if args.output:
         figure = draw_ladders(panels, chosen, target)
         for path in args.output:
-            save(figure, path, rule)
+            save(figure, path, rule, source_line(study.source))
             tell(path)
     return 0

@@ -4,9 +4,14 @@ import argparse
 import contextlib
 import io
 import math
+import os
+import re
+import shlex
+import shutil
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import units
@@ -176,13 +181,7 @@ def study(config, comm, arguments):
         return error.args[0].exit_code
     if ended.code == STOPPED:
         if comm.rank == 0:
-            who = INTERRUPTION.name if INTERRUPTION.requested else "a signal to another rank"
-            what = "no replicate was finished; start again with --resume"
-            if ended.kept or ended.begun:
-                begun = f" and the states of {ended.begun} others" if ended.begun else ""
-                there = f"{ended.kept} finished replicates{begun} are in {ended.journal}"
-                what = f"{there}; continue with --resume"
-            tell(f"flocsim: stopped by {who}: {what}", sys.stderr)
+            tell(INTERRUPTION.farewell(), sys.stderr)
         return STOPPED
     if comm.rank > 0:
         return 0
@@ -190,6 +189,7 @@ def study(config, comm, arguments):
     if not arguments.quiet:
         shown = file_kind(output)
         tell((shown.told or shown.table)(found))
+        tell(shown.source(found))
         tell(f"{output}: {kind.total(found)} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
     code, line = kind.verdict(found)
@@ -221,9 +221,9 @@ def guarded(comm, arguments):
             tell(kind_of(config).dry_run(config, ranks, arguments.pilot))
         comm.close()
         return code
-    except StopRequested as error:
+    except StopRequested:
         if comm.rank == 0:
-            tell(f"flocsim: {error}", sys.stderr)
+            tell(INTERRUPTION.farewell(), sys.stderr)
         if comm.size > 1:
             comm.abort(STOPPED)  # others may wait for this rank
         return STOPPED
@@ -277,9 +277,37 @@ def run(arguments: argparse.Namespace) -> int:
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
+    if arguments.dry_run:
+        INTERRUPTION.kept = lambda: "nothing was run"
+    elif arguments.parent is None:  # else that process says how it goes on
+        INTERRUPTION.kept = lambda: "no further replicate was finished"
+        INTERRUPTION.command = continuing(0 if arguments.jobs > 1 else comm.size)
     if arguments.quiet:
         units.show_by(units.silent)
     return guarded(comm, arguments)
+
+
+ANEW = re.compile("--(resu|rest|overw)[a-z]*")
+"""Options, also cut short, that a command which continues a run does not have or has at its end."""
+
+
+def continuing(ranks: int = 1) -> str:
+    """Return the command line that continues this run, with the launcher where it has ``ranks``."""
+    words = [word for word in sys.argv[1:] if not ANEW.fullmatch(word)]
+    words.insert(words.index("--") if "--" in words else len(words), "--resume")
+    module = sys.modules["__main__"].__spec__
+    program = [on_path(sys.argv[0])]
+    if module is not None:  # python -m flocsim, or flocsim.ensemble
+        program = [sys.orig_argv[0], "-m", module.name.removesuffix(".__main__")]
+    launcher = Path(sys.executable).with_name("mpirun")
+    launch = [on_path(launcher) if launcher.exists() else "mpirun", "-n", str(ranks)]
+    return shlex.join([*(launch if ranks > 1 else []), *program, *words])
+
+
+def on_path(program: str | os.PathLike) -> str:
+    """Return a program's name where the shell finds it by that, its path otherwise."""
+    path = Path(program).absolute()
+    return path.name if shutil.which(path.name) == str(path) else os.fspath(program)
 
 
 def refused_anywhere(comm: Communicator, code: int | None) -> int | None:

@@ -21,7 +21,7 @@ from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.plots.style import Figure
-from flocsim.io.results.run_group import describe_kind, stored
+from flocsim.io.results.run_group import describe_kind, source_line, stored
 from flocsim.io.seals import held
 
 Facts = list[tuple[str, str]]
@@ -30,8 +30,8 @@ Facts = list[tuple[str, str]]
 Figures = Mapping[str, Callable[..., Figure]]
 """{name: function}, the first line of whose docstring is its help."""
 
-SAID_APART = ("config", "preset", "identity", "failed", "overrides", "history", "cpus", "accuracy",
-              "warnings", "modules")  # fmt: skip
+SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history", "cpus",
+              "accuracy", "warnings", "modules")  # fmt: skip
 """What the group ``run`` holds, of any kind, besides what is printed as it is."""
 
 MOST_FAILURES = 10
@@ -102,6 +102,8 @@ class Contents:
     """(found) → its numbers as text."""
     figures: Callable[[Any], Figures]
     """(found) → the figures that it has."""
+    source: Callable[[Any], str] = lambda found: source_line(found.run)
+    """(found) → which flocs, preset and version it is of, in a line."""
     drawn: Mapping[str, Figures]
     """{what has them, in words: all figures}."""
     told: Callable[[Any], str] | None = None
@@ -186,7 +188,8 @@ def text_of(path: str | os.PathLike) -> str:
     kind, found = overview_of(held(path))
     said, mark = summary_of(path, kind, found), kind.mark(found)
     title = f"{kind.title}; {mark}" if mark else kind.title
-    lines = [f"{path}: {title}", "", *fact_lines(said.facts + said.origin)]
+    lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]
+    lines += fact_lines(said.facts + said.origin)
     if said.warnings:
         lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
     if said.failed:
@@ -204,7 +207,8 @@ def unfinished_text(found: Any) -> str:
     if found.unread:
         facts.append(("damaged", f"{found.unread} bytes of {found.noun}, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)
-    lines = [f"{found.path}: {found.progress}", "", *fact_lines(facts)]
+    lines = [f"{found.path}: {found.progress}", *filter(None, [str(last.get("source", ""))]), ""]
+    lines += fact_lines(facts)
     shown = reasons.most_common(MOST_FAILURES)
     lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
     return "\n".join([*lines, "", f"{found.progress}:", kind.table(found.results)])

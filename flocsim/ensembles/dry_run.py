@@ -237,7 +237,7 @@ def chosen_words(config):
 def go_on():
     """StopRequested where a signal has come."""
     if stop_requested():
-        raise StopRequested(f"stopped by {INTERRUPTION.name}: nothing was run")
+        raise StopRequested(f"stopped by {INTERRUPTION.name}")
 
 
 def chosen_study(study, tasks):

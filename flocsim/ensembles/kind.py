@@ -26,7 +26,7 @@ from flocsim.ensembles.config import STUDIES
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import visible
 from flocsim.io.records import CHUNK, SNAPSHOT, Record, encode, matches
-from flocsim.io.results.run_group import NOTE
+from flocsim.io.results.run_group import NOTE, SOURCE, package_version
 from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384
@@ -265,6 +265,12 @@ class StudyKind:
         axes = ((types, "type"), (vertices, "vertex count"), (delta, "displacement"))
         words = " x ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in axes)
         return f"{self.size} replicates: {words} x {replicates}"
+
+    @property
+    def source(self) -> dict[str, Any]:
+        """What `source_line` tells of the study: its flocs, its preset, the version of flocsim."""
+        found = self.config.shapes.described(len(self.flocs)), self.config.preset or ""
+        return dict(zip(SOURCE, (*found, package_version("flocsim")), strict=True))
 
     @property
     def remark(self) -> str:

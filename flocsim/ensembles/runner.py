@@ -51,6 +51,7 @@ from flocsim.io.results.run_group import (
     distinct,
     mixture_warnings,
     provenance,
+    source_line,
     storable,
 )
 from flocsim.io.terminal import Progress, tell
@@ -61,15 +62,14 @@ from flocsim.process import INTERRUPTION, STOPPED, stop_requested
 class Ended:
     """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well.
 
-    ``kept``: finished replicates that ``journal`` holds, which is seen to be there, and ``begun``
-    others of which it has a part; ``count``: with how many of each condition the study has ended.
+    ``kept``: finished replicates that ``journal`` holds, which is seen to be there; ``count``: with
+    how many of each condition the study has ended.
     """
 
     code: int = 0
     results: Any = None
     computed: int = 0
     kept: int = 0
-    begun: int = 0
     wall_time: float = 0.0
     journal: str = ""
     count: int = -1
@@ -211,7 +211,7 @@ def share_jobs(study: Any, comm: Communicator, jobs: Sequence[Job], leads: bool 
     trials = []
     for job in jobs[comm.rank :: comm.size]:
         if comm.rank == 0 and stop_requested():
-            raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
+            raise StopRequested(f"stopped by {INTERRUPTION.name}")
         trials.append(try_out(study, job)[0])
     shares = comm.gather(trials)
     if shares is None:
@@ -260,6 +260,8 @@ def lead(
     began = time.monotonic()
     with sharing_errors(comm):
         state = make_state(study, start, comm.size)
+    if output is not None:
+        INTERRUPTION.kept = partial(kept_words, start, state)
     remaining = state.schedule.remaining
     key = short(start.identity)
     progress.say(announcement(study, comm.size, study.size - remaining))
@@ -281,12 +283,21 @@ def lead(
         final = state.schedule.final
         kept = start.store.there(in_journal=True)
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, kept)
-        ended.count, ended.journal, ended.begun = final, str(start.journal.path), len(state.begun)
+        ended.count, ended.journal = final, str(start.journal.path)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm, output, progress)
     comm.broadcast(ExitCode(ended.code))
     return ended
+
+
+def kept_words(start: Beginning, state: StudyState) -> str:
+    """Say what the journal has of a study that is stopped."""
+    count, begun = start.store.there(in_journal=True), len(state.begun)
+    if not count and not begun:
+        return "no replicate was finished"
+    others = f" and the states of {begun} others" if begun else ""
+    return f"{count} finished replicates{others} are in {start.journal.path}"
 
 
 @contextlib.contextmanager
@@ -387,7 +398,7 @@ def facts(study, start, notes, ended, ranks):
         "history": storable(json.dumps(start.history)),
         "computed": ended.computed,
         "wall_time": ended.wall_time,
-        "preset": config.preset or "",
+        **{name: storable(each) for name, each in study.source.items()},
         "warnings": storable(json.dumps(kind.doubts(study))),
         **{k: storable(v) if isinstance(v, str) else v for k, v in kind.facts(study).items()},
     }
@@ -400,4 +411,5 @@ def progress_of(study: StudyKind, quiet: bool) -> Progress:
 
 def announcement(study: StudyKind, ranks: int, existing: int = 0) -> str:
     line = f"{study.title}, on {ranks} rank{'s' if ranks > 1 else ''}"
-    return line + (f"; {existing} of them exist already" if existing else "")
+    line += f"; {existing} of them exist already" if existing else ""
+    return f"{line}; {source_line(study.source)}"

@@ -21,7 +21,7 @@ from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
-from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
@@ -112,7 +112,7 @@ def error_of(code: int, said: Sequence[str]) -> FlocsimError:
         last = last.replace(word, meant)
     last = last.removeprefix("flocsim: ")
     if code == STOPPED:
-        return FlocsimError(last)
+        return StopRequested(f'{last}; continue with mode="resume"')
     kind = {UsageError.exit_code: UsageError, FileError.exit_code: FileError}
     return kind.get(code, FlocsimError)(last if code > 0 else f"the run was killed: {last}")
 

@@ -55,6 +55,7 @@ from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
+from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.results.schema import GROUPS
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.terminal import aligned
@@ -111,7 +112,9 @@ def sweep(
                      plan=folder / NAME)  # fmt: skip
             there[path] = fitting(path, part, facts, part.config.stop.half_width is None)
         found.append(there[path])
-    results = SweepResults(output, swept, joined(swept, found), plan_text(plan))
+    shared = {name: {str(each.run.get(name, "")) for each in found} for name in SOURCE}
+    source = {name: words.pop() for name, words in shared.items() if len(words) == 1}
+    results = SweepResults(output, swept, joined(swept, found), plan_text(plan), source)
     write_sweep(results, rule)
     return results
 
@@ -276,6 +279,7 @@ class Elasticities:
     high: np.ndarray
     change_low: np.ndarray
     change_high: np.ndarray
+    source: str = ""
 
     def matters(self, place: tuple[int, ...]) -> bool:
         """Whether 0 is outside the interval, numerics included."""
@@ -325,14 +329,15 @@ def elasticities(
         sweep(study, {key: both}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
               tell=tell, ways=ways)  # fmt: skip
         ends = (parts_folder(path) / f"{number:04d}.h5" for number in (0, 1))
-        found.append(compare(*map(open_results, ends)))
+        first, second = map(open_results, ends)
+        found.append(compare(first, second))
     arrays = {
         name: np.stack([each.arrays["pr_a"][column] for each in found]) / math.log(ratio)
         for name, column in COLUMNS.items()
     }
     axes = found[0]
     return Elasticities(tuple(keys), tuple(values), ratio, axes.types, axes.vertices, axes.delta,
-                        **arrays)  # fmt: skip
+                        **arrays, source=source_line(first.run))  # fmt: skip
 
 
 COLUMNS = {

@@ -150,7 +150,7 @@ def test_info_gives_the_config_back_exactly(study, capsys):
 def test_info_without_config_text(tmp_path, capsys):
     write_results(tmp_path / "bare.h5", make_results(count=2, run={}))
     assert call("info", tmp_path / "bare.h5") == 0
-    assert "none named" in capsys.readouterr().out
+    assert "preset" not in capsys.readouterr().out
     with pytest.raises(FileError, match="no config"):
         call("info", tmp_path / "bare.h5", "--config")
 

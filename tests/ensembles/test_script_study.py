@@ -15,7 +15,7 @@ import flocsim
 from flocsim.ensembles import run
 from flocsim.ensembles.config.toml_text import toml_text
 from flocsim.ensembles.script_study import settings_of
-from flocsim.errors import ConfigError, FlocsimError, PlausibilityWarning, UsageError
+from flocsim.errors import ConfigError, PlausibilityWarning, UsageError
 from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
 
@@ -151,11 +151,12 @@ def test_a_replicate_of_a_study_is_kept_as_motion(tmp_path):
 
 
 def test_scripts_get_no_words_of_the_command():
+    from flocsim.ensembles.parallel.communicator import StopRequested
     from flocsim.ensembles.script_study import error_of
 
-    error = error_of(75, ["", "flocsim: stopped by SIGTERM: continue with --resume"])
-    assert type(error) is FlocsimError
-    assert str(error) == 'stopped by SIGTERM: continue with mode="resume"'
+    error = error_of(75, ["", "flocsim: stopped by SIGTERM: 3 replicates are there"])
+    assert type(error) is StopRequested
+    assert str(error) == 'stopped by SIGTERM: 3 replicates are there; continue with mode="resume"'
     assert "killed" in str(error_of(-9, []))
 
 

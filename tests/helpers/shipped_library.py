@@ -17,7 +17,7 @@ from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.files import keep
 from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED, ShapeEntry, StoredFit, write_library
 
-FLOCS, VERTICES = 24, (4, 8, 16, 32, 64)
+FLOCS, VERTICES = 24, (4, 8, 16, 32, 64, 128)
 PARTICLES, DIMENSION, RATIO, SEED = 60, 1.8, 16.0, 1
 SIZES = np.geomspace(5e-6, 25e-6, FLOCS)
 """Equivalent radii [m]."""

@@ -56,6 +56,7 @@ from flocsim.integrators import (
 )
 from flocsim.io.results.events import MOST_UNKNOWN
 from flocsim.io.results.schema import BAND_ENDS
+from flocsim.io.shape_library import SHIPPED
 
 
 def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> Any:
@@ -152,8 +153,8 @@ class ShapesConfig:
         metadata={
             "read": read_text,
             "allowed": "a path, relative to the config file",
-            "help": 'shape library written by `flocsim fit`, or "synthetic", the one included '
-            'in flocsim (24 grown flocs at N = 4, 8, 16, 32, 64); only with source = "library"',
+            "help": 'shape library written by `flocsim fit`, or "synthetic", the one included in '
+            'flocsim (24 grown flocs at N = 4, 8, 16, 32, 64, 128); only with source = "library"',
             "only_for": ("source", "library"),
         },
     )
@@ -244,6 +245,16 @@ class ShapesConfig:
     def label(self) -> str:
         """The source, or the name of the user's own class."""
         return self.source or own_classes.full_name(self.own)
+
+    def described(self, count: int) -> str:
+        """Return which flocs a study takes; ``count`` of them, none where all are spheres."""
+        if self.own is not None or not count:
+            return self.label if self.own is not None else "spheres"
+        if self.file is None:
+            return f"{count} synthetic flocs grown by flocsim"
+        if Path(self.file) == SHIPPED:
+            return f"{count} synthetic flocs included in flocsim"
+        return f"{count} flocs of {Path(self.file).name}"
 
 
 FRACTAL = (

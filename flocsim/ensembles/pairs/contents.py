@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from flocsim.ensembles import report
-from flocsim.ensembles.config.toml_text import parse
 from flocsim.ensembles.contents import (
     Contents,
     Facts,
@@ -22,7 +21,7 @@ from flocsim.ensembles.contents import (
     later,
     origin,
 )
-from flocsim.errors import ConfigError, visible
+from flocsim.errors import visible
 from flocsim.io.plots.curves import KERNEL_FIGURES, SWEEP_FIGURES
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.results import run_group, schema
@@ -163,7 +162,6 @@ def conditions(results: schema.Results) -> Facts:
     """What was simulated."""
     over = stored(results.run, "overrides")
     return [
-        ("preset", preset(results.run)),
         *axes_of(results),
         ("replicates", f"{results.count} in each of {math.prod(results.shape)} conditions"),
         *([("overrides", json.dumps(over))] if over else []),
@@ -198,15 +196,6 @@ def sizes(results: Overview) -> Facts:
         if f"{low:.4g}" != f"{high:.4g}":
             facts.append((words[name], f"{low:.4g} to {high:.4g} in the replicates"))
     return facts
-
-
-def preset(run):
-    if "preset" in run:
-        return run["preset"] or "none named"
-    try:
-        return str(parse("config", str(run.get("config", ""))).get("preset", "none named"))
-    except ConfigError:
-        return "unknown, the config cannot be read"
 
 
 def outcomes(results: Overview) -> Facts:

@@ -31,10 +31,11 @@ from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import figure_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
-from flocsim.io.plots.style import Figure, save
+from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import first_of_each, read_results, read_row
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.layout import FORMAT
+from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
 from flocsim.io.seals import held
 from flocsim.run import Run
@@ -225,6 +226,7 @@ class StudyResults(Tables):
         if figure in OF_ROWS:
             results = attrs.evolve(results, replicates=self.replicates)
         drawn = FIGURES[figure](results)
+        add_foot(drawn, source_line(self.run))
         if file is not None:
             save(drawn, Path(file), figure_rule())
         return drawn

@@ -147,7 +147,7 @@ def write_blocks(
     digests = {}
     for block in range(*blocks):
         if halted():
-            raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
+            raise StopRequested(f"stopped by {INTERRUPTION.name}")
         digests[block] = file.write_block(block, block_rows(reader, block))
     return digests
 

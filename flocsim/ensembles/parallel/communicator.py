@@ -198,7 +198,7 @@ class Communicator:
             if self.inbox[source]:
                 break
             if heed_signals and self.rank == 0 and stop_requested():
-                raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
+                raise StopRequested(f"stopped by {INTERRUPTION.name}")
             time.sleep(SLEEP)
         return self.inbox[source].popleft()
 

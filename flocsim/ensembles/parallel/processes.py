@@ -21,6 +21,7 @@ from flocsim.process import (
     LAUNCHER_RANKS,
     STOPPED,
     end_with_parent,
+    handle,
     install,
     stop_requested,
 )
@@ -227,7 +228,7 @@ class ProcessCommunicator(Communicator):
         process = self.others[rank - 1]
         process.join(LAST_SECONDS)
         if process.exitcode == STOPPED or stop_requested():
-            raise StopRequested("stopped by a signal; continue with --resume")
+            raise StopRequested("stopped by a signal")
         raise LostRank(
             f"the process of rank {rank} has died (exit code {process.exitcode}); what was "
             "computed is kept: continue with --resume"
@@ -304,8 +305,7 @@ def in_copies(works: Sequence[Callable[[], object]]) -> None:
 def as_copy(work, silent):
     """Work in a copied process, which dies with the first one and by any signal; unless it is
     ``silent`` it says what the first one would."""
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_DFL)
+    handle(signal.SIG_DFL)
     end_with_parent()
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.suppress(Exception))

@@ -25,7 +25,7 @@ from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import Journal, MemoryJournal, journal_path
 from flocsim.io.outputs import extension_rule, in_the_way
 from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, encode, matches
-from flocsim.io.results.run_group import distinct, is_session, now, stored
+from flocsim.io.results.run_group import distinct, is_session, now, source_line, stored
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
@@ -163,6 +163,7 @@ def begin(
             "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
             "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
             "rule": start.rule, "accuracy": start.accuracy, "asked": study.asked(),
+            "source": source_line(study.source),
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:

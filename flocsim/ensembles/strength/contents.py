@@ -4,6 +4,7 @@ from collections import Counter
 
 from flocsim.ensembles.contents import Contents, Facts, Summary
 from flocsim.io.plots.curves import STRENGTH_FIGURES
+from flocsim.io.results.run_group import source_line
 from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths, table_of
 
 
@@ -18,7 +19,7 @@ def facts_of(found: Strengths) -> Facts:
     facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
     return facts + [
         (name.replace("_", " "), str(value)) for name, value in found.about.items()
-        if name not in ("asked", "complete", "cpus")
+        if name not in ("asked", "complete", "cpus", "shapes", "preset")
     ]  # fmt: skip
 
 
@@ -28,5 +29,6 @@ CONTENTS = Contents(
     figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
     mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",
     so_far=lambda found: facts_of(found.results),
+    source=lambda found: source_line(found.about),
     opened=lambda path, allowed=None: read_strengths(path),
 )  # fmt: skip

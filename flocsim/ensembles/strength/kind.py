@@ -36,7 +36,7 @@ from flocsim.fields import check_whole, is_number
 from flocsim.forces.outline import refuse_outlines
 from flocsim.io.records import Record
 from flocsim.io.results import strength_file
-from flocsim.io.results.run_group import now, package_version
+from flocsim.io.results.run_group import SOURCE, now, package_version
 from flocsim.io.results.schema import AGGREGATED, AXES, NOT_APPLICABLE, OUTCOMES
 from flocsim.io.results.strength_file import FAILED, strengths_in
 
@@ -150,6 +150,11 @@ class StrengthStudy(StudyKind):
     @property
     def title(self) -> str:
         return f"{self.size} bound doublets of {self.scene.results.path} in {self.scene.flow}"
+
+    @property
+    def source(self) -> dict[str, Any]:
+        """That of the study, as far as its file says it."""
+        return {name: self.scene.results.run.get(name, "") for name in SOURCE}
 
     def unneeded(self, place: int) -> list[Interval]:
         """Replicates that are not bound, or not asked for."""
@@ -269,7 +274,7 @@ def results(
 ) -> strength_file.Strengths:  # fmt: skip
     """The Strengths of all that was tested, in the order of the study."""
     store, bound = start.store, np.array(study.asked()["strength"]["bound"])
-    about = start.identity | {"complete": True, "cpus": run["cpus"]}
+    about = study.source | start.identity | {"complete": True, "cpus": run["cpus"]}
     about["date"] = store.old.more.about.get("date") if store.old else now()
     found = strengths_in(store, bound.reshape(study.shape[:3]), about, study.bonds)
     if output is not None:

@@ -69,6 +69,8 @@ MOST_LETTERS = 40
 MOST_OF_TITLE = 300
 """Letters of a title that has the whole figure's width, and is broken."""
 LEGEND_ROWS = 9
+FOOT_HEIGHT = 0.13
+"""Inches of the line at the foot of a figure."""
 LEGEND_ROOM, MOST_GROWTH = 2.0, 30.0
 """Inches that a legend may take of a figure, and by which a figure grows at most for it."""
 CROWDED = 50
@@ -163,8 +165,9 @@ def keep_titles_whole(figure: Figure) -> None:
         title.set_visible(True)
     panels = [(axes, axes.get_window_extent()) for axes in figure.axes if axes.get_visible()]
     added = dict.fromkeys([box.y1 for _, box in panels], 0.0)
-    for text in [figure._suptitle] if figure._suptitle else []:
-        added[math.inf] = wrap(text, width - text.get_window_extent().x0 - 4.0)
+    for text in filter(None, [figure._suptitle, figure._supxlabel]):
+        more = wrap(text, width - text.get_window_extent().x0 - 4.0)
+        added[math.inf] = added.get(math.inf, 0.0) + more
     for axes, box in panels:
         beside = [o.x0 for _, o in panels if o.x0 > box.x1 and o.y0 < box.y1 and o.y1 > box.y0]
         for title in titles_of(axes):
@@ -201,6 +204,18 @@ def mark_figure(figure: Figure, words: str) -> None:
     """Say something of the whole figure, in red above it: that its results are unfinished."""
     before = f"\n{figure._suptitle.get_text()}" if figure._suptitle else ""
     figure.suptitle(words + before, x=0.01, ha="left", fontsize=9, color=CONTACT_COLOUR)
+
+
+def add_foot(figure: Figure, words: str) -> None:
+    """Name the source of what a figure shows, small, at its foot, for which it grows."""
+    words, above = plain(words, MOST_OF_TITLE), ""
+    if figure._supxlabel:
+        above = f"{figure._supxlabel.get_text()}\n"
+    if not words or words in " ".join(above.split()):
+        return
+    figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT)
+    with house_style():
+        figure.supxlabel(above + words, x=0.01, ha="left", fontsize=6, color="0.4")
 
 
 def graded_colours(count):
@@ -337,14 +352,16 @@ def checked_format(path: str | Path, option: str = "") -> str:
     return suffix
 
 
-def save(figure: Figure, path: str | Path, rule: Rule = redrawn) -> None:
+def save(figure: Figure, path: str | Path, rule: Rule = redrawn, foot: str = "") -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
-    ``rule`` says what becomes of a file that is there (flocsim.io.outputs). The same figure gives
+    ``rule`` says what becomes of a file that is there (flocsim.io.outputs); ``foot`` stands below
+    all panels. The same figure gives
     the same bytes. Raises UsageError for another suffix, FileError if the file cannot be written.
     """
     suffix = checked_format(path)
     picture = io.BytesIO()
+    add_foot(figure, foot)
     with house_style():
         keep_titles_whole(figure)
         figure.savefig(picture, format=suffix, metadata=METADATA[suffix])

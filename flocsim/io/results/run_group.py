@@ -189,6 +189,20 @@ def water_words(facts: dict) -> str:
     )
 
 
+SOURCE = ("shapes", "preset", "flocsim_version")
+"""Names in the group ``run`` of what the source line is made of."""
+
+
+def source_line(run: Mapping[str, Any]) -> str:
+    """Return which flocs, preset and version results are of, as far as the group ``run`` says it.
+
+    >>> source_line({"shapes": "12 flocs of shapes.h5", "preset": "si", "flocsim_version": "0.2.0"})
+    '12 flocs of shapes.h5 · preset si · flocsim 0.2.0'
+    """
+    forms = zip(SOURCE, ("{}", "preset {}", "flocsim {}"), strict=True)
+    return " · ".join(form.format(run[name]) for name, form in forms if run.get(name))
+
+
 PACKAGES = ("flocsim", "numpy", "numba", "h5py")
 
 

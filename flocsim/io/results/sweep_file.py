@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -26,6 +27,7 @@ from flocsim.io.groups import (
 from flocsim.io.hdf5 import Node
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.records import matches, read_json
+from flocsim.io.results.run_group import SOURCE
 
 FORMAT = "flocsim sweep"
 SCHEMA_VERSION = 1
@@ -53,12 +55,13 @@ class Swept:
 @attrs.frozen(eq=False)
 class SweepResults(Tables):
     """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
-    ``plan`` (JSON) says what each of its parts is."""
+    ``plan`` (JSON) says what each of its parts is, ``run`` what `source_line` tells of all."""
 
     path: Path
     swept: dict[str, Swept]
     groups: dict[str, Labelled]
     plan: str = ""
+    run: dict[str, Any] = attrs.Factory(dict)
 
     @property
     def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
@@ -78,7 +81,9 @@ def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
     about = {name: {"key": each.key, "unit": each.unit} for name, each in results.swept.items()}
     attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "swept": json.dumps(about)}
-    write_groups(results.path, attributes, results.groups, {"plan": results.plan}, rule)
+    write_groups(
+        results.path, attributes, results.groups, {"plan": results.plan} | results.run, rule
+    )
 
 
 def read_sweep(
@@ -100,7 +105,9 @@ def read_sweep(
             raise ValueError("it has no group of a sweep")
         declared = {name: joined_group(each, name, about, nodes) for name, each in joined.items()}
         wanted = {name: group.arrays for name, group in declared.items()}
-        hold_against(nodes, wanted | {"run": {"plan": Declared("text")}}, list(joined), lengths)
+        source = {name: Declared("text") for name in SOURCE if f"run/{name}" in nodes}
+        run = {"run": {"plan": Declared("text")} | source}
+        hold_against(nodes, wanted | run, list(joined), lengths)
         groups = {name: group.labelled(group.read(file[name])) for name, group in declared.items()}
         first = next(iter(groups.values())).axes
         swept = {
@@ -108,7 +115,8 @@ def read_sweep(
             for name, each in about.items()
         }
         plan = scalar_of(file["run/plan"]) if "run" in file else ""
-        return SweepResults(Path(path), swept, groups, str(plan))
+        about_all = {name: scalar_of(file[f"run/{name}"]) for name in source}
+        return SweepResults(Path(path), swept, groups, str(plan), about_all)
 
 
 def joined_group(

@@ -284,11 +284,21 @@ def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):
 def test_a_launcher_of_another_kind_is_found_out(tmp_path, monkeypatch):
     mpirun()
     write_small(tmp_path)
-    env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0"}
+    env = os.environ | {"PMIX_SIZE": "2", "PMIX_RANK": "0"}
     done = run_command(tmp_path, "small.toml", env=env, timeout=60)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "the launcher started 2 ranks but MPI counts 1" in line
+
+
+@pytest.mark.parametrize("more", [{}, {"PMI_FD": "9"}])
+def test_ranks_of_a_launcher_that_has_gone_are_forgotten(folder, no_launcher, more):
+    env = os.environ | {"PMI_RANK": "1", "PMI_SIZE": "2"} | more
+    done = run_command(folder, "small.toml", "--dry-run", env=env, timeout=60)
+    assert done.returncode == 0
+    [line] = done.stderr.splitlines()
+    assert line.startswith("flocsim: PMI_RANK=1 and PMI_SIZE=2 in the environment are left over")
+    assert "on 1 rank" in done.stdout
 
 
 @pytest.mark.parametrize(("rank", "lines"), [("0", 1), ("1", 0)])
@@ -307,7 +317,8 @@ def test_tasks_of_srun_that_are_no_ranks_do_not_run_side_by_side(
 def test_mpi_that_cannot_be_loaded_says_what_to_install(tmp_path):
     write_small(tmp_path)
     (tmp_path / "mpi4py.py").write_text("raise RuntimeError('cannot load MPI library')\n")
-    env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0", "PYTHONPATH": str(tmp_path)}
+    launched = {"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": "0"}
+    env = os.environ | launched | {"PYTHONPATH": str(tmp_path)}
     done = run_command(tmp_path, "small.toml", env=env, timeout=60)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()

@@ -325,7 +325,7 @@ def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
     assert command() == 75
     told = capsys.readouterr().err
     assert "stopped by SIGTERM: 3 finished replicates are in " in told
-    assert "study-strength.h5.journal; continue with --resume" in told
+    assert "study-strength.h5.journal" in told
     assert not Path("study-strength.h5").exists()
     assert program.main(["info", "study-strength.h5"]) == 0
     assert "3 of 5 doublets so far; continue with --resume" in capsys.readouterr().out

@@ -229,7 +229,7 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
         said, _ = process.communicate(timeout=120)
     assert journal.exists(), said
     if number == signal.SIGTERM:
-        assert process.returncode == 75 and "continue with --resume" in said
+        assert process.returncode == 75 and said.endswith(" --resume\n")
     monkeypatch.chdir(tmp_path)
     assert main(["info", "swarm.h5"]) == 0
     assert re.search(r"unfinished: \d of 8 snapshots so far", capsys.readouterr().out)
