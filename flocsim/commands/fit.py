@@ -29,12 +29,19 @@ from flocsim.io.fit_report import (
     summary_text,
 )
 from flocsim.io.images.masks import MASK_SUFFIXES
+from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image, read_names
-from flocsim.io.images.stacks import TIFF_SUFFIXES, page_numbers
+from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL, TIFF_SUFFIXES, page_numbers
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
 from flocsim.io.plots.style import checked_format
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
+
+NOT_THE_PAPERS = {
+    "masks": False, "background": "surface", "threshold": None, "noise_scale": "1",
+    "saturated": "0.001",
+}  # fmt: skip
+"""Options that --finder paper has no use for, and their defaults."""
 
 DESCRIPTION = """\
 Find the flocs in pictures, fit a spheropolygon to each at every requested number of vertices, and
@@ -98,8 +105,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--masks-out", metavar="FOLDER",
         help="write a label image of every picture, 0 outside and the number of each floc inside "
         "it (16-bit PNG), which can be edited and read back by --masks")  # fmt: skip
+    add("--memory", default="1", metavar="GB",
+        help="memory that a picture may take; larger ones are refused before the work begins "
+        "(default: %(default)s)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)
     add = parser.add_argument_group("finding flocs").add_argument
+    add("--finder", default="steepest", choices=("steepest", "paper"),
+        help="steepest: each floc is cut where its outline is steepest, against uneven light; "
+        "paper: as in the paper, a low-pass, stretched grey and Otsu's threshold (default: "
+        "%(default)s)")  # fmt: skip
+    add("--cutoff", metavar="FREQUENCY",
+        help="with --finder paper: cycles per pixel of which the low-pass lets half through, above "
+        "0, to 0.5 (default: 0.2)")  # fmt: skip
     add("--flocs", default="auto", choices=("auto", "bright", "dark"),
         help="whether flocs are brighter or darker than the background (default: "
         "%(default)s)")  # fmt: skip
@@ -182,6 +199,8 @@ def run(args: argparse.Namespace) -> int:
         return LOST if lost else 2
     settings = {"method": args.method, "preserve_area": args.preserve_area,
                 "inscribed": args.inscribed} | ({"warning": doubt} if doubt else {})  # fmt: skip
+    if args.finder == "paper":
+        settings |= {"finder": "paper", "cutoff": args.segmentation["cutoff"]}
     if args.holes:
         settings["holes"] = True
     write_library(args.output, entries, settings, rule)
@@ -214,6 +233,13 @@ def read_numbers(args: argparse.Namespace) -> None:
             "--inscribed needs --method pattern and excludes --preserve-area: a shape inside its "
             "floc has less than its area"
         )
+    if args.finder == "paper":
+        for option, default in NOT_THE_PAPERS.items():
+            if getattr(args, option) != default:
+                name = option.replace("_", "-")
+                raise UsageError(f"--{name} does not apply to --finder paper: leave one of them out")
+    elif args.cutoff is not None:
+        raise UsageError("--cutoff applies to --finder paper only")
     if args.band and (args.masks or args.holes):
         raise UsageError(
             "--band excludes --masks, which do not show where else an outline might be, and --holes"
@@ -229,14 +255,27 @@ def read_numbers(args: argparse.Namespace) -> None:
     }
     args.segmentation = {
         "flocs": args.flocs,
-        "threshold": threshold,
-        "noise_scale": number("--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3),
-        "saturated": number("--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999),
         "min_radius": positive("--min-radius", args.min_radius),
         "max_radius": limit,
         "max_blur": float("inf") if endless else positive("--max-blur", args.max_blur, "a share"),
         "neck": None if neck is None else number("--neck", neck, "a share from 0 to 1", 0.0, 1.0),
     }
+    if args.finder == "paper":
+        cutoff = CUTOFF if args.cutoff is None else args.cutoff
+        most = "cycles per pixel above 0, to 0.5"
+        args.segmentation["cutoff"] = number("--cutoff", cutoff, most, 1e-6, 0.5)
+        args.segmentation["neck"] = args.segmentation["neck"] or 0.0
+    else:
+        args.segmentation |= {
+            "threshold": threshold,
+            "noise_scale": number(
+                "--noise-scale", args.noise_scale, "pixels, at least 0", 0.0, 1e3
+            ),
+            "saturated": number(
+                "--saturated", args.saturated, "a share from 0 to below 1", 0.0, 0.999
+            ),
+        }
+    args.memory = 1e9 * positive("--memory", args.memory, "gigabytes")
     args.pixel_size = args.pixel_size and length("--pixel-size", args.pixel_size)
     args.crop = args.crop and rectangle(args.crop)
     args.vertices = sorted({1, *(whole("--vertices", each) for each in args.vertices.split(","))})
@@ -266,9 +305,10 @@ def length(option, text):
         value = read_number(text, "m")
     except ValueError as reason:
         hint = f" ({reason})" if str(reason) else ""
-    if not 0.0 < value < float("inf"):
+    if not SMALLEST_PIXEL <= value <= LARGEST_PIXEL:
         raise UsageError(
-            f"{option} takes a length above 0 such as '0.95 um', or in metres, found {text!r}{hint}"
+            f"{option} takes a length above 0 such as '0.95 um', or in metres, from "
+            f"{SMALLEST_PIXEL:g} to {LARGEST_PIXEL:g}, found {text!r}{hint}"
         )
     return value
 

@@ -19,7 +19,8 @@ from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.images.background import FEWEST_FRAMES
-from flocsim.io.images.masks import MASK_SUFFIXES, is_mask, read_masks, segment_mask
+from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
+from flocsim.io.images.paper import segment_as_paper
 from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
 from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
@@ -176,11 +177,15 @@ def find_flocs(task):
             return masked(path, name, options)
         size, pictures = None, []
         for page, plane in planes_in(path, options):
-            pixels = read_pixels(path, plane)
+            pixels = read_pixels(path, plane, options.memory)
             if is_mask(pixels):
                 return None
             size = size or known_size(path, options)
-            found = segment(grey_of(pixels, path), background=background, **options.segmentation)
+            grey = grey_of(pixels, path)
+            if options.finder == "paper":
+                found = segment_as_paper(grey, **options.segmentation)
+            else:
+                found = segment(grey, background=background, **options.segmentation)
             pictures.append(chosen(path, name + page, found, options, size, plane))
         return pictures
     except FlocsimError as error:
@@ -190,6 +195,8 @@ def find_flocs(task):
 def planes_in(path, options):
     """[(what is put behind its name, Plane)] of the pictures of a file that are asked for."""
     check_file(path, "picture file")
+    if path.suffix.lower() in ARRAYS:
+        raise ImageError(f"{path}: {path.suffix} files hold masks, not pictures: give --masks")
     return planes_of(path, stack_of(path), options.page, options.channel, options.crop)
 
 
@@ -208,7 +215,7 @@ def known_size(path, options):
 def masked(path, name, options):
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
     pictures = []
-    for inner, mask in read_masks(path):
+    for inner, mask in read_masks(path, options.memory):
         found = segment_mask(mask, **limits)
         size = known_size(path, options)
         pictures.append(chosen(path, name + inner[len(path.name) :], found, options, size))
@@ -283,7 +290,7 @@ def find_background(paths, options):
         # A file that cannot be read, or is a mask, is reported when its own turn comes.
         with contextlib.suppress(ImageError, MemoryError):
             for _, plane in planes_in(path, options):
-                pixels = read_pixels(path, plane)
+                pixels = read_pixels(path, plane, options.memory)
                 if not is_mask(pixels):
                     frames.append(grey_of(pixels, path))
     shapes = {frame.shape for frame in frames}
@@ -330,11 +337,11 @@ def pictures_beneath(name, paths, drawn):
 def grey_beneath(picture, beneath, options):
     """What the overlay of a picture is drawn over."""
     if not options.masks:
-        return read_grey(picture.path, picture.plane)
+        return read_grey(picture.path, picture.plane, options.memory)
     mask = picture.found.foreground
     if picture.path not in beneath:
         return mask
-    grey = read_grey(beneath[picture.path])
+    grey = read_grey(beneath[picture.path], memory=options.memory)
     if grey.shape == mask.shape:
         return grey
     sizes = [f"{width} × {height}" for height, width in (grey.shape, mask.shape)]

@@ -77,7 +77,7 @@ def low_pass(grey: np.ndarray, scale: float) -> np.ndarray:
     spectrum = fft.dctn(grey, norm="ortho")
     for axis, size in enumerate(grey.shape):
         wavenumber = np.pi * np.arange(size) / size
-        gain = np.exp(-0.5 * (wavenumber * scale) ** 2)
+        gain = np.exp(-0.5 * (wavenumber * scale) ** 2).astype(grey.dtype)
         spectrum *= np.expand_dims(gain, 1 - axis)
     return fft.idctn(spectrum, norm="ortho", overwrite_x=True)
 
@@ -113,7 +113,7 @@ def smooth_surface(grey: np.ndarray, degree: int, logarithmic: bool = False) -> 
     places = (np.linspace(-1.0, 1.0, n) if n > 1 else np.zeros(1) for n in grey.shape)
     rows, columns = (np.polynomial.legendre.legvander(along, degree) for along in places)
     step = max(1, -(-max(grey.shape) // SURFACE_SAMPLES))
-    values = grey[::step, ::step]
+    values = grey[::step, ::step].astype(float)
     if logarithmic:
         values = np.log(np.maximum(values, 0.0) + DARKEST)
     basis = np.einsum("yi,xj->yxij", rows[::step], columns[::step])
@@ -126,7 +126,7 @@ def smooth_surface(grey: np.ndarray, degree: int, logarithmic: bool = False) -> 
         basis[..., orders <= degree].reshape(values.size, -1), values.ravel(),
         orders[orders <= degree], rim.ravel(),
     )  # fmt: skip
-    surface = rows @ coefficients @ columns.T
+    surface = (rows @ coefficients).astype(grey.dtype) @ columns.T.astype(grey.dtype)
     if logarithmic:
         np.exp(surface, out=surface)
         surface -= DARKEST

@@ -16,9 +16,6 @@ from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import NAN, Filters, sorted_out
 
 ARRAYS = (".npy", ".npz")
-MOST_BYTES = 8 * reading.MOST_PIXELS
-"""Of all masks of a file."""
-
 MOST_LABELS = 100_000
 
 PLAIN_INSIDE = (1, 255, 65535)
@@ -47,7 +44,7 @@ EDGE = 2
 WAY = "fit it without --masks, or give a mask of two values or labels, one value for each floc"
 
 
-def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
+def read_masks(path: str | Path, memory: float = reading.MEMORY) -> list[tuple[str, np.ndarray]]:
     """The masks of a file: [(name, (h, w) integer array)], 0 outside.
 
     Two values are a mask of any number of flocs, the greater one inside; integers of more values
@@ -58,8 +55,8 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     path = Path(path)
     if path.suffix.lower() in ARRAYS:
         return [(f"{path.name}:{key}" if key else path.name, _mask(array, f"{path} {key}"))
-                for key, array in _arrays(path)]  # fmt: skip
-    pixels = reading.read_pixels(path)
+                for key, array in _arrays(path, memory)]  # fmt: skip
+    pixels = reading.read_pixels(path, memory=memory)
     flat = pixels if pixels.ndim == 2 else pixels[..., :3].max(axis=2)
     if path.suffix.lower() in (".jpg", ".jpeg"):
         check_halves(path, flat)
@@ -67,26 +64,29 @@ def read_masks(path: str | Path) -> list[tuple[str, np.ndarray]]:
     return [(path.name, _mask(flat, str(path)))]
 
 
-def _arrays(path):
+def _arrays(path, memory):
     """[(key, array)] of an .npy or .npz file."""
     reading.check_file(path, "file of masks")
     try:
         if path.suffix.lower() == ".npy":
             with open(path, "rb") as file:
-                return [("", reading.read_array(file, path.stat().st_size, str(path)))]
-        arrays, left = {}, MOST_BYTES
+                return [("", reading.read_array(file, path.stat().st_size, str(path), memory))]
+        arrays, left = {}, memory
         with zipfile.ZipFile(path) as archive:
             reading.check_entries(path, archive.infolist())
             for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
                 left -= entry.file_size
                 if left < 0:
                     raise ImageError(
-                        f"{path}: would be more than {MOST_BYTES} bytes after decompression"
+                        f"{path}: would be more than {memory:.3g} bytes after decompression; give "
+                        "--memory"
                     )
                 key = entry.filename.removesuffix(".npy")
                 with archive.open(entry) as file:
-                    arrays[key] = reading.read_array(file, entry.file_size, f"{path} {key}")
-        return _unpacked(path, arrays) if "shapes" in arrays else list(arrays.items())
+                    arrays[key] = reading.read_array(
+                        file, entry.file_size, f"{path} {key}", memory
+                    )
+        return _unpacked(path, arrays, memory) if "shapes" in arrays else list(arrays.items())
     except ImageError:
         raise
     except Exception as problem:
@@ -94,7 +94,7 @@ def _arrays(path):
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
 
 
-def _unpacked(path, arrays):
+def _unpacked(path, arrays, memory):
     """[(key, array)] of masks that are stored as bits."""
     shapes = arrays.pop("shapes")
     if shapes.dtype.kind not in "iu" or shapes.shape != (len(arrays), 2):
@@ -102,6 +102,9 @@ def _unpacked(path, arrays):
             f"{path}: its shapes must be whole numbers ({len(arrays)}, 2), one row for each array, "
             f"found {shapes.shape} of type {shapes.dtype}"
         )
+    # A byte a pixel, and four of the labels that are made of it, are kept of all.
+    sizes = shapes.astype(float).prod(axis=1) if len(arrays) else np.zeros(1)
+    reading.check_memory(path, 5 * float(sizes.sum()), (float(sizes.max()),), memory=memory)
     masks = []
     for (key, bits), (height, width) in zip(arrays.items(), shapes.tolist(), strict=True):
         size = height * width
@@ -118,16 +121,15 @@ def _mask(array, name):
 
     if array.ndim != 2 or array.size == 0:
         raise ImageError(f"{name}: a mask is an (h, w) array, found shape {array.shape}")
-    reading.check_shape(name, array.shape)
     reading.check_array(name, array)
     if array.dtype == bool:
-        return array.astype(np.int64)
+        return array.astype(np.int32)
     values = np.unique(array)
     is_whole = np.issubdtype(array.dtype, np.integer)
     if len(values) == 2 and not (is_whole and values[0] == 0):
-        return (array > values[0]).astype(np.int64)
+        return (array > values[0]).astype(np.int32)
     if len(values) == 1:
-        return (array > 0).astype(np.int64)
+        return (array > 0).astype(np.int32)
     if not is_whole or values[0] < 0:
         raise ImageError(
             f"{name}: a mask holds two values, or labels from 0; found {len(values)} values of "
@@ -136,14 +138,14 @@ def _mask(array, name):
     if len(values) > MOST_LABELS:
         raise ImageError(f"{name}: holds {len(values)} labels, more than {MOST_LABELS}")
     # Numbered anew from 1: a label may be any number, and a table as long as the largest is made.
-    labels = np.searchsorted(values, array) + (values[0] > 0)
+    labels = (np.searchsorted(values, array) + (values[0] > 0)).astype(np.int32)
     if (share := agreement(labels)) < AGREEING:
         raise ImageError(
             f"{name}: is a photograph, not a mask: {len(values)} grey levels, and only "
             f"{100 * share:.0f} % of neighbouring pixels agree; {WAY}"
         )
     reading.check_spread(name, array.shape, find_objects(labels))
-    return labels.astype(np.int64) if values[-1] > LARGEST_KEPT else array.astype(np.int64)
+    return labels if values[-1] > LARGEST_KEPT else array.astype(np.int32)
 
 
 def segment_mask(
@@ -157,7 +159,7 @@ def segment_mask(
     from scipy.ndimage import find_objects, label
 
     levels, labels = np.unique(mask, return_inverse=True)
-    labels = labels.reshape(mask.shape) + (levels[0] > 0)
+    labels = labels.reshape(mask.shape).astype(np.int32) + (levels[0] > 0)
     values: list[int] = levels[levels > 0].tolist()
     if len(values) < 2:
         labels, count = label(filled(labels > 0), EIGHT)

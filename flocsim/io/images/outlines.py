@@ -335,8 +335,7 @@ class Search:
         """The level in the middle of those of the lowest edge."""
         values, square_slopes = around(focus.contrast, mask, (box[0].start, box[1].start))
         values -= base
-        place = (1.0 - self.saturated) * (len(values) - 1)
-        top = float(np.interp(place, np.arange(len(values)), np.sort(values)))
+        top = float(np.quantile(values, 1.0 - self.saturated))
         least = max(1e-3, 0.01 * top)
         if top <= least:
             return base

@@ -168,7 +168,7 @@ def segment(
             )
         light = low_pass(background, noise_scale)
     if flocs == "auto":
-        flocs = _guess_polarity(smooth, light)
+        flocs = guess_polarity(smooth, light)
     contrast, fine = _contrast(grey, smooth, light, flocs, noise_scale)
     noise, slope = background_noise(contrast, fine, noise_scale)
     if threshold is None:
@@ -193,8 +193,8 @@ def segment(
     )  # fmt: skip
 
 
-def _guess_polarity(smooth, light):
-    """The side of the contrast's longer tail."""
+def guess_polarity(smooth: np.ndarray, light: np.ndarray | None = None) -> str:
+    """Return "dark" or "bright", the side of the contrast's longer tail."""
     coarse = smooth[::COARSE, ::COARSE] if min(smooth.shape) > 50 * COARSE else smooth
     step = COARSE if coarse is not smooth else 1
     surface = smooth_surface(coarse, degree=2) if light is None else light[::step, ::step]

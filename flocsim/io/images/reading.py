@@ -1,19 +1,23 @@
-"""Picture files → grey arrays. Pillow opens nearly all; tifffile what Pillow cannot in TIFF.
+"""Picture files → grey arrays: tifffile reads TIFF that it unpacks by itself, Pillow all else.
 
-How large a picture or a mask may be is said before anything is allocated for it.
+How much memory a picture or a mask takes is estimated before anything is allocated for it.
 """
 
+import contextlib
+import logging
 import math
+import os
+import tempfile
 import warnings
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from flocsim.errors import ImageError
-from flocsim.io.images.stacks import Plane, stack_of
+from flocsim.io.images.stacks import TIFF_SUFFIXES, Plane, stack_of
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 """Endings that are taken for pictures when a folder is given."""
@@ -22,7 +26,10 @@ FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
 """What Pillow may take a file for, whatever its ending."""
 
 PLAIN, DEFLATED = (1, 32773), (8, 32946)
-"""How a TIFF may be packed that Pillow cannot read: not or by runs; deflated."""
+"""Compressions of TIFF that tifffile unpacks without further libraries: none or runs; deflate."""
+
+WHITE_IS_ZERO, BLACK_IS_ZERO, RGB = 0, 1, 2
+"""Photometric interpretations of TIFF that are taken as they are stored."""
 
 ONLY = Plane()
 """The only picture of a file that has no other."""
@@ -32,11 +39,12 @@ CHOOSE = "choose with --page and --channel, or save the picture that you want as
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
 
-MOST_PIXELS = 2**27
-"""134 million: some 4 GB while its flocs are looked for."""
+MEMORY = 10**9
+"""Bytes that a picture may take unless --memory gives another number: 25 Mpixel of grey fit."""
 
-PIXELS_PER_BYTE = 10_000
-"""More than any packing makes of a byte of the file: the pixels are not there."""
+BYTES_PER_PIXEL = 38
+"""Peak of reading, finding flocs and measuring them where one floc covers half of the picture,
+which is the worst case; 20 where all flocs are small."""
 
 LARGEST_FILE = 2**32
 MOST_SPREAD = 20
@@ -46,67 +54,106 @@ MOST_ARRAYS = 10_000
 LONGEST_NAME = 200
 
 
-def read_grey(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
-    """The luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float64 in [0, 1].
+for _name in ("tifffile", "PIL"):
+    # Their warnings about odd metadata do not concern the pixels, and would reach the terminal.
+    logging.getLogger(_name).addHandler(logging.NullHandler())
 
-    The full range of the file's number type maps to [0, 1]; floating-point files must already lie
-    there or are divided by their maximum.  Transparent pixels take the median grey of the opaque
-    ones, so that they count as background.  Raises ImageError, naming the file, when it is
-    missing, damaged, no picture, or a stack of several of which ``plane`` names none.
+
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Keep what decoders print, warn and log from the terminal: libtiff writes to descriptor 2."""
+    with warnings.catch_warnings(), tempfile.TemporaryFile() as unread:
+        warnings.simplefilter("ignore")
+        try:
+            stderr = os.dup(2)
+        except OSError:  # there is none
+            yield
+            return
+        os.dup2(unread.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+
+
+def read_grey(path: str | Path, plane: Plane = ONLY, memory: float = MEMORY) -> np.ndarray:
+    """Return the luminance of a picture file (PNG, JPEG, TIFF, BMP), (h, w) float32 in [0, 1].
+
+    The full range of the file's number type maps to [0, 1]; for floating-point values beyond 1 and
+    integers of more than 16 bits see `full_scale`.  Transparent pixels take the median grey of the
+    opaque ones, so that they count as background.  Raises ImageError, naming the file, when it is
+    missing, damaged, no picture, needs more than `memory` bytes, or is a stack of several of which
+    ``plane`` names none.
     """
-    return grey_of(read_pixels(path, plane), path)
+    return grey_of(read_pixels(path, plane, memory), path)
 
 
 def grey_of(pixels: np.ndarray, path: str | Path) -> np.ndarray:
-    """What read_grey gives for a file's pixels as they are stored; path: for messages."""
-    pixels = _to_unit_range(pixels, path)
-    if pixels.ndim == 2:
-        return pixels
-    if pixels.ndim != 3 or pixels.shape[2] > 4:
+    """Return what read_grey gives for a file's pixels as they are stored; path: for messages."""
+    if pixels.ndim not in (2, 3) or (pixels.ndim == 3 and pixels.shape[2] > 4):
         raise ImageError(
             f"{path}: an array of shape {pixels.shape} is not a single grey or colour picture; "
             "save the picture that you want as a file of its own"
         )
-    has_alpha = pixels.shape[2] in (2, 4)
-    colours = pixels[..., :-1] if has_alpha else pixels
-    grey = colours[..., 0] if colours.shape[2] == 1 else colours @ LUMINANCE
-    if not has_alpha:
+    samples = pixels[..., None] if pixels.ndim == 2 else pixels
+    full = full_scale(pixels, path)
+
+    def unit(sample):
+        values = samples[..., sample].astype(np.float32)
+        return np.minimum(np.divide(values, full, out=values), 1.0, out=values)
+
+    count = samples.shape[2]
+    if count < 3:
+        grey = unit(0)
+    else:
+        grey = np.zeros(samples.shape[:2], np.float32)
+        for sample, weight in enumerate(LUMINANCE):
+            grey += weight * unit(sample)
+    if count in (1, 3):
         return grey
-    alpha = pixels[..., -1]
+    alpha = unit(count - 1)
     opaque = grey[alpha > 0.5]
-    backdrop = np.median(opaque) if opaque.size else 0.0
+    backdrop = np.median(opaque) if opaque.size else np.float32(0.0)
     return alpha * grey + (1.0 - alpha) * backdrop
 
 
-def _to_unit_range(pixels, path):
+def full_scale(pixels: np.ndarray, path: str | Path) -> float:
+    """Return the value that stands for white.
+
+    For integers of up to 16 bits it is their largest; wider ones have often come from 16 bits.
+    Values beyond that have no natural white: the brightest that two neighbours reach is taken, so
+    that a single hot pixel does not turn the rest black.
+    """
     if pixels.dtype == bool:
-        return pixels.astype(float)
-    low, high = float(pixels.min()), float(pixels.max())
-    if low < 0:
+        return 1.0
+    if (low := float(pixels.min())) < 0:
         raise ImageError(f"{path}: holds negative values (least {low:g}); grey starts at 0")
-    if np.issubdtype(pixels.dtype, np.floating):
-        return pixels.astype(float) / max(high, 1.0)
-    # 16-bit files may arrive in a 32-bit array: the smallest usual range that holds them counts.
-    full = 255.0 if pixels.dtype.itemsize == 1 else 65535.0
-    return pixels.astype(float) / max(full, high)
+    if pixels.dtype.kind in "iu" and pixels.dtype.itemsize <= 2:
+        return float(np.iinfo(pixels.dtype).max)
+    usual = 1.0 if pixels.dtype.kind == "f" else 65535.0
+    if float(pixels.max()) <= usual:
+        return usual
+    pairs = [(pixels[1:], pixels[:-1]), (pixels[:, 1:], pixels[:, :-1])]
+    reached = [float(np.minimum(*pair).max()) for pair in pairs if pair[0].size]
+    return max(usual, *reached) if reached else float(pixels.max())
 
 
-def read_pixels(path: str | Path, plane: Plane = ONLY) -> np.ndarray:
-    """The pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
+def read_pixels(path: str | Path, plane: Plane = ONLY, memory: float = MEMORY) -> np.ndarray:
+    """Return the pixels of a picture file as they are stored, (h, w) or (h, w, channels)."""
     path = Path(path)
     check_file(path, "picture file")
     stack = stack_of(path)
     if plane is ONLY and stack.frame_count > 1:
         raise ImageError(f"{path}: holds {stack.frame_count} pictures; {CHOOSE}")
-    # Pillow takes planes that are stored as colours for colours, and those of 16 bits wrongly.
-    pixels = (
-        _decode_with_tifffile(path, 0)[plane.frame]
-        if stack.planar else _decode(path, plane.frame)
-    )  # fmt: skip
+    frame = 0 if stack.planar else plane.frame
+    with quiet():
+        pixels = _decode(path, frame, plane.crop, memory)
+    if stack.planar:  # an array of several pictures that is stored as the colours of one
+        pixels = pixels[..., plane.frame]
     pixels = _part(pixels, plane, path)
     if pixels.size == 0:
         raise ImageError(f"{path}: the picture is empty")
-    check_shape(path, pixels.shape)
     check_array(path, pixels)
     return pixels
 
@@ -129,41 +176,48 @@ def _part(pixels, plane, path):
     return pixels[y : y + height, x : x + width]
 
 
-def _decode(path, frame):
+def _decode(path, frame, crop, memory):
+    """Return decoded pixels.  Decoders raise nearly anything on damaged files."""
+    reason, dtype = "", None
+    if path.suffix.lower() in TIFF_SUFFIXES:
+        found, reason = _decode_tiff(path, frame, crop, memory)
+        if not reason:
+            return found
+        dtype = found
     try:
-        with warnings.catch_warnings():
-            # What a decoder only warns of, odd metadata, does not touch the pixels.
-            warnings.simplefilter("ignore")
-            return _decode_with_pillow(path, frame)
+        pixels = _decode_with_pillow(path, frame, crop, memory)
+        # Pillow has no type for some integers: it takes 8 bits for unsigned, and 32 for signed.
+        if dtype is not None and pixels.ndim == 2 and {pixels.dtype.kind, dtype.kind} <= {*"iu"}:
+            pixels = pixels.astype(dtype)
+        return pixels
     except ImageError:
         raise
     except Exception as problem:
         if type(problem).__name__ == "DecompressionBombError":
             raise ImageError(
-                f"{path}: it has more than the {MOST_PIXELS} pixels that a picture may have; cut "
-                "it into smaller ones"
+                f"{path}: has more than the 178 Mpixel of a single picture that are read; cut it "
+                "into smaller ones"
             ) from problem
-        # Decoders raise nearly anything on damaged files; all of it means one thing to the user.
-        if path.suffix.lower() in (".tif", ".tiff"):
-            return _decode_with_tifffile(path, frame)
+        if reason:
+            raise ImageError(f"{path}: {reason}; save it uncompressed, or as PNG") from problem
         raise ImageError(
             f"{path}: cannot be read as a picture ({one_line(problem)}); "
             "give an undamaged PNG, JPEG, TIFF or BMP"
         ) from problem
 
 
-def _decode_with_pillow(path, frame):
+def _decode_with_pillow(path, frame, crop, memory):
     from PIL import Image, ImageOps
 
     # Only these: others run programs on what they read (EPS: Ghostscript).
     with Image.open(path, formats=FORMATS) as image:
-        check_shape(path, (*image.size[::-1], len(image.getbands())))
-        check_promise(path, image.width * image.height)
         if frame >= (count := getattr(image, "n_frames", 1)):
             raise ImageError(f"{path}: has no picture {frame + 1}, only {count}")
         image.seek(frame)
-        check_shape(path, (*image.size[::-1], len(image.getbands())))
-        check_promise(path, image.width * image.height)
+        size = image.size[::-1]
+        stored = math.prod(size) * max(len(image.getbands()), 4 if image.mode in "IF" else 1)
+        # Twice: Pillow's own image, and the array that is made of it.
+        check_memory(path, 2 * stored, size, crop, memory)
         image.load()
         image = ImageOps.exif_transpose(image)
         if image.mode in ("P", "PA"):
@@ -173,8 +227,9 @@ def _decode_with_pillow(path, frame):
         return np.asarray(image)
 
 
-def _decode_with_tifffile(path, frame):
-    """The pixels of a page; ImageError for one that is too large, or unpacks to more than these."""
+def _decode_tiff(path, frame, crop, memory):
+    """Return (pixels, "") of a page of a TIFF that tifffile unpacks by itself, or (the type of its
+    samples, why it is left to Pillow); ImageError where Pillow would read wrong values, too."""
     import tifffile
 
     try:
@@ -182,34 +237,66 @@ def _decode_with_tifffile(path, frame):
             if frame >= len(tiff.pages):
                 raise ImageError(f"{path}: has no picture {frame + 1}, only {len(tiff.pages)}")
             page = tiff.pages[frame]
-            check_shape(path, page.shape)
-            check_promise(path, int(np.prod(page.shape[:2])))
-            check_shape(path, (page.imagelength, page.imagewidth))
-            if page.dtype is None or page.compression not in (*PLAIN, *DEFLATED):
-                raise ImageError(
-                    f"{path}: its packing {page.compression!s:.40} is unknown; save it "
-                    "uncompressed, or as PNG"
-                )
-            rows, columns = page.chunks[:2] if len(page.chunks) > 1 else (page.chunks[0], 1)
-            wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
-            if wanted > 64 * MOST_PIXELS:
-                raise ImageError(f"{path}: its pieces of {rows} × {columns} pixels are too large")
-            for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
-                if page.compression in DEFLATED:
-                    tiff.filehandle.seek(offset)
-                    packed = tiff.filehandle.read(length)
-                    if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
-                        raise ImageError(
-                            f"{path}: a part of it decompresses to more than {wanted} bytes"
-                        )
-            return np.asarray(page.asarray())
+            size = page.imagelength, page.imagewidth
+            check_memory(path, page.nbytes, size, crop, memory)
+            if reason := left_to_pillow(page):
+                # Pillow swaps bytes once more than libtiff has done already, and inverts only bytes.
+                wide = page.dtype not in (None, bool, np.uint8)
+                swapped = tiff.byteorder == ">" and page.dtype != np.uint16
+                if wide and (swapped or page.photometric == WHITE_IS_ZERO):
+                    raise ImageError(f"{path}: {reason}; save it uncompressed, or as PNG")
+                return page.dtype, reason
+            check_segments(path, tiff, page)
+            pixels = np.asarray(page.asarray())
+            if page.axes == "SYX":
+                pixels = np.moveaxis(pixels, 0, -1)
+            if page.photometric == WHITE_IS_ZERO:
+                pixels = inverted(pixels, path)
+            return pixels, ""
     except ImageError:
         raise
     except Exception as problem:
-        raise ImageError(
-            f"{path}: cannot be read as a TIFF ({one_line(problem)}); "
-            "save it uncompressed, or as PNG"
-        ) from problem
+        return None, f"cannot be read as a TIFF ({one_line(problem)})"
+
+
+def left_to_pillow(page):
+    """Return why tifffile cannot read a page by itself, or ""; page: tifffile.TiffPage."""
+    bits, kind = page.bitspersample, getattr(page.sampleformat, "name", page.sampleformat)
+    mixed = bits == 1 and page.samplesperpixel > 1
+    if page.dtype is None or bits not in (1, 8, 16, 32, 64) or mixed:
+        return f"its samples of {bits} bits ({kind}) are not read"
+    if page.compression not in (*PLAIN, *DEFLATED) or page.predictor not in (1, 2):
+        packing = getattr(page.compression, "name", page.compression)
+        return f"its packing {packing} of {page.dtype} is not read"
+    colours = getattr(page.photometric, "name", page.photometric)
+    if page.photometric not in (WHITE_IS_ZERO, BLACK_IS_ZERO, RGB) or page.axes not in (
+        "YX", "YXS", "SYX"
+    ):  # fmt: skip
+        return f"its colours {colours} of {page.dtype}, axes {page.axes}, are not read"
+    orientation = page.tags.get("Orientation")
+    turned = orientation is not None and orientation.value != 1
+    return "it is stored turned" if turned else ""
+
+
+def check_segments(path, tiff, page):
+    """ImageError for a strip or tile of a deflated page that unpacks to more than its pixels."""
+    if page.compression not in DEFLATED:
+        return
+    wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
+    for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
+        tiff.filehandle.seek(offset)
+        packed = tiff.filehandle.read(length)
+        if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
+            raise ImageError(f"{path}: a part of it decompresses to more than {wanted} bytes")
+
+
+def inverted(pixels, path):
+    """Return pixels of which 0 is white as those of which 0 is black."""
+    if pixels.dtype == bool:
+        return ~pixels
+    if pixels.dtype.kind == "u":
+        return np.iinfo(pixels.dtype).max - pixels
+    raise ImageError(f"{path}: 0 is white in it, and values are {pixels.dtype}: no black is known")
 
 
 def one_line(problem: Exception) -> str:
@@ -237,22 +324,23 @@ def check_file(path: Path, what: str) -> None:
         raise ImageError(f"{path}: larger than {LARGEST_FILE >> 30} GB; cut it into smaller ones")
 
 
-def check_shape(name: object, shape: Sequence[int]) -> None:
-    """ImageError for more pixels than MOST_PIXELS; further axes are counted as well."""
-    pixels = math.prod(int(size) for size in shape[:2])
-    if pixels > MOST_PIXELS or math.prod(int(size) for size in shape) > 4 * MOST_PIXELS:
-        sizes = " × ".join(map(str, shape))
+def check_memory(
+    name: object, stored: int, shape: Sequence[int],
+    crop: tuple[int, int, int, int] | None = None, memory: float = MEMORY,
+) -> None:  # fmt: skip
+    """ImageError for a picture or mask that needs more bytes than it may take.
+
+    stored: bytes of its decoded pixels; shape: (h, w, …), worked on but for what is cropped.
+    """
+    pixels = math.prod(shape[:2])
+    used = pixels if crop is None else min(pixels, crop[2] * crop[3])
+    needed = stored + BYTES_PER_PIXEL * used
+    if needed > memory:
         raise ImageError(
-            f"{name}: {sizes[:80]} pixels are more than the {MOST_PIXELS} that a picture may have; "
-            "cut it into smaller ones"
+            f"{name}: {pixels / 1e6:.3g} Mpixel need about {needed / 1e9:.2g} GB, more than the "
+            f"{memory / 1e9:.2g} GB that a picture may take: crop or bin it, or give --memory "
+            f"{math.ceil(needed / 1e8) / 10:g}"
         )
-
-
-def check_promise(path: Path, pixels: int) -> None:
-    """ImageError for a file that is far too small for the pixels that it promises."""
-    size = path.stat().st_size
-    if pixels > PIXELS_PER_BYTE * size:
-        raise ImageError(f"{path}: claims {pixels} pixels in {size} bytes: it is damaged")
 
 
 def check_array(name: object, array: np.ndarray) -> None:
@@ -263,7 +351,7 @@ def check_array(name: object, array: np.ndarray) -> None:
         raise ImageError(f"{name}: holds values that are not finite numbers")
 
 
-def read_array(file: BinaryIO, size: int, name: str) -> np.ndarray:
+def read_array(file: BinaryIO, size: int, name: str, memory: float = MEMORY) -> np.ndarray:
     """The array of an open .npy file of ``size`` bytes; its head is checked before its values.
 
     Raises ImageError for what is none, is too large, or promises more than the file has.
@@ -274,11 +362,11 @@ def read_array(file: BinaryIO, size: int, name: str) -> np.ndarray:
         raise ImageError(f"{name}: has an unknown version of NumPy's format")
     read = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
     shape, by_columns, dtype = read(file)
-    check_shape(name, shape)
     # Python objects would be code of whoever wrote the file.
     if dtype.hasobject or dtype.kind not in "buif" or any(each < 0 for each in shape):
         raise ImageError(f"{name}: holds values of type {dtype!s:.40}, not numbers or flags")
     length = math.prod(shape) * dtype.itemsize
+    check_memory(name, length, shape, memory=memory)
     if length > size:
         raise ImageError(f"{name}: claims {length} bytes of values but has fewer")
     data = file.read(length)
@@ -299,10 +387,6 @@ def check_entries(path: Path, entries: Iterable[Any]) -> None:
         name = entry.filename
         if not name.isprintable() or len(name) > LONGEST_NAME or entry.is_dir():
             raise ImageError(f"{path}: has an array with an impossible name: {name[:60]!r}")
-        if entry.file_size > 8 * MOST_PIXELS:
-            raise ImageError(
-                f"{path}: {name} would be {entry.file_size} bytes, more than {8 * MOST_PIXELS}"
-            )
 
 
 def check_spread(name: object, shape: Sequence[int], boxes: Iterable[Any]) -> None:

@@ -3,12 +3,12 @@
 OME-TIFF and ImageJ say all three; other files have pages alone. Pages and channels count from 1.
 """
 
+import math
 import re
 from pathlib import Path
 from xml.etree import ElementTree
 
 import attrs
-import numpy as np
 
 from flocsim.errors import ImageError, UsageError
 from flocsim.fields import read_number
@@ -19,6 +19,9 @@ LONGEST_TEXT = 2**22
 MOST_PLANES = 100_000
 UNEQUAL = 1e-3
 """By this share the sides of a pixel may differ, and it counts as square."""
+
+SMALLEST_PIXEL, LARGEST_PIXEL = 1e-15, 1e3
+"""Lengths [m] beyond which areas and masses leave the range of numbers, and all optics."""
 
 PLANES = r'\{"shape": \[([34]), (\d+), (\d+)\]'
 TIFF_SUFFIXES = (".tif", ".tiff")
@@ -48,7 +51,7 @@ class Stack:
 
     @property
     def frame_count(self) -> int:
-        return int(np.prod(self.sizes))
+        return math.prod(self.sizes)
 
     @property
     def channel_count(self) -> int:
@@ -97,7 +100,7 @@ def stack_in(tiff):
     elif count == 1 and first.axes == "SYX" and re.match(PLANES, text):
         return Stack(sizes=(first.shape[0],), planar=True)
     # What it says of its axes has to fit what it has.
-    fits = found.frame_count == count
+    fits = min(found.sizes) > 0 and found.frame_count == count
     return found if fits else Stack(sizes=(count,), sides=found.sides)
 
 
@@ -124,7 +127,7 @@ def imagej_stack(page, text):
     """The Stack that ImageJ describes: channels change first, then slices, then frames."""
     said = dict(line.partition("=")[::2] for line in text.splitlines())
     sizes = [int(said.get(name, 1)) for name in ("channels", "slices", "frames")]
-    if int(np.prod(sizes)) == 1:
+    if math.prod(sizes) == 1:
         sizes[1] = int(said.get("images", 1))
     sides = []
     for name in ("XResolution", "YResolution"):
@@ -207,6 +210,12 @@ def pixel_size_in(path: Path, stack: Stack) -> float | None:
     if stack.sides is None:
         return None
     x, y = stack.sides
+    for side in (x, y):
+        if not SMALLEST_PIXEL <= side <= LARGEST_PIXEL:
+            raise ImageError(
+                f"{path}: says that its pixels are {side:.4g} m wide, which is impossible; give "
+                "--pixel-size"
+            )
     if abs(x - y) > UNEQUAL * x:
         raise ImageError(
             f"{path}: its pixels are {x:.4g} m wide and {y:.4g} m high: make them square, or give "

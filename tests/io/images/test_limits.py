@@ -14,6 +14,7 @@ from flocsim.errors import ImageError
 from flocsim.io.images import masks, reading
 from flocsim.io.images.masks import read_masks, segment_mask
 from flocsim.io.images.reading import read_grey
+from flocsim.io.images.stacks import Plane
 
 SQUARE = np.zeros((20, 30), "u1")
 SQUARE[4:16, 5:20] = 1
@@ -124,12 +125,15 @@ def test_two_arrays_of_one_name_are_refused(tmp_path):
     refused(tmp_path / "m.npz", "two arrays of the same name")
 
 
-def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(masks, "MOST_BYTES", 10**6)
+def test_an_archive_that_unpacks_to_very_much_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "m.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         for name in "abc":
             archive.writestr(name, npy(np.zeros((600, 600), "u1")))
-    refused(tmp_path / "m.npz", "after decompression")
+    refused(tmp_path / "m.npz", "0.36 Mpixel need", lambda path: read_masks(path, 1e6))
+    with zipfile.ZipFile(tmp_path / "m.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for number in range(400):
+            archive.writestr(f"{number}", npy(np.zeros((100, 100), "u1")))
+    refused(tmp_path / "m.npz", "after decompression", lambda path: read_masks(path, 2e6))
 
 
 @pytest.mark.parametrize(
@@ -157,12 +161,20 @@ def png(width, height, data=b""):
 @pytest.mark.parametrize(
     ("size", "said"),
     [((100_000, 100_000), "more than the"), ((2**31 - 1, 1), "more than|cannot be read"),
-     ((0, 5), "cannot be read|empty"), ((10_000, 10_000), "it is damaged"),
+     ((0, 5), "cannot be read|empty"), ((10_000, 10_000), "100 Mpixel need about 4 GB"),
      ((50, 50), "cannot be read")],
 )  # fmt: skip
 def test_pictures_that_promise_too_much_are_refused(tmp_path, reader, size, said):
     (tmp_path / "p.png").write_bytes(png(*size, zlib.compress(bytes(100))[:-6]))
     refused(tmp_path / "p.png", said, reader)
+
+
+def test_a_part_of_a_picture_needs_less_memory(tmp_path):
+    """What is cropped is decoded in full, but worked on only in part."""
+    Image.new("1", (3000, 3000)).save(tmp_path / "p.png")
+    refused(tmp_path / "p.png", "give --memory 0.4", lambda path: read_grey(path, memory=1e8))
+    assert read_grey(tmp_path / "p.png", Plane(crop=(5, 5, 40, 30)), 1e8).shape == (30, 40)
+    assert read_grey(tmp_path / "p.png", memory=4e8).shape == (3000, 3000)
 
 
 @pytest.mark.parametrize("ending", ["png", "tif", "jpg"])
