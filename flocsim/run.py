@@ -6,7 +6,6 @@ without any steps left. Looking at every force by itself where the run has ended
 would have gone next, tells such an end from one that the method alone is to blame for.
 """
 
-import copy
 import math
 from collections.abc import Callable
 from typing import Any
@@ -106,12 +105,25 @@ class Run:
 
     def copy(self) -> "Run":
         """The same run with arrays of its own: either may go on."""
-        other = copy.copy(self)
-        other.work = copy_of(self.work)
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), work=copy_of(self.work))
         other.clock, other.counts = self.clock.copy(), self.counts.copy()
         other.observed, other.record = self.observed.copy(), self.record.copy()
         other.saved = list(self.saved)
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Compiled code stays in its process: `revived` gives a copy that of a run of its own.
+        return vars(self) | {"driver": None, "scene": self.scene._replace(laws=None)}
+
+    def revived(self, begin: Callable[[], "Run"]) -> "Run":
+        """Return the run as it is, or, of one that was pickled or copied as an object, a copy with
+        the compiled code of a run that ``begin`` makes of the same scene."""
+        if self.driver is not None:
+            return self
+        made, run = begin(), self.copy()
+        run.driver, run.scene = made.driver, made.scene
+        return run
 
     def to_end(self, halted: Callable[[], bool] | None = None) -> Status:
         """Go on until the run has ended: its Status; PAUSED where ``halted()`` said to give up."""

@@ -1,6 +1,6 @@
 """System: bodies, forces, an integrator and a fluid → Trajectory."""
 
-import copy
+import functools
 import math
 import time
 import warnings
@@ -135,10 +135,16 @@ class System:
             if self.pieces.outlines != NO_OUTLINES:
                 return attrs.evolve(self, **fields)
             water_between(self.forces, fields["bodies"], self.fluid)
-        other = copy.copy(self)
-        for name, value in fields.items():
-            object.__setattr__(other, name, value)
+        other = object.__new__(type(self))
+        for each in attrs.fields(type(self)):
+            value = fields.get(each.name, getattr(self, each.name))
+            object.__setattr__(other, each.name, value)
         return other
+
+    def __reduce__(self) -> tuple:
+        # Laws are functions made of generated text: a copy makes its own.
+        made = functools.partial(type(self), seed=self.seed)
+        return made, (self.bodies, self.forces, self.integrator, self.fluid)
 
     @property
     def spheres_only(self) -> bool:
@@ -278,11 +284,8 @@ class System:
             warnings.warn(line, PlausibilityWarning, stacklevel=2)
         began = time.perf_counter()
 
-        def fresh(record: bool = False) -> Run:
-            run = self.begin(end, max_steps=max_steps, record=record, jit=jit)
-            return run if start is None else self.placed_at_end(run, start)
-
-        run = fresh(record)
+        fresh = functools.partial(self.begin_at, start, end, max_steps=max_steps, jit=jit)
+        run = fresh(record=record)
         status = watched(run, watch)
         if status in UNABLE and (why := force_to_blame(self, run)):
             warnings.warn(f"the run has ended at t = {run.time:.6g} s ({status.name}): {why}",
@@ -295,6 +298,11 @@ class System:
         legs = ((run.steps, end),)
         origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
+
+    def begin_at(self, start: Trajectory | None, until: float, **more: Any) -> Run:
+        """A Run as of `begin`, at the end of another where there is one to ``start`` from."""
+        run = self.begin(until, **more)
+        return run if start is None else self.placed_at_end(run, start)
 
     def placed_at_end(self, run: Run, start: Trajectory) -> Run:
         """A fresh Run put where another has ended, with the history of its contacts.

@@ -1,5 +1,6 @@
 """Swarm: many bodies in a fluid, the run of them, and its SwarmTrajectory."""
 
+import functools
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -53,10 +54,22 @@ class SwarmTrajectory:
     failed: np.ndarray | None
     effort: Effort
     wall_time: float
-    bodies: tuple[Body, ...]
-    box: tuple[float, float]
-    gauge: Gauge
-    bond_gauge: Callable[[], BondGauge]
+    swarm: "Swarm"
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """The bodies of the swarm."""
+        return self.swarm.bodies
+
+    @property
+    def box(self) -> tuple[float, float]:
+        """The periods of the swarm's box [m]."""
+        return self.swarm.box
+
+    @functools.cached_property
+    def gauge(self) -> Gauge:
+        """What measures gaps between the bodies."""
+        return self.swarm.gauge()
 
     def __repr__(self) -> str:
         return (
@@ -81,7 +94,7 @@ class SwarmTrajectory:
         motion = np.concatenate([self.position, self.velocity], axis=2)
         before = (float(self.t[at - 1]), motion[at - 1]) if at else None
         near = self.neighbours(at, within)
-        return self.bond_gauge().bonds(float(self.t[at]), motion[at], near, before)
+        return self.swarm.bond_gauge().bonds(float(self.t[at]), motion[at], near, before)
 
     def momentum(self, at: int = -1) -> np.ndarray:
         """Σ m v of all bodies that move (2,) [kg m/s], at a time of ``t``."""
@@ -162,6 +175,10 @@ class Swarm:
                 "a swarm needs kicks of the same length in all of its islands: give the "
                 'thermal force a kick, as "1 ms", and leave finest out'
             )
+
+    def __reduce__(self) -> tuple:
+        made = functools.partial(type(self), box=self.box, all_pairs=self.all_pairs, seed=self.seed)
+        return made, (self.bodies, self.forces, self.integrator, self.fluid)
 
     def __repr__(self) -> str:
         return repr(self.system).replace("System", "Swarm")
@@ -247,8 +264,7 @@ class Swarm:
         check_whole(threads, 1, "threads")
         stops = stops_of(end, every, times)
         began = time.perf_counter()
-        gauge = self.gauge()
-        self.check_overlaps(gauge)
+        self.check_overlaps(self.gauge())
         progress = self.begin(end, threads=threads, max_steps=max_steps)
         seen, status = [progress.seen()], Status.FINISHED
         for stop in stops:
@@ -264,7 +280,7 @@ class Swarm:
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
-            time.perf_counter() - began, self.bodies, self.box, gauge, self.bond_gauge,
+            time.perf_counter() - began, self,
         )  # fmt: skip
 
 

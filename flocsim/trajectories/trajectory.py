@@ -226,7 +226,7 @@ class Trajectory:
         if self.status in ENDED_FOR_GOOD or self.row is not None:
             reason = self.status.reason if self.row is None else "its study has decided it"
             raise UsageError(f"this run cannot continue: {reason}")
-        began, run = time.perf_counter(), origin.ended.copy()
+        began, run = time.perf_counter(), origin.ended.revived(origin.begin).copy()
         run.clock[at.UNTIL] = end
         run.counts[at.MAX_STEPS] += max_steps
         status = watched(run, watch)

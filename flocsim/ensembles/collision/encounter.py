@@ -1,10 +1,10 @@
 """The binary collision scene: two shapes that meet, and where a replicate of them starts."""
 
 import contextlib
-import copy
 import functools
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
@@ -148,10 +148,15 @@ class Encounter:
         # By the forces, for a scene compiles their laws, and another part of a study comes first.
         if not self.kick_energy:
             return self
-        other = copy.copy(self)
-        object.__setattr__(other, "system", self.system.changed(seed=numbers))
-        other.__dict__["scene"] = self.scene._replace(key=key_of(*numbers))
+        other = object.__new__(Encounter)
+        scene = self.scene._replace(key=key_of(*numbers))
+        vars(other).update(vars(self), scene=scene, system=self.system.changed(seed=numbers))
         return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Arrays and compiled laws are made again where they are needed.
+        fields = {each.name: vars(self)[each.name] for each in attrs.fields(Encounter)}
+        return fields | {"first": None}
 
     @functools.cached_property
     def kind(self) -> tuple:

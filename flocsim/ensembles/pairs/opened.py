@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.ensembles.collision.draw import FAILURES
+from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import METHODS, Config
 from flocsim.ensembles.config.sources import Allowed, Sources
@@ -89,6 +89,13 @@ def recorded_methods(record: dict) -> dict[str, Integrator] | None:
     } or None
 
 
+def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: bool = False) -> Run:
+    """Return a Run of a replicate that has yet to take its first step; see Draw.begin."""
+    encounter = draw.encounter
+    driver = encounter.system.compose(observer=encounter.observer)
+    return draw.begin(driver, steps, integrator=method, record=record)
+
+
 def replicate_of(replicate: int, place: Place, study: Study, most: int | None = None) -> Trajectory:
     """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words.
 
@@ -97,14 +104,12 @@ def replicate_of(replicate: int, place: Place, study: Study, most: int | None = 
     if not is_whole(replicate) or not replicate >= 0:
         raise UsageError(f"replicate must be a whole number of at least 0, found {replicate!r}")
     began, draw = time.perf_counter(), study.draw(*place, int(replicate))
-    driver, system = study.driver(draw.encounter), draw.encounter.system
+    system = draw.encounter.system
 
     def attempt(steps: int, method: Integrator | None = None) -> tuple[dict, Trajectory]:
         steps = steps if most is None else min(most, steps)
 
-        def fresh(record: bool = False) -> Run:
-            return draw.begin(driver, steps, integrator=method, record=record)
-
+        fresh = functools.partial(begin_replicate, draw, steps, method)
         run = fresh(record=True)
         status = run.to_end()
         row = draw.row(run, status)
