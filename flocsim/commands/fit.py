@@ -237,7 +237,9 @@ def read_numbers(args: argparse.Namespace) -> None:
         for option, default in NOT_THE_PAPERS.items():
             if getattr(args, option) != default:
                 name = option.replace("_", "-")
-                raise UsageError(f"--{name} does not apply to --finder paper: leave one of them out")
+                raise UsageError(
+                    f"--{name} does not apply to --finder paper: leave one of them out"
+                )
     elif args.cutoff is not None:
         raise UsageError("--cutoff applies to --finder paper only")
     if args.band and (args.masks or args.holes):

@@ -83,9 +83,7 @@ def _arrays(path, memory):
                     )
                 key = entry.filename.removesuffix(".npy")
                 with archive.open(entry) as file:
-                    arrays[key] = reading.read_array(
-                        file, entry.file_size, f"{path} {key}", memory
-                    )
+                    arrays[key] = reading.read_array(file, entry.file_size, f"{path} {key}", memory)
         return _unpacked(path, arrays, memory) if "shapes" in arrays else list(arrays.items())
     except ImageError:
         raise
