@@ -71,7 +71,7 @@ def measured(study, vertices, replicates):
     """The Costs of a Study."""
     names, config = study.config.scene.names, study.config
     places = [len(names) // 4, len(names) // 2, (3 * len(names)) // 4]
-    steps, exact = config.integrator.max_steps, study.exact[names[0]][0]
+    steps, exact = config.integrator.max_steps, study.exact[0]
     study.run(places[0], vertices, 1.0, 0)
     pair, first, second, flips = [], [], [], 0
     for place in places:

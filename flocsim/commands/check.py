@@ -10,7 +10,7 @@ import itertools
 import math
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -19,13 +19,10 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES, TIGHTER, Draw, exact_method
-from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels import study_of
-from flocsim.ensembles.pilot.choice import first_methods
-from flocsim.ensembles.pilot.ladder import RUNGS, at_rung, scene_length
-from flocsim.ensembles.preflight import check_study, measured_flocs
+from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import ConfigError, FlocsimError, UsageError
 from flocsim.fields import read_number
@@ -107,7 +104,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "pair); for measured flocs: only those between these radii")  # fmt: skip
     add("--tolerance", nargs=2, metavar=("LOW", "HIGH"),
         help="extremes of the tolerance, e.g. '1e-11 m' '1e-7 m' (default: that of the study and "
-        'of its second runs; with accuracy = "auto": all that may be chosen)')  # fmt: skip
+        'of its second runs)')  # fmt: skip
     add("--count", type=int, default=COUNT, metavar="K",
         help=f"replicates of each combination (default: {COUNT})")  # fmt: skip
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -167,11 +164,8 @@ def stiffnesses(config: Config, given: list[str] | None) -> list[float]:
     return [now / DECADE, now * DECADE]
 
 
-def methods(
-    config: Config, condition: int, given: tuple[float, float] | None,
-    flocs: Sequence[Floc] | None = None,
-) -> list[Integrator]:  # fmt: skip
-    """The method of a type at the ends of its tolerance, the loosest first."""
+def methods(config: Config, given: tuple[float, float] | None) -> list[Integrator]:
+    """Return the config's method at the ends of its tolerance, the loosest first."""
     integrator = config.integrator
     method = integrator.method
     if given is not None:
@@ -182,9 +176,6 @@ def methods(
         low, high = given
         made: Any = method
         return [attrs.evolve(made, tolerance=each) for each in (high, low)]
-    if integrator.is_chosen:
-        length = scene_length(config, condition, flocs)
-        return [at_rung(Implicit(), rung * length) for rung in (RUNGS[0], RUNGS[-1])]
     exact = exact_method(method)
     return [method] if exact is None else [method, exact]
 
@@ -193,7 +184,7 @@ def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
     """All runs, one tolerance beside the other."""
     tolerances = ends("--tolerance", args.tolerance, "m")
     counts = sorted({min(config.shapes.vertices), max(config.shapes.vertices)})
-    places, flocs = range(len(config.scene.names)), measured_flocs(config)
+    places = range(len(config.scene.names))
     number = itertools.count()
     for place, vertices, k_n in itertools.product(
         places, counts, stiffnesses(config, args.stiffness)
@@ -202,7 +193,7 @@ def cases_of(config: Config, args: Namespace) -> Iterator[Case]:
             # Other displacements and other random numbers each time, as far as there are any.
             at = next(number)
             delta = config.scene.delta[at % len(config.scene.delta)]
-            for method in methods(config, place, tolerances, flocs):
+            for method in methods(config, tolerances):
                 yield Case(place, vertices, k_n, method, delta, at % config.replicates)
 
 
@@ -240,7 +231,7 @@ class Checker:
             config = stiff(self.config, stiffness)
             check_study(config)
             self.flocs = flocs_of(config) if self.flocs is None else self.flocs
-            self.studies[stiffness] = study_of(config, self.flocs, first_methods(config))
+            self.studies[stiffness] = study_of(config, self.flocs)
         return self.studies[stiffness]
 
     def judge(self, case: Case, reference: float) -> Verdict:

@@ -1,8 +1,10 @@
 """`flocsim work-precision cfg.toml`: flips against CPU time of a study, for every tolerance.
 
-It is the whole ladder of `accuracy = "auto"`, in seconds: where the pilot of a study stops as soon
-as it knows enough and counts evaluations, this runs every rung of both methods and takes the time.
-With `--replicate 17`, error against run time of one collision.
+Some replicates of every collision type are run by both adaptive methods over five decades of
+tolerance, and compared with a much tighter reference. A tolerance has its meaning against the
+lengths of a scene: 1e-6 m is a spheroradius of `tang2014`, so the ladder of tolerances begins at
+the smallest length of the outlines, rounded to a decade. With `--replicate 17`, error against run
+time of one collision.
 """
 
 import math
@@ -17,20 +19,18 @@ import flocsim.arrays as at
 from flocsim.commands.check import HEADER, Case, Checker, line_of
 from flocsim.commands.trajectory import add_replicate, select
 from flocsim.ensembles.collision.draw import MORE_STEPS
+from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.pairs.opened import one_count_study, with_one_count
-from flocsim.ensembles.pilot.choice import ALLOWED, first_methods, sampling_error, settled
-from flocsim.ensembles.pilot.ladder import (
-    DECADES,
-    REFERENCE,
+from flocsim.ensembles.pilot.trials import (
     Job,
-    Ladder,
+    Task,
     Trial,
-    at_rung,
+    expected_replicates,
+    is_flip,
     sample_of,
-    scene_length,
     try_out,
 )
 from flocsim.ensembles.preflight import check_study, inputs_of
@@ -38,7 +38,7 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
-from flocsim.io.confidence import wilson
+from flocsim.io.confidence import Z, wilson
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
 from flocsim.io.plots.style import (
     Figure,
@@ -64,6 +64,18 @@ STEP_COUNTS = (1_000, 10_000, 100_000)
 MOST_STEPS = 1_000_000
 """Steps after which a method counts as having failed."""
 
+DECADES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
+"""Tolerances of the ladder over the scene's length."""
+
+REFERENCE = 1e-6
+"""Tolerance of the runs that the ladder is compared with, over the scene's length."""
+
+CORE = 0.25
+"""Length of an equivalent sphere, which has no spheroradius, over r_eq."""
+
+ALLOWED = 0.2
+"""Share of flips over the sampling error up to which a setting is recommended."""
+
 COUNT = 60
 """Replicates of each type, where nothing else is asked for."""
 
@@ -80,12 +92,28 @@ MARKERS = {"Implicit": "o", "DormandPrince54": "^"}
 
 
 DESCRIPTION = (
-    "Run some replicates of a study by every method and tolerance that "
-    'accuracy = "auto" may choose, and print how many outcomes flip, the error of d_c, and '
-    "the CPU time. With "
-    "--replicate: run one replicate by every integrator over six decades of tolerance, and "
-    "print its error against the reference at the time when the first of the two is decided."
+    "Run some replicates of a study by both adaptive methods over five decades of tolerance, and "
+    "print how many outcomes flip, the error of d_c, and the CPU time. With --replicate: run one "
+    "replicate by every integrator over six decades of tolerance, and print its error against the "
+    "reference at the time when the first of the two is decided."
 )
+
+
+def scene_length(study: Study, condition: int) -> float:
+    """Return the length [m], a power of ten, at which the ladder of a collision type begins."""
+    shapes = study.config.shapes
+    length = CORE * min(pairings_of(study.config, study.flocs)[condition].radii)
+    if max(shapes.vertices) > 1 and shapes.size == "own":
+        measured = [each.radius for floc in study.flocs for each in floc.shapes.values()]
+        length = min(length, float(np.median(measured)))
+    elif max(shapes.vertices) > 1 and shapes.own is None:
+        length = min(length, shapes.radius)
+    return float(f"1e{round(math.log10(length))}")
+
+
+def sampling_error(config: Config) -> float:
+    """Return half of Wilson's 95 % interval of a probability of ½ that the study will have."""
+    return 0.5 * Z / math.sqrt(expected_replicates(config) + Z * Z)
 
 
 class Rung(NamedTuple):
@@ -122,6 +150,11 @@ def methods(duration: float) -> list[Integrator]:
         method(tolerance) for method in (Implicit, DormandPrince54) for tolerance in TOLERANCES
     ]
     return found + [VelocityVerlet(duration / count) for count in STEP_COUNTS]
+
+
+def at_rung(method: type[Implicit] | type[DormandPrince54], tolerance: float) -> Integrator:
+    """Return the method with that tolerance [m], to as many digits as a person would write."""
+    return method(float(f"{tolerance:.6g}"))
 
 
 def run(args: Namespace) -> int:
@@ -173,9 +206,8 @@ class End(NamedTuple):
 
 
 def measured(study: Study, job: Job) -> tuple[Trial, End | None]:
-    """(Trial whose cost is CPU time [µs], how it ended) of a replicate; None for no motion."""
+    """Run a replicate; return (Trial, how it ended), None for one that raised."""
     trial, run = try_out(study, job)
-    trial = trial._replace(cost=1e6 * trial.cpu)
     return trial, None if run is None else End(job, run.time, run.steps, centre_distance(run))
 
 
@@ -198,32 +230,21 @@ def distance_at(study: Study, end: End, instant: float) -> float:
     return centre_distance(run)
 
 
-def climb(
-    study: Study, condition: int, tasks: Sequence
-) -> Iterator[tuple[Ladder, dict[float, np.ndarray]]]:
-    """(ladder, {rung: by how much d_c is off the reference's [m]}) of both methods of a type, from
-    the loosest rung to the tightest."""
-    length, budget = (
-        scene_length(study.config, condition, study.flocs),
-        study.config.integrator.max_steps,
-    )
-    reference = REFERENCE * DECADES[-1]
-    exact = at_rung(Implicit(), reference * length)
-    found = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
-    trials, ends = [each for each, _ in found], [end for _, end in found]
-    steps = np.mean([end.steps for end in ends if end is not None] or [1])
-    for method in (Implicit(), DormandPrince54()):
-        ladder = Ladder(condition, method, length, list(tasks), reference, trials)
-        ladder.max_steps = budget if isinstance(method, Implicit) else int(PATIENCE * steps)
+def climb(study: Study, condition: int, tasks: Sequence[Task]) -> Iterator[Rung]:
+    """Run the whole ladder of a collision type: both methods, from the loosest rung."""
+    length = scene_length(study, condition)
+    budget = study.config.integrator.max_steps
+    exact = at_rung(Implicit, REFERENCE * length)
+    references = [measured(study, Job(task, exact, MORE_STEPS * budget)) for task in tasks]
+    steps = np.mean([end.steps for _, end in references if end is not None] or [1])
+    for method in (Implicit, DormandPrince54):
+        most = budget if method is Implicit else int(PATIENCE * steps)
         # Compiled, or loaded, before the first is timed.
-        measured(study, ladder.jobs(1.0)[0])
-        distances = {}
+        measured(study, Job(tasks[0], at_rung(method, length), most))
         for rung in DECADES:
-            found = [measured(study, job) for job in ladder.jobs(rung)]
-            ladder.tried[rung] = [each for each, _ in found]
-            pairs = zip([end for _, end in found], ends, strict=True)
-            distances[rung] = np.array([apart(study, *pair) for pair in pairs])
-        yield ladder, distances
+            made = at_rung(method, rung * length)
+            found = [measured(study, Job(task, made, most)) for task in tasks]
+            yield rung_of(study, made, found, references)
 
 
 def apart(study: Study, end: End | None, exact: End | None) -> float:
@@ -234,18 +255,31 @@ def apart(study: Study, end: End | None, exact: End | None) -> float:
     return abs(distance_at(study, end, instant) - distance_at(study, exact, instant))
 
 
-def rung_of(ladder: Ladder, distances: np.ndarray, rung: float) -> Rung:
-    """What is printed and drawn of a rung."""
-    trials, flips = ladder.tried[rung], ladder.flips(rung)
-    low, high = (float(end) for end in wilson(flips, len(trials)))
+def rung_of(
+    study: Study,
+    method: Integrator,
+    found: Sequence[tuple[Trial, End | None]],
+    references: Sequence[tuple[Trial, End | None]],
+) -> Rung:
+    """Compare the replicates of a rung with their references."""
+    pairs = list(zip(found, references, strict=True))
+    flips = sum(is_flip(trial, exact) for (trial, _), (exact, _) in pairs)
+    distances = np.array([apart(study, end, exact) for (_, end), (_, exact) in pairs])
+    low, high = (float(end) for end in wilson(flips, len(found)))
     known = distances[np.isfinite(distances)]
     median, most = np.quantile(known, [0.5, 0.9]) if len(known) else (math.nan, math.nan)
-    undecided = sum(OUTCOMES[each.outcome] in UNKNOWN for each in trials)
+    undecided = sum(OUTCOMES[trial.outcome] in UNKNOWN for trial, _ in found)
+    cpu = 1e3 * sum(trial.cpu for trial, _ in found) / len(found)
     return Rung(
-        type(ladder.method).__name__, at_rung(ladder.method, rung * ladder.length).tolerance,
-        len(trials), flips, low, high, float(median), float(most), 1e-3 * ladder.cost(rung),
-        undecided,
+        type(method).__name__, method.tolerance, len(found), flips, low, high, float(median),
+        float(most), cpu, undecided,
     )  # fmt: skip
+
+
+def recommended(rungs: Sequence[Rung], target: float) -> Rung | None:
+    """Return the cheapest rung of which no larger share flips than ``target``; None for none."""
+    good = [each for each in rungs if each.flips <= target * each.runs]
+    return min(good, key=lambda each: each.cpu, default=None)
 
 
 def rung_line(rung: Rung) -> str:
@@ -369,32 +403,32 @@ def run_ladder(args: Namespace) -> int:
         checked_format(path)
     rule = figure_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
-    study = study_of(config, methods=first_methods(config))
+    study = study_of(config)
     target = ALLOWED * sampling_error(config)
-    ladders: list[Ladder] = []
     panels: dict[str, list[Rung]] = {}
     for condition, tasks in enumerate(sample_of(config, args.count or COUNT)):
         name = config.scene.names[condition]
         tell(f"\ntype {name}, {len(tasks)} replicates over all N and delta\n{LADDER_HEADER}")
         panels[name] = []
-        for ladder, distances in climb(study, condition, tasks):
-            ladders.append(ladder)
-            panels[name] += [rung_of(ladder, distances[rung], rung) for rung in DECADES]
-            for rung in panels[name][-len(DECADES) :]:
-                tell(rung_line(rung))
-    methods, types = settled(config, ladders[::2], ladders[1::2], target)
+        for rung in climb(study, condition, tasks):
+            panels[name].append(rung)
+            tell(rung_line(rung))
     tell(
         f"\nwith {config.replicates} replicates the sampling error is "
-        f"{100.0 * sampling_error(config):.2g} %; the cheapest with flips below a fifth of it:"
+        f"{100.0 * sampling_error(config):.2g} %; the cheapest setting of which at most a fifth of "
+        "it flips:"
     )
-    for each in types:
-        end = "" if each["bound"] <= target else ", the tightest tested: not enough"
+    chosen = {}
+    for name, rungs in panels.items():
+        best = recommended(rungs, target)
+        if best is None:
+            tell(f"  {name}: none of these")
+            continue
+        chosen[name] = (best.method, best.tolerance)
         tell(
-            f"  {each['name']}: {each['method']}, tolerance = {each['tolerance']:g}, "
-            f"{100.0 * each['expected']:.2g} % expected{end}"
+            f"  {name}: {best.method}, tolerance = {best.tolerance:g}: {best.flips} of {best.runs} "
+            f"flip, so at most {100.0 * best.high:.2g} % (95 %)"
         )
-    tell('  [integrator] accuracy = "auto" finds these by itself, for each type')
-    chosen = {name: (type(each).__name__, each.tolerance) for name, each in methods.items()}
     if args.output:
         figure = draw_ladders(panels, chosen, target)
         for path in args.output:

@@ -31,7 +31,7 @@ Figures = Mapping[str, Callable[..., Figure]]
 """{name: function}, the first line of whose docstring is its help."""
 
 SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history", "cpus",
-              "accuracy", "warnings", "modules")  # fmt: skip
+              "warnings", "modules")  # fmt: skip
 """What the group ``run`` holds, of any kind, besides what is printed as it is."""
 
 MOST_FAILURES = 10

@@ -28,7 +28,6 @@ from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import BAND, Config
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
-from flocsim.ensembles.pilot.choice import choose, first_methods, run_alone
 from flocsim.ensembles.pilot.forecast import (
     Forecast,
     finding_words,
@@ -36,9 +35,7 @@ from flocsim.ensembles.pilot.forecast import (
     forecast_of,
     in_turn,
     time_replicates,
-    timed,
 )
-from flocsim.ensembles.pilot.ladder import LADDER, pilot_size
 from flocsim.ensembles.preflight import (
     IMPLIED,
     kinds,
@@ -58,7 +55,7 @@ from flocsim.forces.body_forces import thermal_in
 from flocsim.forces.drag import solid_radius
 from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.io.fit_report import coarse_line
-from flocsim.io.results.run_group import choice_lines, class_words, sphere_words
+from flocsim.io.results.run_group import class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
 from flocsim.process import INTERRUPTION, stop_requested
@@ -67,9 +64,6 @@ NOTHING_RUN = (
     "nothing was run (--dry-run); --pilot runs some replicates, to estimate core-hours and file "
     "size and to find which forces matter"
 )
-
-MOST_CHOOSING = 60.0
-"""Seconds that a dry run spends on what accuracy = "auto" chooses; a longer pilot is left out."""
 
 
 def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
@@ -204,9 +198,7 @@ def checked_words(config):
     method, share = config.integrator.method, config.integrator.check_share
     exact = exact_method(method)
     count = count_checks(config.seed, config.replicates, share)
-    if config.integrator.is_chosen and count:
-        how = "a hundredth of the tolerance chosen by the pilot"
-    elif exact is None:
+    if exact is None:
         return f"none, {config.integrator.label} has no tolerance or step to reduce"
     elif not count:
         return "none, so the numerical error stays unknown (integrator.check_share)"
@@ -222,69 +214,29 @@ def checked_words(config):
     )
 
 
-def chosen_words(config):
-    """How a pilot chooses the method; "" where the config names one."""
-    if not config.integrator.is_chosen:
-        return ""
-    size = pilot_size(config)
-    return 'accuracy = "auto", ' + (
-        f"a pilot of {size} replicates of each type chooses method and tolerance"
-        if size
-        else "too few replicates for a pilot: chosen by the flips of other studies"
-    )
-
-
 def go_on():
     """StopRequested where a signal has come."""
     if stop_requested():
         raise StopRequested(f"stopped by {INTERRUPTION.name}")
 
 
-def chosen_study(study, tasks):
-    """(the Study by the methods that it will have, lines on how they were chosen, CPU time [s] of
-    the choice in the run)."""
-    config, types = study.config, len(study.config.scene.names)
-    first = [timed(study, task, False).first.cpu for task in tasks[: 2 * types]]
-    choosing = LADDER * pilot_size(config) * types * sum(first) / len(first)
-    if choosing > MOST_CHOOSING:
-        return study, [
-            f'accuracy = "auto" tries settings for about {duration(choosing)}, and only in the run '
-            f"itself: what follows is for {config.integrator.method}"
-        ], choosing  # fmt: skip
-
-    def share(study, jobs):
-        return [trial for job in jobs for trial in (go_on(), *run_alone(study, [job]))[1:]]
-
+def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, float]:
+    """Run a pilot; return (Study, its Forecast for so many ranks, seconds that compiling or loading
+    took)."""
     began = time.process_time()
-    choice = choose(study, share)
-    spent = time.process_time() - began
-    return study.by_methods(choice.methods), choice_lines(choice.record), spent
-
-
-def forecast_study(config: Config, ranks: int) -> tuple[Study, Forecast, list[str], float]:
-    """(Study, its Forecast for so many ranks, lines on a choice of its methods, seconds that
-    compiling or loading took), from a pilot that is run here."""
-    began = time.process_time()
-    study = study_of(config, methods=first_methods(config))
+    study = study_of(config)
     grown = time.process_time() - began
     compiled = -time.monotonic()
     study.compile(study.kinds)
     compiled += time.monotonic()
-    tasks, lines, spent = in_turn(config), [], 0.0
-    if config.integrator.is_chosen:
-        study, lines, spent = chosen_study(study, tasks)
-        compiled -= time.monotonic()
-        study.compile(study.kinds)
-        compiled += time.monotonic()
-    found = forecast_of(study, time_replicates(study, tasks, go_on), ranks, grown + spent)
-    return study, found, lines, compiled
+    runs = time_replicates(study, in_turn(config), go_on)
+    return study, forecast_of(study, runs, ranks, grown), compiled
 
 
 def pilot_lines(config: Config, ranks: int) -> list[str]:
     """What a pilot of the study says: what it takes, and what of its physics changed no outcome."""
-    study, found, lines, compiled = forecast_study(config, ranks)
+    study, found, compiled = forecast_study(config, ranks)
     return [
-        *lines,
         *forecast_lines(config, found, ranks, compiled),
         *(
             f"without {finding_words(each, found.runs)}"
@@ -387,7 +339,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         f"  vertices {list(shapes.vertices)}, {way_words(scene)}",
         f"  flocs: {flocs}",
         *([f"  {words}"] if (words := config.fluid.words) else []),
-        f"  integrator: {chosen_words(config) or f'{config.integrator.label}, {accuracy}'}",
+        f"  integrator: {config.integrator.label}, {accuracy}",
         f"  run again: {checked_words(config)}",
         "collisions:",
         *condition_lines(config, measured),

@@ -21,7 +21,6 @@ from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.integrators.base import Integrator
 
 OFFSET, ANGLE_I, ANGLE_J, FLOC_I, FLOC_J = range(5)
 """What the dimensions of the sequence are for."""
@@ -120,12 +119,8 @@ def offsets_of(
     return np.where(np.abs(offsets) < least, np.copysign(least, offsets), offsets)
 
 
-def study_of(
-    config: Config, flocs: Sequence[Floc] | None = None,
-    methods: dict[str, Integrator] | None = None,
-) -> Study:  # fmt: skip
-    """The Study of a config of binary collisions or of rates; ``flocs`` are grown or read, and
-    ``methods`` the config's, unless given."""
+def study_of(config: Config, flocs: Sequence[Floc] | None = None) -> Study:
+    """Return the Study of a config of binary collisions or of rates; ``flocs`` are grown or read
+    unless given."""
     made = KernelStudy if config.is_kernel else Study
-    given: dict[str, Any] = {} if methods is None else {"methods": methods}
-    return made(config, flocs=flocs_of(config) if flocs is None else list(flocs), **given)
+    return made(config, flocs=flocs_of(config) if flocs is None else list(flocs))

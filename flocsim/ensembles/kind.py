@@ -352,7 +352,7 @@ class Kind:
     scenes: Sequence[type]
     """The classes of its [scene]."""
     make: Callable[..., Any]
-    """(config, flocs, methods or None) → study."""
+    """(config, flocs) → study."""
     identity: Callable[..., dict]
     """(study, facts of the machine or None) → all that its rows follow from."""
     code: Sequence[str]
@@ -398,9 +398,9 @@ def kind_of(config: Config) -> Kind:
     return kinds()[type(config.scene)]
 
 
-def study_of(config: Config, flocs: list | None = None, methods: dict | None = None) -> StudyKind:
+def study_of(config: Config, flocs: list | None = None) -> StudyKind:
     """The study of a config of any kind; ``flocs`` are grown or read unless given."""
-    study: Any = kind_of(config).make(config, flocs_of(config) if flocs is None else flocs, methods)
+    study: Any = kind_of(config).make(config, flocs_of(config) if flocs is None else flocs)
     return study
 
 

@@ -7,7 +7,7 @@ others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks 
 import contextlib
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,35 +27,26 @@ from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
     ExitCode,
-    StopRequested,
 )
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
-from flocsim.ensembles.pilot.choice import (
-    Choice,
-    choose,
-    first_methods,
-    recorded_choice,
-)
-from flocsim.ensembles.pilot.ladder import Job, try_out
 from flocsim.ensembles.preflight import said_doubts
 from flocsim.ensembles.storage.identity import arithmetic_digest, short
-from flocsim.ensembles.storage.resume import Beginning, begin, claim, recorded_choices
+from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import refuse_other_part
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.journal import MemoryJournal
 from flocsim.io.results.run_group import (
-    choice_lines,
     distinct,
     mixture_warnings,
     provenance,
     source_line,
     storable,
 )
-from flocsim.io.terminal import Progress, tell
-from flocsim.process import INTERRUPTION, STOPPED, stop_requested
+from flocsim.io.terminal import Progress
+from flocsim.process import INTERRUPTION, STOPPED
 
 
 @attrs.define
@@ -91,11 +82,11 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     """
     comm = comm or Communicator()
     try:
-        study, identity, cpus, accuracy = join(config, comm)
+        study, identity, cpus = join(config, comm)
         if comm.rank > 0:
             return follow(study, comm).results
         store = RowStore(MemoryJournal(), study.conditions, study.row)
-        start = Beginning(store, identity, cpus_now=cpus, accuracy=accuracy)
+        start = Beginning(store, identity, cpus_now=cpus)
         return lead(study, start, comm, progress_of(study, quiet)).results
     except SharedError as error:
         raise error.args[0] from None
@@ -119,15 +110,14 @@ def run_to_file(
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
-        records = recorded_choices(journal) if config.integrator.is_chosen else ()
-        study, identity, cpus, accuracy = join(config, comm, records, quiet)
+        study, identity, cpus = join(config, comm)
         progress = progress_of(study, quiet)
         with sharing_errors(comm):
             if plan is not None:
                 refuse_other_part(plan, str(output), identity)
             start = begin(
                 study, identity, output, mode, journal, kind_of(config).old_rows, cpus,
-                overwrite, accuracy,
+                overwrite,
             )  # fmt: skip
         resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
@@ -146,22 +136,16 @@ def run_to_file(
     return ended
 
 
-def join(
-    config: Config, comm: Communicator, records: Sequence[dict] = (), quiet: bool = True
-) -> tuple[StudyKind, dict, list[dict], dict]:
-    """Make the Study on every rank, and see that all would compute the same rows.
+def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict]]:
+    """Make the Study on every rank, and check that all would compute the same rows.
 
-    (study, identity, the kinds of CPU of all ranks, the record of a pilot's choice where there was
-    one); the kinds are known on rank 0 alone.
-
-    Rank 0 grows or reads the flocs for all. Where a pilot chooses the methods, all ranks run it,
-    unless one of the ``records`` that rank 0 has is of this study. Where any rank would compute
-    something else, or has other versions, none goes on: UsageError on rank 0, RankZeroFailed on the
-    others.
+    Return (study, identity, the kinds of CPU of all ranks); the kinds are known on rank 0 alone.
+    Rank 0 grows or reads the flocs for all. Where any rank would compute something else, or has
+    other versions, none continues: UsageError on rank 0, RankZeroFailed on the others.
     """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
-    study: Any = study_of(config, hear(comm, flocs), first_methods(config))
+    study: Any = study_of(config, hear(comm, flocs))
     own, line = own_facts(study, comm)
     leader = hear(comm, own)
     if own is not None:
@@ -175,48 +159,7 @@ def join(
     cpus = distinct([kind for _, kind in answers or []])
     with sharing_errors(comm):
         kind_of(config).prepare(study, comm)
-    if not config.integrator.is_chosen:
-        return study, leader.identity, cpus, {}
-    choice = chosen(study, comm, records, quiet)
-    study = study.by_methods(choice.methods)
-    return study, identity_of(study), cpus, choice.record
-
-
-def chosen(study: Any, comm: Communicator, records: Sequence[dict], quiet: bool) -> Choice:
-    """The Choice of a study's methods, on every rank: of a record, or of a pilot that all run."""
-    if comm.rank > 0:
-        while not isinstance(jobs := hear(comm, None), Choice):
-            share_jobs(study, comm, jobs)
-        return jobs
-    with sharing_errors(comm):
-        choice = recorded_choice(study, records)
-        if choice is None:
-            if not quiet:
-                tell("a pilot chooses method and tolerance")
-            choice = choose(study, lambda study, jobs: share_jobs(study, comm, jobs, True))
-        if not quiet:
-            for line in choice_lines(choice.record):
-                tell(line)
-    return comm.broadcast(choice)
-
-
-def share_jobs(study: Any, comm: Communicator, jobs: Sequence[Job], leads: bool = False) -> list:
-    """The Trials of a pilot's jobs, of which every rank runs its share; all of them on rank 0.
-
-    Rank 0 ``leads``: the others have the jobs from it, and no Trials. StopRequested there where a
-    signal has come.
-    """
-    if leads:
-        comm.broadcast(list(jobs))
-    trials = []
-    for job in jobs[comm.rank :: comm.size]:
-        if comm.rank == 0 and stop_requested():
-            raise StopRequested(f"stopped by {INTERRUPTION.name}")
-        trials.append(try_out(study, job)[0])
-    shares = comm.gather(trials)
-    if shares is None:
-        return []
-    return [shares[place % comm.size][place // comm.size] for place in range(len(jobs))]
+    return study, leader.identity, cpus
 
 
 def own_facts(study: StudyKind, comm: Communicator) -> tuple[Facts | None, str]:
@@ -384,8 +327,6 @@ def facts(study, start, notes, ended, ranks):
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
-    if start.accuracy:
-        found["accuracy"] = storable(json.dumps(start.accuracy, sort_keys=True))
     if config.modules:
         found["modules"] = storable(kept_sources(config.modules))
     return found | {

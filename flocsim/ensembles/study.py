@@ -31,23 +31,12 @@ from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
-from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.run_group import class_words
 from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
-
-
-def methods_of(config: Config) -> dict[str, Integrator]:
-    """{collision type: the config's Integrator}; UsageError where a pilot has to choose."""
-    if config.integrator.is_chosen:
-        raise UsageError(
-            'integrator.accuracy = "auto" needs the choice of a pilot: give Study the methods of '
-            "flocsim.ensembles.pilot.choice.final_methods, or the config a name and a tolerance"
-        )
-    return dict.fromkeys(config.scene.names, config.integrator.method)
 
 
 def flocs_of(config: Config) -> list[Floc]:
@@ -75,17 +64,12 @@ class Study(StudyKind):
 
     ``flocs`` are grown or read unless given; ``pairings`` say who meets whom in every collision
     type, ``zones`` has D_0 [m] of their radii (flocs of measured sizes have their own);
-    ``methods`` the Integrator of every type, which a pilot has
-    to choose where the config says accuracy = "auto" (flocsim.ensembles.pilot; UsageError without),
-    and is the config's otherwise.
+    ``exact`` the more exact methods of second and third runs, None where there are none.
     """
 
     config: Config
     flocs: list[Floc] = attrs.field(
         default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
-    )
-    methods: dict[str, Integrator] = attrs.field(
-        default=attrs.Factory(lambda self: methods_of(self.config), takes_self=True)
     )
     pairings: tuple[Pairing, ...] = attrs.field(init=False)
     zones: dict[str, float] = attrs.field(init=False)
@@ -94,11 +78,11 @@ class Study(StudyKind):
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
     first: dict[str, Encounter] = attrs.field(init=False, factory=dict)
     drivers: dict[tuple, Callable] = attrs.field(init=False, factory=dict)
-    exact: dict[str, tuple[Integrator, Integrator] | None] = attrs.field(init=False)
+    exact: tuple[Integrator, Integrator] | None = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         config = self.config
-        self.exact = {name: exact_methods(method) for name, method in self.methods.items()}
+        self.exact = exact_methods(config.integrator.method)
         self.floc_pool = pool_of(config.shapes, self.flocs)
         ends = BAND_ENDS if self.is_banded else ()
         self.pools = {end: self.floc_pool.cut(end) for end in ends}
@@ -107,13 +91,6 @@ class Study(StudyKind):
             each.name: zone_distance(config.zone, config.forces, *each.radii)
             for each in self.pairings
         }
-
-    def by_methods(self, methods: dict[str, Integrator]) -> "Study":
-        """The same study by other methods; the shapes that have been made are shared."""
-        other = type(self)(self.config, flocs=self.flocs, methods=methods)
-        other.floc_pool, other.pools = self.floc_pool, self.pools
-        other.pairings = self.pairings
-        return other
 
     @property
     def is_banded(self) -> bool:
@@ -179,7 +156,7 @@ class Study(StudyKind):
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
             made = make_encounter(
-                self.config, shapes, self.zone(name, shapes), self.methods[name],
+                self.config, shapes, self.zone(name, shapes), self.config.integrator.method,
                 self.pairings[condition].meeting, self.first.get(name),
             )  # fmt: skip
             self.first.setdefault(name, made)
@@ -230,17 +207,16 @@ class Study(StudyKind):
         draw = self.draw(condition, vertices, share, replicate)
         steps = self.config.integrator.max_steps
         row = draw.run(self.driver(draw.encounter), steps, halted)
-        if row is not None and (attempt := self.second_attempt(condition, row)):
+        if row is not None and (attempt := self.second_attempt(row)):
             second = self.run_carefully(lambda: draw, attempt, halted, row)
             row = second if second is None or says_outcome(second) else row
         if row is not None and self.is_banded:
             row = self.with_band(row, condition, vertices, share, replicate, halted)
-        exact = self.exact[self.pairings[condition].name]
-        if row is None or exact is None:
+        if row is None or self.exact is None:
             return row
         easily = bool(flips_easily(row["outcome"], row["bond"]))
         wanted = self.config.integrator.check_share
-        runs = list(zip(exact, (CHECKED, THIRD), strict=True))
+        runs = list(zip(self.exact, (CHECKED, THIRD), strict=True))
         for method, columns in runs[: further_runs(self.config.seed, replicate, wanted, easily)]:
             steps *= MORE_STEPS
             found = self.run_carefully(lambda: draw, (steps, method), halted, WITHOUT_OUTCOME)
@@ -268,17 +244,16 @@ class Study(StudyKind):
             row = row | {column: found[name] for column, name in columns_of(end).items()}
         return row
 
-    def second_attempt(self, condition: int, row: dict) -> tuple[int, Integrator | None] | None:
+    def second_attempt(self, row: dict) -> tuple[int, Integrator | None] | None:
         """(steps, method) by which a replicate is tried again whose row says nothing of its
         outcome; None where it is not.
 
         With more steps; more exactly, too, where the first did not end for lack of steps.
         """
         ran_out = FAILURES[row["failure"]] == "step budget"
-        exact = self.exact[self.pairings[condition].name]
-        if FAILURES[row["failure"]] not in TRIED_AGAIN or (exact is None and not ran_out):
+        if FAILURES[row["failure"]] not in TRIED_AGAIN or (self.exact is None and not ran_out):
             return None
-        method = None if ran_out or exact is None else exact[0]
+        method = None if ran_out or self.exact is None else self.exact[0]
         return MORE_STEPS * self.config.integrator.max_steps, method
 
     def run_carefully(
@@ -300,10 +275,7 @@ class Study(StudyKind):
     def kinds(self) -> list[Code]:
         """What stands for the kinds of compiled code that the study needs."""
         vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
-        first: dict[type, int] = {}
-        for place, name in enumerate(self.config.scene.names):
-            first.setdefault(type(self.methods[name]), place)
-        return [(place, n) for place in first.values() for n in vertices]
+        return [(0, n) for n in vertices]
 
     def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
         """Compile, or load from the disk, what these kinds need, by running it.

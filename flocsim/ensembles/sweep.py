@@ -34,7 +34,6 @@ from flocsim.ensembles.contents import (
 from flocsim.ensembles.kind import flocs_of, identity_of, kind_of, study_of
 from flocsim.ensembles.pairs.comparison import Comparison, compare, with_change
 from flocsim.ensembles.pairs.opened import open_results
-from flocsim.ensembles.pilot.choice import first_methods
 from flocsim.ensembles.script_study import WAYS, Study
 from flocsim.ensembles.storage.identity import machine_facts
 from flocsim.ensembles.storage.unfinished import (
@@ -153,11 +152,9 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
         config = part.config
         if drawn[0] != (config.shapes, config.seed):
             drawn = (config.shapes, config.seed), flocs_of(config)
-        study = study_of(config, drawn[1], first_methods(config))
+        study = study_of(config, drawn[1])
         machine = machine or machine_facts(kind_of(config).code)
         facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(study.asked()))}
-        if config.integrator.is_chosen:  # a pilot has yet to say by what method each type is run
-            facts = {k: v for k, v in facts.items() if not k.endswith(".integrator")}
         plan[path.name] = facts
         first, own = (study.fixed(each["asked"]) for each in (next(iter(plan.values())), facts))
         for axis, there in first.items():

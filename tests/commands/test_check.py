@@ -11,7 +11,6 @@ from flocsim.commands import check
 from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.forces import Contact
-from flocsim.integrators import Implicit
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import write_small
 from tests.helpers.tiers import rest_slow
@@ -148,15 +147,6 @@ def test_the_ends_of_what_is_stated(folder):
     assert {case.method.tolerance for case in found} == {1e-11, 1e-6}
     assert {case.stiffness for case in found} == {1.0, 1e3}
     assert len(found) == 8
-
-
-def test_auto_has_the_ends_of_its_ladder(folder):
-    write_small(folder, vertices="[1]", text=(folder / "small.toml").read_text()
-                + '[integrator]\naccuracy = "auto"\n')  # fmt: skip
-    _, found = cases()
-    assert {case.method for case in found if case.condition == 1} == {
-        Implicit(1e-6), Implicit(1e-10),
-    }  # fmt: skip
 
 
 def test_the_stiffness_takes_the_tangential_one_with_it(folder):

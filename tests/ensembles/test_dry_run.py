@@ -48,22 +48,6 @@ def test_without_a_pilot_nothing_is_run(tmp_path, monkeypatch):
     assert "nothing was run (--dry-run); --pilot runs some replicates" in text
 
 
-def test_auto_is_forecast_at_what_it_chooses(tmp_path, brief):
-    auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
-    config = spheres(tmp_path, **auto)
-    text = dry_run.dry_run(config, 1, pilot=True)
-    assert re.search(r"pilot:\n  III: implicit, \S+ m, expected flips", text)
-
-
-def test_auto_is_not_waited_for_where_it_takes_long(tmp_path, brief, monkeypatch):
-    monkeypatch.setattr(dry_run, "MOST_CHOOSING", 0.0)
-    auto = {"integrator": {"accuracy": "auto"}, "replicates": 450, "scene": {"types": ["III"]}}
-    monkeypatch.setattr(dry_run, "choose", None)
-    text = dry_run.dry_run(spheres(tmp_path, **auto), 1, pilot=True)
-    assert re.search(r"what follows is for Implicit\(tolerance=1e-09", text)
-    assert "core-hours: " in text
-
-
 @pytest.mark.parametrize(
     ("error", "words"),
     [

@@ -31,7 +31,6 @@ def study(tmp_path):
 
 def test_the_scene_says_which_study_it_is(study, tmp_path):
     assert isinstance(study, KernelStudy)
-    assert isinstance(study.by_methods(study.methods), KernelStudy)
     assert type(study_of(small_config(tmp_path))) is Study
 
 

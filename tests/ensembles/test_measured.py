@@ -8,7 +8,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.dry_run import dry_run
-from flocsim.ensembles.pilot.ladder import sample_of
+from flocsim.ensembles.pilot.trials import sample_of
 from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of

@@ -86,7 +86,7 @@ def test_what_fails_is_tried_again_more_exactly(study, monkeypatch):
     monkeypatch.setattr(Draw, "run", failing)
     row = study.run(0, 4, 0.0, 1)
     steps = study.config.integrator.max_steps
-    assert tried[:2] == [(steps, None), (5 * steps, study.exact["I"][0])]
+    assert tried[:2] == [(steps, None), (5 * steps, study.exact[0])]
     assert (row["outcome"], row["failure"]) == (right["outcome"], 0)
     # A second try that fails, too, leaves the first as it was.
     monkeypatch.setattr(Draw, "run", lambda draw, *_, **__: failing(draw, *_[:2]))

@@ -91,7 +91,7 @@ TABLES = (
     ("shapes", {"source": "library", "file": "/dev/zero"}),
     ("shapes", {"source": "library", "file": "library.h5", "size": "own"}),
     ("shapes", {"primary_particles": 10**9, "fractal_dimension": 1.0}),
-    ("integrator", {"accuracy": "auto"}), ("integrator", {"tolerance": 1e-300}),
+    ("integrator", {"tolerance": 1e-300}),
     ("integrator", {"name": "velocity_verlet", "step": 1e-30, "max_steps": 2**62}),
     ("integrator", {"max_steps": 2**53}), ("integrator", {"check_share": 1.0}),
     ("zone", {"distance": -1e9}), ("stop", {"half_width": 1e-12}), ("bodies", {"density": -1.0}),

@@ -344,14 +344,6 @@ class IntegratorConfig:
         shown='"implicit"',
         help="the method: see `flocsim.integrators`",
     )
-    accuracy: str | None = choice(
-        "auto",
-        default=None,
-        help="instead of a `name` and a `tolerance`: before the study a pilot tries methods and "
-        "tolerances on up to 900 replicates, and chooses for every collision type the cheapest "
-        "whose flips are expected to stay below a fifth of the sampling error of `replicates`; the "
-        "results file records the choice and the reasons",
-    )
     tolerance: float = quantity(
         "m",
         above=0.0,
@@ -400,13 +392,8 @@ class IntegratorConfig:
         return self.name or own_classes.full_name(self.own)
 
     @property
-    def is_chosen(self) -> bool:
-        """Whether a pilot chooses the method of every collision type (flocsim.ensembles.pilot)."""
-        return self.accuracy is not None
-
-    @property
     def method(self) -> Integrator:
-        """The method; where a pilot is to choose it, one that stands in for what it chooses."""
+        """The method, made of its keys."""
         if self.own is not None:
             return self.own
         made = METHODS[self.name or "implicit"]
@@ -532,7 +519,7 @@ ALTERNATIVES: dict[str, tuple[set[str], ...]] = {
     "bodies": ({"surface_density"}, {"density", "depth"}),
     "fluid": ({"salinity"}, {"ionic_strength"}),
     "zone": ({"root"}, {"distance"}, {"centre"}),
-    "integrator": ({"name"}, {"class"}, {"accuracy"}),
+    "integrator": ({"name"}, {"class"}),
 }
 """Table → sets of keys that exclude each other: one of them replaces the others from below."""
 
@@ -548,8 +535,5 @@ FOLLOWING: dict[tuple[str, ...], Collection[str]] = {
 }
 """Place of a key → the keys of [fluid] that it follows from: these replace it from below."""
 
-INSTEAD_OF = {
-    "integrator": {"accuracy": {"tolerance", "step"}},
-    "forces.contact": {material: {key} for material, key in INSTEAD.items()},
-}
+INSTEAD_OF = {"forces.contact": {material: {key} for material, key in INSTEAD.items()}}
 """Table → key → further keys that it excludes, and that go with one another."""

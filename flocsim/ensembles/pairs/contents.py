@@ -118,8 +118,6 @@ def summary(results: Overview) -> Summary:
         ("numerical error", report.checked_line(results) or "unknown: no replicate was run again")
     ]
     facts += [("", line) for line in report.change_lines(results)]
-    if choice := stored(run, "accuracy"):
-        facts += [("accuracy", line) for line in run_group.choice_lines(choice)]
     warnings = [str(line) for line in stored(run, "warnings")]
     warnings += filter(None, [report.undecided_line(results)])
     failed = [run_group.describe_note(note) for note in stored(run, "failed")]

@@ -15,16 +15,15 @@ import numpy as np
 import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.schema import METHODS, Config
+from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, file_kind, stored_in
 from flocsim.ensembles.dry_run import water_facts
 from flocsim.ensembles.kernels import study_of
 from flocsim.ensembles.kind import Place
-from flocsim.ensembles.pilot.choice import final_methods
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, facts_before, identity_of
-from flocsim.ensembles.study import Study, methods_of, says_outcome
+from flocsim.ensembles.study import Study, says_outcome
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
@@ -71,22 +70,9 @@ def with_one_count(config: Config, vertex_count: int) -> Config:
     return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
 
 
-def one_count_study(
-    config: Config, vertex_count: int, methods: dict[str, Integrator] | None = None
-) -> Study:
-    """The Study of `with_one_count`, by the methods of the whole one: a pilot may choose them."""
-    one, methods = with_one_count(config, vertex_count), methods or final_methods(config)
-    return study_of(one, methods=methods)
-
-
-def recorded_methods(record: dict) -> dict[str, Integrator] | None:
-    """{type: Integrator} that a pilot has chosen, as a results file has it; None for no record.
-    UsageError for methods that are none."""
-    for each in record.get("types", []):
-        chosen(each["method"], tuple(METHODS), "the method chosen by a pilot", 0)
-    return {
-        each["name"]: METHODS[each["method"]](each["tolerance"]) for each in record.get("types", [])
-    } or None
+def one_count_study(config: Config, vertex_count: int) -> Study:
+    """Return the Study of `with_one_count`."""
+    return study_of(with_one_count(config, vertex_count))
 
 
 def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: bool = False) -> Run:
@@ -121,7 +107,7 @@ def replicate_of(replicate: int, place: Place, study: Study, most: int | None = 
         return row, Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)
 
     row, found = attempt(study.config.integrator.max_steps)
-    if again := study.second_attempt(place[0], row):
+    if again := study.second_attempt(row):
         row, second = attempt(*again)
         return second if says_outcome(row) else found
     return found
@@ -300,14 +286,11 @@ class StudyResults(Tables):
         """
         if vertices not in self.studies:
             config, identity = self.config, self.stored("identity")
-            methods = recorded_methods(self.stored("accuracy")) or self.methods()
-            if lacking := set(config.scene.names) - methods.keys():
-                self.refuse([f"no method is known for the type {min(lacking)}"])
             # What costs nothing comes first: flocs may take hours.
-            before = facts_before(config, methods)
+            before = facts_before(config)
             self.refuse(differences({k: v for k, v in identity.items() if k in before}, before))
             self.refuse(self.contradictions())
-            study = one_count_study(config, vertices, methods)
+            study = one_count_study(config, vertices)
             self.refuse(differences(identity, identity_of(study)))
             self.studies[vertices] = study
         return self.studies[vertices]
@@ -319,12 +302,6 @@ class StudyResults(Tables):
                 f"{self.path} cannot be reproduced: {unlike[0]}; use the version of flocsim, the "
                 "files and the kind of machine that it was made with"
             )
-
-    def methods(self) -> dict[str, Integrator]:
-        """The methods of a config that needs no pilot."""
-        if self.config.integrator.is_chosen:
-            raise FileError(f"{self.path} does not record which methods its pilot chose")
-        return methods_of(self.config)
 
     def contradictions(self) -> list[str]:
         """What the config asks for that the file does not have, a line each."""

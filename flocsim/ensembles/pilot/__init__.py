@@ -1,10 +1,7 @@
-"""What a few replicates, run before all others, tell of a study.
+"""Some replicates of a study, run before all others by `--dry-run --pilot` and `work-precision`.
 
-ladder: which replicates a pilot runs, one at a setting and what it costs; the settings that it
-tries, and how many outcomes flip at a tolerance, from those that were seen to; choice:
-`integrator.accuracy = "auto"`, the cheapest setting that is accurate enough. Both are functions of
-config and seed, and look at no clock. forecast, for `--dry-run` alone: what a study will take,
-which of its forces changed no outcome, and whether inertia did.
+trials: which replicates, and one of them run by any method; forecast: how long a study takes, and
+which of its forces, or inertia, changed no outcome.
 
-May import study and what lies below it, and `storage.identity`, which says what a choice is of.
+May import study and what lies below it.
 """

@@ -4,8 +4,8 @@ the disk, and which parts of its physics changed no outcome.
 The replicates of `sample` are run in turn, until SECONDS of this process's time are spent, and each
 third of them again as `check_share` has it. What they took is extrapolated type by type, as they
 are spread evenly over N and δ; the interval is that of samples drawn anew from them (bootstrap).
-What is made once for two flocs at one N, is counted once. Unlike a choice of accuracy it looks at
-the clock: it changes no result.
+What is made once for two flocs at one N, is counted once. It looks at the clock, and changes no
+result.
 
 The same replicates are run again without every force in turn, and without inertia, from the same
 start and judged by the same zone. Nothing is left out of the study: what is found is said, and what
@@ -27,8 +27,15 @@ from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import COUNTED
-from flocsim.ensembles.pilot import ladder
-from flocsim.ensembles.pilot.ladder import Job, Task, Trial, is_flip, try_out
+from flocsim.ensembles.pilot.trials import (
+    Job,
+    Task,
+    Trial,
+    expected_replicates,
+    is_flip,
+    sample_of,
+    try_out,
+)
 from flocsim.ensembles.preflight import sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
@@ -41,6 +48,9 @@ from flocsim.io.results.events import flips_easily
 from flocsim.io.results.layout import frame_of, plan_of
 from flocsim.io.seals import seal_size
 from flocsim.system import System
+
+MOST = 900
+"""Replicates that are timed, of all types together."""
 
 SECONDS = 5.0
 """CPU time of the replicates that are timed, their second runs included."""
@@ -124,23 +134,23 @@ class Forecast:
 def in_turn(config: Config) -> list[Task]:
     """Tasks of all types in turn, at most MOST: any first few are spread over all conditions."""
     types = len(config.scene.names)
-    lists = ladder.sample_of(config, max(ladder.MOST // types, LEAST))
+    lists = sample_of(config, max(MOST // types, LEAST))
     return [task for tasks in zip(*lists, strict=True) for task in tasks]
 
 
 def timed(study: Study, task: Task, again: bool) -> Timed:
     """Run a replicate as the study would, and ``again`` as its second runs are."""
-    name, steps = study.config.scene.names[task.condition], study.config.integrator.max_steps
-    first, _ = try_out(study, Job(task, study.methods[name], steps))
+    method, steps = study.config.integrator.method, study.config.integrator.max_steps
+    first, _ = try_out(study, Job(task, method, steps))
     for end in schema.BAND_ENDS if study.is_banded else ():
-        job = Job(task, study.methods[name], MORE_STEPS * steps)
+        job = Job(task, method, MORE_STEPS * steps)
 
         def otherwise(_: Draw, end: str = end) -> Draw:
             return study.draw(*task, end)
 
         more, _ = try_out(study, job, changed=otherwise)
         first = first._replace(cpu=first.cpu + more.cpu, setup=first.setup + more.setup)
-    exact = study.exact[name] if again else None
+    exact = study.exact if again else None
     if exact is None:
         return Timed(task, first)
     return Timed(task, first, try_out(study, Job(task, exact[0], MORE_STEPS * steps))[0])
@@ -168,7 +178,7 @@ def time_replicates(
 def pairs_made(study: Study, ranks: int) -> float:
     """How many pairs of flocs the study makes ready, on all ranks together."""
     config = study.config
-    count = ladder.expected_replicates(config)
+    count = expected_replicates(config)
     numbers = [study.numbers(k) for k in range(min(count, 1000))]
     total = 0
     for condition in range(len(config.scene.names)):
@@ -237,9 +247,9 @@ def estimated(
 
 
 def forecast_of(study: Study, runs: Sequence[Timed], ranks: int, before: float) -> Forecast:
-    """The Forecast for so many ranks; ``before`` [s]: flocs grown, a choice made."""
+    """The Forecast for so many ranks; ``before`` [s]: flocs grown."""
     config = study.config
-    count = ladder.expected_replicates(config)
+    count = expected_replicates(config)
     cells = len(config.shapes.vertices) * len(config.scene.delta)
     fixed = START * ranks + before + setting_up(study, runs, ranks)
     fixed += EACH * cells * count * len(config.scene.names)
@@ -323,9 +333,7 @@ def without_inertia(system):
     return attrs.evolve(system, integrator=method)
 
 
-def parts_of(
-    config: Config, methods: Sequence[object], flocs: Sequence[Floc] | None = None
-) -> Iterator[Part | Finding]:
+def parts_of(config: Config, flocs: Sequence[Floc] | None = None) -> Iterator[Part | Finding]:
     """The parts that may be left out; a Finding for those that cannot, or need not be tried."""
     contacts = [force for force in config.forces if isinstance(force, ContactForce)]
     pairs = [pair for _, pair in sphere_pairs(config, flocs)]
@@ -345,7 +353,7 @@ def parts_of(
             yield Finding(name, why="the pair would not meet")
             continue
         yield part
-    if all(isinstance(each, Overdamped) for each in methods):
+    if isinstance(config.integrator.method, Overdamped):
         return
     number = stokes_number(config, flocs)
     if number > LARGEST_STOKES:
@@ -358,7 +366,7 @@ def findings(
     study: Study, runs: Sequence[Timed], go_on: Callable[[], None], seconds: float = TRYING
 ) -> list[Finding]:
     """A Finding for every force of a study, and for inertia, from replicates that were run."""
-    parts = list(parts_of(study.config, list(study.methods.values()), study.flocs))
+    parts = list(parts_of(study.config, study.flocs))
     tried = sum(isinstance(part, Part) for part in parts)
     return [
         tried_without(study, runs, part, go_on, seconds / tried) if isinstance(part, Part) else part

@@ -13,7 +13,6 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from itertools import product
 from pathlib import Path
 
 import attrs
@@ -27,7 +26,6 @@ from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.study import Study
 from flocsim.geometry.contact.compounds import outlines_of, point_columns
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
-from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 
 VARIABLE = {"scene": {"types", "pairs", "delta", "sizes"}, "shapes": {"vertices", "file", "own"}}
@@ -59,24 +57,20 @@ def identity_of(study: Study, machine: dict | None = None) -> dict:
 
     ``machine``: the machine_facts, where they are known.
     """
-    facts = facts_before(study.config, study.methods, machine)
+    facts = facts_before(study.config, machine)
     facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
     return json.loads(json.dumps(facts))
 
 
-def facts_before(
-    config: Config, methods: dict[str, Integrator], machine: dict | None = None
-) -> dict:
+def facts_before(config: Config, machine: dict | None = None) -> dict:
     """What of the identity is known before any floc is made, which may take long."""
-    facts = config_facts(config, ("scene", "shapes", "bodies", "fluid", "zone"), methods)
+    facts = config_facts(config, ("scene", "shapes", "bodies", "fluid", "zone"))
     facts |= machine or machine_facts()
     facts["integrator.check_share"] = config.integrator.check_share
     return json.loads(json.dumps(facts))
 
 
-def config_facts(
-    config: Config, tables: Sequence[str], methods: dict[str, Integrator] | None = None
-) -> dict:
+def config_facts(config: Config, tables: Sequence[str]) -> dict:
     """What a config of any kind says: these tables, the method, the forces."""
     facts: dict = {"seed": config.seed}
     for table in tables:
@@ -84,7 +78,7 @@ def config_facts(
     if config.shapes.own is not None:
         facts |= settings("shapes", config.shapes.own)
         facts["shapes.class"] = config.shapes.label
-    facts |= method_facts(config, methods)
+    facts |= method_facts(config)
     facts["integrator.max_steps"] = config.integrator.max_steps
     for name, force in zip(config.force_names, config.forces, strict=True):
         facts[f"forces.{name}"] = type(force).__qualname__
@@ -92,11 +86,8 @@ def config_facts(
     return facts
 
 
-def method_facts(config, methods):
-    """The method, or what a pilot has chosen for each type."""
-    if config.integrator.is_chosen:
-        chosen = {f"types.{name}.integrator": repr(each) for name, each in methods.items()}
-        return {"integrator.accuracy": config.integrator.accuracy} | chosen
+def method_facts(config):
+    """Return what identifies the integration method."""
     method = config.integrator.method
     facts = settings("integrator", method)
     # A class of the user's own may have these as properties, whose code no kernel reaches.
@@ -206,15 +197,12 @@ def kernel_facts(study):
     config, facts = study.config, {}
     meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
     pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
-    methods = {type(each): each for each in study.methods.values()}.values()
     several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
     for pair in (pairs[place] for place in sorted(meetings.values())):
         wanted = [*kinds(config, pair.shapes), *((each, each) for each in several[:1])]
-        for shapes, method in product(wanted, methods):
-            system = placed_system(config, pair.system.changed(integrator=method), shapes)
+        for shapes in wanted:
+            system = placed_system(config, pair.system, shapes)
             name = system.family
-            if config.integrator.is_chosen:
-                name += f" by {type(method).__name__}"
             if pair.meeting != SETTLING:
                 name += f" in {pair.meeting}"
             laws = sorted(system.pieces.laws.items())

@@ -54,8 +54,7 @@ class Beginning:
     ends the study early, as the journal has it; ``unasked`` says what rows the journal has of other
     conditions, and ``farthest`` how far it has them of these (those beyond the end of a run with
     the same rule left out): they are not to go with it. ``at_least``: replicates that each
-    condition has in the results file already. ``accuracy``: the record of a pilot's choice, where
-    there was one.
+    condition has in the results file already.
     """
 
     store: RowStore
@@ -67,7 +66,6 @@ class Beginning:
     unasked: list[kind.Condition] = attrs.Factory(list)
     farthest: int = 0
     at_least: int = 0
-    accuracy: dict = attrs.Factory(dict)
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     replacing: Rule = keep
@@ -139,18 +137,16 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 def begin(
     study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
     old_rows: Callable[..., OldTable], cpus: Sequence[dict] = (), overwrite: bool = False,
-    accuracy: dict | None = None,
 ) -> Beginning:  # fmt: skip
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
-    ``journal``: as `claim` gave it; ``old_rows`` of the Kind; ``accuracy``: the record of a pilot's
-    choice. Raises UsageError
-    where what lies there is of another config, of other shapes or other physics, has rows that this
-    study would drop, or is anything but results of this study to be extended; with ``overwrite``
-    that is set aside.
+    ``journal``: as `claim` gave it; ``old_rows`` of the Kind. Raises UsageError where what lies
+    there is of another config, of other shapes or other physics, has rows that this study would
+    drop, or is anything but results of this study to be extended; with ``overwrite`` that is set
+    aside.
     """
     start = Beginning(RowStore(journal, study.conditions, study.row), identity)
-    start.cpus_now, start.accuracy = list(cpus), accuracy or {}
+    start.cpus_now = list(cpus)
     if (stop := study.config.stop).half_width is not None:
         start.rule = [stop.half_width, list(stop.of), stop.least]  # as JSON gives it back
     start.resources.callback(journal.release)
@@ -162,20 +158,13 @@ def begin(
         session = {
             "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
             "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
-            "rule": start.rule, "accuracy": start.accuracy, "asked": study.asked(),
-            "source": source_line(study.source),
+            "rule": start.rule, "asked": study.asked(), "source": source_line(study.source),
         }  # fmt: skip
         journal.append(encode(SESSION, session))
     except Exception:
         start.resources.close()
         raise
     return start
-
-
-def recorded_choices(journal: Journal) -> list[dict]:
-    """The records of pilots' choices that the sessions of a journal have."""
-    found = [each.description for each in journal.records if each.kind == SESSION]
-    return [each["accuracy"] for each in found if is_session(each) and each.get("accuracy")]
 
 
 def check_free(output: str | Path) -> None:

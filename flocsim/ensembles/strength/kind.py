@@ -320,7 +320,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
 
 KIND = Kind(
     scenes=(Bonds,),
-    make=lambda config, flocs, methods: StrengthStudy(config), identity=about_of, code=TESTING,
+    make=lambda config, flocs: StrengthStudy(config), identity=about_of, code=TESTING,
     old_rows=old_rows, results=results,
     total=lambda found: len(found.column("status")), so_far=so_far, asked={"strength": SURVEY},
 )  # fmt: skip

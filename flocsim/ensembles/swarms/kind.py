@@ -273,7 +273,7 @@ def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
 
 
 KIND = Kind(
-    scenes=(SwarmScene,), make=lambda config, flocs, methods: SwarmStudy(config, flocs),
+    scenes=(SwarmScene,), make=lambda config, flocs: SwarmStudy(config, flocs),
     flocs=flocs_of, identity=identity_of, code=CODE, check=check_study, prepare=check_room,
     doubts=doubts, facts=facts, old_rows=old_rows, results=results,
     total=lambda found: len(found.scales["replicate"]), verdict=verdict,

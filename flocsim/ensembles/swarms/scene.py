@@ -219,8 +219,6 @@ class SwarmScene:
         if not self.is_measured and shapes.size == "own":
             text = '"own" takes every floc at its own size: leave out scene.radius'
             yield ("shapes", "size"), text
-        if parts["integrator"] is not None and parts["integrator"].is_chosen:
-            yield ("integrator", "accuracy"), "is for studies of pairs: give name and tolerance"
 
 
 SCENE = SwarmScene

@@ -27,16 +27,6 @@ CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm
 SESSION = {"identity": {}, "short": str, "layout": str, "date": str, "command": str}
 """The description of a journal's session, as a pattern of `flocsim.io.records`."""
 
-TRIED = {"method": str, "tolerance": float, "flips": int, "cost": float}
-CHOSEN = {
-    "name": str, "method": str, "tolerance": float, "replicates": int, "reference": float,
-    "expected": float, "bound": float, "tried": [TRIED],
-}  # fmt: skip
-CHOICE = {
-    "of": str, "target": float, "half_width": float, "cost": float, "types": [CHOSEN],
-}  # fmt: skip
-"""What a pilot has chosen, as `flocsim.ensembles.pilot.choice.Choice` says."""
-
 SETTLED = {
     "type": str, "body": str, "radius": float, "speed": float, "reynolds": float, "stokes": float,
 }  # fmt: skip
@@ -58,7 +48,6 @@ FORMS: dict[str, tuple[Any, Any]] = {
     "history": ([{}], []),
     "cpus": ([CPU], []),
     "overrides": ({}, {}),
-    "accuracy": (CHOICE, {}),
     "warnings": ([str], []),
     "settling": ([SETTLED], []),
     "size_classes": ([SIZE_CLASS], []),
@@ -82,12 +71,7 @@ def stored(run: Mapping[str, Any], name: str) -> Any:
 
 def is_session(description: dict) -> bool:
     """Whether a record's description, whoever wrote it, can be that of a session."""
-    accuracy = description.get("accuracy", {})
-    return (
-        matches(description, SESSION)
-        and matches(description.get("cpus", []), [CPU])
-        and (accuracy == {} or matches(accuracy, CHOICE))
-    )
+    return matches(description, SESSION) and matches(description.get("cpus", []), [CPU])
 
 
 MOST_FEATURES = 4
@@ -160,25 +144,6 @@ def sphere_words(facts: dict) -> str:
         f"um, D = {facts['diffusion']:.4g} m2/s; equivalent spheres touch with probability {free} "
         f"without forces between them, {touch} with them; stability ratio W = {stability}"
     )
-
-
-def choice_lines(record: dict) -> list[str]:
-    """A choice for people: a line for each type, and one on what was asked for."""
-    lines = []
-    for each in record["types"]:
-        mine = [tried for tried in each["tried"] if tried["method"] == each["method"]]
-        seen = ", ".join(f"{tried['flips']} at {tried['tolerance']:g} m" for tried in mine)
-        from_pilot = f"of {each['replicates']} replicates {seen}" if seen else "no pilot: too few"
-        lines.append(
-            f"{each['name']}: {each['method']}, {each['tolerance']:g} m, expected flips "
-            f"{100.0 * each['expected']:.2g} % ({from_pilot})"
-            + ("" if each["bound"] <= record["target"] else "; the tightest setting")
-        )
-    lines.append(
-        f"target: flips below {100.0 * record['target']:.2g} %, a fifth of a sampling error of "
-        f"{100.0 * record['half_width']:.2g} %"
-    )
-    return lines
 
 
 def water_words(facts: dict) -> str:

@@ -31,7 +31,6 @@ def test_a_swarm_is_a_scene_of_its_own(tmp_path):
         ("radius spread", "needs radius, the median r_eq, or measured"),
         ("radius", "spread needs radius"),
         ({"shapes": {"vertices": [1, 4]}}, "bodies of one number of vertices, found [1, 4]"),
-        ({"integrator": {"accuracy": "auto"}}, "is for studies of pairs"),
         ({"scene": {"types": ["I"]}}, "types"),
         ({"scene": {"kind": "crowd"}}, "kind"),
     ],

@@ -6,6 +6,7 @@ import attrs
 import pytest
 
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.config.schema import IntegratorConfig
 from flocsim.ensembles.pilot import forecast
 from flocsim.ensembles.pilot.forecast import (
     ENOUGH,
@@ -23,7 +24,7 @@ from flocsim.ensembles.pilot.forecast import (
     tried_without,
     without_force,
 )
-from flocsim.ensembles.pilot.ladder import Task, Trial
+from flocsim.ensembles.pilot.trials import Task, Trial
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.small_study import small_study
@@ -82,7 +83,8 @@ def test_a_force_is_left_out_by_itself_where_bodies_meet_without_their_weight(tm
     shear = SPHERES | {"scene": {"types": ["III"], "meeting": "shear", "rate": "100 1/s"}}
     study = small_study(tmp_path, shear | {"zone": {"distance": 5e-6}})
     system = study.encounter(0, 1, [0.0] * 5).system
-    parts = [each for each in parts_of(study.config, [Overdamped()]) if isinstance(each, Part)]
+    overdamped = attrs.evolve(study.config, integrator=IntegratorConfig(name="overdamped"))
+    parts = [each for each in parts_of(overdamped) if isinstance(each, Part)]
     assert [each.name for each in parts] == ["van_der_waals", "double_layer"]
     for part, name in zip(parts, ("VanDerWaals", "DoubleLayer"), strict=True):
         left = [type(force).__name__ for force in part.left_out(system).forces]
@@ -92,22 +94,23 @@ def test_a_force_is_left_out_by_itself_where_bodies_meet_without_their_weight(tm
 def test_a_force_that_is_absent_is_not_tried(tmp_path):
     over = SPHERES | {"forces": {"van_der_waals": {"hamaker": 0.0}}, "zone": {"distance": 5e-6}}
     config = small_study(tmp_path, over).config
-    assert "van_der_waals" not in [part.name for part in parts_of(config, [Implicit()])]
+    assert "van_der_waals" not in [part.name for part in parts_of(config)]
 
 
 def test_inertia_is_tried_where_bodies_forget_their_speed(tmp_path, study):
-    parts = {part.name: part for part in parts_of(study.config, [Implicit(1e-9)])}
+    parts = {part.name: part for part in parts_of(study.config)}
     assert stokes_number(study.config) < 1.0
     system = next(iter(study.encounters.values())).system
     bare = parts[INERTIA].left_out(attrs.evolve(system, integrator=Implicit(1e-7)))
     assert bare.integrator == Overdamped(1e-7)
-    assert INERTIA not in [part.name for part in parts_of(study.config, [Overdamped()])]
+    overdamped = attrs.evolve(study.config, integrator=IntegratorConfig(name="overdamped"))
+    assert INERTIA not in [part.name for part in parts_of(overdamped)]
 
 
 def test_inertia_is_not_tried_where_it_must_matter(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text('preset = "tang2014"\n[scene]\ntypes = ["I"]\n', "utf-8")
-    [finding] = [part for part in parts_of(load_config(path), [Implicit()]) if part.name == INERTIA]
+    [finding] = [part for part in parts_of(load_config(path)) if part.name == INERTIA]
     assert "Stokes number of 3.8" in finding.why
 
 

@@ -1,19 +1,10 @@
-"""Which replicates a pilot runs: few, spread over all conditions, the same on every machine."""
+"""The replicates that a pilot runs: spread over all conditions, the same on every machine."""
 
 from collections import Counter
 
 import pytest
 
-from flocsim.ensembles.pilot.ladder import (
-    LADDER,
-    LEAST,
-    MOST,
-    SHARE,
-    expected_replicates,
-    pilot_size,
-    sample_of,
-    stride_through,
-)
+from flocsim.ensembles.pilot.trials import expected_replicates, sample_of, stride_through
 from tests.helpers.small_study import small_config
 
 
@@ -23,21 +14,7 @@ def config(tmp_path, replicates, delta=(0.0, 0.25, 0.5, 0.75, 1.0), stop=None):
     return small_config(tmp_path, over | ({"stop": stop} if stop else {}))
 
 
-@pytest.mark.parametrize("replicates", [10, 39, 40, 1000, 10_000, 10**9])
-def test_a_pilot_is_a_small_share_of_the_study(tmp_path, replicates):
-    size, types, cells = pilot_size(config(tmp_path, replicates)), 2, 15
-    assert size == 0 or size >= LEAST
-    assert types * size <= MOST
-    assert size * LADDER <= SHARE * cells * replicates
-
-
-def test_a_study_that_is_too_small_has_none(tmp_path):
-    assert pilot_size(config(tmp_path, 39)) == 0
-    assert pilot_size(config(tmp_path, 40)) == LEAST
-    assert sample_of(config(tmp_path, 39)) == [[], []]
-
-
-def test_a_rule_that_ends_the_study_early_makes_the_pilot_smaller(tmp_path):
+def test_a_stop_rule_limits_the_expected_replicates(tmp_path):
     stop = {"half_width": 0.05, "least": 100}
     assert expected_replicates(config(tmp_path, 10_000, stop=stop)) == 385
     assert expected_replicates(config(tmp_path, 200, stop=stop)) == 200
@@ -47,8 +24,8 @@ def test_a_rule_that_ends_the_study_early_makes_the_pilot_smaller(tmp_path):
 @pytest.mark.parametrize("replicates", [60, 77, 100, 1000])
 def test_no_replicate_comes_twice_and_every_condition_comes_as_often(tmp_path, replicates):
     made = config(tmp_path, replicates)
-    for place, tasks in enumerate(sample_of(made)):
-        assert len(set(tasks)) == len(tasks) == pilot_size(made)
+    for place, tasks in enumerate(sample_of(made, 150)):
+        assert len(set(tasks)) == len(tasks) == 150
         assert {task.condition for task in tasks} == {place}
         assert all(0 <= task.replicate < replicates for task in tasks)
         for begin in range(0, len(tasks), 15):
@@ -57,7 +34,7 @@ def test_no_replicate_comes_twice_and_every_condition_comes_as_often(tmp_path, r
 
 
 def test_the_first_tasks_are_spread_over_n_and_delta(tmp_path):
-    first = sample_of(config(tmp_path, 1000))[0][:6]
+    first = sample_of(config(tmp_path, 1000), 150)[0][:6]
     assert {task.vertices for task in first} == {1, 4, 16}
     assert len({task.delta for task in first}) >= 4
 

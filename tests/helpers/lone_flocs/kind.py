@@ -143,7 +143,7 @@ def so_far(path: Path, sessions: list[dict], found: list) -> Unfinished:
 
 
 KIND = Kind(
-    scenes=(LoneScene,), make=lambda config, flocs, methods: LoneStudy(config, flocs),
+    scenes=(LoneScene,), make=lambda config, flocs: LoneStudy(config, flocs),
     flocs=flocs_of, identity=identity_of, code=CODE, old_rows=old_rows, results=results,
     total=lambda found: found.columns["speed"].size, so_far=so_far,
     asked={"lone": int},
