@@ -42,12 +42,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
         help="override any value of the config; may be repeated")  # fmt: skip
-    add("--elasticities", metavar="KEY,KEY…",
-        help="instead of --over: find which parameters matter. Each in turn is multiplied and "
-        "divided by the root of --ratio, on the same draws, for a table and a figure (-o, "
-        "NAME-elasticities.png) of d Pr[A]/d ln p")  # fmt: skip
-    add("--ratio", type=float, metavar="R",
-        help="for elasticities: the larger value over the smaller (default: 2)")  # fmt: skip
     add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
     add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
     add("--resume", action="store_true", help="continue a sweep, extend it, or join its parts")
@@ -65,7 +59,7 @@ def values_of(text: str) -> tuple[str, list[Any]]:
 
 
 def run(args: Namespace) -> int:
-    """Run what is missing and join it, or find elasticities; the exit code."""
+    """Run what is missing and join it; return the exit code."""
     handle(interrupt)
     try:
         return run_study(args)
@@ -77,12 +71,12 @@ def run(args: Namespace) -> int:
 
 
 def run_study(args: Namespace) -> int:
-    """Do what the arguments ask for; the exit code."""
+    """Do what the arguments ask for; return the exit code."""
     from flocsim.ensembles.script_study import Study
     from flocsim.ensembles.storage.resume import WAYS
 
-    if bool(args.elasticities) == bool(args.over):
-        raise UsageError("sweep needs one of --over KEY=VALUE,VALUE and --elasticities KEY,KEY")
+    if not args.over:
+        raise UsageError("sweep needs --over KEY=VALUE,VALUE")
     study = Study(args.config)
     if args.settings:
         study = study.with_(nested(map(parse_setting, args.settings)))
@@ -90,7 +84,7 @@ def run_study(args: Namespace) -> int:
         "jobs": args.jobs, "mode": "resume" if args.resume else "new",
         "overwrite": args.overwrite, "tell": tell, "ways": WAYS,
     }  # fmt: skip
-    return (run_elasticities if args.elasticities else run_sweep)(args, study, how)
+    return run_sweep(args, study, how)
 
 
 def run_sweep(args, study, how):
@@ -98,8 +92,6 @@ def run_sweep(args, study, how):
     from flocsim.ensembles.script_study import settings_of
     from flocsim.ensembles.sweep import planned, sweep
 
-    if args.ratio is not None:
-        raise UsageError("--ratio is for --elasticities: leave it out")
     pairs = [values_of(text) for text in args.over]
     over = dict(pairs)
     if len(over) < len(pairs):
@@ -112,29 +104,6 @@ def run_sweep(args, study, how):
         return 0
     sweep(study, over, output, **how)
     tell(os.fspath(output))
-    return 0
-
-
-def run_elasticities(args, study, how):
-    """Run both values of each key, print the table and write the figure."""
-    from flocsim.ensembles.sweep import RATIO, elasticities
-    from flocsim.io.outputs import Output, check_outputs, figure_rule
-    from flocsim.io.plots.curves import elasticities as figure_of
-    from flocsim.io.plots.style import checked_format, save
-
-    if args.dry_run:
-        raise UsageError("--dry-run is for --over: leave it out")
-    picture = Path(args.output or f"{Path(args.config).stem}-elasticities.png")
-    checked_format(picture, "--output ")
-    rule = figure_rule(args.overwrite)
-    check_outputs([Output(picture, rule)], [args.config])
-    keys = [key.strip() for key in args.elasticities.split(",") if key.strip()]
-    ratio = RATIO if args.ratio is None else args.ratio
-    found = elasticities(study, keys, picture, ratio=ratio, **how)
-    tell(found.table())
-    tell(found.source)
-    save(figure_of(found), picture, rule, found.source)
-    tell(os.fspath(picture))
     return 0
 
 

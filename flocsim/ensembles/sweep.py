@@ -4,19 +4,15 @@ Every value is a part: a study with a results file of its own in a folder beside
 NAME.parts. What each of them is, is fixed before the first is run (`storage.unfinished`), and what
 is found, made or joined is held against that. So a sweep that was stopped goes on there, and a
 cluster may fill it by `flocsim ensemble`.
-
-Which parameter matters: elasticities of Pr[A], one parameter at a time on the same draws.
 """
 
 import itertools
 import json
-import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.ensembles.config import STUDIES, contents_of
@@ -32,8 +28,6 @@ from flocsim.ensembles.contents import (
     studies,
 )
 from flocsim.ensembles.kind import flocs_of, identity_of, kind_of, study_of
-from flocsim.ensembles.pairs.comparison import Comparison, compare, with_change
-from flocsim.ensembles.pairs.opened import open_results
 from flocsim.ensembles.script_study import WAYS, Study
 from flocsim.ensembles.storage.identity import machine_facts
 from flocsim.ensembles.storage.unfinished import (
@@ -54,7 +48,7 @@ from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
-from flocsim.io.results.run_group import SOURCE, source_line
+from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import GROUPS
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.terminal import aligned
@@ -252,106 +246,6 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
         axes = labelled[0].axes | {name: stacked("axes", name) for name in kind.own}
         found[group] = Labelled(coordinates | axes, columns)
     return found
-
-
-RATIO = 2.0
-"""Of the larger to the smaller value of a parameter."""
-
-
-@attrs.frozen(eq=False)
-class Elasticities:
-    """dPr[A]/d ln p of parameters: ``keys`` and their ``values`` (SI); ``ratio`` of the larger to
-    the smaller value that was run, the geometric mean of which is the value; ``types``,
-    ``vertices``, ``delta`` the conditions; ``value``, ``low``, ``high`` (key, type, vertices,
-    delta), the 95 % interval paired; ``change_low``, ``change_high`` what numerics change."""
-
-    keys: tuple[str, ...]
-    values: tuple[float, ...]
-    ratio: float
-    types: tuple[str, ...]
-    vertices: np.ndarray
-    delta: np.ndarray
-    value: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    change_low: np.ndarray
-    change_high: np.ndarray
-    source: str = ""
-
-    def matters(self, place: tuple[int, ...]) -> bool:
-        """Whether 0 is outside the interval, numerics included."""
-        return self.words(place).endswith("*")
-
-    def words(self, place: tuple[int, ...]) -> str:
-        """The interval of sampling, and what numerics change."""
-        ends = self.low, self.high, self.change_low, self.change_high
-        return with_change(*(float(each[place]) for each in ends))
-
-    def table(self) -> str:
-        """A row for each parameter and condition; a star where 0 is outside the interval."""
-        rows = [("parameter", "at", "type", "N", "delta", "dPr[A]/dln p", "[95 %] numerics")]
-        for place in np.ndindex(self.value.shape):
-            k, t, v, d = place
-            names = (self.keys[k], f"{self.values[k]:g}", self.types[t], str(self.vertices[v]),
-                     f"{self.delta[d]:g}")  # fmt: skip
-            value = float(self.value[place])
-            known = not math.isnan(value)
-            rows.append((*names, *((f"{value:+.3f}", self.words(place)) if known else ("-", "-"))))
-        return "\n".join(aligned(rows))
-
-
-def elasticities(
-    study: Study, keys: Sequence[str], output: str | os.PathLike, *, ratio: float = RATIO,
-    jobs: int = 1, mode: str = "new", overwrite: bool = False, quiet: bool = True,
-    tell: Callable[[str], object] = lambda line: None, ways: str = WAYS,
-) -> Elasticities:  # fmt: skip
-    """Run a Study of pairs with each parameter multiplied by √ratio and divided by it.
-
-    The difference of Pr[A] over ln ratio, replicate by replicate on the same draws, by Newcombe's
-    paired interval. Each parameter is a sweep of two values, in a file ``output`` with its key
-    behind the name; ``mode`` and others as in `sweep`. UsageError for a key without a number above
-    0, for swarms, and as `sweep` raises it.
-    """
-    if not ratio > 1.0 or not math.isfinite(ratio):
-        raise UsageError(f"the ratio of an elasticity must be above 1 and finite, found {ratio:g}")
-    if not keys or len(set(keys)) < len(keys):
-        raise UsageError("give at least one key, each only once, for elasticities")
-    if study.config.scene.kind != "binary":
-        raise UsageError("elasticities are for probabilities of pairs: sweep the key instead")
-    values = [number_of(study, key) for key in keys]
-    found: list[Comparison] = []
-    for key, value in zip(keys, values, strict=True):
-        path = Path(output).with_name(f"{Path(output).stem}-{key.replace('.', '-')}.h5")
-        both = [value / math.sqrt(ratio), value * math.sqrt(ratio)]
-        sweep(study, {key: both}, path, jobs=jobs, mode=mode, overwrite=overwrite, quiet=quiet,
-              tell=tell, ways=ways)  # fmt: skip
-        ends = (parts_folder(path) / f"{number:04d}.h5" for number in (0, 1))
-        first, second = map(open_results, ends)
-        found.append(compare(first, second))
-    arrays = {
-        name: np.stack([each.arrays["pr_a"][column] for each in found]) / math.log(ratio)
-        for name, column in COLUMNS.items()
-    }
-    axes = found[0]
-    return Elasticities(tuple(keys), tuple(values), ratio, axes.types, axes.vertices, axes.delta,
-                        **arrays, source=source_line(first.run))  # fmt: skip
-
-
-COLUMNS = {
-    "value": "difference", "low": "difference_low", "high": "difference_high",
-    "change_low": "change_low", "change_high": "change_high",
-}  # fmt: skip
-
-
-def number_of(study: Study, key: str) -> float:
-    """The value of a parameter (SI); UsageError where it is not a number above 0."""
-    value, _ = value_of(study.config, key)
-    if not is_number(value) or not value > 0.0:
-        raise UsageError(
-            f"{key} has no elasticity: its value is {value!r}; name a key whose value is a number "
-            "above 0 in the config, or sweep it"
-        )
-    return float(value)
 
 
 def kinds_joined() -> list[Joined]:

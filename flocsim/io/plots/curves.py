@@ -1,5 +1,5 @@
-"""Figures along a quantity: probabilities along a swept key, clusters along time for its values,
-elasticities; kernels and efficiencies along sizes, opened bonds along the rate of a flow.
+"""Figures along a quantity: probabilities along a swept key, clusters along time for its values;
+kernels and efficiencies along sizes, opened bonds along the rate of a flow.
 
 A figure stands in one of the dicts of FIGURES under the name that `flocsim plot` gives it.
 """
@@ -175,44 +175,6 @@ SHOWN = (
 
 SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": against_key}
 SWARM_SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": over_time}
-
-
-def elasticities(found: Any) -> Figure:
-    """dPr[A]/d ln p of Elasticities: a panel for each type, a row for each parameter, a mark for
-    each N and delta; hollow where 0 is in the interval."""
-    count = len(found.types)
-    conditions = list(np.ndindex(len(found.vertices), len(found.delta)))
-    height = 0.9 + 0.12 * len(found.keys) * max(len(conditions), 3)
-    with drawing(2.2 * count + 3.4, height) as figure:
-        panels = figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0]
-        rows = np.arange(len(found.keys), dtype=float)[::-1]
-        colours = style.graded_colours(len(conditions))
-        for t, (axes, title) in enumerate(zip(panels, style.type_titles(found.types), strict=True)):
-            axes.axvline(0.0, color="0.75", linewidth=0.8)
-            for index, (v, d) in enumerate(conditions):
-                colour, marker = colours[index], style.marker(index)
-                for k, row in enumerate(rows):
-                    place = (k, t, v, d)
-                    value, low, high = found.value[place], found.low[place], found.high[place]
-                    if np.isnan(value):
-                        continue
-                    at = row - style.dodge(index, len(conditions))
-                    axes.plot([low, high], [at, at], color=colour, linewidth=1.0)
-                    down, up = np.nan_to_num([found.change_low[place], found.change_high[place]])
-                    axes.plot([low + down, high + up], [at, at], color=colour, linewidth=0.4)
-                    axes.plot(value, at, marker=marker, color=colour, ms=4.0,
-                              mfc=colour if found.matters(place) else "white")  # fmt: skip
-            axes.set(title=title, xlabel=r"$d\Pr[A]\,/\,d\ln p$")
-            axes.grid(axis="x", color="0.92", linewidth=0.6)
-        panels[0].set_yticks(rows, labels=[plain(key) for key in found.keys])
-        panels[0].set_ylim(-0.6, len(rows) - 0.4)
-        for index, (v, d) in enumerate(conditions):
-            word = f"N = {found.vertices[v]}, δ = {found.delta[d]:g}"
-            panels[-1].plot([], [], color=colours[index], marker=style.marker(index),
-                            label=word)  # fmt: skip
-        title = "bars: 95 %, paired; thin:\nplus numerics; hollow: may be 0"
-        panels[-1].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title=title)
-        return figure
 
 
 MICRO = 1e6
