@@ -204,8 +204,6 @@ class StudyKind:
     config: Config
     flocs: list
     row: ClassVar[np.dtype] = ROW
-    compared: ClassVar[tuple[str, ...]] = COLUMNS
-    """Columns by which what is computed first is held against other ranks and earlier runs."""
     most_rows: ClassVar[int] = MOST_ROWS
     """Of a chunk; where it is 1 a replicate may go on from what was kept of it."""
     noun: ClassVar[str] = "replicates"
@@ -249,11 +247,6 @@ class StudyKind:
         """What stands for the kinds of compiled code that the study needs."""
         return [(0, self.config.shapes.vertices[0])]
 
-    def first_of(self, code: Code) -> tuple[Condition, int]:
-        """The condition and the replicate that stand for a kind of code."""
-        scene = self.config.scene
-        return Condition(scene.names[code[0]], code[1], scene.delta[0]), 0
-
     def unneeded(self, place: int) -> list[Interval]:
         """Replicates of a condition that are not to be run."""
         return []
@@ -294,8 +287,8 @@ class StudyKind:
         """{name: what all parts of a sweep have in common} of what `asked` says of one of them."""
         return {name: asked[name] for name in ORDER}
 
-    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
-        """Compile, or load from the disk, what these kinds need; {kind: a row of what it gives}."""
+    def compile(self, kinds: Iterable[Code]) -> None:
+        """Compile, or load from the disk, what these kinds need."""
         raise NotImplementedError
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:

@@ -21,7 +21,6 @@ from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, merged, study_of
-from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
@@ -32,7 +31,7 @@ from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinato
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.preflight import said_doubts
-from flocsim.ensembles.storage.identity import arithmetic_digest, short
+from flocsim.ensembles.storage.identity import short
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import refuse_other_part
@@ -214,7 +213,7 @@ def lead(
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
-        compile_in_turn(study, comm, agreement.stored_rows(study, start.store))
+        compile_in_turn(study, comm)
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):
@@ -258,25 +257,13 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
         raise SharedError(error) from error
 
 
-def compile_in_turn(study, comm, stored=()):
-    """Every kind of code is compiled by one rank, in a copy of it; then all load what the others
-    made.
-
-    UsageError where the first rows are not the same on all ranks, and as ``stored``.
-    """
+def compile_in_turn(study, comm):
+    """Compile every kind of code on one rank, in a copy of it; then load it on all ranks."""
     own = study.kinds[comm.rank :: comm.size]
     in_copies([partial(study.compile, [kind]) for kind in study.uncompiled(own)])
     study.compile(own)
     comm.barrier()
-    rows = agreement.packed(study, study.compile(study.kinds))
-    told = comm.gather((rows, arithmetic_digest()))
-    with sharing_errors(comm):
-        if told and (
-            line := agreement.row_difference(study, *zip(*told, strict=True), dict(stored))
-        ):
-            raise UsageError(line)
-    if isinstance(go_on := comm.broadcast(None), ExitCode):
-        raise RankZeroFailed(go_on.code)
+    study.compile(study.kinds)
 
 
 def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:

@@ -277,12 +277,10 @@ class Study(StudyKind):
         vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
         return [(0, n) for n in vertices]
 
-    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
-        """Compile, or load from the disk, what these kinds need, by running it.
-
-        {kind: row of the first replicate at the first displacement}.
-        """
-        return {kind: self.run(*kind, self.config.scene.delta[0], 0) for kind in kinds}
+    def compile(self, kinds: Iterable[Code]) -> None:
+        """Compile, or load from the disk, what these kinds need, by running a replicate of each."""
+        for kind in kinds:
+            self.run(*kind, self.config.scene.delta[0], 0)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """Those whose engine is not on the disk."""

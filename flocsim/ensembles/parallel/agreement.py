@@ -1,12 +1,8 @@
-"""What all ranks of a job have to agree on before the first replicate, and who does not.
+"""What all ranks of a job have to agree on before the first replicate, and which rank differs.
 
-Rank 0 reads the config, the user's own modules and the flocs, and hands them out. What nobody can
-hand out is compared: the words of the command line, and all that rows follow from, the versions of
-Python and of the packages and the code of the kernels included.
-
-Whatever makes two machines, or two days, compute otherwise, the identity of a study may not see it.
-Every rank runs one replicate of each kind of code before the study begins; where its bytes are not
-those of all other ranks, and of the file that is gone on with, nothing is added to it.
+Rank 0 reads the config, the user's own modules and the flocs, and broadcasts them. What cannot be
+broadcast is compared: the command line, and all that rows follow from, which includes the versions
+of Python and of the packages, the code of the kernels, and how the machine rounds.
 """
 
 import platform
@@ -14,12 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
-import numpy as np
 
 from flocsim.compiler.processor import versions
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.kind import Code, StudyKind
-from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import UsageError
 
 MOST_DIFFERENCES = 3
@@ -100,58 +93,3 @@ def unlike(rank: int, apart: Sequence[tuple[str, Any, Any]], host: str) -> str:
 def brief(value):
     text = " ".join(repr(value).split()) if value is not None else "nothing"
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-Rows = dict[Code, bytes]
-"""{kind of code: what is compared of the row of its first replicate at the first displacement}."""
-
-
-def packed(study: StudyKind, rows: Mapping[Code, dict | None]) -> Rows:
-    """The rows of StudyKind.compile as bytes."""
-    return {
-        code: b"".join(np.array(row[name], study.row[name]).tobytes() for name in study.compared)
-        for code, row in rows.items() if row is not None
-    }  # fmt: skip
-
-
-def stored_rows(study: StudyKind, store: RowStore) -> Rows:
-    """The same rows as a journal or an older results file has them, where it does."""
-    found: dict[Code, dict | None] = {}
-    for code in study.kinds:
-        condition, replicate = study.first_of(code)
-        place = store.places[condition]
-        if any(first <= replicate < stop for first, stop in store.intervals(place)):
-            found[code] = {name: store.read(place, name, replicate, replicate + 1)[0]
-                           for name in study.compared}  # fmt: skip
-    return packed(study, found)
-
-
-def row_difference(
-    study: StudyKind, ranks: Sequence[Rows], arithmetic: Sequence[str], stored: Rows
-) -> str:
-    """What was computed otherwise, in one line; "" for nothing.
-
-    ``ranks`` and ``arithmetic``: the Rows of all ranks, and how they round (arithmetic_digest).
-    """
-    for rank, each in enumerate(arithmetic):
-        if each != arithmetic[0]:
-            return (
-                f"rank {rank} rounds sin, exp and similar functions differently from rank 0 "
-                "(another kind of processor, C library or numpy): run the job on machines of one "
-                "kind"
-            )
-    for code in study.kinds:
-        (name, n, share), replicate = study.first_of(code)
-        which = f"replicate {replicate} of type {name}, N = {n}, delta {share:g}"
-        for rank, rows in enumerate(ranks):
-            if rows.get(code) != ranks[0].get(code):
-                return (
-                    f"{which} differs between rank {rank} and rank 0: run the job on machines of "
-                    "one kind, or remove randomness from a force of your own"
-                )
-        if code in stored and stored[code] != ranks[0].get(code):
-            return (
-                f"{which} comes out differently here from the file: resume where the run was "
-                "begun, or start over with --restart"
-            )
-    return ""

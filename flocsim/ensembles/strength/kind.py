@@ -121,7 +121,6 @@ class StrengthStudy(StudyKind):
     wanted: dict[int, list[int]] = attrs.field(init=False)
     rows: dict[Code, dict[str, Any]] = attrs.field(init=False, factory=dict)
     row: ClassVar[np.dtype] = strength_file.ROW
-    compared: ClassVar[tuple[str, ...]] = tuple(strength_file.ROW.fields or ())
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "doublets"
     check_rows = staticmethod(strength_file.check_opened)
@@ -172,10 +171,6 @@ class StrengthStudy(StudyKind):
         """(place of the condition, replicate) of the first that is wanted."""
         return next((place, each[0]) for place, each in self.wanted.items() if each)
 
-    def first_of(self, code: Code) -> tuple[Condition, int]:
-        place, replicate = self.first
-        return self.conditions[place], replicate
-
     def asked(self) -> dict[str, Any]:
         """What the study consists of, with how many of each condition are bound."""
         counts = np.zeros(len(self.wanted), int)
@@ -184,12 +179,11 @@ class StrengthStudy(StudyKind):
             "strength": {"bound": counts.tolist(), "wanted": self.size, "about": about_of(self)}
         }
 
-    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+    def compile(self, kinds: Iterable[Code]) -> None:
         """Test the first doublet, once."""
         place, replicate = self.first
         for code in kinds:
             self.rows[code] = self.rows.get(code) or self.tested(self.places[place], replicate)
-        return {code: self.rows[code] for code in kinds}
 
     def tested(
         self, place: Place, replicate: int, halted: Callable[[], bool] = lambda: False

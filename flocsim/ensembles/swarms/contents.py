@@ -34,7 +34,7 @@ def summary(results: swarm_file.SwarmResults) -> Summary:
     """What a results file of swarms says of its study; ValueError where that cannot be read."""
     failed = [f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")]
     warnings = [str(line) for line in stored(results.run, "warnings")]
-    return Summary(facts_of(results), origin(results.run, ["trial"]), warnings, failed)
+    return Summary(facts_of(results), origin(results.run), warnings, failed)
 
 
 def facts_of(results: swarm_file.SwarmResults) -> Facts:

@@ -163,9 +163,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     found = swarm_file.read_swarm(output)
     ends, run = found.groups["ends"], found.run
     count, vertices = len(ends["finished"]), int(run.get("vertices", 0))
-    trial = int(str(run.get("trial", "0")), 16)
-    columns = {**ends, "trial": np.full(count, trial, "u8")}
-    return OldTable(columns, {Condition("swarm", vertices, 0.0): ()}, count, run, found)
+    return OldTable(ends, {Condition("swarm", vertices, 0.0): ()}, count, run, found)
 
 
 def results(
@@ -182,8 +180,6 @@ def results(
         new = records.groups_of(form, found, store.journal.read)
         groups = records.appended(groups, new) if groups else new
     groups["ends"] = {name: store.read(0, name, 0, count) for name in swarm_file.ENDS}
-    # Of the rows, as a run that found all of them has made no trial itself.
-    run["trial"] = f"{int(store.read(0, 'trial', 0, 1)[0]):016x}"
     made = records.results_from(form, groups, run)
     if output is not None:
         swarm_file.write_swarm(output, made, start.replacing)

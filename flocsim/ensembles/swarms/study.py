@@ -1,7 +1,6 @@
 """A study of swarms: the bodies of any replicate, by its number."""
 
 import functools
-import hashlib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
@@ -30,8 +29,8 @@ from flocsim.system import System
 SPHERE = -1
 """Place among the flocs of a body that is a sphere."""
 
-ROW = np.dtype([*((name, f"<{kind}") for name, (kind, _, _) in ENDS.items()), ("trial", "<u8")])
-"""A finished replicate: how it ended, and a digest of what its rank computed first."""
+ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in ENDS.items()])
+"""A finished replicate: how it ended."""
 
 TRIAL_SECONDS = 1e-6
 """For so long the first bodies are run before a study begins [s]."""
@@ -73,9 +72,7 @@ class SwarmStudy(StudyKind):
     pool: FlocPool = attrs.field(init=False)
     choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
     """Places of the measured flocs that bodies are drawn from."""
-    trial: int = attrs.field(init=False, default=0)
     row: ClassVar[np.dtype] = ROW
-    compared: ClassVar[tuple[str, ...]] = ("trial",)
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
     check_rows = staticmethod(records.check_ends)
@@ -135,13 +132,10 @@ class SwarmStudy(StudyKind):
         form = {name: asked["swarm"][name] for name in ("times", "bounds")}
         return super().fixed(asked) | form | {"replicates": [asked["replicates"]]}
 
-    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+    def compile(self, kinds: Iterable[Code]) -> None:
         """Compile all that a swarm needs, or load it, by running two bodies for no time."""
-        found: dict[Code, dict | None] = {}
-        for code in kinds:
-            self.trial = trial_of(self.first)
-            found[code] = {"trial": self.trial}
-        return found
+        for _ in kinds:
+            run_briefly(self.first)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """All where the engine is not on the disk: a swarm has but one."""
@@ -162,7 +156,7 @@ class SwarmStudy(StudyKind):
             return None, None
         finished = ended["status"] == Status.FINISHED.name
         row = {name: ended.get(name, 0) for name in ROW.fields or ()}
-        row |= {"finished": finished, "end_time": ended["time"], "trial": self.trial}
+        row |= {"finished": finished, "end_time": ended["time"]}
         if finished:
             return row, None
         why = (
@@ -305,8 +299,8 @@ def lognormal(scene: SwarmScene, numbers: np.ndarray) -> np.ndarray:
     return scene.radius * np.exp(scene.spread * ndtri(shares))
 
 
-def trial_of(swarm: Swarm) -> int:
-    """A digest of where two bodies of a swarm come to that begin next to each other."""
+def run_briefly(swarm: Swarm) -> None:
+    """Run two bodies of a swarm that begin next to each other for TRIAL_SECONDS."""
     free = [body for body in swarm.bodies if not body.fixed][:2]
     (x, y), reach = free[0].position, sum(body.shape.bounding_radius for body in free)
     free[1:] = [attrs.evolve(body, position=(x, y + 1.001 * reach)) for body in free[1:]]
@@ -316,5 +310,3 @@ def trial_of(swarm: Swarm) -> int:
     progress = few.begin(TRIAL_SECONDS)
     while progress.advance(TRIAL_SECONDS) == Status.PAUSED:
         pass
-    motion = progress.swarm.motion.tobytes()
-    return int.from_bytes(hashlib.blake2b(motion, digest_size=8).digest(), "little")

@@ -4,27 +4,20 @@ import os
 import subprocess
 import sys
 
-import attrs
-import numpy as np
 import pytest
 
 from flocsim.ensembles import runner
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.kind import COLUMNS, ROW
 from flocsim.ensembles.parallel import agreement
 from flocsim.ensembles.parallel.agreement import (
     Facts,
     Launch,
     disagreement,
-    packed,
     refuse_other_words,
-    row_difference,
 )
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
-from flocsim.ensembles.storage.resume import NEW, RESUME
-from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError, UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import write_own
@@ -36,7 +29,6 @@ from tests.helpers.small_study import (
     problems,
     run_command,
     small_config,
-    small_study,
     write_small,
     write_star_library,
 )
@@ -306,62 +298,3 @@ def test_a_machine_that_rounds_otherwise_has_another_digest(name, value):
     assert found[0][0] != found[1][0]
     # What is compiled in does not hang on the machine.
     assert found[0][1] == found[1][1]
-
-
-def changed(row):
-    return row | {"t_end": np.nextafter(row["t_end"], np.inf)}
-
-
-def test_a_rank_whose_first_row_differs_is_named(tmp_path):
-    study = small_study(tmp_path, SPHERES)
-    rows = study.compile(study.kinds)
-    other = packed(study, {(0, 1): changed(rows[0, 1])})
-    rows = packed(study, rows)
-    assert len(rows[0, 1]) == ROW.itemsize
-    assert (
-        row_difference(study, [rows, rows], "aa", {})
-        == row_difference(study, [rows], "a", rows)
-        == ""
-    )
-    line = row_difference(study, [rows, rows, other], "aaa", {})
-    assert line.startswith(
-        "replicate 0 of type I, N = 1, delta 0 differs between rank 2 and rank 0"
-    )
-    assert "differently here from the file" in row_difference(study, [rows], "a", other)
-    assert "rank 1 rounds sin, exp" in row_difference(study, [rows, rows], "ab", {})
-
-
-def test_a_file_whose_first_row_comes_out_otherwise_is_not_gone_on_with(tmp_path, monkeypatch):
-    output = tmp_path / "r.h5"
-    run_to_file(small_config(tmp_path, SPHERES), Communicator(), output, NEW)
-    before = output.read_bytes()
-    original = Study.run
-    monkeypatch.setattr(Study, "run", lambda *words, **more: changed(original(*words, **more)))
-    more = small_config(tmp_path, SPHERES | {"replicates": 3})
-    with pytest.raises(SharedError, match="replicate 0 of type I, N = 1, delta 0 comes out") as why:
-        run_to_file(more, Communicator(), output, RESUME)
-    assert isinstance(why.value.args[0], UsageError)
-    assert output.read_bytes() == before
-    monkeypatch.undo()
-    assert run_to_file(more, Communicator(), output, RESUME).computed == 1
-
-
-@pytest.mark.slow
-def test_stored_rows_are_those_of_the_file(tmp_path):
-    output = tmp_path / "r.h5"
-    config = small_config(tmp_path, SPHERES)
-    run_to_file(config, Communicator(), output, NEW)
-    study, seen = Study(config), []
-    original = runner.agreement.stored_rows
-
-    def noted(study, store):
-        seen.append(original(study, store))
-        return seen[-1]
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runner.agreement, "stored_rows", noted)
-        more = attrs.evolve(config, replicates=3)
-        run_to_file(more, Communicator(), output, RESUME)
-    table = read_results(output).replicates
-    row = np.array(tuple(table[name][0, 0, 0, 0] for name in COLUMNS), ROW)
-    assert seen == [{(0, 1): row.tobytes()}] == [packed(study, study.compile([(0, 1)]))]

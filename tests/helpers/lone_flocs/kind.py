@@ -48,7 +48,6 @@ class LoneStudy(StudyKind):
     config: Config
     flocs: list
     row: ClassVar[np.dtype] = ROW
-    compared: ClassVar[tuple[str, ...]] = tuple(ROW.names or ())
     noun: ClassVar[str] = "flocs"
     check_rows = staticmethod(check_rows)
 
@@ -70,9 +69,10 @@ class LoneStudy(StudyKind):
         """What the study consists of, by which its journal is known."""
         return super().asked() | {"lone": self.size}
 
-    def compile(self, kinds: Iterable[Code]) -> dict[Code, dict | None]:
+    def compile(self, kinds: Iterable[Code]) -> None:
         """Run the first floc."""
-        return {code: self.run_task((*code, 0.0), 0, lambda: False)[0] for code in kinds}
+        for code in kinds:
+            self.run_task((*code, 0.0), 0, lambda: False)
 
     def run_task(
         self, place: Place, replicate: int, halted: Callable[[], bool], *_: Any
