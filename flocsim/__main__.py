@@ -18,6 +18,7 @@ from flocsim.commands import SUMMARIES, add_command
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
+from flocsim.io.arguments import Parser
 
 STUDIES = {"ensemble", "kernel", "swarm", "strength"}
 """Commands that run studies, also under mpirun."""
@@ -31,7 +32,7 @@ ALONE = (
 def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """The parser of a command line ``words``: of the command that they name alone, for the others
     need not be loaded for it; of all commands where words are not told."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="flocsim",
         description="When two flocs of real shape meet in water: do they collide, do they stick?",
     )

@@ -3,7 +3,9 @@
 A message is one line: what was found, where, and what to do about it.
 """
 
+import difflib
 import re
+from collections.abc import Iterable
 
 UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """Letters that steer a terminal, turn the direction of what follows, or are no letters."""
@@ -73,3 +75,19 @@ class FileError(FlocsimError, OSError):
 
 class ZoneError(UsageError):
     """There is no attraction zone: the attraction and the repulsion never balance."""
+
+
+LONGEST_SHOWN = 60
+"""Characters of a word or value in a message."""
+
+
+def closest(word: str, words: Iterable[str]) -> str:
+    """Return the one of the words that is nearest to a misspelt one; "" where none is close."""
+    near = difflib.get_close_matches(word, words, n=1) if len(word) <= LONGEST_SHOWN else []
+    return near[0] if near else ""
+
+
+def suggestion(word: str, words: Iterable[str]) -> str:
+    """Return " (did you mean …?)", or "" where nothing is close."""
+    near = closest(word, words)
+    return f" (did you mean {near!r}?)" if near else ""

@@ -18,6 +18,7 @@ from flocsim.compiler import units
 from flocsim.ensembles.parallel.communicator import SECONDS, Communicator, StopRequested
 from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
+from flocsim.io.arguments import Parser
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
@@ -359,7 +360,7 @@ def silent_unless_first():
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `python -m flocsim.ensemble`; the exit code."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
     )
     add_arguments(parser)

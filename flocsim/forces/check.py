@@ -1,6 +1,5 @@
 """A force's kernels tried once, uncompiled, so that a wrong one is named before it is compiled."""
 
-import difflib
 import functools
 import inspect
 import math
@@ -17,7 +16,7 @@ from flocsim.arrays import BodyView, ContactView, OrientedView, OutlineView, Pai
 from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import globals_read, made_by, tell, wrong_return
 from flocsim.compiler.linker import names_in, refuse_closure, where
-from flocsim.errors import KernelError
+from flocsim.errors import KernelError, closest
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 
 SAMPLE_BODIES = (
@@ -190,8 +189,8 @@ def failure(view, error):
     """What a kernel did wrong, in words, from the exception that it raised for a sample."""
     if isinstance(error, AttributeError) and error.obj is view:
         fields = type(view)._fields
-        near = difflib.get_close_matches(error.name, fields, n=1)
-        advice = f"did you mean {near[0]!r}?" if near else f"it has {', '.join(fields)}"
+        near = closest(error.name, fields)
+        advice = f"did you mean {near!r}?" if near else f"it has {', '.join(fields)}"
         lacks = f"{type(view).__name__} has no attribute {error.name!r}"
         return f"fails in {failing_line(error)}: {lacks}; {advice}"
     what = " ".join(f"{type(error).__name__}: {error}".split())

@@ -47,9 +47,8 @@ from flocsim.ensembles.config.values import (
     misfit,
     reader_of,
     show,
-    suggestion,
 )
-from flocsim.errors import ConfigError
+from flocsim.errors import ConfigError, suggestion
 from flocsim.fields import list_words
 from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED
 

@@ -8,7 +8,6 @@ What is wrong with a file is worded here as well, and collected, so that all of 
 each with its line.
 """
 
-import difflib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from types import SimpleNamespace
@@ -17,7 +16,7 @@ from typing import Any
 import attrs
 
 from flocsim.ensembles.config.toml_text import BARE_KEY, line_of_key
-from flocsim.errors import ConfigError, visible
+from flocsim.errors import LONGEST_SHOWN, ConfigError, closest, suggestion, visible
 from flocsim.fields import (
     is_number,
     is_whole,
@@ -28,7 +27,6 @@ from flocsim.fields import (
     read_quantity,
 )
 
-LONGEST_SHOWN = 60
 MOST_SHOWN = 50
 
 
@@ -57,14 +55,6 @@ def show(value: object) -> str:
         return "a number of more than 30 digits"
     text = repr(value) if isinstance(value, str | int | float) else str(value)
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "…"
-
-
-def suggestion(word: str, words: Iterable[str]) -> str:
-    """ " (did you mean …?)", or "" where nothing is close."""
-    if len(word) > LONGEST_SHOWN:
-        return ""
-    close = difflib.get_close_matches(word, words, n=1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
 
 
 def dotted(place: Iterable[str]) -> str:
@@ -283,12 +273,16 @@ def read_plain(value, is_float):
 
 @attrs.define
 class Problems:
-    """The findings so far. A place is a tuple of keys, e.g. ("forces", "contact", "k_n")."""
+    """The findings so far. A place is a tuple of keys, e.g. ("forces", "contact", "k_n").
+
+    ``meant``: what misspelt keys and tables at the top seem to be; there something is wrong, too.
+    """
 
     file: str
     text: str
     overrides: Mapping
     found: list[tuple[tuple[str, ...], str]] = attrs.Factory(list)
+    meant: set[str] = attrs.Factory(set)
 
     def misfit(self, place: tuple[str, ...], error: Misfit) -> None:
         for index, text in error.findings:
@@ -300,11 +294,13 @@ class Problems:
 
     def unknown(self, place: tuple[str, ...], known: Iterable[str]) -> None:
         words = f"known: {', '.join(known)}" if known else "there are none here"
+        if len(place) == 1:
+            self.meant.add(closest(place[0], known))
         self.note(place, f"unknown key{suggestion(place[-1], known)}; {words}")
 
     def at(self, *tables: str) -> bool:
         """Whether anything within one of the top-level tables was found wrong."""
-        return any(place[:1] == (table,) for place, _ in self.found for table in tables)
+        return not {*tables}.isdisjoint({place[0] for place, _ in self.found if place} | self.meant)
 
     def raise_if_any(self) -> None:
         """ConfigError with one line per problem, in the order of the file."""

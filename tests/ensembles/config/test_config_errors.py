@@ -194,3 +194,18 @@ def test_a_list_of_very_many_lines_is_soon_told(tmp_path, comma):
     assert problem_lines(tmp_path, text) == [
         "study.toml:3003: scene.receiver must be 'free' or 'fixed', found 3"
     ]
+
+
+@pytest.mark.parametrize("key", ["presett", "preet", "Preset"])
+def test_a_misspelt_preset_is_all_that_is_told(tmp_path, key):
+    [line] = problem_lines(tmp_path, f'{key} = "si"\nseed = 1\n[shapes]\nvertices = [1]\n')
+    assert line.startswith(f"study.toml:1: {key}: unknown key (did you mean 'preset'?)")
+
+
+def test_a_contact_has_its_stiffness_once(tmp_path):
+    text = 'preset = "si"\n[forces.contact]\nyoung = "1 MPa"\nk_n = 20\n'
+    said = "study.toml:2: forces.contact: give either young or k_n, not both"
+    assert problem_lines(tmp_path, text) == [said]
+    text = 'preset = "si"\n[forces.contact]\nyoung = "1 MPa"\npoisson = 0.28\nrestitution = 0.5\n'
+    contact = next(each for each in load_text(tmp_path, text).forces if hasattr(each, "young"))
+    assert (contact.young, contact.k_n, contact.k_t, contact.damping_n) == (1e6, None, None, None)
