@@ -1,22 +1,93 @@
 """`flocsim init` of each kind: what it writes can be run as it is."""
 
+import re
+
 import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands.init import COMMANDS, KINDS, TEMPLATES
+from flocsim.ensembles.config.loader import load_any_config
+from flocsim.ensembles.config.presets import PRESETS
+from flocsim.io.shape_library import SHIPPED
 from tests.helpers.tiers import rest_slow
+
+TAKES_SHAPES = [kind for kind in KINDS if kind != "spheres"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 0
+    own = ["--shapes", str(SHIPPED)] if kind == "pictures" else []
+    assert main(["init", f"1-{kind}.toml", "--kind", kind, *own]) == 0
     told = capsys.readouterr().out
     command = COMMANDS.get(kind, "ensemble")
     assert told.endswith(f"run it with: flocsim {command} 1-{kind}.toml\n")
     assert main([command, f"1-{kind}.toml", "--dry-run"]) == 0
     assert "nothing was run" in capsys.readouterr().out
-    assert main(["init", f"1-{kind}.toml", "--kind", kind]) == 2
+    assert main(["init", f"1-{kind}.toml", "--kind", kind, *own]) == 2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_commented_values_are_those_of_the_preset(kind, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    own = ["--shapes", str(SHIPPED)] if kind == "pictures" else []
+    assert main(["init", "s.toml", "--kind", kind, *own]) == 0
+    text = (tmp_path / "s.toml").read_text("utf-8")
+    plain, table = load_any_config("s.toml"), ""
+    lines, checked = text.split("\n"), 0
+    for number, line in enumerate(lines):
+        header = re.match(r"(?:# )?\[([\w.]+)\]", line)
+        table = header[1] if header else table
+        entry = re.match(r"# (\w+) = ", line)
+        given = PRESETS[plain.preset]
+        for name in table.split("."):
+            given = given.get(name, {})
+        if entry and entry[1] in given:
+            changed = [*lines[:number], f"[{table}]", line[2:], *lines[number + 1 :]]
+            changed = [
+                each for k, each in enumerate(changed) if each != f"[{table}]" or k == number
+            ]
+            (tmp_path / "t.toml").write_text("\n".join(changed))
+            found = load_any_config("t.toml")
+            for part in ("scene", "shapes", "bodies", "fluid", "forces", "zone", "integrator"):
+                assert repr(getattr(found, part)) == repr(getattr(plain, part)), line
+            checked += 1
+    assert checked >= (5 if kind in ("study", "measured") else 0)
+
+
+@pytest.mark.parametrize("kind", TAKES_SHAPES)
+def test_a_library_is_written_in(kind, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.h5").write_bytes(SHIPPED.read_bytes())
+    (tmp_path / "studies").mkdir()
+    line = ["init", "studies/s.toml", "--kind", kind, "--shapes", "mine.h5"]
+    assert main(line) == 0
+    assert "24 flocs of mine.h5" in capsys.readouterr().out
+    shapes = load_any_config("studies/s.toml").shapes
+    assert (tmp_path / str(shapes.file)).resolve() == tmp_path / "mine.h5"
+    assert set(shapes.vertices) <= {1, 4, 8, 16, 32, 64}
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("init --kind pictures", "flocsim: --kind pictures needs the flocs of your pictures: fit"),
+        ("init --shapes none.h5", "none.h5"),
+        ("init --shapes damaged.h5", "damaged.h5 does not end in flocsim's checksum"),
+        (
+            "init --kind spheres --shapes mine.h5",
+            "this kind of study, or this library, has spheres",
+        ),
+    ],
+)
+def test_what_has_no_flocs_is_refused_in_a_line(line, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.h5").write_bytes(SHIPPED.read_bytes())
+    (tmp_path / "damaged.h5").write_bytes(SHIPPED.read_bytes()[:-100])
+    assert main(line.split()) != 0
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+    assert not (tmp_path / "study.toml").exists()
 
 
 def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
