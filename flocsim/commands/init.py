@@ -67,7 +67,9 @@ def value_with_unit(value: Any, unit: str) -> str:
     # A number from 0.1 to 100 where a prefix makes it one; energies are known without.
     thousands = 0 if unit == "J" else max(-math.floor((math.log10(value) + 1.0) / 3.0), 0)
     number = format(Decimal(repr(value)).scaleb(3 * thousands), "f")
-    number = number.rstrip("0").rstrip(".") if thousands else format(value, "g")
+    if "." in number:
+        number = number.rstrip("0").rstrip(".")
+    number = number if thousands else format(value, "g")
     return f'"{number} {PREFIXES[thousands]}{unit}"'
 
 
