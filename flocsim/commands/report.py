@@ -191,7 +191,7 @@ def run(args: argparse.Namespace) -> int:
     write_file(path, marked(page.encode(), ".html"), rule)
     for reason in dict.fromkeys(example.reason for example in examples if example.reason):
         names = [example.outcome for example in examples if example.reason == reason]
-        print(f"class {' and '.join(names)} not animated: {reason}")
+        print(f"class {', '.join(names)} not animated: {reason}")
     print(path)
     return 0
 

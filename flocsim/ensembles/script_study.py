@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -17,7 +18,7 @@ from flocsim.ensembles.config.loader import lay_over, load_any_config, nested
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import read_text_file, toml_text, value_text
+from flocsim.ensembles.config.toml_text import parse, read_text_file, toml_text, value_text
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
@@ -178,36 +179,47 @@ class Study:
         """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
 
         ``jobs`` processes of this machine (without ``if __name__ == "__main__"``);
-        ``output``, instead of the config's file; ``mode``: "new", "resume" (go on, extend, or take
-        finished results as they are) or "restart"; ``overwrite``: keep a file that is in the way
-        under another name; ``quiet=False`` prints what the command prints. What is finished is kept
-        when it is interrupted: go on with ``mode="resume"``. ``plan``: of a sweep of which this is
-        a part, and has to be what it says. UsageError for a file in the way, FileError where it
-        cannot be written.
+        ``output``, instead of the config's file: where neither names one, results are in memory
+        alone, and nothing is kept of a run that is interrupted; ``mode``: "new", "resume" (go on,
+        extend, or take finished results as they are) or "restart"; ``overwrite``: keep a file that
+        is in the way under another name; ``quiet=False`` prints what the command prints. What is
+        finished is kept when it is interrupted: go on with ``mode="resume"``. ``plan``: of a sweep
+        of which this is a part, and has to be what it says. UsageError for a file in the way,
+        FileError where it cannot be written.
         """
         if not is_whole(jobs) or jobs < 1:
             raise UsageError(f"jobs must be a whole number of at least 1, found {jobs!r}")
         if mode not in MODES:
             raise UsageError(f"mode must be one of {', '.join(MODES)}, found {mode!r}")
-        target = Path(self.config.output.file if output is None else output)
-        # The command reads the text from a pipe, and cannot know the file.
-        check_outputs(
-            [Output(target, data_rule(overwrite or mode == "resume"), SUFFIX, WAYS)],
-            inputs_of(self.config, str(self.path)),
-        )
-        words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(int(jobs))]
-        words += [f"--{mode}"] if mode != "new" else []
-        words += ["--overwrite"] if overwrite else []
-        words += ["--quiet"] if quiet else []
-        words += ["--plan", os.path.abspath(plan)] if plan is not None else []
-        for key, value in settings_of(self.overrides):
-            words += ["--set", f"{key}={value}"]
-        run_command(words, self.text, self.path.parent, quiet)
-        # Modules are those that this very study has imported, whatever the file names.
-        found = open_any(target, own=self.sources.named)
-        if isinstance(found, StudyResults):
-            found.folder = self.path.parent
-        return found
+        in_memory = output is None and mode == "new" and not self.names_output
+        with tempfile.TemporaryDirectory() if in_memory else contextlib.nullcontext() as scratch:
+            target = Path(self.config.output.file if output is None else output)
+            target = Path(scratch, target.name) if scratch else target
+            # The command reads the text from a pipe, and cannot know the file.
+            check_outputs(
+                [Output(target, data_rule(overwrite or mode == "resume"), SUFFIX, WAYS)],
+                inputs_of(self.config, str(self.path)),
+            )
+            words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(int(jobs))]
+            words += [f"--{mode}"] if mode != "new" else []
+            words += ["--overwrite"] if overwrite else []
+            words += ["--quiet"] if quiet else []
+            words += ["--plan", os.path.abspath(plan)] if plan is not None else []
+            for key, value in settings_of(self.overrides):
+                words += ["--set", f"{key}={value}"]
+            run_command(words, self.text, self.path.parent, quiet)
+            # Modules are those that this very study has imported, whatever the file names.
+            found = open_any(target, own=self.sources.named)
+            if isinstance(found, StudyResults):
+                found.folder = self.path.parent
+                if in_memory:
+                    found.load_all()
+            return found
+
+    @property
+    def names_output(self) -> bool:
+        """Whether the config says where its results go."""
+        return "file" in lay_over(parse(self.path, self.text), self.overrides).get("output", {})
 
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""

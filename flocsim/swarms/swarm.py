@@ -54,17 +54,9 @@ class SwarmTrajectory:
     failed: np.ndarray | None
     effort: Effort
     wall_time: float
+    bodies: tuple[Body, ...]
+    box: tuple[float, float]
     swarm: "Swarm"
-
-    @property
-    def bodies(self) -> tuple[Body, ...]:
-        """The bodies of the swarm."""
-        return self.swarm.bodies
-
-    @property
-    def box(self) -> tuple[float, float]:
-        """The periods of the swarm's box [m]."""
-        return self.swarm.box
 
     @functools.cached_property
     def gauge(self) -> Gauge:
@@ -280,7 +272,7 @@ class Swarm:
         t, motion, error = (np.array(column) for column in zip(*seen, strict=True))
         return SwarmTrajectory(
             t, motion[:, :, :3], motion[:, :, 3:], error, status, progress.failed, progress.effort,
-            time.perf_counter() - began, self,
+            time.perf_counter() - began, self.bodies, self.box, self,
         )  # fmt: skip
 
 

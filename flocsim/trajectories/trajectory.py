@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 import flocsim.arrays as at
-from flocsim.errors import UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.fields import check_whole, in_unit, is_number
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.amplification import MOST_AMPLIFIED
@@ -69,6 +69,7 @@ class Trajectory:
     amplification: float | None = None
     row: dict | None = None
     origin: Origin | None = None
+    stored_shapes: tuple[Shape, ...] = ()
 
     def __repr__(self) -> str:
         n = self.position.shape[1]
@@ -116,7 +117,7 @@ class Trajectory:
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """The bodies' shapes."""
-        return tuple(body.shape for body in self.known().bodies)
+        return self.stored_shapes or tuple(body.shape for body in self.known().bodies)
 
     @functools.cached_property
     def all_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -276,6 +277,25 @@ class Trajectory:
             Path(file), self.t, self.position, self.velocity, self.shapes, facts,
             data_rule(overwrite),
         )  # fmt: skip
+
+    @classmethod
+    def load(cls, file: str | os.PathLike) -> "Trajectory":
+        """Read what `save`, or `flocsim trajectory --save`, has written.
+
+        Motion and shapes, to be asked with `at`, drawn and exported; forces, contacts and more
+        motion need the System. FileError for a file that is absent, damaged or of another kind.
+        """
+        from flocsim.io.trajectory import read_trajectory
+
+        found = read_trajectory(file)
+        said = found.facts.get
+        try:
+            status, error = Status[said("status", "FINISHED")], float(said("error", np.nan))
+            counts = int(said("steps", len(found.t) - 1)), int(said("rejected", 0)), 0
+        except (KeyError, TypeError, ValueError, OverflowError) as wrong:
+            raise FileError(f"{file} has no readable trajectory: {wrong}") from wrong
+        motion = found.t, found.position, found.velocity
+        return cls(*motion, status, *counts, error, np.nan, stored_shapes=found.shapes)
 
     def export(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
         """Write the motion for OVITO and HOOMD, where ``file`` ends in .gsd, or for ParaView, in

@@ -183,7 +183,7 @@ def test_the_first_of_each_outcome_has_the_most_vertices(made_up):
 def test_what_cannot_be_run_again_is_said(made_up, capsys):
     assert call("r.h5") == 0
     said = capsys.readouterr().out
-    assert "class A not animated: " in said and said.endswith("r.html\n")
+    assert " not animated: " in said and said.endswith("r.html\n")
     assert "Not shown in motion: " in (made_up / "r.html").read_text("utf-8")
 
 

@@ -115,6 +115,23 @@ def test_a_file_in_the_way_is_left_alone(finished, monkeypatch):
     assert again.count == 3
 
 
+def test_without_an_output_results_are_in_memory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    parts_here.use(monkeypatch)
+    study = flocsim.Study(TABLES)
+    first, second = study.run(), study.run()
+    assert not list(tmp_path.iterdir())
+    assert first.table() == second.table() and first.count == 3
+    assert first.replicates["outcome"].shape == (1, 1, 2, 3)
+    assert second.replicate(1).row["outcome"]
+    assert "in memory" in repr(first)
+    study.with_({"output.file": "named.h5"}).run()
+    study.run(mode="resume")
+    assert {path.name for path in tmp_path.iterdir()} == {"named.h5", "study.h5"}
+    with pytest.raises(UsageError, match=r"already exists.*overwrite=True"):
+        study.run(output="study.h5")
+
+
 def test_what_the_command_refuses_is_an_error_here(tmp_path):
     study = flocsim.Study(TABLES, folder=tmp_path).with_({"forces.contact": False})
     with pytest.raises(UsageError, match=r"needs a contact force.*add \[forces.contact\]"):

@@ -168,6 +168,10 @@ class StudyResults(Tables):
         assert found is not None
         return found
 
+    def load_all(self) -> None:
+        """Read all rows now, so that the file may go."""
+        _, self.path = self.replicates, Path("results in memory")
+
     @functools.cached_property
     def config(self) -> Config:
         """What was run: the config that the file holds, and what was laid over it."""
