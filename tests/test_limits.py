@@ -11,6 +11,7 @@ from flocsim import process
 from flocsim.compiler.composer import compose
 from flocsim.errors import FlocsimError
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 
 def limited(size, *words):
@@ -19,7 +20,7 @@ def limited(size, *words):
     env = {name: value for name, value in os.environ.items() if name != process.BLAS_THREADS}
     return subprocess.run(
         [sys.executable, *words], preexec_fn=limit, env=env, capture_output=True, text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from tests.helpers.results_files import write_results
 from tests.helpers.small_study import command, run_command, write_small
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 NAMES = ("init", "fit", "shapes", "ensemble", "sweep", "check", "work-precision", "trajectory",
          "plot", "info", "compare", "report", "export")  # fmt: skip
@@ -92,7 +93,7 @@ def test_a_reader_that_leaves_early_is_no_error(tmp_path, words):
     job.stdout.close()
     errors = job.stderr.read()
     job.stderr.close()
-    assert (job.wait(timeout=60), errors) == (0, b"")
+    assert (job.wait(timeout=PATIENCE), errors) == (0, b"")
     # What was run is saved, whether anybody reads the table or not.
     assert (tmp_path / "a.h5").exists() == ("a.h5" in words)
 
@@ -111,7 +112,7 @@ def in_shell(folder, line, **more):
     program = f"{sys.executable} -m flocsim"
     return subprocess.run(
         ["bash", "-c", line.replace("FLOCSIM", program)], cwd=folder, capture_output=True,
-        text=True, timeout=120, env=os.environ | more,
+        text=True, timeout=PATIENCE, env=os.environ | more,
     )  # fmt: skip
 
 
@@ -165,5 +166,7 @@ def test_importing_the_package_loads_nothing_heavy():
         "import sys, flocsim, flocsim.__main__\n"
         "print({'h5py', 'matplotlib', 'skimage', 'mpi4py', 'numba'} & set(sys.modules))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert (done.stdout, done.stderr) == ("set()\n", "")

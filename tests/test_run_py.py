@@ -9,11 +9,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 import pytest
+
+from tests.helpers.waiting import PATIENCE, wait_until
 
 posix = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python is a shell script")
 RUN_PY = Path(__file__).resolve().parents[1] / "run.py"
@@ -251,8 +252,11 @@ def test_interrupt_waits_for_the_command_to_save_its_work(installed, tmp_path):
     )
     while process.stdout.readline().strip() != "ready":
         assert process.poll() is None
-    time.sleep(0.1)  # run.py itself has to be waiting by now
+    # run.py itself has to be waiting by now, which it does asleep.
+    state = Path(f"/proc/{process.pid}/stat")
+    asleep = lambda: state.read_text().rpartition(")")[2].split()[0] == "S"  # noqa: E731
+    assert not state.exists() or wait_until(asleep)
     os.killpg(process.pid, signal.SIGINT)
-    assert process.communicate(timeout=10)[1] == "run.py: interrupted\n"
+    assert process.communicate(timeout=PATIENCE)[1] == "run.py: interrupted\n"
     assert process.returncode == 130
     assert (tmp_path / "work").read_text() == "saved\n"

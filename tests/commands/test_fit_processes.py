@@ -19,6 +19,7 @@ from flocsim.errors import UsageError
 from flocsim.io.shape_library import read_library
 from tests.helpers.small_study import ROOT
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE, wait_until
 
 needs_fork = pytest.mark.skipif(sys.platform != "linux", reason="needs fork")
 JOBS = [1, pytest.param(2, marks=needs_fork)]
@@ -175,12 +176,11 @@ def test_results_come_in_order_and_errors_for_the_user_are_raised(jobs):
 
 
 def slow(_):
-    time.sleep(600)
+    time.sleep(2 * PATIENCE)
 
 
 @needs_fork
 def test_an_interrupt_ends_the_processes_at_once():
-    began = time.monotonic()
     with pytest.raises(KeyboardInterrupt), workers(2, lambda: None) as mapped:
         found = mapped(slow, range(2))
         original = fit_processes.wait
@@ -189,7 +189,6 @@ def test_an_interrupt_ends_the_processes_at_once():
             next(found)
         finally:
             fit_processes.wait = original
-    assert time.monotonic() - began < 60
     assert multiprocessing.active_children() == []
 
 
@@ -205,7 +204,7 @@ def test_processes_end_with_their_parent(tmp_path):
         "def where(number):\n"
         "    if number < 2:\n"
         "        os.write(1, b'%d\\n' % os.getpid())  # at once, unlike print\n"
-        "    time.sleep(600)\n"
+        "    time.sleep(1200)\n"
         "with workers(2, lambda: None) as mapped:\n"
         "    list(mapped(where, range(2)))\n"
     )
@@ -214,11 +213,8 @@ def test_processes_end_with_their_parent(tmp_path):
     )
     children = [int(parent.stdout.readline()) for _ in range(2)]
     parent.kill()
-    parent.communicate(timeout=60)  # ends once nobody holds its output
-    until = time.monotonic() + 30
-    while any(alive(child) for child in children):
-        assert time.monotonic() < until
-        time.sleep(0.05)
+    parent.communicate(timeout=PATIENCE)  # ends once nobody holds its output
+    assert wait_until(lambda: not any(alive(child) for child in children))
 
 
 def alive(process):

@@ -13,6 +13,7 @@ import pytest
 from flocsim.compiler import composer, disk_cache, units
 from flocsim.compiler.composer import compose
 from flocsim.compiler.disk_cache import MARK, digest, file_name, read, why_unsafe, write
+from tests.helpers.waiting import PATIENCE
 
 ROOT = hasattr(os, "getuid") and os.getuid() == 0
 only_root = pytest.mark.skipif(not ROOT, reason="gives files to other users")
@@ -362,7 +363,9 @@ def test_another_process_finds_the_code_and_a_damaged_one_is_no_trouble(folder, 
     script.write_text(RUN)
 
     def run():
-        done = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+        done = subprocess.run(
+            [sys.executable, script], capture_output=True, text=True, timeout=PATIENCE
+        )
         assert (done.returncode, done.stdout, done.stderr) == (0, "7.0\n", "")
 
     run()

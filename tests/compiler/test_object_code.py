@@ -9,6 +9,7 @@ import pytest
 
 from flocsim.compiler import processor
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 SCRIPT = """
 import math, sys
@@ -46,7 +47,7 @@ def test_a_later_process_needs_no_numba_but_where_numba_lends_something(tmp_path
 
     def run():
         words = [sys.executable, str(script)]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=120, env=env)
+        done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE, env=env)
         assert (done.returncode, done.stderr) == (0, "")
         return done.stdout.splitlines()
 
@@ -81,7 +82,7 @@ def test_what_is_set_in_the_environment_is_told_by_numba(name, value, told):
     )
     said = [
         subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=env
+            [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE, env=env
         ).stdout
         for env in (dict(os.environ), {**os.environ, name: value})
     ]

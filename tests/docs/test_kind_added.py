@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.waiting import PATIENCE
+
 ROOT = Path(__file__).resolve().parents[2]
 KIND = ROOT / "tests/helpers/lone_flocs"
 TABLE = "flocsim/ensembles/config/__init__.py"
@@ -111,7 +113,7 @@ def test_it_is_extended_by_processes_and_run_by_a_script(home):
 @pytest.mark.slow
 def test_what_it_has_when_killed_is_shown_and_continued(home):
     words = "ensemble s.toml --replicates 60 -o long.h5"
-    journal, until = home / "long.h5.journal", time.monotonic() + 60.0
+    journal, until = home / "long.h5.journal", time.monotonic() + PATIENCE
     with python(home, "-m", "flocsim", *words.split(), start_new_session=True) as process:
         while time.monotonic() < until and process.poll() is None:
             if journal.exists() and journal.read_bytes().count(b'"vertices": 8') > 1:

@@ -10,6 +10,7 @@ from flocsim.ensembles import cli
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, run_command, write_small, write_star_library
+from tests.helpers.waiting import PATIENCE
 
 
 def call(capsys, *words):
@@ -208,5 +209,7 @@ def test_the_module_is_a_command(folder):
 def test_help_is_quick_and_loads_no_numba(folder):
     code = "import sys; from flocsim.ensembles.cli import main\ntry:\n    main(['--help'])\n"
     code += "finally:\n    print({'numba', 'h5py', 'matplotlib'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
+    )
     assert done.stdout.endswith("set()\n")

@@ -92,6 +92,6 @@ def test_a_swarm_describes_itself(path, examples, capsys):
 @pytest.mark.slow
 def test_a_reduced_swarm_runs(examples):
     words = ["--set", "scene.number=24", "--set", "scene.duration=0.2", "--quiet"]
-    done = run_command(examples, SWARM.name, *words, timeout=600)
+    done = run_command(examples, SWARM.name, *words)
     assert (done.returncode, done.stdout, problems(done.stderr)) == (0, "", [])
     assert read_swarm(examples / "swarm.h5").groups["ends"]["finished"].tolist() == [1, 1]

@@ -24,6 +24,7 @@ from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import mpirun
 from tests.helpers.swarm_study import SWARM
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 PAIRS = """\
 preset = "tang2014"
@@ -128,7 +129,7 @@ def in_processes(cell):
 def under_mpirun(cell):
     words = [mpirun(), "-n", "2", sys.executable, "-m", "flocsim", *cell.kind.words]
     done = subprocess.run(
-        [*words, "-o", "new.h5", "--quiet"], capture_output=True, text=True, timeout=240
+        [*words, "-o", "new.h5", "--quiet"], capture_output=True, text=True, timeout=PATIENCE
     )
     assert done.returncode == 0, done.stderr
     assert cell.same("new.h5", cell.file)
@@ -138,7 +139,7 @@ def begun(cell, word):
     """The command, killed when what it has kept has the word in it."""
     words = [sys.executable, "-m", "flocsim", *cell.kind.words, "-o", "new.h5"]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True) as running:
-        until = time.monotonic() + 120.0
+        until = time.monotonic() + PATIENCE
         while running.poll() is None and time.monotonic() < until:
             found = [each for each in ("new.h5.journal", "new.h5") if os.path.exists(each)]
             if found and word in Path(found[0]).read_bytes():

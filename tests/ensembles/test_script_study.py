@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from flocsim.ensembles.script_study import settings_of
 from flocsim.errors import ConfigError, PlausibilityWarning, UsageError
 from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
+from tests.helpers.waiting import PATIENCE, wait_until
 
 TABLES = {
     "preset": "tang2014", "seed": 1, "replicates": 3,
@@ -204,14 +204,6 @@ def members(group):
     return [int(pid) for pid, of, state in rows if int(of) == group and state[0] != "Z"]
 
 
-def until(condition, seconds):
-    """Whether a condition comes to hold within so long."""
-    end = time.monotonic() + seconds
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.05)
-    return condition()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize("what", ["script", "sweep"])
@@ -231,11 +223,11 @@ def killed_after(words, folder, journal):
     size = journal.stat().st_size if journal.exists() else 0
     running = subprocess.Popen(words, cwd=folder, env=ENV, start_new_session=True)
     try:
-        grown = until(lambda: journal.exists() and journal.stat().st_size > size + 5000, 120)
+        grown = wait_until(lambda: journal.exists() and journal.stat().st_size > size + 5000)
         assert grown and running.poll() is None
         running.kill()
         running.wait()
-        assert until(lambda: not members(running.pid), 3.0)
+        assert wait_until(lambda: not members(running.pid))
     finally:
         for pid in members(running.pid):
             os.kill(pid, signal.SIGKILL)
@@ -248,7 +240,7 @@ def test_what_is_no_study_is_done_by_one_rank(tmp_path):
     words = ["info", "r.h5"]
     done = subprocess.run(
         command(*words, ranks=2, module="flocsim"), cwd=tmp_path, env=ENV, capture_output=True,
-        text=True, timeout=300,
+        text=True, timeout=PATIENCE,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     alone = run_command(tmp_path, *words, module="flocsim")

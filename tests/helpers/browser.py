@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.helpers.waiting import PATIENCE
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome", "chrome-headless-shell")
 PLAYWRIGHT = ("chromium-*/chrome-linux*/chrome",
               "chromium_headless_shell-*/*/chrome-headless-shell")  # fmt: skip
@@ -46,6 +48,8 @@ def open_page(page, folder, *options, width=1200, height=2000):
 
 
 def run(command):
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, encoding="utf-8")
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE, encoding="utf-8"
+    )
     assert done.returncode == 0, done.stderr[-2000:]
     return done

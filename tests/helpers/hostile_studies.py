@@ -62,7 +62,7 @@ file = "pairs.h5"
 """
 OWN_CLASS = PAIRS + '[forces.mine]\nclass = "own_pull:Pull"\n'
 
-LONGEST, LONGEST_WAIT, MOST_MEMORY = 5.0, 30.0, 2**30
+LONGEST, LONGEST_WAIT, MOST_MEMORY = 5.0, 600.0, 2**30
 """What a command may take of a processor [s], of time [s], of memory [bytes]."""
 
 ODD = (

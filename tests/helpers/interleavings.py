@@ -107,10 +107,10 @@ ALLOWED = (*DONE, 2, 74, 75)
 SLOWER = 0.01
 """Seconds that a replicate takes more."""
 
-LONGEST = 60.0
+LONGEST = 600.0
 """Seconds after which a command hangs."""
 
-ORPHANED = 3.0
+ORPHANED = 60.0
 """Seconds within which all that a command started has ended."""
 
 

@@ -13,6 +13,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
+from tests.helpers.waiting import PATIENCE
 
 SMALL = """\
 preset = "tang2014"
@@ -184,9 +185,9 @@ def command(*words, ranks=None, module="flocsim.ensemble"):
     return [*launch, sys.executable, "-m", module, *map(str, words)]
 
 
-def run_command(folder, *words, ranks=None, module="flocsim.ensemble", env=None, timeout=120):
+def run_command(folder, *words, ranks=None, module="flocsim.ensemble", env=None):
     """Run a command in the folder; the finished process with its output as text."""
     return subprocess.run(
         command(*words, ranks=ranks, module=module),
-        cwd=folder, env=env, capture_output=True, text=True, timeout=timeout,
+        cwd=folder, env=env, capture_output=True, text=True, timeout=PATIENCE,
     )  # fmt: skip

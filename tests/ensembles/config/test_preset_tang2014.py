@@ -13,6 +13,7 @@ from flocsim.ensembles.config.loader import lay_over, load_config
 from flocsim.io.results.file import read_results
 from tests.helpers.small_study import ROOT, problems
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 FOLDER = ROOT / "examples" / "tang2014"
 READINGS = tomllib.loads((FOLDER / "readings.toml").read_text("utf-8"))
@@ -21,7 +22,9 @@ READINGS = tomllib.loads((FOLDER / "readings.toml").read_text("utf-8"))
 def reproduce(folder, *words, env=None):
     """Run the script; the finished process."""
     script = [sys.executable, FOLDER / "reproduce.py", "-o", folder / "out", "--jobs", "1"]
-    return subprocess.run([*script, *words], capture_output=True, text=True, timeout=300, env=env)
+    return subprocess.run(
+        [*script, *words], capture_output=True, text=True, timeout=PATIENCE, env=env
+    )
 
 
 def test_the_study_is_the_papers():
@@ -65,7 +68,7 @@ def test_a_reduced_study_runs_and_resumes(tmp_path, vertices, animations):
     (out / "summary.md").unlink()
     (out / "figure-4.png").unlink()
     draw = f"import fill_page, pathlib; fill_page.draw(pathlib.Path({str(out)!r}))"
-    subprocess.run([sys.executable, "-c", draw], cwd=FOLDER, check=True, timeout=300)
+    subprocess.run([sys.executable, "-c", draw], cwd=FOLDER, check=True, timeout=PATIENCE)
     assert (out / "figure-4.png").exists()
     assert (out / "summary.md").read_text() == summary
     before = (out / "study.h5").read_bytes()

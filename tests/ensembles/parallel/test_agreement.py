@@ -33,6 +33,7 @@ from tests.helpers.small_study import (
     write_star_library,
 )
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE
 
 HERE = Facts({"seed": 1, "kernels.spheres": "ab", "code": "cd"}, {"version of numpy": "2.0"}, "n0")
 
@@ -110,7 +111,7 @@ def test_a_kernel_that_cannot_be_hashed_ends_all_ranks(tmp_path, monkeypatch):
     assert comm.heard[-1].code == 2
 
 
-def mixed(folder, *jobs, timeout=60):
+def mixed(folder, *jobs, timeout=PATIENCE):
     """Run several command lines as ranks of one job."""
     words = [mpirun()]
     for job in jobs:
@@ -210,7 +211,7 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(DIFFERS)
     env = os.environ | {}
     env["PYTHONPATH"] = os.pathsep.join([str(tmp_path), env.get("PYTHONPATH", "")])
-    done = run_command(tmp_path, "small.toml", ranks=2, env=env, timeout=60)
+    done = run_command(tmp_path, "small.toml", ranks=2, env=env)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
@@ -229,7 +230,7 @@ FACTOR = -1.0 if FIRST else -2.0
 def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
     write_own(tmp_path)
     (tmp_path / "neighbour.py").write_text(DEPENDS)
-    done = run_command(tmp_path, "small.toml", ranks=2, timeout=60)
+    done = run_command(tmp_path, "small.toml", ranks=2)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
@@ -256,7 +257,7 @@ def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
     jobs = [
         subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)
     ]
-    errors = [job.communicate(timeout=60)[1] for job in jobs]
+    errors = [job.communicate(timeout=PATIENCE)[1] for job in jobs]
     assert sorted(job.returncode for job in jobs) == [0, 2]
     [line] = [line for each in errors for line in problems(each)]
     assert "already exists and is left as it is" in line

@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import time
 
 import attrs
 import pytest
@@ -21,6 +20,7 @@ from flocsim.ensembles.parallel.communicator import (
 from flocsim.io.records import CHUNK, Record, scan
 from tests.helpers.small_study import command, mpirun, problems, run_command, write_small
 from tests.helpers.tiers import rest_slow
+from tests.helpers.waiting import PATIENCE, wait_until
 
 
 class Wire(Communicator):
@@ -130,9 +130,7 @@ def test_a_call_of_mpi_that_does_not_come_back_is_seen_by_the_thread():
     beat.silence = {1: 0.0, 2: 0.0}
     wire.called, wire.calls = 2, 17
     beat.start()
-    until = time.monotonic() + 20.0
-    while wire.ended_with is None and time.monotonic() < until:
-        time.sleep(0.01)
+    wait_until(lambda: wire.ended_with is not None)
     beat.stop()
     assert wire.ended_with == 75
     assert beat.silence[1] == 0.0
@@ -172,29 +170,25 @@ def test_a_frozen_rank_ends_the_job_which_keeps_its_rows(tmp_path, ranks, words,
         mpirun()
     write_small(tmp_path, vertices="[1]", replicates="20000")
     journal = tmp_path / "small.h5.journal"
-    words = command("small.toml", "--heartbeat", "2", *words, ranks=ranks)
+    words = command("small.toml", "--heartbeat", "8", *words, ranks=ranks)
     with open(tmp_path / "errors.txt", "w") as errors:
         job = subprocess.Popen(
             words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True
         )
     try:
-        until = time.monotonic() + 240.0  # it may have to compile
-        while not (journal.exists() and journal.stat().st_size > 20_000):
-            assert job.poll() is None and time.monotonic() < until
-            time.sleep(0.02)
+        assert wait_until(lambda: (journal.exists() and journal.stat().st_size > 20_000)
+                          or job.poll() is not None)  # fmt: skip
+        assert job.poll() is None
         pids = sorted(pid for pid in descendants(job.pid) if is_python(pid))
         os.kill(pids[frozen], signal.SIGSTOP)
         kept = rows_in(journal)
         left = [pid for pid in pids if pid != pids[frozen]]
-        until = time.monotonic() + 30.0
-        while list(alive(left)) and time.monotonic() < until:
-            time.sleep(0.02)
-        assert not list(alive(left))
+        assert wait_until(lambda: not list(alive(left)))
         if pids[frozen] == job.pid:
             os.kill(job.pid, signal.SIGCONT)
-        assert job.wait(timeout=30) == 75
+        assert job.wait(timeout=PATIENCE) == 75
         lines = (tmp_path / "errors.txt").read_text().splitlines()
-        told = [line for line in lines if "has been silent for 2 s" in line]
+        told = [line for line in lines if "has been silent for 8 s" in line]
         assert f"flocsim: rank {frozen} (" in told[0] and f"process {pids[frozen]})" in told[0]
         assert not any("Traceback" in line for line in lines)
         assert rows_in(journal) >= kept > 0

@@ -20,6 +20,7 @@ from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.processes import in_copies
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_study import swarm_config
+from tests.helpers.waiting import PATIENCE, wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux")
 
@@ -32,12 +33,14 @@ def processors(monkeypatch, request):
 
 def has_ended(number):
     """Whether a process is gone, or soon is; nobody may have asked for its exit code."""
-    path = Path(f"/proc/{number}/stat")
-    for _ in range(400):
-        if not path.exists() or path.read_text().split()[2] == "Z":
+
+    def gone():
+        try:
+            return Path(f"/proc/{number}/stat").read_text().split()[2] == "Z"
+        except (FileNotFoundError, ProcessLookupError):
             return True
-        time.sleep(0.05)
-    return False
+
+    return wait_until(gone)
 
 
 def test_works_are_done_in_other_processes_by_the_end(tmp_path, processors):
@@ -61,7 +64,7 @@ def test_they_end_with_what_goes_wrong_here(tmp_path, monkeypatch):
 
     def work():
         leave(path)
-        time.sleep(60.0)
+        time.sleep(2 * PATIENCE)
 
     def interrupted(*arguments):
         while not (path.exists() and path.read_text()):
@@ -80,7 +83,7 @@ from flocsim.ensembles.parallel.processes import in_copies
 
 def work():
     print(os.getpid(), flush=True)
-    time.sleep(60.0)
+    time.sleep(1200.0)
 
 in_copies([work])
 """
@@ -90,7 +93,7 @@ def test_they_end_with_a_killed_parent():
     job = subprocess.Popen([sys.executable, "-c", KILLED], stdout=subprocess.PIPE, text=True)
     number = int(job.stdout.readline())
     os.kill(job.pid, signal.SIGKILL)
-    job.wait(timeout=20)
+    job.wait(timeout=PATIENCE)
     assert has_ended(number)
 
 

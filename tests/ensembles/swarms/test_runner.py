@@ -22,6 +22,7 @@ from flocsim.io import terminal
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
+from tests.helpers.waiting import PATIENCE
 
 
 @pytest.fixture(scope="module")
@@ -203,9 +204,11 @@ def test_records_that_no_flocsim_wrote_are_refused(listed):
 
 
 def start(folder, *words):
-    """The command in a process of its own."""
+    """The command in a process of its own, which is given the time to save its state."""
+    code = "import sys; from flocsim import __main__, process; process.PATIENCE = 600.0; "
+    code += "sys.exit(__main__.main(sys.argv[1:]))"
     return subprocess.Popen(
-        [sys.executable, "-m", "flocsim", "swarm", "swarm.toml", *words],
+        [sys.executable, "-c", code, "swarm", "swarm.toml", *words],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
 
@@ -219,14 +222,14 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
 ):
     write_swarm_study(tmp_path)
     with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
-        until = time.monotonic() + 120.0
+        until = time.monotonic() + PATIENCE
         journal = tmp_path / "swarm.h5.journal"
         while time.monotonic() < until and process.poll() is None:
             if journal.exists() and b'"state"' in journal.read_bytes():
                 process.send_signal(number)
                 break
             time.sleep(0.002)
-        said, _ = process.communicate(timeout=120)
+        said, _ = process.communicate(timeout=PATIENCE)
     assert journal.exists(), said
     if number == signal.SIGTERM:
         assert process.returncode == 75 and said.endswith(" --resume\n")
@@ -258,7 +261,7 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
 def test_ranks_change_no_byte(finished, tmp_path):
     write_swarm_study(tmp_path)
     with start(tmp_path, "--jobs", "3", "--quiet") as process:
-        said, _ = process.communicate(timeout=240)
+        said, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, said
     assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
 
