@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import numpy as np
 
 from flocsim.commands.fit import number
 from flocsim.ensembles.contents import Contents, Summary
@@ -24,14 +23,13 @@ from flocsim.io.fit_report import (
     plural,
     population_lines,
 )
-from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import Figure
 from flocsim.io.shape_library import (
     ShapeEntry,
-    columns_of_fits,
-    columns_of_flocs,
+    labelled_flocs,
     read_library,
     read_settings,
     write_library,
@@ -217,41 +215,21 @@ def names_of(entry):
     return {entry.floc_id, entry.floc_id.removesuffix(f" r={entry.spheroradius:g}")}
 
 
+INDICES = {"flocs": ("floc",)}
+
+
 @attrs.frozen(eq=False)
 class Library(Tables):
-    """The flocs of a library, and what their fits were made with.
-
-    Its tables: "flocs" with a row for each, and for every N "fits-N" with a row for each vertex.
-    """
+    """The flocs of a library, and what their fits were made with."""
 
     entries: list[ShapeEntry]
     settings: dict[str, Any]
+    indices = INDICES
 
-    @property
-    def indices(self) -> dict[str, tuple[str, ...]]:  # type: ignore[override]
-        """{table: axes of its rows}."""
-        fits = {f"fits-{count}": ("floc", "vertex") for count in self.entries[0].fits}
-        return {"flocs": ("floc",), **fits}
-
-    def labelled(self, group: str) -> Labelled:
-        """The columns of a table with their axes; UsageError for an unknown one."""
-        order: tuple[str, ...] = ("floc", "axis")
-        if self.known(group) == "flocs":
-            columns, count = columns_of_flocs(self.entries), 0
-        else:
-            order, count = ("floc", "vertex", "axis"), int(group.removeprefix("fits-"))
-            columns = columns_of_fits(self.entries, count)
-        values = {
-            "floc": np.array([entry.floc_id for entry in self.entries], object),
-            "vertex": np.arange(count), "axis": np.array(["x", "y"], object),
-        }  # fmt: skip
-        return Labelled(
-            {name: Column((name,), values[name]) for name in order},
-            {
-                name: Column(order[: each.values.ndim], each.values, each.about)
-                for name, each in columns.items()
-            },
-        )
+    def labelled(self, group: str = "flocs") -> Labelled:
+        """The flocs, without their fits; UsageError for another group."""
+        self.known(group)
+        return labelled_flocs(self.entries)
 
 
 def read(path: str | os.PathLike) -> Library:

@@ -289,8 +289,6 @@ def run_tables(args):
     found = {f"{Path(args.source).stem}-{name}.csv": name for name in names}
     if args.output:
         found = {args.output: names[0]}
-        if Path(args.output).suffix.lower() != ".csv":
-            raise UsageError(f"--output {args.output}: the name must end in .csv")
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in found], [args.source])
     for path, name in found.items():

@@ -3,7 +3,7 @@ installed."""
 
 import csv
 import importlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 import attrs
@@ -17,9 +17,6 @@ Dataset = Any
 DataFrame = Any
 """A pandas DataFrame."""
 
-ROWS = 10_000
-"""Rows that are written at once: as text, a table takes several times the memory of its arrays."""
-
 
 @attrs.frozen(eq=False)
 class Column:
@@ -31,13 +28,6 @@ class Column:
     axes: tuple[str, ...]
     values: np.ndarray
     about: dict[str, Any] = attrs.Factory(dict)
-
-    def coded(self, values: np.ndarray) -> tuple[np.ndarray, list[str]] | None:
-        """Return (positions among the words, words) of some of its codes; None for plain values."""
-        if "flag_values" not in self.about:
-            return None
-        words = self.about["flag_meanings"].split()
-        return np.searchsorted(self.about["flag_values"], values), words
 
 
 def about_of(schema: Sequence[str]) -> dict[str, Any]:
@@ -81,9 +71,10 @@ class Labelled:
         labels = [self.axes[name].values for name in index]
         rows = pandas.MultiIndex.from_product(labels, names=list(index))
         found = {}
-        for label, column, values in self.flat(index):
-            coded = column.coded(values)
-            found[label] = values if coded is None else pandas.Categorical.from_codes(*coded)
+        further = {name: each for name, each in self.axes.items() if each.axes != (name,)}
+        for name, column in (further | self.columns).items():
+            for label, values in self.spread(name, column, index):
+                found[label] = worded(pandas, column, values)
         return pandas.DataFrame(found, index=rows)
 
     def write_csv(self, file: TextIO, index: Sequence[str]) -> None:
@@ -92,26 +83,20 @@ class Labelled:
         Numbers have all their digits, codes are written as their words, NaN as an empty cell; there
         is a column for each word of any further axis.
         """
-        shape = [len(self.axes[name].values) for name in index]
-        places = np.unravel_index(np.arange(np.prod(shape, dtype=int)), shape)
-        columns = {
-            name: self.axes[name].values[place] for name, place in zip(index, places, strict=True)
-        }
-        for label, column, values in self.flat(index):
-            coded = column.coded(values)
-            columns[label] = values if coded is None else np.array(coded[1], object)[coded[0]]
+        columns = {}
+        beside = {n: a for n, a in self.axes.items() if n not in index and a.axes != (n,)}
+        named = {name: self.axes[name] for name in index}
+        for name, column in (named | beside | self.columns).items():
+            for label, values in self.spread(name, column, index):
+                if "flag_values" in column.about:
+                    words = np.array(column.about["flag_meanings"].split(), object)
+                    values = words[np.searchsorted(column.about["flag_values"], values)]
+                columns[label] = values
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        for start in range(0, len(places[0]), ROWS):
-            cells = (cells_of(each[start : start + ROWS]) for each in columns.values())
-            writer.writerows(zip(*cells, strict=True))
-
-    def flat(self, index: Sequence[str]) -> Iterator[tuple[str, Column, np.ndarray]]:
-        """Yield (label, column, values along the index), coordinates that are no axis first."""
-        further = {name: each for name, each in self.axes.items() if each.axes != (name,)}
-        for name, column in (further | self.columns).items():
-            for label, values in self.spread(name, column, index):
-                yield label, column, values
+        # Row by row: as lists, a table would take several times the memory of its arrays.
+        for row in zip(*columns.values(), strict=True):
+            writer.writerow(["" if cell != cell else cell for cell in row])
 
     def spread(
         self, name: str, column: Column, index: Sequence[str]
@@ -171,9 +156,12 @@ class Tables:
         return self.labelled(name).to_pandas(self.indices[name])
 
 
-def cells_of(values: np.ndarray) -> list[Any]:
-    """Return the values as cells of a table: an empty one for NaN."""
-    return ["" if value != value else value for value in values.tolist()]
+def worded(pandas, column, values):
+    """Codes as a categorical of their words; all else as it is."""
+    if "flag_values" not in column.about:
+        return values
+    codes = np.searchsorted(column.about["flag_values"], values)
+    return pandas.Categorical.from_codes(codes, column.about["flag_meanings"].split())
 
 
 def needed(library: str) -> Any:

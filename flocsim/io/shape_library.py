@@ -303,7 +303,7 @@ def write_library(
             "the size of one, as in '0.95 um'"
         )
 
-    compound = is_any_compound(entries)
+    compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
     groups = {"flocs": labelled(FLOC_COLUMNS, entries)}
     kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
     for kind, count in product(kinds, sorted(entries[0].fits)):
@@ -332,22 +332,11 @@ def labelled_measures(entries):
     return labelled(MEASURE_COLUMNS, [entry.measures or UNMEASURED for entry in entries])
 
 
-def is_any_compound(entries):
-    """Return True if a fit has holes or several parts."""
-    return any(fit.table is not None for entry in entries for fit in entry.fits.values())
-
-
-def columns_of_flocs(entries: Sequence[ShapeEntry]) -> dict[str, Column]:
-    """Return all that is known of each floc but its name: (floc,), a place (floc, 2)."""
-    named = {name: each for name, each in FLOC_COLUMNS.items() if name != "id"}
-    columns = labelled(named | POPULATION_COLUMNS, entries).columns
-    return columns | labelled_measures(entries).columns
-
-
-def columns_of_fits(entries: Sequence[ShapeEntry], count: int) -> dict[str, Column]:
-    """Return the fits at N = ``count``: (floc,), (floc, vertex), places (floc, vertex, 2)."""
-    columns = fits_at(count, is_any_compound(entries))
-    return labelled(columns, [entry.fits[count] for entry in entries]).columns
+def labelled_flocs(entries: Sequence[ShapeEntry]) -> Labelled:
+    """Return all that is known of each floc but its fits, with the axes ``floc`` and ``2``."""
+    columns = labelled(FLOC_COLUMNS | POPULATION_COLUMNS, entries).columns
+    axes = {"floc": columns.pop("id"), "2": Column(("2",), np.array(["x", "y"], object))}
+    return Labelled(axes, columns | labelled_measures(entries).columns)
 
 
 def reach_of(entry):

@@ -42,32 +42,6 @@ def centre_distance(position: np.ndarray) -> np.ndarray:
     return np.hypot(*(position[:, 1, :2] - position[:, 0, :2]).T)
 
 
-def scales_of(values: Mapping[str, Any]) -> dict[str, Column]:
-    """Return the coordinates of some axes {name: values}."""
-    return {
-        name: Column(
-            (name,), each, about_of(DATASETS.get(name, ("1", name.replace("_", " of body "))))
-        )
-        for name, each in values.items()
-    }
-
-
-def labelled_motion(times: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> Labelled:
-    """Return the arrays of a motion with their axes; of a pair also the distance of the centres."""
-    arrays = {"position": position, "velocity": velocity}
-    if position.shape[1] == 2:
-        arrays["centre_distance"] = centre_distance(position)
-    axes = {
-        "time": times, "body": np.arange(position.shape[1]),
-        "component": np.array(COMPONENTS, object),
-    }  # fmt: skip
-    columns = {
-        name: Column(tuple(axes)[: array.ndim], array, about_of(DATASETS[name]))
-        for name, array in arrays.items()
-    }
-    return Labelled(scales_of(axes), columns)
-
-
 def write_trajectory(
     path: str | Path,
     times: np.ndarray,
@@ -87,11 +61,21 @@ def write_trajectory(
     """
     import h5py
 
-    scales: dict[str, Any] = {"axis": np.array(COMPONENTS[:2], object)} | {
-        f"vertex_{body}": np.arange(len(each.vertices)) for body, each in enumerate(shapes)
+    count = len(shapes)
+    scales: dict[str, Any] = {
+        "time": times,
+        "body": np.arange(count),
+        "component": np.array(COMPONENTS, object),
+        "axis": np.array(COMPONENTS[:2], object),
+    } | {f"vertex_{body}": np.arange(len(each.vertices)) for body, each in enumerate(shapes)}
+    arrays = {"position": position, "velocity": velocity}
+    if count == 2:
+        arrays["centre_distance"] = centre_distance(position)
+    axes = ("time", "body", "component")
+    columns = {
+        name: Column(axes[: array.ndim], array, about_of(DATASETS[name]))
+        for name, array in arrays.items()
     }
-    motion = labelled_motion(times, position, velocity)
-    columns = motion.columns
     for body, shape in enumerate(shapes):
         of_points, about = (f"vertex_{body}", "axis"), {"units": "m", "radius": shape.radius}
         columns[f"vertices_{body}"] = Column(of_points, np.array(shape.vertices), about)
@@ -102,7 +86,10 @@ def write_trajectory(
                 ("point_radius", table.radius, "m"),
             ):  # fmt: skip
                 columns[f"{name}_{body}"] = Column(of_points[:1], values, {"units": unit})
-    coordinates = motion.axes | scales_of(scales)
+    said = {name: DATASETS.get(name, ("1", name.replace("_", " of body "))) for name in scales}
+    coordinates = {
+        name: Column((name,), each, about_of(said[name])) for name, each in scales.items()
+    }
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
         file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})
@@ -317,8 +304,12 @@ class StoredTrajectory(Tables):
 
     def labelled(self, group: str = "motion") -> Labelled:
         """The motion with its axes; UsageError for another group."""
-        self.known(group)
-        return labelled_motion(self.t, self.position, self.velocity)
+        axes = (*INDICES[self.known(group)], "component")
+        words = self.t, np.arange(len(self.shapes)), np.array(COMPONENTS, object)
+        return Labelled(
+            {name: Column((name,), each) for name, each in zip(axes, words, strict=True)},
+            {name: Column(axes, getattr(self, name)) for name in ("position", "velocity")},
+        )
 
     @property
     def status(self) -> str:

@@ -112,14 +112,13 @@ def load_matplotlib() -> None:
     if "matplotlib" in sys.modules:
         return
     backend = os.environ.pop("MPLBACKEND", "")
-    try:
-        import matplotlib
-    finally:
-        if backend:
-            os.environ["MPLBACKEND"] = backend
-    # A script's own pyplot uses the backend as if it had imported matplotlib first.
-    with contextlib.suppress(ValueError):
-        matplotlib.rcParams.update({"backend": backend} if backend else {})
+    import matplotlib
+
+    if backend:
+        os.environ["MPLBACKEND"] = backend
+        # A script's own pyplot uses the backend as if it had imported matplotlib first.
+        with contextlib.suppress(ValueError):
+            matplotlib.rcParams["backend"] = backend
 
 
 def new_figure(width: float, height: float) -> Figure:
