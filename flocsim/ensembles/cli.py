@@ -278,10 +278,8 @@ def run(arguments: argparse.Namespace) -> int:
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
-    if arguments.dry_run:
-        INTERRUPTION.kept = lambda: "nothing was run"
-    elif arguments.parent is None:  # else that process says how it goes on
-        INTERRUPTION.kept = lambda: "no further replicate was finished"
+    INTERRUPTION.kept = lambda: "nothing more was finished"
+    if arguments.parent is None and not arguments.dry_run:  # a parent says how it goes on
         INTERRUPTION.command = continuing(0 if arguments.jobs > 1 else comm.size)
     if arguments.quiet:
         units.show_by(units.silent)

@@ -52,16 +52,13 @@ from flocsim.process import INTERRUPTION, STOPPED
 class Ended:
     """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well.
 
-    ``kept``: finished replicates that ``journal`` holds, which is seen to be there; ``count``: with
-    how many of each condition the study has ended.
+    ``count``: with how many replicates of each condition the study has ended.
     """
 
     code: int = 0
     results: Any = None
     computed: int = 0
-    kept: int = 0
     wall_time: float = 0.0
-    journal: str = ""
     count: int = -1
 
 
@@ -223,9 +220,7 @@ def lead(
         start.journal.sync()
         progress.finish()
         final = state.schedule.final
-        kept = start.store.there(in_journal=True)
-        ended = Ended(STOPPED if final < 0 else 0, None, state.computed, kept)
-        ended.count, ended.journal = final, str(start.journal.path)
+        ended = Ended(STOPPED if final < 0 else 0, None, state.computed, count=final)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm, output, progress)

@@ -15,7 +15,7 @@ from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import BESIDE_PYTHON, mpirun
 from tests.helpers.swarm_study import SWARM
 
-MANY = PAIRS.replace("replicates = 6", "replicates = 3000")
+MANY = PAIRS.replace("replicates = 6", "replicates = 1500")
 FLOCSIM, MODULE = [str(BESIDE_PYTHON / "flocsim")], [sys.executable, "-m", "flocsim.ensemble"]
 OVER = ["--over", "fluid.viscosity=1e-3,2e-3"]
 

@@ -207,9 +207,8 @@ def mark_figure(figure: Figure, words: str) -> None:
 
 def add_foot(figure: Figure, words: str) -> None:
     """Name the source of what a figure shows, small, at its foot, for which it grows."""
-    words, above = plain(words, MOST_OF_TITLE), ""
-    if figure._supxlabel:
-        above = f"{figure._supxlabel.get_text()}\n"
+    above = f"{figure._supxlabel.get_text()}\n" if figure._supxlabel else ""
+    words = plain(words, MOST_OF_TITLE)
     if not words or words in " ".join(above.split()):
         return
     figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT)

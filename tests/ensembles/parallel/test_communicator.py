@@ -284,7 +284,7 @@ def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):
 def test_a_launcher_of_another_kind_is_found_out(tmp_path, monkeypatch):
     mpirun()
     write_small(tmp_path)
-    env = os.environ | {"PMIX_SIZE": "2", "PMIX_RANK": "0"}
+    env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0", "PMI_CONTROL_PORT": "9"}
     done = run_command(tmp_path, "small.toml", env=env)
     assert done.returncode == 2
     [line] = done.stderr.splitlines()

@@ -18,7 +18,7 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.io.records import encode
 from flocsim.io.results.file import read_results
-from flocsim.process import STOPPED
+from flocsim.process import INTERRUPTION, STOPPED
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config
 from tests.helpers.tiers import rest_slow
@@ -67,7 +67,8 @@ def left(tmp_path_factory):
         patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
         stop_after(patch, 30)
         ended = go_on(folder, NEW)
-    assert (ended.code, ended.kept) == (STOPPED, 30)
+    kept = f"30 finished replicates are in {folder / 'r.h5.journal'}"
+    assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
     assert [path.name for path in folder.glob("r.h5*")] == ["r.h5.journal"]
     return folder / "r.h5.journal"
 

@@ -20,7 +20,7 @@ from flocsim.errors import FileError, KernelError, UsageError
 from flocsim.io import journal as locked_file
 from flocsim.io.journal import Journal
 from flocsim.io.records import CHUNK
-from flocsim.process import STOPPED
+from flocsim.process import INTERRUPTION, STOPPED
 from tests.ensembles.storage.test_resume import stop_after
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems, small_config
@@ -254,16 +254,17 @@ def test_a_kernel_that_does_not_compile_leaves_no_journal(tmp_path, monkeypatch)
 def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, monkeypatch):
     monkeypatch.setattr("flocsim.ensembles.parallel.coordinator.stop_requested", lambda: True)
     ended = go_on(tmp_path, NEW)
-    assert (ended.code, ended.kept) == (STOPPED, 0)
+    assert (ended.code, INTERRUPTION.kept()) == (STOPPED, "no replicate was finished")
     assert names(tmp_path) == []
 
 
 def test_what_is_promised_counts_the_journal_and_not_the_results(finished, monkeypatch):
     stop_after(monkeypatch, 5)
     ended = go_on(finished, replicates=30)
-    assert (ended.code, ended.kept) == (STOPPED, 5)
-    assert ended.journal == str(finished / "r.h5.journal")
-    assert rows_in(ended.journal) == 5
+    journal = finished / "r.h5.journal"
+    kept = f"5 finished replicates are in {journal}"
+    assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
+    assert rows_in(journal) == 5
 
 
 def test_a_journal_that_is_deleted_meanwhile_is_there_when_it_is_promised(
@@ -281,8 +282,10 @@ def test_a_journal_that_is_deleted_meanwhile_is_there_when_it_is_promised(
         patch.setattr(Journal, "append", append)
         stop_after(patch, 30)
         ended = go_on(tmp_path, NEW)
-    assert (ended.code, ended.kept) == (STOPPED, 30)
-    assert rows_in(ended.journal) == 30
+    journal = tmp_path / "r.h5.journal"
+    kept = f"30 finished replicates are in {journal}"
+    assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
+    assert rows_in(journal) == 30
     assert go_on(tmp_path).computed == 50
     assert same_data(tmp_path / "r.h5", whole) == []
 

@@ -1,0 +1,85 @@
+"""Which flocs, preset and version results are of: said by the run, its file and all made of it."""
+
+import numpy as np
+import pytest
+
+import flocsim
+from flocsim.__main__ import main
+from flocsim.ensembles.config.schema import ShapesConfig
+from flocsim.io.plots.results import FIGURES, OF_ROWS
+from flocsim.io.plots.style import add_foot, keep_titles_whole
+from flocsim.io.results.file import write_results
+from flocsim.io.results.run_group import source_line
+from flocsim.io.shape_library import SHIPPED
+from tests.helpers.small_study import run_command, write_small, write_star_library
+from tests.helpers.synthetic_results import make_results
+
+SOURCE = f"3 flocs of stars.h5 · preset tang2014 · flocsim {flocsim.__version__}"
+POOL = '3\nsource = "library"\nfile = "stars.h5"'
+
+
+@pytest.mark.parametrize(
+    ("keys", "count", "words"),
+    [
+        ({"source": "library", "file": "a/shapes.h5"}, 12, "12 flocs of shapes.h5"),
+        ({"source": "library", "file": SHIPPED}, 24, "24 synthetic flocs included in flocsim"),
+        ({}, 10, "10 synthetic flocs grown by flocsim"),
+        ({"vertices": (1,)}, 0, "spheres"),
+        ({"source": None, "own": flocsim.SpheroPolygon([(0, 0), (1e-5, 0)], 1e-6)}, 1,
+         "flocsim.geometry.shapes.spheropolygon:SpheroPolygon"),
+    ],
+)  # fmt: skip
+def test_flocs_in_words(keys, count, words):
+    assert ShapesConfig(**keys).described(count) == words
+
+
+@pytest.mark.parametrize(
+    ("run", "line"),
+    [
+        ({}, ""),
+        ({"flocsim_version": "0.1.0", "preset": ""}, "flocsim 0.1.0"),
+        ({"shapes": "spheres", "preset": "si"}, "spheres · preset si"),
+    ],
+)
+def test_what_a_file_does_not_state_is_left_out(run, line):
+    assert source_line(run) == line
+
+
+def test_run_info_report_and_comparison_name_the_source(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write_star_library(tmp_path / "stars.h5")
+    write_small(tmp_path, vertices="[4]", delta="[0.0]", types='["I"]', pool=POOL)
+    done = run_command(tmp_path, "small.toml")
+    assert done.returncode == 0, done.stderr
+    first, *table = done.stdout.splitlines()
+    assert first.endswith(f"; {SOURCE}") and SOURCE in table
+    (tmp_path / "stars.h5").unlink()
+    assert main(["info", "small.h5"]) == 0
+    assert capsys.readouterr().out.splitlines()[1] == SOURCE
+    assert main(["report", "small.h5", "--no-motion"]) == 0
+    assert f"<p>{SOURCE}</p>" in (tmp_path / "small.html").read_text("utf-8")
+    assert main(["compare", "small.h5", "small.h5"]) == 0
+    assert capsys.readouterr().out.count(f"small.h5: {SOURCE}\n") == 2
+    drawn = flocsim.open("small.h5").plot("4")
+    assert drawn._supxlabel.get_text() == SOURCE
+
+
+def test_files_without_a_source_are_shown_without(tmp_path, capsys):
+    write_results(tmp_path / "old.h5", make_results(count=2, run={}))
+    assert main(["info", str(tmp_path / "old.h5")]) == 0
+    assert capsys.readouterr().out.splitlines()[1] == ""
+    main(["plot", str(tmp_path / "old.h5"), "--figures", "4", "--output-dir", str(tmp_path)])
+    assert (tmp_path / "old-figure-4.png").exists()
+
+
+@pytest.mark.parametrize("name", sorted(FIGURES.keys() - OF_ROWS))
+def test_the_line_at_the_foot_touches_nothing(name):
+    figure = FIGURES[name](make_results(count=4))
+    add_foot(figure, SOURCE)
+    add_foot(figure, SOURCE)  # saved under a second name
+    keep_titles_whole(figure)
+    foot = figure._supxlabel.get_window_extent()
+    assert figure._supxlabel.get_text() == SOURCE
+    assert foot.y0 >= 0.0 and foot.x1 <= figure.bbox.x1
+    below = [axes.get_tightbbox().y0 for axes in figure.axes if axes.get_visible()]
+    assert foot.y1 <= np.min(below)
