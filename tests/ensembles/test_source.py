@@ -8,9 +8,9 @@ from flocsim.__main__ import main
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import add_foot, keep_titles_whole
-from flocsim.io.results.file import write_results
 from flocsim.io.results.run_group import source_line
 from flocsim.io.shape_library import SHIPPED
+from tests.helpers.results_files import write_results
 from tests.helpers.small_study import run_command, write_small, write_star_library
 from tests.helpers.synthetic_results import make_results
 

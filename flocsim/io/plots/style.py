@@ -214,6 +214,9 @@ def add_foot(figure: Figure, words: str) -> None:
     figure.set_figheight(figure.get_figheight() + FOOT_HEIGHT)
     with house_style():
         figure.supxlabel(above + words, x=0.01, ha="left", fontsize=6, color="0.4")
+    for legend in figure.legends:  # below all panels, and above the line
+        low = FOOT_HEIGHT / figure.get_figheight()
+        legend.set_bbox_to_anchor((0.0, low, 1.0, 1.0 - low), figure.transSubfigure)
 
 
 def graded_colours(count):

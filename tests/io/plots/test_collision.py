@@ -17,7 +17,7 @@ from flocsim.io.plots.collision import (
     time_unit,
     write_animation,
 )
-from flocsim.io.plots.style import save
+from flocsim.io.plots.style import add_foot, save
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * 1e-5
 
@@ -36,6 +36,17 @@ def test_a_strip_shows_bodies_contacts_and_distances():
     assert "µm" in " ".join(text.get_text() for text in figure.axes[0].texts)
     rings = [line.get_xydata() for line in figure.axes[1].lines if line.get_marker() == "o"]
     np.testing.assert_array_equal(rings, [[[0.0, 1e-5]]])
+
+
+def test_a_line_at_the_foot_stands_below_the_legend():
+    frames = [[[SQUARE], [SQUARE + [0.0, 2e-5]]]] * 6
+    figure = draw_strip(Frames(np.arange(6.0), frames, [()] * 6, [], [2e-5] * 6), "A")
+    add_foot(figure, "12 flocs of shapes.h5")
+    figure.canvas.draw()
+    foot, [legend] = figure._supxlabel.get_window_extent(), figure.legends
+    assert 0.0 <= foot.y0 < foot.y1 <= legend.get_window_extent().y0
+    panels = [axes.get_tightbbox().y0 for axes in figure.axes]
+    assert legend.get_window_extent().y1 <= min(panels)
 
 
 def test_frames_share_one_scale_and_hold_their_bodies():
