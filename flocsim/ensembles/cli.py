@@ -292,8 +292,7 @@ ANEW = re.compile("--(resu|rest|overw)[a-z]*")
 
 def continuing(ranks: int = 1) -> str:
     """Return the command line that continues this run, with the launcher where it has ``ranks``."""
-    words = [word for word in sys.argv[1:] if not ANEW.fullmatch(word)]
-    words.insert(words.index("--") if "--" in words else len(words), "--resume")
+    words = [*(word for word in sys.argv[1:] if not ANEW.fullmatch(word)), "--resume"]
     module = sys.modules["__main__"].__spec__
     program = [on_path(sys.argv[0])]
     if module is not None:  # python -m flocsim, or flocsim.ensemble
