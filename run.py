@@ -110,7 +110,9 @@ def demo():
     if not found:
         print("There is no mpirun in .venv: the study runs on one process.")
     code = call(*([found[0], "-n", "2"] if found else []) + study)
-    code = code or call(tool("flocsim"), "plot", "quickstart.h5", "--figures", "overview")
+    code = code or call(
+        tool("flocsim"), "plot", "quickstart.h5", "--figures", "overview", "--overwrite"
+    )
     if code == 0:
         results = ["quickstart.h5"] + sorted(path.name for path in HERE.glob("quickstart*.png"))
         print("\nThe results are in\n  " + "\n  ".join(str(HERE / name) for name in results))

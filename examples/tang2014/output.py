@@ -1,7 +1,7 @@
 """How the scripts of the study write: figures in every format, pages, tables.
 
-They go into the script's own folder. What lies there and was not made by flocsim, or was changed
-since, is kept as name.1.png, name.1.md, …
+They go into the script's own folder. What lies there and differs is kept as name.1.png,
+name.1.md, …
 """
 
 import csv
@@ -9,8 +9,7 @@ import io
 from pathlib import Path
 
 from flocsim.io.files import write_file
-from flocsim.io.outputs import data_rule, figure_rule
-from flocsim.io.outputs import marked as with_own_mark
+from flocsim.io.outputs import data_rule
 
 FORMATS = ("png", "pdf")
 
@@ -24,22 +23,27 @@ def save_all(figure, stem):
 
     paths = paths_of(stem)
     for path in paths:
-        save(figure, path, figure_rule(overwrite=True))
+        save(figure, path, data_rule(overwrite=True))
     return paths
+
+
+def write(path, text):
+    """Write a text; a file that says the same already stays."""
+    data = text.encode()
+    if not (path.is_file() and path.read_bytes() == data):
+        write_file(path, data, data_rule(overwrite=True))
 
 
 def write_page(path, text):
     """Write a page of Markdown."""
-    write_file(path, with_own_mark(text.encode(), ".md"), figure_rule(overwrite=True))
+    write(path, text)
 
 
 def write_table(path, rows):
-    """Write rows as CSV; a table that says the same already stays."""
+    """Write rows as CSV."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
-    data = text.getvalue().encode()
-    if not (path.is_file() and path.read_bytes() == data):
-        write_file(path, data, data_rule(overwrite=True))
+    write(path, text.getvalue())
 
 
 def marked(name, text):

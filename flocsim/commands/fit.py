@@ -32,7 +32,7 @@ from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image, read_names
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL, TIFF_SUFFIXES, page_numbers
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.style import checked_format
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
@@ -164,7 +164,7 @@ def run(args: argparse.Namespace) -> int:
             "pixel; give the length of its side, for example --pixel-size '0.95 um'"
         )
     beneath = pictures_beneath(args.pictures, paths, args.masks and args.overlay is not None)
-    rule, drawn = data_rule(args.overwrite), figure_rule(args.overwrite)
+    rule, drawn = data_rule(args.overwrite), data_rule(args.overwrite)
     outputs = [Output(args.output, rule), Output(summary, rule)]
     if args.overlay is not None:
         outputs += [Output(path, drawn) for path in expected_overlays(args.overlay, paths)]

@@ -18,7 +18,7 @@ from flocsim.ensembles.contents import compare, file_kind, studies, text_of, unf
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.files import make_folder, unfinished, write_file
 from flocsim.io.journal import journal_of
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.results import MOST_ROWS
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.results import kernel_tables
@@ -135,7 +135,7 @@ def run_plot(args: argparse.Namespace) -> int:
         raise UsageError(f"{args.results} has no figure {foreign[0]}, only {', '.join(figures)}")
     folder = Path(args.output_dir)
     make_folder(folder, "--output-dir ")
-    stem, rule = Path(args.results).stem, figure_rule(args.overwrite)
+    stem, rule = Path(args.results).stem, data_rule(args.overwrite)
     paths = {name: folder / f"{stem}-{label(name)}.{args.format}" for name in names or figures}
     animation = animation_of(args, kind)
     check_outputs([Output(path, rule) for path in (*paths.values(), *animation)], [args.results])

@@ -19,7 +19,7 @@ from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.ensembles.parallel.communicator import SECONDS, StopRequested
 from flocsim.ensembles.parallel.processes import launched_rank
 from flocsim.errors import UsageError
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import tell
 from flocsim.process import STOPPED, handle
 
@@ -167,7 +167,7 @@ def read_survey(args: Namespace, sources: Any, first: bool) -> Any:
             raise UsageError(
                 f"--output {output} must not end in {figure.suffix}, as the figure does: use .h5"
             )
-        rules = data_rule(args.overwrite or args.mode == "resume"), figure_rule(args.overwrite)
+        rules = data_rule(args.overwrite or args.mode == "resume"), data_rule(args.overwrite)
         check_outputs([Output(output, rules[0], SUFFIX, WAYS), Output(figure, rules[1])],
                       [args.results])  # fmt: skip
     results = open_results(args.results, allowed_by(args), sources)
@@ -186,7 +186,7 @@ def run_strength(args: Namespace) -> int:
     if code == 0 and launched_rank() == 0:
         output, figure = places(args)
         found = read_strengths(output)
-        save(over_rate(found), figure, figure_rule(args.overwrite), source_line(found.about))
+        save(over_rate(found), figure, data_rule(args.overwrite), source_line(found.about))
         if not args.quiet:
             tell(str(figure))
     return code

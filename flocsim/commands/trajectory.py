@@ -13,7 +13,7 @@ from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.errors import UsageError
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule, figure_rule
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
@@ -99,7 +99,7 @@ def outcome_line(config, place, replicate, row):
 
 def draw(args, trajectory, title, source):
     """Draw and save what was asked for; the paths written."""
-    rule, written = figure_rule(args.overwrite), []
+    rule, written = data_rule(args.overwrite), []
     asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
     for figure, names in asked.items():
         made = drawn(trajectory, figure, args.frames, title) if names else None
@@ -129,7 +129,7 @@ def run(args: Namespace) -> int:
     if args.animation and Path(args.animation).suffix.lower() != ".gif":
         raise UsageError(f"--animation {args.animation} must end in .gif")
     drawn = [*figures, *filter(None, [args.animation])]
-    outputs = [Output(path, figure_rule(args.overwrite)) for path in drawn]
+    outputs = [Output(path, data_rule(args.overwrite)) for path in drawn]
     motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
     check_outputs([*outputs, *motion], inputs_of(config, args.config))
     study = one_count_study(config, place[1])

@@ -39,7 +39,7 @@ from flocsim.errors import UsageError
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
 from flocsim.io.confidence import Z, wilson
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, figure_rule
+from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.style import (
     Figure,
     checked_format,
@@ -401,7 +401,7 @@ def run_ladder(args: Namespace) -> int:
     check_study(config)
     for path in args.output:
         checked_format(path)
-    rule = figure_rule(args.overwrite)
+    rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule) for path in args.output], inputs_of(config, args.config))
     study = study_of(config)
     target = ALLOWED * sampling_error(config)

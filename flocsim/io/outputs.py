@@ -1,98 +1,27 @@
 """What the commands may write to: the one rule for every file that one of them makes.
 
 - What a command reads is never what it writes, whatever its options.
-- A file that exists is left alone, and the command ends before anything is run. Two may be
-  replaced: a figure or page that flocsim made and nobody has changed since (`own_mark`), and a
-  results file that is extended.
+- A file that exists is left alone, and the command ends before anything is run. Only a results
+  file that is extended is replaced.
 - With ``--overwrite`` the new file takes the place, and the old one is kept as name.1.h5.
 """
 
 import contextlib
 import os
-import stat
-import struct
 import sys
-import zlib
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Iterable
 
 import attrs
 
 from flocsim.errors import UsageError
 from flocsim.io.files import Old, Rule, check_writable, keep, ordinary_target
-from flocsim.io.seals import digest_of
-
-NAME = b"flocsim blake2b-256"
-
-MOST_BYTES = 2**30
-"""No figure is larger."""
-
-
-def png_remark(text):
-    body = b"tEXt" + NAME.replace(b" ", b"\0", 1) + b" " + text
-    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-
-
-def gif_remark(text):
-    words = NAME + b" " + text
-    return b"\x21\xfe" + bytes([len(words)]) + words + b"\0"
-
-
-# ending: (remark in the format, bytes of the file that come after it)
-PLACES: dict[str, tuple[Callable[[bytes], bytes], int]] = {
-    ".png": (png_remark, 12),
-    ".gif": (gif_remark, 1),
-    ".pdf": (lambda text: b"% " + NAME + b" " + text + b"\n", 0),
-} | dict.fromkeys(
-    (".svg", ".md", ".html"), (lambda text: b"<!-- " + NAME + b" " + text + b" -->\n", 0)
-)
-
-
-def marked(data: bytes, suffix: str) -> bytes:
-    """The bytes of a figure or page with their mark; ``suffix`` such as ".png" tells the format."""
-    remark, after = PLACES[suffix]
-    end = len(data) - after
-    return data[:end] + remark(digest_of(data).hex().encode()) + data[end:]
-
-
-def is_marked(data: bytes, suffix: str) -> bool:
-    """Whether these are bytes that `marked` gave."""
-    if suffix not in PLACES:
-        return False
-    remark, after = PLACES[suffix]
-    end = len(data) - after
-    start = end - len(remark(b"0" * 64))
-    return start >= 0 and marked(data[:start] + data[end:], suffix) == data
-
-
-def is_own(path: Path) -> bool:
-    """Whether an ordinary file is a figure or page of flocsim's that was not changed since."""
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    try:
-        with open(os.open(path, flags), "rb") as file:
-            about = os.fstat(file.fileno())
-            if not stat.S_ISREG(about.st_mode) or about.st_size > MOST_BYTES:
-                return False
-            return is_marked(file.read(), path.suffix.lower())
-    except OSError:
-        return False
-
 
 OVERWRITE_HELP = "replace files that exist; each is kept, study.h5 as study.1.h5"
 
 
 def data_rule(overwrite: bool = False) -> Rule:
-    """The rule for results, libraries, tables and motions."""
+    """Return the rule for new files: with ``overwrite`` the old one is kept under another name."""
     return (lambda _: Old.SET_ASIDE) if overwrite else keep
-
-
-def figure_rule(overwrite: bool = False) -> Rule:
-    """The rule for what can be drawn again: figures and pages."""
-    otherwise = data_rule(overwrite)
-    return lambda target: Old.REPLACED if is_own(target) else otherwise(target)
-
-
-redrawn = figure_rule()
 
 
 def extension_rule(path: str | os.PathLike) -> Rule:

@@ -11,8 +11,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.geometry.contact.points import placed_contacts
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.files import Rule
-from flocsim.io.outputs import figure_rule
+from flocsim.io.files import Rule, keep
 from flocsim.io.plots import collision
 from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
@@ -130,9 +129,7 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
     return collision.draw_forces(trajectory.t, along, touch, title)
 
 
-def animated(
-    trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule | None = None
-) -> None:
+def animated(trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule = keep) -> None:
     """Write the animation of a pair; ``rule`` says what becomes of a file that is there."""
     if path.suffix.lower() != ".gif":
         raise UsageError(f"{path}: an animation's name must end in .gif")
@@ -140,7 +137,7 @@ def animated(
     seen = frames_of(trajectory, frames)
     _, zone = touch_and_zone(trajectory)
     told = plain(title, MOST_OF_TITLE)
-    collision.write_animation(path, seen, distances(trajectory), zone, told, rule or figure_rule())
+    collision.write_animation(path, seen, distances(trajectory), zone, told, rule)
 
 
 def distances(trajectory: Any) -> tuple[list[float], list[float]]:

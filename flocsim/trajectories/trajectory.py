@@ -235,29 +235,34 @@ class Trajectory:
         return Trajectory.of(run, status, self.wall_time + time.perf_counter() - began, origin=made)
 
     def plot(
-        self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES
-    ) -> Any:
-        """A matplotlib Figure: "strip" of frames, "energies" (work of each force, kinetic), and of
-        a pair "distance" of the centres or "forces".
+        self, figure: str = "strip", file: str | os.PathLike | None = None, frames: int = FRAMES,
+        *, overwrite: bool = False,
+    ) -> Any:  # fmt: skip
+        """Return a matplotlib Figure: "strip" of frames, "energies" (work of each force, kinetic),
+        and of a pair "distance" of the centres or "forces".
 
         Forces are those on the second body along the line of centres, above 0 where they push
-        apart. Written to ``file`` if given. UsageError for an unknown one, and where there are not
-        two bodies but for the strip and the energies.
+        apart. Written to ``file`` if given; with ``overwrite`` a file that exists is kept under
+        another name. UsageError for an unknown figure, and where there are not two bodies but for
+        the strip and the energies; FileError for a file in the way.
         """
-        from flocsim.io.outputs import figure_rule
+        from flocsim.io.outputs import data_rule
         from flocsim.io.plots.style import save
         from flocsim.trajectories.figures import drawn
 
         made = drawn(self, figure, frames)
         if file is not None:
-            save(made, Path(file), figure_rule())
+            save(made, Path(file), data_rule(overwrite))
         return made
 
-    def animate(self, file: str | os.PathLike, frames: int = ANIMATION_FRAMES) -> None:
+    def animate(
+        self, file: str | os.PathLike, frames: int = ANIMATION_FRAMES, *, overwrite: bool = False
+    ) -> None:
         """Write an animation of a pair as a GIF; UsageError where there are not two bodies."""
+        from flocsim.io.outputs import data_rule
         from flocsim.trajectories.figures import animated
 
-        animated(self, Path(file), frames)
+        animated(self, Path(file), frames, rule=data_rule(overwrite))
 
     def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
         """Write the motion to HDF5, which `flocsim info`, `flocsim plot`, xarray and ParaView read.

@@ -28,7 +28,7 @@ from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.outputs import figure_rule
+from flocsim.io.outputs import data_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import first_of_each, read_results, read_row
@@ -210,10 +210,14 @@ class StudyResults(Tables):
             raise UsageError(f"{self.path} has no group {group}: it was written without it")
         return self.results.labelled(group, arrays)
 
-    def plot(self, figure: str = "overview", file: str | os.PathLike | None = None) -> Figure:
-        """One of the figures of `flocsim plot`, as a matplotlib Figure.
+    def plot(
+        self, figure: str = "overview", file: str | os.PathLike | None = None, *,
+        overwrite: bool = False,
+    ) -> Figure:  # fmt: skip
+        """Return one of the figures of `flocsim plot`, as a matplotlib Figure.
 
-        Written to ``file`` if given. UsageError for an unknown one, which lists them.
+        Written to ``file`` if given; with ``overwrite`` a file that exists is kept under another
+        name. UsageError for an unknown figure, which lists them, FileError for a file in the way.
         """
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
@@ -223,7 +227,7 @@ class StudyResults(Tables):
         drawn = FIGURES[figure](results)
         add_foot(drawn, source_line(self.run))
         if file is not None:
-            save(drawn, Path(file), figure_rule())
+            save(drawn, Path(file), data_rule(overwrite))
         return drawn
 
     def replicate(

@@ -9,8 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule
-from flocsim.io.outputs import redrawn
+from flocsim.io.files import Rule, keep
 from flocsim.io.plots import style
 from flocsim.io.plots.style import CONTACT_COLOUR, Figure, drawing, plain
 
@@ -230,7 +229,7 @@ def largest_of(curves):
 
 def write_animation(
     path: str | Path, frames: Frames, motion: tuple[Sequence[float], Sequence[float]],
-    zone_distance: float = math.nan, title: str = "", rule: Rule = redrawn,
+    zone_distance: float = math.nan, title: str = "", rule: Rule = keep,
 ) -> None:  # fmt: skip
     """Write Frames as a GIF that loops.
 

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.errors import UsageError, visible
-from flocsim.io.files import Rule, write_file
-from flocsim.io.outputs import marked, redrawn
+from flocsim.io.files import Rule, keep, write_file
 
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""
@@ -353,7 +352,7 @@ def checked_format(path: str | Path, option: str = "") -> str:
     return suffix
 
 
-def save(figure: Figure, path: str | Path, rule: Rule = redrawn, foot: str = "") -> None:
+def save(figure: Figure, path: str | Path, rule: Rule = keep, foot: str = "") -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
     ``rule`` says what becomes of a file that is there (flocsim.io.outputs); ``foot`` stands below
@@ -366,7 +365,7 @@ def save(figure: Figure, path: str | Path, rule: Rule = redrawn, foot: str = "")
     with house_style():
         keep_titles_whole(figure)
         figure.savefig(picture, format=suffix, metadata=METADATA[suffix])
-    write_file(path, marked(picture.getvalue(), f".{suffix}"), rule)
+    write_file(path, picture.getvalue(), rule)
 
 
 def frame_of(figure: Figure) -> Any:
@@ -377,11 +376,11 @@ def frame_of(figure: Figure) -> Any:
     return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
 
 
-def save_gif(path: str | Path, frames: Sequence[Any], each: int, rule: Rule = redrawn) -> None:
+def save_gif(path: str | Path, frames: Sequence[Any], each: int, rule: Rule = keep) -> None:
     """Write frames as a GIF that loops, ``each`` shown for so many milliseconds and the last for
     LAST; FileError if it cannot be written."""
     lasting = [each] * (len(frames) - 1) + [LAST]
     buffer = io.BytesIO()
     frames[0].save(buffer, "GIF", save_all=True, append_images=frames[1:], duration=lasting,
                    loop=0, optimize=False)  # fmt: skip
-    write_file(path, marked(buffer.getvalue(), ".gif"), rule)
+    write_file(path, buffer.getvalue(), rule)

@@ -12,8 +12,7 @@ import numpy as np
 from flocsim.geometry.shapes.cores import parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
-from flocsim.io.files import Rule
-from flocsim.io.outputs import redrawn
+from flocsim.io.files import Rule, keep
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
     Figure,
@@ -248,7 +247,7 @@ def shifts(place, reach, side, repeats):
 
 
 def write_swarm_animation(
-    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = redrawn
+    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = keep
 ) -> None:
     """Write a swarm at all its times as a GIF that loops; FileError if it cannot be written."""
     outlines, pictures = outlines_of(results, replicate), []
