@@ -1,7 +1,10 @@
 """Hostile files of every kind are read or refused in one line: a fast part of the fuzzing that
 benchmarks/faults/fuzz_readers.py does, in this process."""
 
+import os
 import random
+import sys
+import traceback
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
+from flocsim.__main__ import main
 from tests.helpers import hostile_files
 from tests.helpers.tiers import rest_slow
 
@@ -52,6 +56,56 @@ def test_some_are_read_and_some_are_refused(readers, kind, files):
     }
     assert ends <= {"read", "refused"}
     assert "refused" in ends
+
+
+def run_forked(argv, folder):
+    """(exit code, lines of both streams, CPU seconds, peak bytes) of a command in a fork."""
+    out = folder / "out.txt"
+    child = os.fork()
+    if child == 0:
+        with open(out, "wb") as file:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+        sys.stdout, sys.stderr = (os.fdopen(number, "w") for number in (1, 2))
+        code = 99
+        try:
+            code = main(argv)
+        except SystemExit as end:
+            code = end.code
+        except BaseException:
+            traceback.print_exc()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    _, status, used = os.wait4(child, 0)
+    lines = out.read_text("utf-8", "replace").splitlines()
+    return (
+        os.waitstatus_to_exitcode(status), lines, used.ru_utime + used.ru_stime,
+        1024 * used.ru_maxrss,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+@pytest.mark.parametrize("files", rest_slow([8, 150], lambda files: files == 8))
+@pytest.mark.parametrize("kind", ["pictures", "masks"])
+def test_fit_ends_with_plain_lines_and_little_work(tmp_path, capfd, kind, files):
+    make, _ = reader(kind, tmp_path)
+    options = ["--vertices", "4", "--overwrite", "-o", str(tmp_path / "o.h5")]
+    with capfd.disabled():
+        for number in range(files):
+            path = made(make, f"fit {kind}", number, tmp_path)
+            sized = [] if ".ome" in path.name else ["--pixel-size", "1e-6"]
+            masks = ["--masks"] if kind == "masks" or number % 4 == 0 else []
+            code, lines, seconds, peak = run_forked(
+                ["fit", str(path), *sized, *masks, *options], tmp_path
+            )
+            ours = (str(path.name), "flocsim: ", "mean relative", "         N ", "1 (circle)",
+                    "   ", "diameters", "perimeter-based", str(tmp_path), "warning: ",
+                    "pixel size")  # fmt: skip
+            foreign = [line for line in lines if not line.startswith(ours)]
+            assert code in (0, 2, 70) and not foreign, (number, path, code, lines)
+            assert not any("internal error" in line for line in lines), (number, lines)
+            assert seconds < 5.0 and peak < 2**30, (number, seconds, peak, lines)
 
 
 @pytest.mark.parametrize("files", rest_slow([60, 300], lambda files: files == 60))

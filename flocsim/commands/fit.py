@@ -105,7 +105,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--masks-out", metavar="FOLDER",
         help="write a label image of every picture, 0 outside and the number of each floc inside "
         "it (16-bit PNG), which can be edited and read back by --masks")  # fmt: skip
-    add("--memory", default="1", metavar="GB",
+    add("--memory", default="1.3", metavar="GB",
         help="memory that a picture may take; larger ones are refused before the work begins "
         "(default: %(default)s)")  # fmt: skip
     add("--overwrite", action="store_true", help=OVERWRITE_HELP)

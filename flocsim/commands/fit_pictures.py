@@ -22,7 +22,15 @@ from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.paper import segment_as_paper
 from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
-from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
+from flocsim.io.images.reading import (
+    ANNOUNCED,
+    BYTES_PER_PIXEL,
+    SUFFIXES,
+    check_file,
+    grey_of,
+    read_grey,
+    read_pixels,
+)
 from flocsim.io.images.regions import Region, mask_measures, with_holes
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.plots.shapes import draw_overlay, single_fit
@@ -180,6 +188,7 @@ def find_flocs(task):
             pixels = read_pixels(path, plane, options.memory)
             if is_mask(pixels):
                 return None
+            announce(name + page, pixels.shape)
             size = size or known_size(path, options)
             grey = grey_of(pixels, path)
             if options.finder == "paper":
@@ -190,6 +199,16 @@ def find_flocs(task):
         return pictures
     except FlocsimError as error:
         return error
+
+
+def announce(name, shape):
+    """Say before it begins what the work on a large picture takes."""
+    needed = BYTES_PER_PIXEL * shape[0] * shape[1]
+    if needed > ANNOUNCED:
+        report(
+            f"{name}: {shape[0] * shape[1] / 1e6:.3g} Mpixel may take up to {needed / 1e9:.2g} GB "
+            "of memory (--memory)"
+        )
 
 
 def planes_in(path, options):
@@ -216,6 +235,7 @@ def masked(path, name, options):
     limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
     pictures = []
     for inner, mask in read_masks(path, options.memory):
+        announce(name + inner[len(path.name) :], mask.shape)
         found = segment_mask(mask, **limits)
         size = known_size(path, options)
         pictures.append(chosen(path, name + inner[len(path.name) :], found, options, size))

@@ -394,6 +394,39 @@ def tiff_bytes(rng):
     return file.getvalue()
 
 
+def ome_bytes(rng):
+    """An OME-TIFF with odd sizes of its axes and pixels."""
+    import tifffile
+
+    file, grey = io.BytesIO(), grey_array(rng)
+    sizes = {"axes": "YX", "PhysicalSizeX": 1.000001, "PhysicalSizeY": 1.000001}
+    tifffile.imwrite(file, grey, metadata=sizes, ome=True)
+    odd = [b"-1", b"0", b"nan", b"inf", b"1e-300", b"1e300", b"99999999999", b"x", b"1"]
+    data = file.getvalue()
+    for name in (b"SizeC", b"SizeZ", b"SizeT", b"PhysicalSizeX", b"PhysicalSizeY"):
+        before, mark, rest = data.partition(name + b'="')
+        old, _, after = rest.partition(b'"')
+        if mark and rng.random() < 0.6:
+            # Of the same length, since offsets lie behind it.
+            new = rng.choice(odd)[: len(old)].rjust(len(old))
+            data = before + mark + new + b'"' + after
+    return data
+
+
+def changed_tags(rng, data):
+    """A TIFF with odd numbers in the place of the values of some of its tags."""
+    import tifffile
+
+    found = bytearray(data)
+    with tifffile.TiffFile(io.BytesIO(data)) as tiff:
+        tags = list(tiff.pages[0].tags.values())
+        order = "little" if tiff.byteorder == "<" else "big"
+    for tag in rng.sample(tags, min(len(tags), rng.randint(1, 2))):
+        value = rng.choice([*ODD_NUMBERS, 40_000, 32773, 34925])
+        found[tag.valueoffset : tag.valueoffset + 2] = value.to_bytes(2, order)
+    return bytes(found)
+
+
 def repaired_png(data):
     """A PNG whose chunks have right checksums again."""
     found, place = bytearray(data[:8]), 8
@@ -410,7 +443,11 @@ def picture_file(rng, folder):
     suffix, data = picture_bytes(rng.randrange(60))
     if rng.random() < 0.2:
         suffix, data = "tif", tiff_bytes(rng)
-    if rng.random() < 0.9:
+    elif rng.random() < 0.1:
+        suffix, data = "ome.tif", ome_bytes(rng)
+    if suffix.endswith("tif") and rng.random() < 0.5:
+        data = changed_tags(rng, data)
+    elif rng.random() < 0.9:
         data = flip(rng, data, most=3)
     if suffix == "png" and rng.random() < 0.8:
         data = repaired_png(data)

@@ -189,6 +189,23 @@ def quietened(contrast: np.ndarray, noise: float, scale: float) -> tuple[np.ndar
     return gaussian_filter(contrast, more, mode="nearest"), float(np.hypot(there, more))
 
 
+def distances(mask: np.ndarray) -> np.ndarray:
+    """Return the distance [px] of every pixel of a mask from the nearest one outside, float32.
+
+    scipy's own distances would take twice the memory, the most of all steps.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(mask, return_distances=False, return_indices=True)
+    squares = np.zeros(mask.shape, np.float32)
+    for axis, size in enumerate(mask.shape):
+        nearest[axis] -= np.expand_dims(np.arange(size, dtype=np.int32), 1 - axis)
+        along = nearest[axis].astype(np.float32)
+        along *= along
+        squares += along
+    return np.sqrt(squares, out=squares)
+
+
 class Search:
     """The outlines of a contrast (h, w).
 
@@ -244,7 +261,7 @@ class Search:
         """The contrast of the light beside an island, and three times its noise: in a crowd the
         light that all of a picture has may be too dark for one of its corners. 0 where it is as
         bright, or the noise hides it."""
-        from scipy.ndimage import distance_transform_edt, gaussian_filter
+        from scipy.ndimage import gaussian_filter
 
         place = clipped(beyond(box, FAR), self.contrast.shape)
         near = self.contrast[place]
@@ -252,7 +269,7 @@ class Search:
         corner = box[0].start - place[0].start, box[1].start - place[1].start
         if 2 * np.count_nonzero(near <= -self.floor) < lit_at_ends(lit, mask, corner):
             return 0.0, self.floor
-        away = distance_transform_edt(~placed(mask, box, place))
+        away = distances(~placed(mask, box, place))
         beside = lit & (away > FRINGE) & (away <= FAR)
         base = float(np.median(near[beside])) if beside.any() else 0.0
         if base > -self.floor:
@@ -263,9 +280,9 @@ class Search:
 
     def down_to(self, level, mask, near):
         """An island with what stands above a lower level beside it."""
-        from scipy.ndimage import distance_transform_edt, label
+        from scipy.ndimage import label
 
-        beside = (near <= self.floor) & (near > level) & (distance_transform_edt(~mask) <= FRINGE)
+        beside = (near <= self.floor) & (near > level) & (distances(~mask) <= FRINGE)
         parts = label(mask | beside, EIGHT)[0]
         return np.isin(parts, np.unique(parts[mask]))
 

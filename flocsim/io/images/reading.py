@@ -39,12 +39,15 @@ CHOOSE = "choose with --page and --channel, or save the picture that you want as
 LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 """Weights of red, green and blue in the luminance (ITU-R BT.709)."""
 
-MEMORY = 10**9
+MEMORY = 1.3e9
 """Bytes that a picture may take unless --memory gives another number: 25 Mpixel of grey fit."""
 
-BYTES_PER_PIXEL = 38
-"""Peak of reading, finding flocs and measuring them where one floc covers half of the picture,
-which is the worst case; 20 where all flocs are small."""
+ANNOUNCED = 0.85e9
+"""Bytes above which it is said beforehand: with the libraries 1 GiB."""
+
+BYTES_PER_PIXEL = 48
+"""Peak of reading, finding flocs and measuring them where one island covers most of the picture,
+which is the worst case; 25 where all flocs are small."""
 
 LARGEST_FILE = 2**32
 MOST_SPREAD = 20

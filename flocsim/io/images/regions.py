@@ -11,6 +11,7 @@ from flocsim.io.images.outlines import (
     PIXEL,
     SHARP,
     beyond,
+    distances,
     filled,
     pieces,
     placed,
@@ -145,8 +146,6 @@ def reason_to_reject(box, shape, radius, blur, filters):
 def with_band(region, taken, contrast):
     """The Region with its band: a level is uncertain by BAND of the step at the edge, and by what
     it changes over PIXEL."""
-    from scipy.ndimage import distance_transform_edt
-
     top, left, bottom, right = region.bbox
     box = slice(top, bottom), slice(left, right)
     mask = region.mask[1:-1, 1:-1]
@@ -156,7 +155,7 @@ def with_band(region, taken, contrast):
     slope = float(np.median(along(near.astype(np.float32), wide, (0, 0), 0)))
     change = np.hypot(BAND * (region.level - region.base), PIXEL * slope)
     inner = largest_piece(filled(wide & (near > region.level + change)), wide)
-    around = (distance_transform_edt(~wide) <= reach) & ~(taken[place] & ~wide)
+    around = (distances(~wide) <= reach) & ~(taken[place] & ~wide)
     outer = largest_piece(filled(wide | (around & (near > region.level - change))), wide)
     # What the picture's edge has cut off is given back, so that the margin is the same all around.
     whole = beyond(box, reach)
@@ -243,10 +242,9 @@ def confidence(parts, width):
 def bodies(mask, neck, min_radius):
     """The mask's pixels numbered by body, from 1, 0 outside; and the width of the widest neck that
     is cut, as a share of the smaller body's."""
-    from scipy.ndimage import distance_transform_edt
     from skimage.segmentation import watershed
 
-    depth = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
+    depth = distances(np.pad(mask, 1))[1:-1, 1:-1]
     peaks = peaks_of(depth, max(1, int(0.5 * min_radius)))
     if not has_neck(depth, peaks, neck):
         return mask.astype(int), 1.0
