@@ -580,3 +580,65 @@ def test_both_ends_of_bands_are_fitted_on_request(tmp_path, frame, capsys):
     capsys.readouterr()
     with pytest.raises(UsageError, match="--band excludes --masks"):
         run(frame, *options, "--band", "--masks", "-o", tmp_path / "c.h5")
+
+
+def drawn_flocs():
+    """A grey picture with two bright flocs."""
+    y, x = np.mgrid[:200, :300]
+    grey = 40 + 3 * np.sin(x / 5) + 160 * (np.hypot(x - 90, y - 80) < 30)
+    return grey + 160 * (np.hypot(x - 220, y - 120) < 22)
+
+
+@pytest.mark.parametrize("finder", ["steepest", "paper"])
+def test_both_finders_find_the_same_flocs_on_even_light(tmp_path, capsys, finder):
+    from PIL import Image
+
+    Image.fromarray(drawn_flocs().astype("u1")).save(tmp_path / "p.png")
+    library = tmp_path / "o.h5"
+    words = ["fit", str(tmp_path / "p.png"), "--pixel-size", "1e-6", "--vertices", "4"]
+    assert main([*words, "--finder", finder, "-o", str(library)]) == 0
+    assert "2 bright flocs" in capsys.readouterr().out
+    sizes = sorted(1e6 * entry.measured_radius for entry in read_library(library))
+    assert sizes == pytest.approx([22, 30], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--finder", "paper", "--threshold", "0.2"], "--threshold does not apply"),
+     (["--finder", "paper", "--noise-scale", "2"], "--noise-scale does not apply"),
+     (["--finder", "paper", "--cutoff", "0.7"], "--cutoff takes"),
+     (["--cutoff", "0.1"], "--finder paper only")],
+)  # fmt: skip
+def test_options_of_the_other_finder_are_refused(tmp_path, capsys, words, said):
+    assert main(["fit", str(tmp_path / "p.png"), "--pixel-size", "1e-6", *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("dtype", ["u4", "f4"])
+def test_one_hot_pixel_does_not_hide_the_flocs(tmp_path, capsys, dtype):
+    import tifffile
+
+    grey = drawn_flocs().astype(dtype) * (2**23 if dtype == "u4" else 1)
+    grey[5, 7] = np.iinfo(dtype).max if dtype == "u4" else 1e6
+    tifffile.imwrite(tmp_path / "p.tif", grey)
+    words = ["fit", str(tmp_path / "p.tif"), "--pixel-size", "1e-6", "--vertices", "4"]
+    assert main([*words, "-o", str(tmp_path / "o.h5")]) == 0
+    assert "2 bright flocs" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("side", ["1e-300", "1e300", "nan", "0", "-1"])
+def test_pixel_sizes_of_files_are_possible(tmp_path, capsys, side):
+    import tifffile
+
+    sizes = {f"PhysicalSize{axis}": side for axis in "XY"}
+    units = {f"PhysicalSize{axis}Unit": "m" for axis in "XY"}
+    path = tmp_path / "p.ome.tif"
+    tifffile.imwrite(path, drawn_flocs().astype("u1"), metadata={"axes": "YX", **sizes, **units})
+    assert main(["fit", str(path), "-o", str(tmp_path / "o.h5")]) == 2
+    assert "--pixel-size" in capsys.readouterr().err
+
+
+def test_arrays_among_pictures_are_told_to_be_masks(tmp_path, capsys):
+    np.savez(tmp_path / "m.npz", a=np.ones((9, 9), bool))
+    assert main(["fit", str(tmp_path / "m.npz"), "--pixel-size", "1e-6"]) == 2
+    assert ".npz files hold masks, not pictures: give --masks" in capsys.readouterr().err

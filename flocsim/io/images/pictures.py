@@ -214,7 +214,7 @@ def _contrast(grey, smooth, light, flocs, noise_scale):
         smooth -= smooth_surface(smooth, DEGREE) if light is None else light
         return smooth, left_over * robust_deviation(fine)
     light = smooth_surface(smooth, DEGREE, logarithmic=True) if light is None else light
-    floor = max(UNLIT * light.max(), np.finfo(float).tiny)
+    floor = max(UNLIT * light.max(), np.finfo(np.float32).tiny)
     np.maximum(light, floor, out=light)
     smooth /= light
     np.subtract(1.0, smooth, out=smooth)

@@ -243,7 +243,7 @@ def _decode_tiff(path, frame, crop, memory):
             size = page.imagelength, page.imagewidth
             check_memory(path, page.nbytes, size, crop, memory)
             if reason := left_to_pillow(page):
-                # Pillow swaps bytes once more than libtiff has done already, and inverts only bytes.
+                # Pillow swaps bytes that libtiff has swapped already, and inverts bytes only.
                 wide = page.dtype not in (None, bool, np.uint8)
                 swapped = tiff.byteorder == ">" and page.dtype != np.uint16
                 if wide and (swapped or page.photometric == WHITE_IS_ZERO):

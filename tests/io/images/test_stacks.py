@@ -136,3 +136,29 @@ def test_what_a_file_says_falsely_is_not_believed(tmp_path):
     assert stack_of(path).frame_count == 1
     path.write_bytes(b"no picture")
     assert stack_of(path) == Stack()
+
+
+@pytest.mark.parametrize("compression", [None, "zlib"])
+@pytest.mark.parametrize("order", "<>")
+@pytest.mark.parametrize("dtype", ["?", "u1", "u2", "u4", "u8", "i1", "i2", "i4", "f4", "f8"])
+@pytest.mark.parametrize("photometric", ["minisblack", "rgb", "miniswhite"])
+def test_numbers_of_every_type_are_read_right_or_refused(
+    tmp_path, compression, order, dtype, photometric
+):
+    grey = np.linspace(0, 1, 63).reshape(7, 9)
+    white = 1 if dtype[0] in "?f" else np.iinfo(dtype).max * 0.999
+    stored = (grey > 0.5) if dtype == "?" else (grey * white).astype(dtype)
+    wanted = stored.astype(float) if dtype == "?" else grey
+    if photometric == "rgb":
+        stored = np.stack([stored] * 3, axis=-1)
+    path = tmp_path / "p.tif"
+    tifffile.imwrite(
+        path, stored, photometric=photometric, byteorder=order, compression=compression
+    )
+    try:
+        found = read_grey(path)
+    except ImageError as error:
+        assert "save it" in str(error) or "no black is known" in str(error)
+        return
+    wanted = 1 - wanted if photometric == "miniswhite" else wanted
+    assert found == pytest.approx(wanted, abs=0.04)
