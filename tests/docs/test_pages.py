@@ -108,7 +108,8 @@ def test_every_config_loads(page, line, text, tmp_path):
 def config_of(text, folder):
     """The path of a config in a folder: that of a block, or a minimal one under its fragment."""
     for name in re.findall(r'^file = "(.*\.h5)"', text, re.MULTILINE):
-        shutil.copy(ROOT / "flocsim" / "io" / "synthetic.h5", folder / name)
+        if not (folder / name).exists():
+            shutil.copy(ROOT / "flocsim" / "io" / "synthetic.h5", folder / name)
     rest = 'source = "library"\nfile = "synthetic"\n'
     if 'pairs = "measured"' in text and "[shapes]" not in text:
         text += f"[shapes]\n{rest}"
@@ -141,6 +142,8 @@ RUN = [page for page in PAGES if blocks(page) and page not in NOT_RUN]
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
 def test_every_block_runs_as_pasted_in_an_empty_folder(page, tmp_path, monkeypatch, capsys):
+    if page == "docs/formats.md":
+        pytest.importorskip("gsd")
     if page in ("docs/library.md", "docs/kernels.md", "docs/results.md"):
         pytest.importorskip("xarray")
         pytest.importorskip("pandas")
@@ -192,7 +195,7 @@ def give(page, folder):
         else:
             (folder / "study.toml").write_text(SMALL, "utf-8")
     if {"study.h5", "run.vtkhdf"} & set(GIVEN.get(page, ())):
-        study = flocsim.Study(folder / "study.toml" if (folder / "study.toml").exists() else SMALL)
+        study = flocsim.Study(folder / "study.toml")
         study.run(output=folder / "study.h5")
         study.replicate(17).export(folder / "run.vtkhdf")
 
