@@ -8,7 +8,7 @@ from flocsim import __version__
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 from flocsim.process import check_memory, forget_left_over_launch, install, is_limited
 
-if {"ensemble", "kernel", "swarm", "strength"}.intersection(sys.argv[1:2]):
+if {"ensemble", "kernel", "swarm"}.intersection(sys.argv[1:2]):
     fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
@@ -20,7 +20,7 @@ from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
 
-STUDIES = {"ensemble", "kernel", "swarm", "strength"}
+STUDIES = {"ensemble", "kernel", "swarm"}
 """Commands that run studies, also under mpirun."""
 
 ALONE = (

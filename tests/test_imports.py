@@ -75,6 +75,7 @@ INNER_ROWS = {
         ["sweep"],
         ["cli", "script_study"],
         ["runner"],
+        ["strength"],
         [folder.name for folder in STUDIES.values()],
         ["dry_run", "report"],
         ["parallel"],

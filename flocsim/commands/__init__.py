@@ -53,7 +53,6 @@ ENSEMBLES = "ensemble", "kernel", "swarm"
 """A study by the name of its kind of scene."""
 
 FILES = {
-    "strength": ("commands.sweep", "_strength"),
     **{name: ("commands.show", f"_{name}") for name in ("plot", "export", "compare", "info")},
     **dict.fromkeys(ENSEMBLES, ("ensembles.cli", "")),
 }

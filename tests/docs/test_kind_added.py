@@ -16,7 +16,7 @@ from tests.helpers.waiting import PATIENCE
 ROOT = Path(__file__).resolve().parents[2]
 KIND = ROOT / "tests/helpers/lone_flocs"
 TABLE = "flocsim/ensembles/config/__init__.py"
-BEFORE = '    "flocsim strength": Folder("strength"),\n'
+BEFORE = '    "flocsim swarm": Folder("swarms", "swarm"),\n'
 LINE = '    "flocsim lone": Folder("lone", "lone"),\n'
 MOST_LINES = 330
 

@@ -7,7 +7,6 @@ import sys
 
 import pytest
 
-from flocsim.__main__ import main
 from tests.ensembles.test_matrix import PAIRS
 from tests.helpers.swarm_study import SWARM
 from tests.helpers.tiers import rest_slow
@@ -20,10 +19,8 @@ flocsim.Study("study.toml").run(jobs=2, output="new.h5", mode="resume")
 FLOCSIM = [sys.executable, "-m", "flocsim"]
 OVER = ["--over", "fluid.viscosity=1e-3,2e-3"]
 SWEEP = ["sweep", "study.toml", *OVER, "-o", "new.h5", "--jobs", "2"]
-STRENGTH = ["strength", "study.h5", "-o", "new.h5", "--jobs", "2"]
 RUNS = {
     "sweep": ([*FLOCSIM, *SWEEP], "new.parts/0000.h5.journal", ["--resume"]),
-    "strength": ([*FLOCSIM, *STRENGTH], "new.h5.journal", ["--resume", "--count", "2"]),
     "Study.run": ([sys.executable, "-c", SCRIPT], "new.h5.journal", []),
 }
 """What is killed, a file that shows that its processes work, further words that go on with it."""
@@ -38,9 +35,9 @@ def members(group):
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    rest_slow([("sweep", PAIRS), ("sweep", SWARM), ("strength", PAIRS), ("Study.run", PAIRS),
+    rest_slow([("sweep", PAIRS), ("sweep", SWARM), ("Study.run", PAIRS),
                ("Study.run", SWARM)], lambda name, text: name == "sweep" and text is PAIRS),
-    ids=["sweep", "sweep of swarms", "strength", "Study.run", "Study.run of swarms"],
+    ids=["sweep", "sweep of swarms", "Study.run", "Study.run of swarms"],
 )  # fmt: skip
 def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
     monkeypatch.chdir(tmp_path)
@@ -50,8 +47,6 @@ def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
     changed = text.replace(f"replicates {few}\n", f"replicates {more}\n")
     (tmp_path / "study.toml").write_text(changed, "utf-8")
     first, shows, then = RUNS[name]
-    if name == "strength":
-        assert main(["ensemble", "study.toml", "-o", "study.h5", "--quiet", "--jobs", "2"]) == 0
     running = subprocess.Popen(
         first, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

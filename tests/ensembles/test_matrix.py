@@ -17,7 +17,6 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.io.results.file import read_results
-from flocsim.io.results.strength_file import read_strengths
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers import parts_here
 from tests.helpers.kernel_study import kernel_text
@@ -50,7 +49,6 @@ class Kind:
     read: object
 
 
-FEW = ("--count", "2", "--precision", "0.5")
 KINDS = {
     each.name: each
     for each in (
@@ -59,19 +57,10 @@ KINDS = {
              kernel_text(replicates=8, scrambles=2).replace("kernel.h5", "rates.h5"), read_results),
         Kind("swarms", ("swarm", "swarms.toml"), ("--replicates", "3"),
              SWARM.replace('file = "swarm.h5"', 'file = "swarms.h5"'), read_swarm),
-        Kind("strengths", ("strength", "pairs.h5", *FEW), ("--count", "5"), "", read_strengths),
     )
 }  # fmt: skip
 
-REFUSED = {
-    ("sweep", "strengths"): "pairs.h5",
-    ("Study", "strengths"): "pairs.h5",
-    (
-        "compare",
-        "strengths",
-    ): "holds a flocsim strength: name a file of flocsim results or flocsim s",
-    ("dry run", "strengths"): "unrecognized arguments: --dry-run",
-}
+REFUSED: dict = {}
 """What is refused, and the words that say why."""
 
 

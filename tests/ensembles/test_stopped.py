@@ -27,7 +27,6 @@ RUNS = {
     "kernel": (kernel_text(replicates=2048), FLOCSIM, ["kernel", "my study.toml"], signal.SIGINT),
     "swarm": (SWARM.replace("replicates = 2", "replicates = 40"), FLOCSIM,
               ["swarm", "my study.toml"], signal.SIGINT),
-    "strength": (PAIRS, FLOCSIM, ["strength", "results.h5"], signal.SIGTERM),
     "sweep": (MANY, FLOCSIM, ["sweep", "my study.toml", *OVER], signal.SIGHUP),
 }  # fmt: skip
 """{name: (config, what is started, its words, the signal that stops it)}."""
@@ -73,9 +72,6 @@ def test_the_last_line_of_a_stopped_job_finishes_it(tmp_path, monkeypatch, name)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", str(BESIDE_PYTHON) + os.pathsep + os.environ["PATH"])
     (tmp_path / "my study.toml").write_text(text, "utf-8")
-    if name == "strength":
-        made = [*FLOCSIM, "ensemble", "my study.toml", "-o", "results.h5", "--quiet"]
-        subprocess.run(made, check=True, timeout=300)
     code, errors = stopped(
         [*start, *words, "-o", "new.h5"], tmp_path / JOURNALS.get(name, "new.h5.journal"), number
     )

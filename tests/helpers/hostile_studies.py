@@ -328,7 +328,7 @@ def kept_journal(path, parts, name):
 
 KINDS = (
     "pairs", "own_classes", "rates", "swarms", "strengths", "sweeps", "swarm_sweeps",
-    "trajectories", "libraries", "pairs_journals", "swarms_journals", "strengths_journals",
+    "trajectories", "libraries", "pairs_journals", "swarms_journals",
     "places",
 )  # fmt: skip
 

@@ -41,5 +41,5 @@ def mixed(complete=True):
     columns = {name: np.array(values) for name, values in columns.items()}
     bound = np.zeros((2, 2, 2), dtype=np.int64)
     bound[1, 0, 1] = 6
-    about = {"flow": "shear", "precision": 0.005, "asked": 4, "complete": complete}
+    about = {"flow": "shear", "precision": 0.005, "complete": complete}
     return strengths_of(AXES, bound, columns, about)

@@ -35,11 +35,11 @@ class Folder(NamedTuple):
 STUDIES = {
     "flocsim results": Folder("pairs"),
     "flocsim swarm": Folder("swarms", "swarm"),
-    "flocsim strength": Folder("strength"),
 }
 """What a results file says that it is → the Folder of the kind."""
 
 FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
+    "flocsim strength": "ensembles.strength.contents",
     "flocsim sweep": "ensembles.sweep",
     "flocsim trajectory": "commands.trajectory:TRAJECTORY",
     "flocsim shape library": "commands.shapes:LIBRARY",

@@ -19,7 +19,7 @@ def facts_of(found: Strengths) -> Facts:
     facts = [("tested", told), ("found", ", ".join(ends)), ("tolerance", ", ".join(needed))]
     return facts + [
         (name.replace("_", " "), str(value)) for name, value in found.about.items()
-        if name not in ("asked", "complete", "cpus", "shapes", "preset")
+        if name not in ("complete", "shapes", "preset")
     ]  # fmt: skip
 
 
@@ -28,7 +28,6 @@ CONTENTS = Contents(
     summary=lambda found: Summary(facts_of(found)), table=table_of,
     figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
     mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",
-    so_far=lambda found: facts_of(found.results),
     source=lambda found: source_line(found.about),
     opened=lambda path, allowed=None: read_strengths(path),
 )  # fmt: skip

@@ -59,10 +59,6 @@ hundred steps. Edges that slide over each other near the rate at which they open
 1e-15 m, tens of thousands of times; coarser steps go over that (docs/strength.md)."""
 
 
-class Halted(Exception):
-    """Somebody wants a doublet to be given up."""
-
-
 @attrs.frozen
 class Opening:
     """Between which rates a doublet opens: it ``holds`` at one and ``opens`` at the next [1/s].
@@ -197,20 +193,15 @@ class Doublet:
             return None
         return watch.opened
 
-    def opening(
-        self, precision: float = 5e-3, halted: Callable[[], bool] = lambda: False
-    ) -> Opening:
+    def opening(self, precision: float = 5e-3) -> Opening:
         """The first rate of the ladder at which it opens, then by halves of the logarithm to a
         relative ``precision``.
 
-        A doublet may hold again at higher rates: it is the first rung that counts. ``halted()``,
-        looked at before every rate, ends it: Halted.
+        A doublet may hold again at higher rates: it is the first rung that counts.
         """
         used = []
 
         def opens_at(rate: float) -> bool | None:
-            if halted():
-                raise Halted
             found, tolerance = self.answer(rate)
             used.append(tolerance)
             return found

@@ -12,7 +12,7 @@ there is so far. Here its tables are made of rows, too, and told.
 
 import json
 import os
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +47,6 @@ DOUBLETS = {
     "tolerance": ("f8", "m", "largest tolerance that one of its runs needed; NaN: unknown"),
 }
 """Columns (doublet,): {name: (type, units, long name)}."""
-
-ROW = np.dtype([(name, kind if kind == "u1" else f"<{kind}")
-                for name, (kind, _, _) in list(DOUBLETS.items())[4:]])  # fmt: skip
-"""What a tested doublet comes to: the columns but for where it stands."""
 
 COUNTS = {
     "n_bound": ("i8", "1", "doublets found bound"),
@@ -98,10 +94,8 @@ class Strengths(Tables):
 
     @property
     def progress(self) -> str:
-        """How many have been, in words."""
-        asked = self.about.get("asked")
-        of = f" of {asked}" if isinstance(asked, int) else ""
-        return f"{len(self.column('status'))}{of} doublets"
+        """How many doublets have been tested, in words."""
+        return f"{len(self.column('status'))} doublets"
 
     def labelled(self, group: str = "doublets") -> Labelled:
         """The arrays of "doublets" or "conditions"; UsageError for another group."""
@@ -204,30 +198,6 @@ def strengths_of(
         rate[place] = quantiles_of(opens[opened], holding)
     conditions = labelled_conditions(axes, {"n_bound": bound, **counts, "rate": rate})
     return Strengths(about, labelled_doublets(columns), conditions)
-
-
-def strengths_in(
-    store: Any, bound: np.ndarray, about: dict[str, Any],
-    known: Container[tuple[int, int]] | None = None,
-) -> Strengths:  # fmt: skip
-    """The Strengths of all rows of a store, in its order; of those (place of the condition,
-    replicate) that are ``known`` to be bound, all for None."""
-    axes = [list(dict.fromkeys(each)) for each in zip(*store.conditions, strict=True)]
-    tested = [
-        (place, replicate)
-        for place in range(len(store.conditions))
-        for interval in store.intervals(place)
-        for replicate in range(*interval)
-        if known is None or (place, replicate) in known
-    ]
-    places, replicates = np.array(tested, dtype=np.int64).reshape(-1, 2).T
-    columns = dict(zip(AXES, np.unravel_index(places, bound.shape), strict=True))
-    columns["replicate"] = replicates
-    for name in ROW.fields or ():
-        values = [store.read(place, name, each, each + 1) for place, each in tested]
-        columns[name] = np.concatenate([np.empty(0, ROW[name]), *values])
-    given = axes[0], np.array(axes[1]), np.array(axes[2])
-    return strengths_of(given, bound, columns, {"asked": len(tested)} | about)
 
 
 def table_of(found: Strengths) -> str:

@@ -1,6 +1,5 @@
-"""Strengths as a kind of study: which doublets are tested, their distribution, file and command."""
+"""The bound doublets of a file in flows: which are tested, their distribution, file and command."""
 
-import json
 import math
 import signal
 from pathlib import Path
@@ -11,19 +10,9 @@ import pytest
 
 from flocsim import __main__ as program
 from flocsim.commands import show
-from flocsim.commands.sweep import places
-from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.runner import SharedError, run, run_to_file
-from flocsim.ensembles.strength import kind as module
-from flocsim.ensembles.strength.kind import (
-    Bonds,
-    Bound,
-    StrengthStudy,
-    bound_doublets,
-    config_of,
-    in_words,
-)
+from flocsim.ensembles.strength import survey as module
 from flocsim.ensembles.strength.opening import Opening
+from flocsim.ensembles.strength.survey import Bound, Survey, bound_doublets, gathered, in_words
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.curves import over_rate
 from flocsim.io.results.strength_file import (
@@ -43,11 +32,12 @@ class FakeResults:
     """A results file of 2 × 2 × 2 conditions of three replicates, run again by nobody."""
 
     types, vertices, delta = AXES
-    path, source, folder, count = "study.h5", "study.h5", ".", 3
+    path = "study.h5"
 
     def __init__(self, folder, seed=1):
         over = {"shapes": {"vertices": [1, 16]}}
         self.seed, self.config = seed, small_config(folder, over)
+        self.run = {"preset": "tang2014", "flocsim_version": "0.2.0"}
         outcome = np.full((2, 2, 2, 3), 4)
         outcome[0, 0, 0] = (0, 1, 2)
         outcome[1, 1, 1] = (0, 0, 0)
@@ -73,18 +63,19 @@ def fake(monkeypatch, tmp_path):
     """The results, and doublets that nobody runs."""
 
     def doublet(start, flow):
-        return SimpleNamespace(opening=lambda precision, halted: opening_of(start))
+        return SimpleNamespace(opening=lambda precision: opening_of(start))
 
     monkeypatch.setattr(module, "Doublet", doublet)
-    return FakeResults(tmp_path)
+    results = FakeResults(tmp_path)
+    monkeypatch.setattr(module, "opened", lambda *_: results)
+    return results
 
 
-def survey(results, output="", mode="new", overwrite=False, **given):
-    """The Strengths that a survey finds, in memory or in a file."""
-    config = config_of(Bonds(results, **given), str(output or "s.h5"))
-    if not output:
-        return run(config)
-    return run_to_file(config, Communicator(), output, mode, overwrite=overwrite).results
+def survey(results, count=None, **given):
+    """The Strengths that a survey finds."""
+    made = Survey("study.h5", count=count, **given)
+    tested = {each: made.test(each) for each in bound_doublets(results, count)}
+    return gathered(made, tested, True)
 
 
 def test_the_bound_ones_are_those_of_classes_a_and_c(fake):
@@ -108,21 +99,12 @@ def test_every_one_is_run_again(fake):
     assert found.table("n_bound")[0, 0, 0] == found.table("n_tested")[0, 0, 0] == 2
     assert found.table("rate")[1, 1, 1, 2] == 200.0
     assert np.isnan(found.table("rate")[0, 1]).all()
-    assert found.complete and found.progress == "5 of 5 doublets"
+    assert found.complete and found.progress == "5 doublets"
 
 
-def test_what_is_found_is_told_and_failures_are_noted(fake, monkeypatch):
-    study, said = StrengthStudy(config_of(Bonds(fake))), []
-    row, note = study.run_task((0, 1, 0.0), 2, lambda: False, going=said.append)
-    assert row["opens"] == 300.0 and note is None
-    assert said == ["type I, N = 1, delta 0, replicate 2: opens at 300 1/s (20 runs)"]
-    failed = Opening(4.0, math.nan, FAILED, 3, 1e-9)
-    monkeypatch.setattr(
-        module, "Doublet", lambda *words: SimpleNamespace(opening=lambda *_: failed)
-    )
-    row, note = study.run_task((0, 1, 0.0), 0, lambda: False)
-    assert note["why"] == in_words(failed) == "a run failed above 4 1/s (3 runs)"
-    assert note["replicate"] == 0
+def test_what_is_found_is_told_in_words():
+    assert in_words(Opening(297.0, 300.0, OPENED, 20)) == "opens at 300 1/s (20 runs)"
+    assert in_words(Opening(4.0, math.nan, FAILED, 3)) == "a run failed above 4 1/s (3 runs)"
 
 
 def test_a_count_takes_the_first_of_every_condition(fake):
@@ -136,74 +118,15 @@ def test_a_count_takes_the_first_of_every_condition(fake):
     [({"flow": "rain"}, "flow must be one of shear, extension"), ({"count": 0}, "count must be"),
      ({"precision": 0.0}, "precision must lie between")],
 )  # fmt: skip
-def test_bad_input_is_refused(fake, given, words):
+def test_bad_input_is_refused(given, words):
     with pytest.raises(UsageError, match=words):
-        survey(fake, **given)
+        Survey("study.h5", **given)
+
+
+def test_a_study_without_a_bond_is_refused(fake):
     fake.replicates["outcome"][:] = 4
     with pytest.raises(UsageError, match="has no bound doublet"):
-        survey(fake)
-
-
-def same(one, other):
-    """Whether two surveys have found the same of the same."""
-    left_out = {"date", "cpus"}
-    for group in ("doublets", "conditions"):
-        for name, column in getattr(one, group).columns.items():
-            np.testing.assert_array_equal(column.values, getattr(other, group).columns[name].values)
-    known = [{k: v for k, v in each.about.items() if k not in left_out} for each in (one, other)]
-    assert known[0] == known[1]
-    return True
-
-
-def test_what_is_there_stays_and_more_is_tested(fake, tmp_path):
-    output = tmp_path / "s.h5"
-    few = survey(fake, output, count=1)
-    assert few.complete and few.progress == "2 of 2 doublets"
-    fake.asked.clear()
-    more = survey(fake, output, "resume")
-    assert len(fake.asked) == 4  # with the first, which has to come out as before
-    assert same(more, survey(fake)) and more.about["date"] == few.about["date"]
-    assert same(read_strengths(output), more)
-    # Less is not asked for by a smaller count.
-    fake.asked.clear()
-    assert same(survey(fake, output, "resume", count=1), more) and not fake.asked
-
-
-def test_a_file_that_was_written_unfinished_is_gone_on_with(fake, tmp_path):
-    """As earlier versions did every 20 s."""
-    output = tmp_path / "s.h5"
-    few = survey(fake, output, count=1)
-    few.about.update(complete=False, asked=5)
-    write_strengths(tmp_path / "t.h5", few)
-    assert same(survey(fake, tmp_path / "t.h5", "resume"), survey(fake))
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [({"flow": "extension"}, 'flow is "extension" in the file, "shear" now'),
-     ({"precision": 0.1}, "precision is 0.1 in the file, 0.005 now"),
-     ({"study": "other.h5"}, 'study is "other.h5" in the file, "study.h5" now'),
-     ({"study_digest": "0"}, 'study_digest is "0" in the file'),
-     ({"flocsim_version": "0.0"}, 'flocsim_version is "0.0" in the file'),
-     ({"code": None}, "flocsim's own code has changed")],
-)  # fmt: skip
-def test_no_survey_goes_on_with_another_one(fake, tmp_path, change, words):
-    known = survey(fake, count=1)
-    known.about.update(change)
-    write_strengths(tmp_path / "s.h5", known)
-    before = (tmp_path / "s.h5").read_bytes()
-    with pytest.raises(SharedError, match=words):
-        survey(fake, tmp_path / "s.h5", "resume")
-    assert (tmp_path / "s.h5").read_bytes() == before
-
-
-def test_data_of_another_study_are_seen(fake, tmp_path):
-    survey(fake, tmp_path / "s.h5", count=1)
-    other = FakeResults(tmp_path)
-    other.replicates["outcome"][0, 1, 1, 2] = 2
-    for found in (FakeResults(tmp_path, seed=2), other):
-        with pytest.raises(SharedError, match="study_digest is"):
-            survey(found, tmp_path / "s.h5", "resume")
+        bound_doublets(fake)
 
 
 def test_quantiles_count_what_holds_as_never():
@@ -239,7 +162,7 @@ def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
     write_strengths(tmp_path / "s.h5", mixed(complete=False))
     back = read_strengths(tmp_path / "s.h5")
     assert not back.complete and mixed().complete
-    assert show.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 of 4 doublets"
+    assert show.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 doublets"
     words = ["plot", str(tmp_path / "s.h5"), "--output-dir", str(tmp_path)]
     assert program.main(words) == 0
     assert (tmp_path / "s-strength.png").exists()
@@ -276,8 +199,20 @@ def command(fake, tmp_path, monkeypatch):
     """Runs the command in a folder where study.h5 is the fake one."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "study.h5").write_bytes(b"never read here")
-    monkeypatch.setattr("flocsim.ensembles.pairs.opened.open_results", lambda *_: fake)
-    return lambda *words: program.main(["strength", "study.h5", *map(str, words)])
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    yield lambda *words: program.main(["strength", "study.h5", *map(str, words)])
+    for each, action in before.items():
+        signal.signal(each, action)
+
+
+def same(one, other):
+    """Whether two surveys have found the same of the same."""
+    for group in ("doublets", "conditions"):
+        for name, column in getattr(one, group).columns.items():
+            np.testing.assert_array_equal(column.values, getattr(other, group).columns[name].values)
+    known = [{k: v for k, v in each.about.items() if k != "date"} for each in (one, other)]
+    assert known[0] == known[1]
+    return True
 
 
 def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
@@ -287,9 +222,8 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     assert "III" in capsys.readouterr().out
     names = {path.name for path in tmp_path.iterdir()}
     assert names >= {"study-strength.h5", "study-strength.png"} and len(names) == 4
-    found = read_strengths("study-strength.h5")
-    assert found.about["flow"] == "shear" and "features" in json.loads(found.about["cpus"])[0]
-    kind, found, _ = show.read_content("study-strength.h5")
+    assert read_strengths("study-strength.h5").about["flow"] == "shear"
+    kind, found, *_ = show.read_content("study-strength.h5")
     assert kind.figures(found).keys() == {"strength"}
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()
@@ -304,56 +238,51 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     assert command("--jobs", "0") == 2
 
 
-def test_a_command_that_is_stopped_keeps_what_it_has_and_goes_on(
-    fake, command, tmp_path, monkeypatch, capsys
-):
-    from flocsim.ensembles.parallel import coordinator
-    from flocsim.process import Interruption
-
-    stop = Interruption()
-    for name in ("flocsim.ensembles.runner", "flocsim.ensembles.cli"):
-        monkeypatch.setattr(f"{name}.INTERRUPTION", stop)
-    monkeypatch.setattr(coordinator, "stop_requested", lambda: stop.requested)
+def test_a_stopped_command_keeps_what_it_has_tested_and_is_resumed(fake, command, capsys):
     run_again = fake.replicate
 
     def third_stopped(*place):
         if len(fake.asked) == 2:
-            stop.note(signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
         return run_again(*place)
 
     fake.replicate = third_stopped
     assert command() == 75
-    told = capsys.readouterr().err
-    assert "stopped by SIGTERM: 3 finished replicates are in " in told
-    assert "study-strength.h5.journal" in told
-    assert not Path("study-strength.h5").exists()
+    *_, why, how = capsys.readouterr().err.splitlines()
+    assert "stopped by SIGTERM: 2 tested doublets are in study-strength.h5" in why
+    assert how.endswith("--resume")
     assert program.main(["info", "study-strength.h5"]) == 0
-    assert "3 of 5 doublets so far; continue with --resume" in capsys.readouterr().out
-    assert program.main(["plot", "study-strength.h5"]) == 0
-    fake.replicate, stop.signal = run_again, 0
-    before = Path("study-strength.h5.journal").read_bytes()
+    assert "2 doublets so far; continue with --resume" in capsys.readouterr().out
+    fake.replicate = run_again
+    before = Path("study-strength.h5").read_bytes()
     assert command() == 2 and command("--resume", "--flow", "extension") == 2
     told = capsys.readouterr().err
-    assert "holds an unfinished run: continue it with --resume" in told
-    assert 'flow is "shear" in the file, "extension" now' in told and told.count("\n") == 2
-    assert Path("study-strength.h5.journal").read_bytes() == before
-    assert command("--resume") == 0
-    assert same(read_strengths("study-strength.h5"), survey(FakeResults(tmp_path)))
-    assert not Path("study-strength.h5.journal").exists()
-    # A finished one has nothing left to test.
+    assert "continue it with --resume" in told and "flow is 'shear' in the file" in told
+    assert Path("study-strength.h5").read_bytes() == before
     fake.asked.clear()
-    assert command("--resume") == 0 and not fake.asked
+    assert command("--resume") == 0 and len(fake.asked) == 3
+    assert same(read_strengths("study-strength.h5"), survey(fake))
 
 
-def test_resume_begins_where_there_is_nothing(command):
-    assert command("--resume", "--quiet") == 0
+def test_resume_tests_more_and_keeps_what_is_there(fake, command):
+    assert command("--resume", "--count", "1", "--quiet") == 0
     assert read_strengths("study-strength.h5").complete
-    # A file of something else is no strengths, and stays.
+    fake.asked.clear()
+    assert command("--resume", "--quiet") == 0 and len(fake.asked) == 3
+    assert same(read_strengths("study-strength.h5"), survey(fake))
+    # A smaller count drops nothing.
+    assert command("--resume", "--count", "1", "--quiet") == 0
+    assert same(read_strengths("study-strength.h5"), survey(fake))
+
+
+def test_a_survey_of_other_data_is_not_continued(fake, command, capsys):
+    assert command("--count", "1", "--quiet") == 0
+    fake.seed = 2
+    assert command("--resume") == 2
+    assert "study_digest is" in capsys.readouterr().err
+
+
+def test_a_file_of_something_else_is_not_replaced(command):
     Path("other.h5").write_bytes(b"mine")
     assert command("--resume", "-o", "other.h5") != 0
     assert Path("other.h5").read_bytes() == b"mine"
-
-
-def test_names_follow_from_the_study():
-    args = SimpleNamespace(results="a/b.h5", output=None, figure=None)
-    assert places(args) == (Path("b-strength.h5"), Path("b-strength.png"))
