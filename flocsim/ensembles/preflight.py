@@ -26,7 +26,7 @@ from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
 from flocsim.ensembles.collision.meetings import refuse_release
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.start import zone_distance
-from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import ConfigError, KernelError
@@ -378,7 +378,38 @@ def study_doubts(config: Config, flocs: Sequence[Floc] | None = None) -> list[st
     if resizes(config):
         share = config.shapes.radius / smallest(config)
         lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
-    return [line for line in lines if line]
+    return [line for line in lines if line] + trivial_values(config, flocs)
+
+
+def trivial_values(config: Config, flocs: Sequence[Floc] | None = None) -> list[str]:
+    """Lines on the values of a study whose answer they make known beforehand."""
+    scene, shapes, lines = config.scene, config.shapes, []
+    if shapes.source == "library" and shapes.vertices == (1,):
+        lines.append(
+            "shapes.vertices = [1] takes every floc of the library for its equivalent sphere, so "
+            "that no shape counts: add a number of vertices, as in [1, 16]"
+        )
+    if scene.kind != "binary" or scene.meeting == BROWNIAN:
+        return lines
+    # D_0 over r_i + r_j of every collision type.
+    reaches = [
+        zone_distance(config.zone, config.forces, *pairing.largest) / sum(pairing.largest)
+        for pairing in pairings_of(config, measured_flocs(config) if flocs is None else flocs)
+    ]
+    beyond = [delta for delta in scene.delta if delta > max(1.0, *reaches)]
+    if beyond and scene.meeting == SETTLING:
+        lines.append(
+            f"scene.delta = {beyond[-1]:g} misses by construction: offsets are fractions of "
+            "delta_max, at 1 of which the outlines just graze, and the attraction zone ends at "
+            f"{max(reaches):.3g} of it: give fractions up to 1, as 0.5 for 50 %"
+        )
+    # Ten times as far as the farthest offset: a body that falls past is inside however it moves.
+    if min(reaches) > 10.0 * max(1.0, *scene.delta):
+        lines.append(
+            f"[zone] reaches to {min(reaches):.3g} (r_i + r_j) of the centres at least, farther "
+            "than any offset of scene.delta, so that every pair is inside: give a smaller distance"
+        )
+    return lines
 
 
 def settling_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[dict]:
