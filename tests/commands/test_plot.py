@@ -104,7 +104,6 @@ def test_info_tells_conditions_and_origin(study, capsys):
     assert call("info", study) == 0
     text = capsys.readouterr().out
     facts = facts_printed(text)
-    assert facts["preset"] == "si"
     assert facts["vertices"] == "1 (sphere), 4, 16, 64"
     assert facts["delta / delta_max"] == "0, 0.25, 0.5, 0.75, 1"
     assert facts["replicates"] == "8 in each of 60 conditions"
