@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flocsim.__main__ import main
 from flocsim.commands import add_command, fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shape_library import read_library, read_settings
@@ -591,8 +592,6 @@ def drawn_flocs():
 
 @pytest.mark.parametrize("finder", ["steepest", "paper"])
 def test_both_finders_find_the_same_flocs_on_even_light(tmp_path, capsys, finder):
-    from PIL import Image
-
     Image.fromarray(drawn_flocs().astype("u1")).save(tmp_path / "p.png")
     library = tmp_path / "o.h5"
     words = ["fit", str(tmp_path / "p.png"), "--pixel-size", "1e-6", "--vertices", "4"]

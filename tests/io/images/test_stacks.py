@@ -5,7 +5,7 @@ import pytest
 import tifffile
 
 from flocsim.errors import ImageError, UsageError
-from flocsim.io.images.reading import read_pixels
+from flocsim.io.images.reading import read_grey, read_pixels
 from flocsim.io.images.stacks import Plane, Stack, page_numbers, pixel_size_in, planes_of, stack_of
 
 RNG = np.random.default_rng(4)
