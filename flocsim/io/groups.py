@@ -267,17 +267,43 @@ def write_groups(
 
 
 def check_format(
-    file: Any, nodes: Mapping[str, Node], name: str, version: int,
+    path: object, file: Any, nodes: Mapping[str, Node], name: str, version: int,
     further: Mapping[str, str] | None = None,
 ) -> None:  # fmt: skip
-    """ValueError unless an open file says that it is of this format and version, and has the
-    ``further`` attributes {name: type}."""
-    needed = {"format": "text", "schema_version": "i8", **(further or {})}
-    for attribute, kind in needed.items():
+    """ValueError unless an open file is of this format and has the ``further`` attributes {name:
+    type}; FileError for another version."""
+    for attribute, kind in {"format": "text", **(further or {})}.items():
         if nodes[""].attributes.get(attribute) != (kind, ()):
             raise Unfit(f"its attribute {attribute} is missing, or is of another type")
-    if (str(file.attrs["format"]), int(file.attrs["schema_version"])) != (name, version):
-        raise ValueError(f"its format is not {name} of version {version}")
+    if str(file.attrs["format"]) != name:
+        raise ValueError(f"its format is not {name}")
+    check_version(path, file, nodes, version)
+
+
+def check_version(
+    path: object, file: Any, nodes: Mapping[str, Node], first: int, last: int | None = None,
+    remedy: str = "run the study again",
+) -> int:  # fmt: skip
+    """The schema version of an open file; FileError unless it is one of ``first`` to ``last``.
+
+    Versions below ``first`` were never released, so there is nothing to migrate them by: whoever
+    raises a version puts here what makes a file of before one of now.
+    """
+    known = nodes[""].attributes.get("schema_version") == ("i8", ())
+    version = int(file.attrs["schema_version"]) if known else 0
+    if version < 1:
+        raise Unfit("it does not record a schema version")
+    if version < first:
+        raise FileError(
+            f"{path} has schema version {version}, written by a flocsim before 0.3 that was never "
+            f"released: {remedy}"
+        )
+    if version > (last or first):
+        raise FileError(
+            f"{path} has schema version {version}, and this flocsim reads up to {last or first}: "
+            "read it with the version that wrote it"
+        )
+    return version
 
 
 @contextlib.contextmanager

@@ -33,6 +33,7 @@ from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import (
     Declared,
+    check_version,
     column_of,
     declared,
     hold_against,
@@ -365,14 +366,8 @@ def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
     with opened(path) as (file, nodes):
         if text_of(file, nodes, "kind") != KIND:
             raise FileError(f"{path} is not a shape library: name a file written by flocsim fit")
-        version = nodes[""].attributes.get("schema_version") == ("i8", ()) and int(
-            file.attrs["schema_version"]
-        )
-        if version not in (SCHEMA_VERSION, COMPOUND_VERSION):
-            raise FileError(
-                f"{path} has schema version {version or 'unknown'}; this flocsim reads "
-                f"{SCHEMA_VERSION} and {COMPOUND_VERSION}: make it again with flocsim fit"
-            )
+        remedy = "make it again with flocsim fit"
+        version = check_version(path, file, nodes, SCHEMA_VERSION, COMPOUND_VERSION, remedy)
         check_structure(nodes, version == COMPOUND_VERSION)
         entries = _entries(file)
     return entries

@@ -18,7 +18,7 @@ from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep, write_file
-from flocsim.io.groups import opened_file, write_labelled
+from flocsim.io.groups import check_version, opened_file, text_of, write_labelled
 from flocsim.io.labelled import Column, Labelled, Tables, about_of
 from flocsim.io.seals import seal
 
@@ -323,7 +323,10 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
     """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
     with opened_file(
         path, lambda reason: f"{path} has no readable trajectory: {reason}; write it again"
-    ) as (file, _):
+    ) as (file, nodes):
+        if text_of(file, nodes, "kind") != KIND:
+            raise ValueError(f"it is not a {KIND}")
+        check_version(path, file, nodes, SCHEMA_VERSION, remedy="write it again")
         return stored_trajectory(file)
 
 
@@ -333,8 +336,7 @@ def stored_trajectory(file):
         name: value.item() if hasattr(value, "item") else value
         for name, value in file.attrs.items()
     }
-    if facts.pop("kind", "") != KIND or facts.pop("schema_version", 0) != SCHEMA_VERSION:
-        raise ValueError(f"it is not a {KIND} of version {SCHEMA_VERSION}")
+    del facts["kind"], facts["schema_version"]
     time, *arrays = (file[name][()] for name in ("time", "position", "velocity"))
     bodies = len(file["body"])
     if time.ndim != 1 or not len(time) or not bodies:

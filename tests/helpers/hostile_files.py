@@ -17,13 +17,18 @@ import h5py
 import numpy as np
 from PIL import Image
 
+from flocsim import Sphere
+from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import Condition, chunk_record, layout
+from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.records import CHUNK, SESSION, encode
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
+from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
 from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
+from flocsim.io.trajectory import write_trajectory
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed
@@ -279,6 +284,37 @@ def valid_swarm(folder):
 def swarm_file(rng, folder):
     """A hostile results file of swarms."""
     return written(folder, "s.h5", hostile_hdf5(rng, valid_swarm(folder)))
+
+
+@cache
+def valid_sweep(folder):
+    """The HDF5 data of a small joined file of a sweep."""
+    valid_results(folder)
+    parts = [open_any(folder / "valid.h5")] * 2
+    swept = {"potential": Swept("forces.double_layer.potential", [-0.02, -0.03], "V")}
+    path = folder / "valid-sweep.h5"
+    write_sweep(SweepResults(path, swept, joined(swept, parts), "{}"))
+    return read_sealed(path)
+
+
+def sweep_file(rng, folder):
+    """A hostile file of a sweep."""
+    return written(folder, "w.h5", hostile_hdf5(rng, valid_sweep(folder)))
+
+
+@cache
+def valid_trajectory(folder):
+    """The HDF5 data of a small trajectory file, of a sphere and a shape with a hole."""
+    rng = np.random.default_rng(4)
+    arrays = np.sort(rng.random(5)), rng.random((5, 2, 3)), rng.random((5, 2, 3))
+    path = folder / "valid-trajectory.h5"
+    write_trajectory(path, *arrays, (Sphere(2e-6), framed(1e-6)), {"replicate": 3, "end": "I"})
+    return read_sealed(path)
+
+
+def trajectory_file(rng, folder):
+    """A hostile trajectory file."""
+    return written(folder, "t.h5", hostile_hdf5(rng, valid_trajectory(folder)))
 
 
 # Journals --------------------------------------------------------------------------------------

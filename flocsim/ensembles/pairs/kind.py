@@ -34,7 +34,7 @@ from flocsim.errors import FlocsimError
 from flocsim.io.groups import run_of
 from flocsim.io.records import CHUNK, Record, matches
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened, why_apart
+from flocsim.io.results.file import opened
 from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.schema import Results, as_words
 from flocsim.process import WITHHELD
@@ -44,8 +44,6 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The table of replicates of a results file, open until the resources are closed."""
     file = resources.enter_context(opened(output))
     rows = file["replicates"]
-    if apart := why_apart(file):
-        raise ValueError(apart)
     if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
     places = kind.places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])

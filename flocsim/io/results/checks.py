@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.groups import Group, hold_against, scalars_in
+from flocsim.io.groups import hold_against, scalars_in
 from flocsim.io.hdf5 import Node
 from flocsim.io.results import schema
 from flocsim.io.results.events import AGGREGATED, HELD, MISSED
@@ -31,12 +31,9 @@ WITHIN = {
 INSIDE_OF_CLASS = np.array([1, 1, 0, 0])
 
 
-def check_structure(nodes: Mapping[str, Node], groups: Mapping[str, Group] = schema.GROUPS) -> None:
-    """ValueError unless the groups and datasets of a file are those of results.
-
-    ``groups``: as the version of the file has them.
-    """
-    declared = {"kernel": KERNEL_GROUP, **groups, "flocs": schema.FLOCS}
+def check_structure(nodes: Mapping[str, Node]) -> None:
+    """ValueError unless the groups and datasets of a file are those of results."""
+    declared = {"kernel": KERNEL_GROUP, **schema.GROUPS, "flocs": schema.FLOCS}
     wanted = {name: group.arrays for name, group in declared.items()}
     wanted["run"] = scalars_in(nodes, "run")
     known = {axis: len(words) for axis, words in schema.WORDS.items()}
@@ -107,30 +104,24 @@ def beyond(values, least, most):
     return bool(np.any((values < least - ROUNDING) | (values > most + ROUNDING)))
 
 
-def check_rows(
-    column: Callable[[str], np.ndarray], failures: int, flocs: int,
-    lacking: frozenset[str] = frozenset(),
-) -> None:  # fmt: skip
+def check_rows(column: Callable[[str], np.ndarray], failures: int, flocs: int) -> None:
     """ValueError for rows of replicates that no run can have given.
 
     ``column(name)`` gives the values of a column, all of one shape; ``failures``, ``flocs``: how
-    many words and flocs the codes may stand for, no flocs where that is unknown; ``lacking``:
-    columns that a file of an older version does not have.
+    many words and flocs the codes may stand for, no flocs where that is unknown.
     """
     outcome, inside = column("outcome"), column("inside")
     check_codes({name: column(name) for name in CODED}, failures)
-    runs = [run for run in FURTHER_RUNS if f"{run}_outcome" not in lacking]
     for names, least, most in (
-        (("inside", "crossed_zone", *(f"{run}_inside" for run in runs)), 0, 1),
-        ([f"{run}_outcome" for run in runs], 0, len(schema.OUTCOMES) - 1),
-        ([f"{run}_bond" for run in runs], 1, len(schema.BONDS)),
+        (("inside", "crossed_zone", *(f"{run}_inside" for run in FURTHER_RUNS)), 0, 1),
+        ([f"{run}_outcome" for run in FURTHER_RUNS], 0, len(schema.OUTCOMES) - 1),
+        ([f"{run}_bond" for run in FURTHER_RUNS], 1, len(schema.BONDS)),
     ):
         for name in names:
             codes = column(name)
             refuse_row(((codes < least) | (codes > most)) & (codes != schema.NOT_APPLICABLE), name)
-    if "third" in runs:
-        never = column("checked_outcome") == schema.NOT_APPLICABLE
-        refuse_row(never & (column("third_outcome") != schema.NOT_APPLICABLE), "third_outcome")
+    never = column("checked_outcome") == schema.NOT_APPLICABLE
+    refuse_row(never & (column("third_outcome") != schema.NOT_APPLICABLE), "third_outcome")
     decided = outcome < len(schema.CLASSES)
     of_class = INSIDE_OF_CLASS[np.where(decided, outcome, 0)]
     refuse_row(decided & (inside != of_class), "inside")
@@ -145,14 +136,12 @@ def check_rows(
     ended = outcome != schema.FAILED
     for name in ("angle_i", "angle_j", "d_c_last", "t_end"):
         refuse_row(ended & ~np.isfinite(column(name)), name)
-    for name in {"r_i", "r_j", "D_0", *schema.SHAPE_COLUMNS} - lacking:
+    for name in ("r_i", "r_j", "D_0", *schema.SHAPE_COLUMNS):
         values = column(name)
         refuse_row(ended & ~((values > 0.0) & np.isfinite(values)), name)
     touched = ended & (inside != schema.NOT_APPLICABLE)
     for name in ("d_c_collision", "d_c_max", "t_collision"):
         refuse_row(touched & ~np.isfinite(column(name)), name)
-    if "D_0" in lacking:
-        return
     with np.errstate(invalid="ignore", over="ignore"):
         expected = column("d_c_over_D_0") * column("D_0")
         apart = np.abs(expected - column("d_c_collision"))

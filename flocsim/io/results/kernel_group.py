@@ -128,19 +128,17 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def read_kernel(file: Any, identity: str, group: Group = KERNEL_GROUP) -> Kernel | None:
+def read_kernel(file: Any, identity: str) -> Kernel | None:
     """The group of an open file, None where it has none; ValueError for values that cannot be.
 
-    ``identity``: the text of what its rows follow from; ``group``: as the version of the file has
-    it; what it lacks is NaN.
+    ``identity``: the text of what its rows follow from.
     """
     if "kernel" not in file:
         return None
-    found = group.read(file["kernel"])
+    found = KERNEL_GROUP.read(file["kernel"])
     if found["i"].tolist() != found["j"].tolist():
         raise ValueError("kernel/i and kernel/j name other classes")
-    blank = np.full_like(found["alpha"], np.nan)
-    arrays = {name: found.get(name, blank) for name in KERNEL}
+    arrays = {name: found[name] for name in KERNEL}
     check_kernel(arrays)
     return Kernel(
         tuple(found["mechanism"]),

@@ -18,7 +18,6 @@ import os
 import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import attrs
 import numpy as np
@@ -116,25 +115,18 @@ class Frame:
 def frame_of(results: Results) -> Frame:
     """The Frame of Results, the same bytes whenever the results are."""
     frame = Frame()
-    frame.streams = write_groups(frame.image, results, {}, empty_dataset)
+    frame.streams = write_groups(frame.image, results, empty_dataset)
     return frame
 
 
-def image_of(results: Results, attributes: Mapping[str, Any]) -> io.BytesIO:
-    """A whole results file in memory, with further attributes, and without a seal."""
-    image = io.BytesIO()
-    write_groups(image, results, attributes)
-    return image
-
-
-def write_groups(image, results, attributes, create=None):
+def write_groups(image, results, create):
     """Write a file of Results into an image; of the table of replicates, whose datasets are made by
-    ``create``, where that is given, [(offset, length [bytes], name)]."""
+    ``create``, [(offset, length [bytes], name)]."""
     import h5py
 
     streamed = ("replicate", *REPLICATES)
     with h5py.File(image, "w") as file:
-        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION, **attributes})
+        file.attrs.update({"format": FORMAT, "schema_version": SCHEMA_VERSION})
         for name in ("probabilities", "pooled", "differences", "numerics", "outlines"):
             if getattr(results, name):
                 write_labelled(file.create_group(name), results.labelled(name))

@@ -136,7 +136,7 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
     with opened_file(
         path, lambda reason: f"{path} has no readable strengths of bonds: {reason}"
     ) as (file, nodes):
-        check_format(file, nodes, FORMAT, SCHEMA_VERSION, {"about": "text"})
+        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION, {"about": "text"})
         known = read_json(str(file.attrs["about"]), {})
         if not isinstance(known, dict):
             raise ValueError("its attribute about is not a table")

@@ -35,8 +35,6 @@ from flocsim.io.terminal import aligned
 
 FORMAT = "flocsim swarm"
 SCHEMA_VERSION = 6
-ADDED = ("clusters", "events")
-"""Groups that came with versions 5 and 6, one with each."""
 
 WALL = -2
 """In `bodies/floc`: a wall."""
@@ -231,25 +229,17 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
         file,
         nodes,
     ):
-        absent = [name for name in ADDED if name not in nodes]
-        check_format(file, nodes, FORMAT, SCHEMA_VERSION - len(absent))
-        known = {name: group for name, group in GROUPS.items() if name not in absent}
-        wanted = {name: group.arrays for name, group in known.items()}
-        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*known, "run"])
+        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION)
+        wanted = {name: group.arrays for name, group in GROUPS.items()}
+        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*GROUPS, "run"])
         scales: dict[str, np.ndarray] = {}
-        groups: dict[str, dict[str, np.ndarray]] = {
-            "clusters": {name: np.zeros(0, kind) for name, (kind, _, _) in CLUSTERS.items()}
-        }
-        for name, group in known.items():
+        groups: dict[str, dict[str, np.ndarray]] = {}
+        for name, group in GROUPS.items():
             found = group.read(file[name])
             groups[name] = {column: found[column] for column in group.columns}
             for axis in group.scales:
                 if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):
                     raise ValueError(f"{name}/{axis} is not that of the other groups")
-        if "events" in absent:
-            groups["events"] = events_of(groups["snapshots"]["cluster"])
-            scales["event"] = np.arange(len(groups["events"]["event_time"]))
-        scales.setdefault("row", np.zeros(0, dtype=np.int64))
         run = run_of(file)
         check_swarm(scales, groups)
         return SwarmResults(scales, groups, run)

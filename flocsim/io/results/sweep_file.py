@@ -96,7 +96,7 @@ def read_sweep(
         path,
         lambda reason: f"{path} has no readable sweep: {reason}; join it again with --resume",
     ) as (file, nodes):
-        check_format(file, nodes, FORMAT, SCHEMA_VERSION, {"swept": "text"})
+        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION, {"swept": "text"})
         about = read_json(str(file.attrs["swept"]), {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept does not name any keys")

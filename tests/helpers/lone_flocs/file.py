@@ -67,7 +67,7 @@ def read_lone(path: str | os.PathLike) -> LoneResults:
     """The LoneResults of a file; FileError for one that is absent, damaged, or of another kind."""
     complaint = f"{path} holds no readable results of single flocs: "
     with opened_file(path, lambda why: complaint + why) as (file, nodes):
-        check_format(file, nodes, FORMAT, SCHEMA_VERSION)
+        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION)
         wanted = {"flocs": GROUP.arrays, "run": scalars_in(nodes, "run")}
         hold_against(nodes, wanted, wanted)
         found = GROUP.read(file["flocs"])

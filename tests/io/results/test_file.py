@@ -246,7 +246,7 @@ def test_cut_and_damaged_files_are_refused(written):
 def test_other_versions_are_refused(written, version):
     path, _ = written
     reseal(path, lambda file: file.attrs.create("schema_version", version))
-    with pytest.raises(FileError, match=f"schema version {version}"):
+    with pytest.raises(FileError, match="schema version"):
         read_results(path)
 
 
