@@ -23,6 +23,7 @@ from flocsim.ensembles.kind import Condition, chunk_record, layout
 from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.records import CHUNK, SESSION, encode
+from flocsim.io.results.schema import POOLED, blank
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
@@ -289,8 +290,10 @@ def swarm_file(rng, folder):
 @cache
 def valid_sweep(folder):
     """The HDF5 data of a small joined file of a sweep."""
-    valid_results(folder)
-    parts = [open_any(folder / "valid.h5")] * 2
+    results = make_results(types=("I",), vertices=(1, 8), delta=(0.0, 0.7), count=5)
+    results = attrs.evolve(results, pooled=blank(POOLED, results.shape[:2]))
+    write_results(folder / "part.h5", results)
+    parts = [open_any(folder / "part.h5")] * 2
     swept = {"potential": Swept("forces.double_layer.potential", [-0.02, -0.03], "V")}
     path = folder / "valid-sweep.h5"
     write_sweep(SweepResults(path, swept, joined(swept, parts), "{}"))
