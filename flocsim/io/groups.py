@@ -2,35 +2,29 @@
 
 A Group says what arrays a group has, along which axes, of what type, in what unit, and what they
 mean: how it is written and read, what a file is held against and what a user sees follow from it.
-A file is opened in three steps: its checksum, then its structure, then h5py.
+A file is opened in three steps: its checksum, then its structure (`flocsim.io.hdf5`), then values.
 """
 
 import contextlib
 import io
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, BinaryIO
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Rule, keep, write_file
-from flocsim.io.hdf5 import Node, Unfit, structure_of
+from flocsim.io.hdf5 import File, Node, Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.seals import checked_sealed, seal
 
-SCALE_ATTRIBUTES = {
-    "units": "text",
-    "long_name": "text",
-    "flag_values": "u1",
-    "flag_meanings": "text",
-    "CLASS": "fixed",
-    "NAME": "fixed",
-    "DIMENSION_LIST": "references",
-    "REFERENCE_LIST": "scales",
-}
-"""Attributes that a dataset may have, and their types."""
+ATTRIBUTES = {
+    "units", "long_name", "flag_values", "flag_meanings", "CLASS", "NAME", "DIMENSION_LIST",
+    "REFERENCE_LIST",
+}  # fmt: skip
+"""Attributes that a dataset may have."""
 
 Schema = Mapping[str, tuple[str, str, str]]
 """{name: (type, unit, meaning)}."""
@@ -89,7 +83,7 @@ def hold_against(
             if path and path not in groups:
                 raise Unfit(f"there is an unknown group {path}")
             # Coordinates that are no axis, as xarray looks for them.
-            if path and node.attributes.items() - {("coordinates", ("text", ()))}:
+            if path and node.attributes.keys() - {"coordinates"}:
                 raise Unfit(f"the group {path} has attributes")
         elif name not in groups.get(group, {}):
             raise Unfit(f"there is an unknown dataset {path}")
@@ -111,10 +105,8 @@ def check_column(path, node, column, lengths):
         wanted = axis if isinstance(axis, int) else lengths.setdefault(axis, length)
         if length != wanted:
             raise Unfit(f"{path} has {length} values along {axis}, expected {wanted}")
-    for name, (kind, shape) in node.attributes.items():
-        known = SCALE_ATTRIBUTES.get(name)
-        if known is None or kind.split()[0] != known or len(shape) > 1:
-            raise Unfit(f"{path} has an attribute {name} that flocsim does not write")
+    for name in node.attributes.keys() - ATTRIBUTES:
+        raise Unfit(f"{path} has an attribute {name} that flocsim does not write")
 
 
 def declared(
@@ -168,9 +160,9 @@ class Group:
 
         return Labelled(columns({**self.scales, **self.beside}), columns(self.columns))
 
-    def read(self, place: Any) -> dict[str, np.ndarray]:
-        """{name: values} of all that an open group holds, which was held against this one."""
-        return {name: values_of(place[name]) for name in self.arrays}
+    def read(self, file: File, path: str) -> dict[str, np.ndarray]:
+        """{name: values} of all that a group of a file holds, which was held against this one."""
+        return {name: file.read(f"{path}/{name}") for name in self.arrays}
 
 
 def column_of(declared: Declared, values: Any) -> Column:
@@ -184,20 +176,9 @@ def column_of(declared: Declared, values: Any) -> Column:
     return Column(tuple(map(str, declared.axes)), found, declared.about)
 
 
-def values_of(dataset: Any) -> np.ndarray:
-    """The values of an open dataset; text as objects."""
-    words = dataset.dtype.kind == "O"
-    return np.array(dataset.asstr()[()].tolist(), dtype=object) if words else dataset[()]
-
-
-def scalar_of(dataset: Any) -> str | int | float:
-    """A scalar of an open file."""
-    return dataset.asstr()[()] if dataset.dtype.kind == "O" else dataset[()].item()
-
-
-def run_of(file: Any) -> dict[str, str | int | float]:
+def run_of(file: File) -> dict[str, str | int | float]:
     """The scalars of the group ``run`` of an open file."""
-    return {name: scalar_of(dataset) for name, dataset in file["run"].items()}
+    return {name: file.scalar(f"run/{name}") for name in file.names("run")}
 
 
 def scalars_in(nodes: Mapping[str, Node], group: str) -> dict[str, Declared]:
@@ -267,21 +248,20 @@ def write_groups(
 
 
 def check_format(
-    path: object, file: Any, nodes: Mapping[str, Node], name: str, version: int,
-    further: Mapping[str, str] | None = None,
-) -> None:  # fmt: skip
-    """ValueError unless an open file is of this format and has the ``further`` attributes {name:
-    type}; FileError for another version."""
-    for attribute, kind in {"format": "text", **(further or {})}.items():
-        if nodes[""].attributes.get(attribute) != (kind, ()):
+    path: object, file: File, name: str, version: int, text: str | None = None
+) -> None:
+    """ValueError unless an open file is of this format, and has the attribute ``text``; FileError
+    for another version."""
+    for attribute in ("format", text or "format"):
+        if not isinstance(file.attributes.get(attribute), str):
             raise Unfit(f"its attribute {attribute} is missing, or is of another type")
-    if str(file.attrs["format"]) != name:
+    if file.attributes["format"] != name:
         raise ValueError(f"its format is not {name}")
-    check_version(path, file, nodes, version)
+    check_version(path, file, version)
 
 
 def check_version(
-    path: object, file: Any, nodes: Mapping[str, Node], first: int, last: int | None = None,
+    path: object, file: File, first: int, last: int | None = None,
     remedy: str = "run the study again",
 ) -> int:  # fmt: skip
     """The schema version of an open file; FileError unless it is one of ``first`` to ``last``.
@@ -289,9 +269,8 @@ def check_version(
     Versions below ``first`` were never released, so there is nothing to migrate them by: whoever
     raises a version puts here what makes a file of before one of now.
     """
-    known = nodes[""].attributes.get("schema_version") == ("i8", ())
-    version = int(file.attrs["schema_version"]) if known else 0
-    if version < 1:
+    version = file.attributes.get("schema_version")
+    if not isinstance(version, int) or version < 1:
         raise Unfit("it does not record a schema version")
     if version < first:
         raise FileError(
@@ -307,41 +286,40 @@ def check_version(
 
 
 @contextlib.contextmanager
-def parsed(data: BinaryIO, size: int) -> Iterator[tuple[Any, dict[str, Node]]]:
-    """(open h5py file, its structure) of HDF5 data, h5py being let at it once the structure is one
-    that flocsim writes."""
-    import h5py
+def opened_file(path: str | os.PathLike, complaint: Callable[[str], str]) -> Iterator[File]:
+    """An open file, once checksum and structure were found right.
 
-    nodes = structure_of(data, size)
-    data.seek(0)
-    with h5py.File(data, "r") as file:
-        yield file, nodes
-
-
-@contextlib.contextmanager
-def opened_file(
-    path: str | os.PathLike, complaint: Callable[[str], str]
-) -> Iterator[tuple[Any, dict[str, Node]]]:
-    """(open h5py file, its structure), once checksum and structure were found right.
-
-    FileError with ``complaint(reason)`` where it, or what is done with it, fails on what it holds.
+    FileError with ``complaint(reason)`` where it, or what is done with it, fails on what it holds,
+    and where it was written to meanwhile.
     """
-    with checked_sealed(path) as (data, size):
+    before = stamp(path)
+    with checked_sealed(path) as (data, _):
         try:
-            with parsed(data, size) as found:
-                yield found
+            yield open_hdf5(path, data)
         except FileError:
             raise
         except UNREADABLE as error:
             raise FileError(complaint(" ".join(str(error).split()))) from error
+        if stamp(data.fileno()) != before:
+            raise FileError(f"{path} was changed by another program while it was read: try again")
 
 
-def text_of(file: Any, nodes: dict[str, Node], name: str) -> str:
+def stamp(file: str | os.PathLike | int) -> tuple | None:
+    """What tells that a file is another one, or was written to; None where there is none."""
+    try:
+        about = os.stat(file)
+    except (OSError, ValueError):
+        return None
+    return about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+
+
+def text_of(file: File, name: str) -> str:
     """An attribute of an open file that is a text; "" where there is none, or none that flocsim
     writes there, which messages show."""
-    known = nodes[""].attributes.get(name)
-    found = str(file.attrs[name]) if known == ("text", ()) else ""
-    return found if found.isprintable() and len(found) <= LONGEST_WORDS else ""
+    found = file.attributes.get(name)
+    if not isinstance(found, str) or not found.isprintable() or len(found) > LONGEST_WORDS:
+        return ""
+    return found
 
 
 def kind_of(path: str | os.PathLike) -> str:
@@ -351,12 +329,12 @@ def kind_of(path: str | os.PathLike) -> str:
     One look for all kinds, since each look goes through the whole file for its checksum. FileError
     where that is wrong, or where there is no such file.
     """
-    with checked_sealed(path) as (data, size):
+    with checked_sealed(path) as (data, _):
         try:
-            with parsed(data, size) as (file, nodes):
-                return text_of(file, nodes, "kind") or text_of(file, nodes, "format")
+            file = open_hdf5(path, data, root_only=True)
         except UNREADABLE:
             return ""
+        return text_of(file, "kind") or text_of(file, "format")
 
 
 def checked_arrays(

@@ -39,10 +39,9 @@ from flocsim.io.groups import (
     hold_against,
     opened_file,
     text_of,
-    values_of,
     write_groups,
 )
-from flocsim.io.hdf5 import Node
+from flocsim.io.hdf5 import File, Node
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.results.schema import BAND_ENDS
 
@@ -349,12 +348,9 @@ def reach_of(entry):
 
 def read_settings(path: str | os.PathLike) -> dict[str, Any]:
     """{name: value} of what the fits of a shape library were made with."""
-    with opened(path) as (file, _):
-        return {
-            name: value.item() if isinstance(value, np.generic) else value
-            for name, value in file.attrs.items()
-            if name not in ("kind", "schema_version")
-        }
+    with opened(path) as file:
+        named = file.attributes.items()
+        return {name: value for name, value in named if name not in ("kind", "schema_version")}
 
 
 def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
@@ -363,18 +359,17 @@ def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
     Raises FileError for a file that is missing, damaged, of another kind or another version, or
     that has impossible values.
     """
-    with opened(path) as (file, nodes):
-        if text_of(file, nodes, "kind") != KIND:
+    with opened(path) as file:
+        if text_of(file, "kind") != KIND:
             raise FileError(f"{path} is not a shape library: name a file written by flocsim fit")
         remedy = "make it again with flocsim fit"
-        version = check_version(path, file, nodes, SCHEMA_VERSION, COMPOUND_VERSION, remedy)
-        check_structure(nodes, version == COMPOUND_VERSION)
-        entries = _entries(file)
-    return entries
+        version = check_version(path, file, SCHEMA_VERSION, COMPOUND_VERSION, remedy)
+        check_structure(file.nodes, version == COMPOUND_VERSION)
+        return _entries(file)
 
 
-def opened(path: str | os.PathLike) -> AbstractContextManager[tuple[Any, dict[str, Node]]]:
-    """(open h5py file, its structure), once checksum and structure were found right."""
+def opened(path: str | os.PathLike) -> AbstractContextManager[File]:
+    """An open file, once checksum and structure were found right."""
     return opened_file(
         path,
         lambda reason: (
@@ -402,8 +397,8 @@ def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
         raise ValueError("there are no flocs")
     if any(each != counts["fits"] for each in counts.values()):
         raise ValueError("the ends of its bands have different numbers of vertices from its fits")
-    for name, (kind, shape) in nodes[""].attributes.items():
-        if shape != () or kind not in ("text", "flag", "i8", "f8"):
+    for name, value in nodes[""].attributes.items():
+        if not isinstance(value, str | bool | int | float):
             raise ValueError(f"its attribute {name} is neither text nor a number")
 
 
@@ -411,7 +406,7 @@ def _entries(file):
     """The ShapeEntries of an open library; ValueError for values that cannot be."""
     flocs = {}
     for name, declared_as in FLOC_COLUMNS.items():
-        values = values_of(file["flocs"][name])
+        values = file.read(f"flocs/{name}")
         if declared_as.type != "text":
             least = -MOST_PIXELS if name == "centroid" else 0.0
             most = LARGEST if name == "pixel_size" else MOST_PIXELS
@@ -424,10 +419,11 @@ def _entries(file):
         raise ValueError("two flocs have the same id")
     for name, (columns, read) in OPTIONAL.items():
         if name in file:
-            flocs |= read({each: file[name][each][()] for each in columns})
+            flocs |= read({each: file.read(f"{name}/{each}") for each in columns})
     for kind in ("fits", *BAND_ENDS):
         if kind in file:
-            fits = {n: _fits(n, file[f"{kind}/{n}"]) for n in sorted(map(int, file[kind]))}
+            counts = sorted(map(int, file.names(kind)))
+            fits = {n: _fits(n, file, f"{kind}/{n}") for n in counts}
             flocs[kind] = [
                 dict(zip(fits, each, strict=True)) for each in zip(*fits.values(), strict=True)
             ]
@@ -437,31 +433,34 @@ def _entries(file):
     ]
 
 
-def _fits(count, group):
-    """The StoredFits of all flocs at N = ``count``."""
-    vertices, radius, error = (group[name][()] for name in FIT_COLUMNS)
+def _fits(count, file, group):
+    """The StoredFits of all flocs at N = ``count``, in a group."""
+    vertices, radius, error = (file.read(f"{group}/{name}") for name in FIT_COLUMNS)
     for name, values, most in (
         ("vertices", np.abs(vertices), LARGEST),
         ("radius", radius, LARGEST),
         ("relative_error", error, np.inf),
     ):
         if not (np.isfinite(values).all() and np.all(values >= 0.0) and np.all(values <= most)):
-            raise ValueError(f"{group.name[1:]}/{name} has values that a floc cannot have")
+            raise ValueError(f"{group}/{name} has values that a floc cannot have")
     if count == 1 and not np.all(radius > 0.0):
         raise ValueError("fits/1/radius holds circles without a size")
-    tables = _tables(count, group, vertices, radius)
+    tables = _tables(file, group, vertices, radius)
     columns = vertices, radius.tolist(), error.tolist(), tables
     return [StoredFit(*each) for each in zip(*columns, strict=True)]
 
 
-def _tables(count, group, vertices, radius):
-    """The PointTables of all flocs at N = ``count``; None for those of one ring."""
-    if "part" not in group:
+def _tables(file, group, vertices, radius):
+    """The PointTables of all flocs in a group; None for those of one ring."""
+    if f"{group}/part" not in file:
         return [None] * len(vertices)
-    columns = {ATTRIBUTES[name].removeprefix("points."): group[name][()] for name in POINT_COLUMNS}
+    columns = {
+        ATTRIBUTES[name].removeprefix("points."): file.read(f"{group}/{name}")
+        for name in POINT_COLUMNS
+    }
     wide = columns["radius"]
     if not np.all((wide > 0.0) & (wide <= LARGEST)) or np.any(wide.min(axis=1) != radius):
-        raise ValueError(f"fits/{count}/point_radius has values that are not radii")
+        raise ValueError(f"{group}/point_radius has values that are not radii")
     tables = []
     for row, place in enumerate(vertices):
         table = PointTable(place, **{name: values[row] for name, values in columns.items()})

@@ -323,22 +323,19 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
     """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
     with opened_file(
         path, lambda reason: f"{path} has no readable trajectory: {reason}; write it again"
-    ) as (file, nodes):
-        if text_of(file, nodes, "kind") != KIND:
+    ) as file:
+        if text_of(file, "kind") != KIND:
             raise ValueError(f"it is not a {KIND}")
-        check_version(path, file, nodes, SCHEMA_VERSION, remedy="write it again")
+        check_version(path, file, SCHEMA_VERSION, remedy="write it again")
         return stored_trajectory(file)
 
 
 def stored_trajectory(file):
     """The StoredTrajectory of an open file; ValueError where it is none."""
-    facts = {
-        name: value.item() if hasattr(value, "item") else value
-        for name, value in file.attrs.items()
-    }
-    del facts["kind"], facts["schema_version"]
-    time, *arrays = (file[name][()] for name in ("time", "position", "velocity"))
-    bodies = len(file["body"])
+    named = file.attributes.items()
+    facts = {name: value for name, value in named if name not in ("kind", "schema_version")}
+    time, *arrays = (file.read(name) for name in ("time", "position", "velocity"))
+    bodies = len(file.read("body"))
     if time.ndim != 1 or not len(time) or not bodies:
         raise ValueError("it has no times or no bodies")
     for array in (time, *arrays):
@@ -347,10 +344,10 @@ def stored_trajectory(file):
             raise ValueError("its arrays do not match its times and bodies, or are not numbers")
     shapes = []
     for body in range(bodies):
-        vertices = file[f"vertices_{body}"]
-        radius, points = float(vertices.attrs["radius"]), vertices[()]
+        points = file.read(f"vertices_{body}")
+        radius = float(file.node(f"vertices_{body}").attributes["radius"])
         if f"part_{body}" in file:
-            columns = [file[f"{name}_{body}"][()] for name in ("part", "ring", "point_radius")]
+            columns = [file.read(f"{name}_{body}") for name in ("part", "ring", "point_radius")]
             if any(column.shape != (len(points),) for column in columns):
                 raise ValueError("the columns of its core points do not match the points")
             shapes.append(shape_of_parts(parts_in(PointTable(points, *columns))))

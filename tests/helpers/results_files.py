@@ -35,19 +35,20 @@ def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
     Coordinates included; a dataset that only one file has differs. Empty when all agree.
     """
 
-    def content(dataset):
+    def content(file, path):
         """Its values, some at a time: all of a file may be larger than the memory."""
-        for part in parts_of(dataset.shape):
-            values = dataset[part]
-            yield values.tolist() if dataset.dtype.kind == "O" else values.tobytes()
+        for part in parts_of(file.node(path).shape):
+            values = file.read(path, part)
+            yield values.tolist() if file.node(path).text is not None else values.tobytes()
 
-    def agree(one, other):
-        if (one.shape, str(one.dtype)) != (other.shape, str(other.dtype)):
+    def agree(one, other, path):
+        mine, yours = one.node(path), other.node(path)
+        if (mine.shape, mine.type) != (yours.shape, yours.type):
             return False
-        pairs = zip(content(one), content(other), strict=True)
+        pairs = zip(content(one, path), content(other, path), strict=True)
         return all(mine == yours for mine, yours in pairs)
 
     with opened(path_a) as a, opened(path_b) as b:
-        names = {f"{group}/{name}" for file in (a, b) for group in file if group != "run"
-                 for name in file[group]}  # fmt: skip
-        return sorted(n for n in names if n not in a or n not in b or not agree(a[n], b[n]))
+        names = {f"{group}/{name}" for file in (a, b) for group in file.names("")
+                 for name in file.names(group) if group != "run"}  # fmt: skip
+        return sorted(n for n in names if n not in a or n not in b or not agree(a, b, n))

@@ -32,9 +32,10 @@ from flocsim.ensembles.storage.unfinished import ASKED, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.io.groups import run_of
+from flocsim.io.hdf5 import Dataset
 from flocsim.io.records import CHUNK, Record, matches
 from flocsim.io.results.checks import check_rows
-from flocsim.io.results.file import opened
+from flocsim.io.results.file import failures_of, opened
 from flocsim.io.results.layout import FORMAT, new_row_file
 from flocsim.io.results.schema import Results, as_words
 from flocsim.process import WITHHELD
@@ -43,12 +44,12 @@ from flocsim.process import WITHHELD
 def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     """The table of replicates of a results file, open until the resources are closed."""
     file = resources.enter_context(opened(output))
-    rows = file["replicates"]
-    if tuple(rows["failure"].attrs["flag_meanings"].split()) != as_words(FAILURES):
+    if tuple(failures_of(file)) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
-    places = kind.places_in(rows["type"].asstr()[()], rows["vertices"][()], rows["delta"][()])
-    run = run_of(file)
-    return OldTable(rows, places, len(rows["replicate"]), run)
+    axes = (file.read(f"replicates/{axis}") for axis in ("type", "vertices", "delta"))
+    columns = {name: Dataset.of(file, f"replicates/{name}") for name in kind.COLUMNS}
+    count = file.node("replicates/replicate").shape[0]
+    return OldTable(columns, kind.places_in(*axes), count, run_of(file))
 
 
 def results(

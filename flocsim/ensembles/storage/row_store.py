@@ -314,10 +314,9 @@ def old_columns(table: OldTable) -> OldColumns | None:
     offsets, shape = {}, table.columns[COLUMNS[0]].shape
     for name in COLUMNS:
         dataset = table.columns[name]
-        offset = dataset.id.get_offset()
-        if offset is None or dataset.dtype != ROW[name] or dataset.shape != shape:
+        if dataset.offset is None or dataset.dtype != ROW[name] or dataset.shape != shape:
             return None
-        offsets[name] = offset
+        offsets[name] = dataset.offset
     path = os.path.realpath(table.path)
     try:
         descriptor = open_to_read(path)

@@ -18,20 +18,19 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError
-from flocsim.io.groups import check_version, opened_file, run_of, text_of, values_of
+from flocsim.io.groups import check_version, opened_file, run_of, text_of
+from flocsim.io.hdf5 import File
 from flocsim.io.results import checks, schema
 from flocsim.io.results.kernel_group import read_kernel
 from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
 from flocsim.io.results.schema import GROUPS, OUTCOMES, REPLICATES, Results
 
 
-def results_of(file: Any, replicates: bool = True) -> Results:
+def results_of(file: File, replicates: bool = True) -> Results:
     """The Results in an open file; ``replicates``: whether their table is read as well."""
-    tables = [name for name in GROUPS if name in file and name != "replicates"]
-    found = {name: GROUPS[name].read(file[name]) for name in tables}
-    table, rows = found["probabilities"], file["replicates"]
-    if replicates:
-        found["replicates"] = GROUPS["replicates"].read(rows)
+    tables = [name for name in GROUPS if name in file and (replicates or name != "replicates")]
+    found = {name: GROUPS[name].read(file, name) for name in tables}
+    table = found["probabilities"]
     made: Any = {
         name: {column: each[column] for column in GROUPS[name].columns}
         for name, each in found.items()
@@ -39,12 +38,18 @@ def results_of(file: Any, replicates: bool = True) -> Results:
     run = run_of(file)
     return Results(
         types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
-        failures=rows["failure"].attrs["flag_meanings"].split(),
-        flocs=values_of(file["flocs/floc"]) if "flocs" in file else (),
-        count=len(rows["replicate"]), radii={name: table[name] for name in schema.SIZES},
+        failures=failures_of(file), flocs=file.read("flocs/floc") if "flocs" in file else (),
+        count=file.node("replicates/replicate").shape[0],
+        radii={name: table[name] for name in schema.SIZES},
         kernel=read_kernel(file, str(run.get("identity", ""))),
         **{"replicates": None, **made},
     )  # fmt: skip
+
+
+def failures_of(file: File) -> list[str]:
+    """The words for the codes of failures."""
+    words: str = file.node("replicates/failure").attributes["flag_meanings"]
+    return words.split()
 
 
 BLOCK = 262_144
@@ -68,7 +73,7 @@ def read_overview(path: str | os.PathLike) -> "Overview":
     """
     with opened(path) as file:
         results = results_in(file, replicates=False)
-        totals = totals_in(file["replicates"], len(results.failures))
+        totals = totals_in(file, len(results.failures))
         known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
         return Overview(**known, totals=totals)
 
@@ -96,10 +101,8 @@ def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[
     """{column: value} of one replicate, at (type, vertices, delta, replicate); FileError as
     `read_results`, and for values that no run can have given."""
     with opened(path) as file:
-        rows = file["replicates"]
-        found = {name: rows[name][place] for name in REPLICATES}
-        reasons = len(rows["failure"].attrs["flag_meanings"].split())
-        checks.check_rows(lambda name: np.asarray(found[name]), reasons, 0)
+        found = {name: file.read(f"replicates/{name}", place)[()] for name in REPLICATES}
+        checks.check_rows(lambda name: np.asarray(found[name]), len(failures_of(file)), 0)
         return found
 
 
@@ -127,11 +130,11 @@ class Overview(Results):
     totals: Totals = attrs.field(kw_only=True)
 
 
-def totals_in(rows, reasons):
-    """The Totals of an open table of replicates with so many reasons of failure."""
+def totals_in(file, reasons):
+    """The Totals of the replicates of an open file with so many reasons of failure."""
     found = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
-    for part in parts_of(rows["outcome"].shape):
-        columns = {name: rows[name][part] for name in checks.CODED}
+    for part in parts_of(file.node("replicates/outcome").shape):
+        columns = {name: file.read(f"replicates/{name}", part) for name in checks.CODED}
         checks.check_codes(columns, reasons)
         outcome, failure, steps, rejected = columns.values()
         found.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
@@ -141,7 +144,7 @@ def totals_in(rows, reasons):
         found.most_steps = max(found.most_steps, int(steps.max(initial=0)))
         found.rejected += int(rejected.sum())
         for name in SPANNED:
-            values = rows[name][part]
+            values = file.read(f"replicates/{name}", part)
             known = np.append(values[np.isfinite(values)], found.spans.get(name, ()))
             if known.size:
                 found.spans[name] = float(known.min()), float(known.max())
@@ -154,13 +157,14 @@ def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int
     Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
     """
     with opened(path) as file:
-        outcome, vertices = file["replicates/outcome"], file["replicates/vertices"][()]
+        outcome, vertices = file.node("replicates/outcome"), file.read("replicates/vertices")
         order = np.argsort(-vertices, kind="stable")
         found: dict[str, tuple[int, int, int, int]] = {}
         types, _, deltas, count = outcome.shape
         for v, t, d in ((v, t, d) for v in order for t in range(types) for d in range(deltas)):
             for first in range(0, count, BLOCK):
-                codes = outcome[t, v, d, first : first + BLOCK]
+                part = t, v, d, slice(first, first + BLOCK)
+                codes = file.read("replicates/outcome", part)
                 for code, row in zip(*np.unique(codes, return_index=True), strict=True):
                     if code < len(OUTCOMES):
                         found.setdefault(OUTCOMES[code], (t, int(v), d, first + int(row)))
@@ -179,21 +183,18 @@ def parts_of(shape):
 
 
 @contextlib.contextmanager
-def opened(path: str | os.PathLike) -> Iterator[Any]:
-    """An open h5py file of this schema, once the checksum over all of it was found right.
-
-    And once its structure was found to be one that flocsim writes: HDF5 sees no other.
-    """
+def opened(path: str | os.PathLike) -> Iterator[File]:
+    """An open file of this schema, once checksum and structure were found right."""
     with opened_file(
         path, lambda reason: f"{path} has no readable results: {reason}; run it again"
-    ) as (file, nodes):
-        if text_of(file, nodes, "format") != FORMAT:
-            what = text_of(file, nodes, "format") or text_of(file, nodes, "kind")
+    ) as file:
+        if text_of(file, "format") != FORMAT:
+            what = text_of(file, "format") or text_of(file, "kind")
             found = f", it holds a {what}" if what else ""
             raise FileError(
                 f"{path} is not a results file{found}: name one written by flocsim ensemble"
             )
-        check_version(path, file, nodes, SCHEMA_VERSION)
-        checks.check_structure(nodes)
+        check_version(path, file, SCHEMA_VERSION)
+        checks.check_structure(file.nodes)
         checks.check_coordinates(file)
         yield file

@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
 from flocsim.io.groups import Group, checked_arrays, declared
+from flocsim.io.hdf5 import File
 from flocsim.io.labelled import Labelled
 
 AXES = ("mechanism", "vertices", "i", "j")
@@ -128,14 +128,14 @@ class Kernel:
         return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
 
 
-def read_kernel(file: Any, identity: str) -> Kernel | None:
+def read_kernel(file: File, identity: str) -> Kernel | None:
     """The group of an open file, None where it has none; ValueError for values that cannot be.
 
     ``identity``: the text of what its rows follow from.
     """
     if "kernel" not in file:
         return None
-    found = KERNEL_GROUP.read(file["kernel"])
+    found = KERNEL_GROUP.read(file, "kernel")
     if found["i"].tolist() != found["j"].tolist():
         raise ValueError("kernel/i and kernel/j name other classes")
     arrays = {name: found[name] for name in KERNEL}

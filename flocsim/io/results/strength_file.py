@@ -135,14 +135,14 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
     """The Strengths of a file; FileError for one that is absent, damaged, or of another kind."""
     with opened_file(
         path, lambda reason: f"{path} has no readable strengths of bonds: {reason}"
-    ) as (file, nodes):
-        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION, {"about": "text"})
-        known = read_json(str(file.attrs["about"]), {})
+    ) as file:
+        check_format(path, file, FORMAT, SCHEMA_VERSION, "about")
+        known = read_json(file.attributes["about"], {})
         if not isinstance(known, dict):
             raise ValueError("its attribute about is not a table")
         wanted = {name: group.arrays for name, group in GROUPS.items()}
-        hold_against(nodes, wanted, wanted, {"quantile": len(QUANTILES)})
-        doublets, conditions = (group.read(file[name]) for name, group in GROUPS.items())
+        hold_against(file.nodes, wanted, wanted, {"quantile": len(QUANTILES)})
+        doublets, conditions = (group.read(file, name) for name, group in GROUPS.items())
         for axis in AXES:
             if np.any((doublets[axis] < 0) | (doublets[axis] >= len(conditions[axis]))):
                 raise ValueError(f"a doublet has a {axis} that the file does not have")

@@ -225,17 +225,15 @@ def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> N
 def read_swarm(path: str | os.PathLike) -> SwarmResults:
     """The SwarmResults in a file; FileError for one that is absent, damaged, of another kind or
     version."""
-    with opened_file(path, lambda why: f"{path} has no readable results of a swarm: {why}") as (
-        file,
-        nodes,
-    ):
-        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION)
+    with opened_file(path, lambda why: f"{path} has no readable results of a swarm: {why}") as file:
+        check_format(path, file, FORMAT, SCHEMA_VERSION)
         wanted = {name: group.arrays for name, group in GROUPS.items()}
-        hold_against(nodes, {**wanted, "run": scalars_in(nodes, "run")}, [*GROUPS, "run"])
+        wanted["run"] = scalars_in(file.nodes, "run")
+        hold_against(file.nodes, wanted, wanted)
         scales: dict[str, np.ndarray] = {}
         groups: dict[str, dict[str, np.ndarray]] = {}
         for name, group in GROUPS.items():
-            found = group.read(file[name])
+            found = group.read(file, name)
             groups[name] = {column: found[column] for column in group.columns}
             for axis in group.scales:
                 if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):

@@ -21,7 +21,6 @@ from flocsim.io.groups import (
     check_format,
     hold_against,
     opened_file,
-    scalar_of,
     write_groups,
 )
 from flocsim.io.hdf5 import Node
@@ -95,9 +94,9 @@ def read_sweep(
     with opened_file(
         path,
         lambda reason: f"{path} has no readable sweep: {reason}; join it again with --resume",
-    ) as (file, nodes):
-        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION, {"swept": "text"})
-        about = read_json(str(file.attrs["swept"]), {})
+    ) as file:
+        check_format(path, file, FORMAT, SCHEMA_VERSION, "swept")
+        about, nodes = read_json(file.attributes["swept"], {}), file.nodes
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept does not name any keys")
         joined, lengths = next((each for each in known if each[0].keys() <= nodes.keys()), ({}, {}))
@@ -108,14 +107,14 @@ def read_sweep(
         source = {name: Declared("text") for name in SOURCE if f"run/{name}" in nodes}
         run = {"run": {"plan": Declared("text")} | source}
         hold_against(nodes, wanted | run, list(joined), lengths)
-        groups = {name: group.labelled(group.read(file[name])) for name, group in declared.items()}
+        groups = {name: group.labelled(group.read(file, name)) for name, group in declared.items()}
         first = next(iter(groups.values())).axes
         swept = {
             name: Swept(each["key"], first[name].values.tolist(), each["unit"])
             for name, each in about.items()
         }
-        plan = scalar_of(file["run/plan"]) if "run" in file else ""
-        about_all = {name: scalar_of(file[f"run/{name}"]) for name in source}
+        plan = file.scalar("run/plan") if "run" in file else ""
+        about_all = {name: file.scalar(f"run/{name}") for name in source}
         return SweepResults(Path(path), swept, groups, str(plan), about_all)
 
 

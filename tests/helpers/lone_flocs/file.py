@@ -66,10 +66,10 @@ def write_lone(path: Any, results: LoneResults, rule: Rule) -> None:
 def read_lone(path: str | os.PathLike) -> LoneResults:
     """The LoneResults of a file; FileError for one that is absent, damaged, or of another kind."""
     complaint = f"{path} holds no readable results of single flocs: "
-    with opened_file(path, lambda why: complaint + why) as (file, nodes):
-        check_format(path, file, nodes, FORMAT, SCHEMA_VERSION)
-        wanted = {"flocs": GROUP.arrays, "run": scalars_in(nodes, "run")}
-        hold_against(nodes, wanted, wanted)
-        found = GROUP.read(file["flocs"])
+    with opened_file(path, lambda why: complaint + why) as file:
+        check_format(path, file, FORMAT, SCHEMA_VERSION)
+        wanted = {"flocs": GROUP.arrays, "run": scalars_in(file.nodes, "run")}
+        hold_against(file.nodes, wanted, wanted)
+        found = GROUP.read(file, "flocs")
         run = run_of(file)
         return LoneResults(found["vertices"], {name: found[name] for name in COLUMNS}, run)
