@@ -64,6 +64,10 @@ LOADING = 700 * 10**6
 COMPILING = 1500 * 10**6
 """The same while an engine is compiled."""
 
+WAITING = "flocsim waits"
+"""Name of our threads that only wait, for a signal or the end of another process: a process may be
+forked beside them."""
+
 BLAS_THREADS = "OPENBLAS_NUM_THREADS"
 
 FAILED = 70
@@ -161,7 +165,7 @@ def install() -> None:
     os.set_blocking(writing, False)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     handle(lambda *_: None)
-    threading.Thread(target=watch, args=(reading,), daemon=True).start()
+    threading.Thread(target=watch, args=(reading,), daemon=True, name=WAITING).start()
 
 
 def watch(reading: int) -> None:
@@ -172,7 +176,7 @@ def watch(reading: int) -> None:
                 first = not INTERRUPTION.requested
                 INTERRUPTION.note(number)
                 if first:
-                    threading.Thread(target=end_in_time, daemon=True).start()
+                    threading.Thread(target=end_in_time, daemon=True, name=WAITING).start()
 
 
 def end_in_time() -> None:
@@ -205,7 +209,7 @@ def end_with_parent(parent: int | None = None) -> None:
             time.sleep(PARENT_SECONDS)
         os._exit(STOPPED)
 
-    threading.Thread(target=look, daemon=True).start()
+    threading.Thread(target=look, daemon=True, name=WAITING).start()
 
 
 def address_space() -> float:

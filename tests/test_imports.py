@@ -97,7 +97,7 @@ INNER_ROWS = {
         ["images", "results", "journal"],
         ["outputs", "groups", "records"],
         ["files", "hdf5", "labelled", "confidence", "terminal"],
-        ["seals"],
+        ["seals", "hdf5_child"],
     ],
 }
 
@@ -106,6 +106,8 @@ HEAVYWEIGHTS = {
     "mpi4py": ["ensembles/parallel/processes.py"],
     "h5py": [
         "io/groups.py",
+        "io/hdf5.py",
+        "io/hdf5_child.py",
         "io/results/layout.py",
         "io/trajectory.py",
     ],

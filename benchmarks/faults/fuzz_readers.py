@@ -143,6 +143,23 @@ def read_swarm_file(path):
     text_of(path)
 
 
+def read_sweep_file(path):
+    """Read it, and describe it."""
+    from flocsim.ensembles.contents import text_of
+    from flocsim.ensembles.sweep import read_joined
+
+    read_joined(path)
+    text_of(path)
+
+
+def read_trajectory_file(path):
+    """Read it; the motion that was believed is one."""
+    from flocsim.io.trajectory import read_trajectory
+
+    found = read_trajectory(path)
+    assert np.isfinite(found.position).all() and len(found.shapes) == found.position.shape[1]
+
+
 class SwarmJournalReader:
     """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
 
@@ -267,6 +284,8 @@ def reader(name, folder):
         "compounds": (hostile_files.compounds_file, read_library_file),
         "kernels": (hostile_files.kernel_file, read_kernel_file),
         "strengths": (hostile_files.strengths_file, read_strengths_file),
+        "sweeps": (hostile_files.sweep_file, read_sweep_file),
+        "trajectories": (hostile_files.trajectory_file, read_trajectory_file),
         "pictures": (hostile_files.picture_file, read_picture_file),
         "masks": (hostile_files.masks_file, read_masks_file),
         "configs": (hostile_files.config_file, read_config_file),
@@ -275,7 +294,7 @@ def reader(name, folder):
 
 KINDS = (
     "results", "libraries", "journals", "pictures", "masks", "configs", "swarms", "swarm_journals",
-    "compounds", "kernels", "strengths",
+    "compounds", "kernels", "strengths", "sweeps", "trajectories",
 )  # fmt: skip
 
 

@@ -178,7 +178,13 @@ def column_of(declared: Declared, values: Any) -> Column:
 
 def run_of(file: File) -> dict[str, str | int | float]:
     """The scalars of the group ``run`` of an open file."""
-    return {name: file.scalar(f"run/{name}") for name in file.names("run")}
+    return {name: scalar_of(file, f"run/{name}") for name in file.names("run")}
+
+
+def scalar_of(file: File, path: str) -> str | int | float:
+    """The value of a dataset of one."""
+    value: str | int | float = file.read(path).item()
+    return value
 
 
 def scalars_in(nodes: Mapping[str, Node], group: str) -> dict[str, Declared]:

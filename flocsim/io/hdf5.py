@@ -1,196 +1,154 @@
 """Open HDF5 files, with the HDF5 library in a process of its own (`flocsim.io.hdf5_child`).
 
-That process describes the file; numbers are read here, from where they lie in it. On Linux it is
-forked, which takes some ms: h5py lets no other thread hold its lock meanwhile, glibc none that of
-the memory. Under MPI, whose libraries may not outlive a fork, and on other systems it is started
-anew, in 0.2 s. It has no descriptor but the file and a pipe, and does not outlive its limit of
-time, whatever becomes of this process.
+That process describes the file; numbers are read here, from where they lie in it. It is forked,
+which takes some ms; where that is not safe it is started anew, in 0.2 s. It has no descriptor but
+the file and a pipe, and does not outlive its limit of time, whatever becomes of this process.
 """
 
-import contextlib
 import json
 import math
 import os
 import signal
 import subprocess
 import sys
+import threading
 import warnings
 from typing import Any, BinaryIO
 
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError
+from flocsim.errors import FileError, visible
 from flocsim.io import hdf5_child
-from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS
+from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING
 
 MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
 """How names of variables begin that make a process a rank, which a child of a rank is not."""
+
+
+LONGEST = 300
+"""Letters of what the HDF5 library says."""
 
 
 class Unfit(ValueError):
     """What a file holds that flocsim does not write, in a line without the file's name."""
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class Node:
     """A group (``type`` None) or a dataset: its type ("f8", "i8", "i4", "u1" or "text"), its shape,
-    where its numbers lie, its attributes {name: value} (None for units and the like, which are
-    known from the schema), and its text in one list."""
+    where its numbers lie in the open file ``data``, its attributes {name: value} (None for units
+    and the like, which are known from the schema), and its text in one list."""
 
     type: str | None
     shape: tuple[int, ...]
     offset: int | None
     attributes: dict[str, Any]
     text: list[str] | None
-
-
-@attrs.frozen(eq=False)
-class File:
-    """An open HDF5 file: ``nodes`` {path: Node} of all that is in it, "" being its root."""
-
-    nodes: dict[str, Node]
     data: BinaryIO
+
+    @property
+    def dtype(self) -> np.dtype:
+        return np.dtype(f"<{self.type}")
+
+    def __getitem__(self, at: tuple) -> np.ndarray:
+        """All values for (); for (numbers along all axes but the last, slice) only these are read
+        of an array of numbers. Text are objects."""
+        if self.text is not None:
+            words = np.array(self.text, object).reshape(self.shape)
+            return words[at] if at else words
+        first, shape = 0, self.shape
+        if at:
+            *place, part = at
+            start, stop, _ = part.indices(shape[-1])
+            row = int(np.ravel_multi_index((*place, 0), (*shape[:-1], 1)))
+            first, shape = row * shape[-1] + start, (stop - start,)
+        self.data.seek((self.offset or 0) + first * self.dtype.itemsize)
+        values = np.fromfile(self.data, self.dtype, math.prod(shape))
+        return values.reshape(shape)  # ValueError where the file ends before them
+
+
+class File(dict[str, Node]):
+    """An open HDF5 file: {path: Node} of all that is in it, "" being its root."""
 
     @property
     def attributes(self) -> dict[str, Any]:
         """Those of the root."""
-        return self.nodes[""].attributes
-
-    def __contains__(self, path: str) -> bool:
-        return path in self.nodes
+        return self[""].attributes
 
     def names(self, group: str) -> list[str]:
-        """The names of what is in a group, or in the root, in order."""
-        above = f"{group}/" if group else ""
-        inner = (path.removeprefix(above) for path in self.nodes if path.startswith(above))
-        return [name for name in inner if name and "/" not in name]
+        """The names of what is in a group."""
+        parts = (path.rpartition("/") for path in self if path)
+        return [name for above, _, name in parts if above == group]
 
     def node(self, path: str) -> Node:
         """A dataset; Unfit where there is none."""
-        node = self.nodes.get(path)
-        if node is None or node.type is None:
+        if path not in self or self[path].type is None:
             raise Unfit(f"{path} is missing")
-        return node
+        return self[path]
 
-    def read(self, path: str, at: tuple = ()) -> Any:
-        """The values of a dataset as an array, text as objects.
-
-        ``at``: numbers along the first axes, and after them perhaps a slice along the next: of a
-        large array only these are read.
-        """
-        node = self.node(path)
-        if node.text is not None:
-            found = np.empty(len(node.text), object)
-            found[:] = node.text
-            return found.reshape(node.shape)[at]
-        *place, part = at if at and isinstance(at[-1], slice) else (*at, slice(None))
-        inner = node.shape[len(place) :]
-        kind, start = np.dtype(f"<{node.type}"), 0
-        for number, length in zip(place, node.shape, strict=False):
-            if not 0 <= number < length:
-                raise IndexError(f"{path} has no place {number}")
-            start = start * length + number
-        start *= math.prod(inner)
-        if inner:
-            first, stop, _ = part.indices(inner[0])
-            inner = (max(stop - first, 0), *inner[1:])
-            start += first * math.prod(inner[1:])
-        self.data.seek((node.offset or 0) + start * kind.itemsize)
-        values = np.fromfile(self.data, kind, math.prod(inner))
-        if len(values) < math.prod(inner):
-            raise Unfit(f"the values of {path} are missing")
-        return values.reshape(inner)
-
-    def scalar(self, path: str) -> str | int | float:
-        """The value of a dataset of one."""
-        node = self.node(path)
-        if node.shape:
-            raise Unfit(f"{path} has {len(node.shape)} dimensions, expected 0")
-        value: str | int | float = node.text[0] if node.text else self.read(path).item()
-        return value
-
-
-@attrs.frozen(eq=False)
-class Dataset:
-    """A dataset of numbers in an open file, which are read as they are indexed."""
-
-    file: File
-    path: str
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    offset: int | None
-
-    @classmethod
-    def of(cls, file: File, path: str) -> "Dataset":
-        """The dataset at a path; Unfit where there is none."""
-        node = file.node(path)
-        return cls(file, path, node.shape, np.dtype(node.type), node.offset)
-
-    def __getitem__(self, at: tuple) -> np.ndarray:
-        values: np.ndarray = self.file.read(self.path, at)
-        return values
+    def read(self, path: str, at: tuple = ()) -> np.ndarray:
+        """The values of a dataset, or some of them (see Node); Unfit where there is none."""
+        return self.node(path)[at]
 
 
 def open_hdf5(path: object, data: BinaryIO, root_only: bool = False) -> File:
     """Return the File of an open file whose checksum was found right.
 
     ``path``: its name in messages; ``root_only``: without what is in it. Raises Unfit for all that
-    flocsim does not write, and FileError for a file that the HDF5 library does not come to an end
-    with.
+    flocsim does not write, and FileError for a file that the HDF5 library fails on.
     """
-    import h5py  # noqa: F401 (so that a forked process has it)
-
-    if sys.platform == "linux" and not is_under_mpi():
-        said, status = describe_forked(data.fileno(), root_only)
-    else:
-        said, status = describe_spawned(data, root_only)
+    describe = describe_forked if can_fork() else describe_spawned
+    said, status = describe(data, root_only)
     # The other process may have moved the place in the file that both have, which a buffer does not
     # notice unless it is sought from the end.
-    data.seek(0, os.SEEK_END)
+    seconds = hdf5_child.cpu_seconds(data.seek(0, os.SEEK_END))
     try:
-        found = json.loads(said)
+        found = json.loads(said.rpartition(b"\n")[2])  # behind what others print as Python starts
     except ValueError:
-        late = status in (-signal.SIGXCPU, -signal.SIGALRM) if os.name == "posix" else status == 1
-        what = (
-            f"the HDF5 library took more than {hdf5_child.CPU_SECONDS} s to read it"
-            if late
-            else f"the HDF5 library crashed on it ({status})"
-        )
+        late = status in (1, -getattr(signal, "SIGXCPU", 1), -getattr(signal, "SIGALRM", 1))
+        what = f"took more than {seconds} s" if late else f"crashed ({status})"
         raise FileError(
-            f"{path} is damaged or hostile: {what}; use a copy or run it again"
+            f"{path} is damaged or hostile: the HDF5 library {what}; use a copy or run it again"
         ) from None
     if "refused" in found:
-        raise Unfit(found["refused"])
-    nodes = {
-        name: Node(kind, tuple(shape), *rest)
-        for name, (kind, shape, *rest) in found["nodes"].items()
-    }
-    return File(nodes, data)
+        raise Unfit(visible(found["refused"][:LONGEST], ""))
+    return File(
+        (name, Node(kind, tuple(shape), offset, attributes, text, data))
+        for name, (kind, shape, offset, attributes, text) in found["nodes"].items()
+    )
 
 
-def is_under_mpi() -> bool:
-    """Return True in a rank of an MPI job."""
-    return "mpi4py.MPI" in sys.modules or any(name in os.environ for name in LAUNCHER_RANKS)
+def can_fork() -> bool:
+    """Return True where a forked process is safe.
+
+    Not beside threads of others, whose locks it would have for ever, nor under MPI, nor on macOS,
+    whose libraries may not be used in one. Our own threads only wait.
+    """
+    others = [each for each in threading.enumerate() if each is not threading.current_thread()]
+    return (
+        sys.platform == "linux"
+        and "mpi4py.MPI" not in sys.modules
+        and not any(name in os.environ for name in LAUNCHER_RANKS)
+        and all(each.name.startswith(WAITING) for each in others)
+    )
 
 
-def describe_forked(file: int, root_only: bool) -> tuple[bytes, int]:
+def describe_forked(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:
     """(what a forked process writes, its status: −n where signal n ended it)."""
+    import h5py  # noqa: F401 (so that the process has it)
+
     reading, writing = os.pipe()
     # Signals of a terminal go to both processes: this one answers them. None comes in between.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # of forks beside threads
-            child = os.fork()
-        if child == 0:
-            run_forked(file, writing, root_only, before)
-    except OSError:
-        os.close(reading)
-        raise
-    finally:
-        os.close(writing)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    with warnings.catch_warnings():
+        # Python counts the threads of numpy's libraries, too, which are idle.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        run_forked(data.fileno(), writing, root_only, mask)
+    os.close(writing)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     with open(reading, "rb") as pipe:
         try:
             said = pipe.read()
@@ -212,13 +170,11 @@ def run_forked(file: int, writing: int, root_only: bool, mask: Any) -> None:
         own = os.dup(file), os.dup(writing), os.open(os.devnull, os.O_WRONLY)
         for place, each in enumerate(own):
             os.dup2(each, place)
-        for each in map(int, os.listdir("/proc/self/fd")):
-            if each > 2:
-                with contextlib.suppress(OSError):
-                    os.close(each)
+        for number in map(int, os.listdir("/proc/self/fd")):
+            os.closerange(max(number, 3), number + 1)
         hdf5_child.main(root_only)
     finally:
-        os._exit(1)
+        os._exit(2)
 
 
 def describe_spawned(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:

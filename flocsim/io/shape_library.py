@@ -364,7 +364,7 @@ def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
             raise FileError(f"{path} is not a shape library: name a file written by flocsim fit")
         remedy = "make it again with flocsim fit"
         version = check_version(path, file, SCHEMA_VERSION, COMPOUND_VERSION, remedy)
-        check_structure(file.nodes, version == COMPOUND_VERSION)
+        check_structure(file, version == COMPOUND_VERSION)
         return _entries(file)
 
 

@@ -120,8 +120,10 @@ def valid_compounds(folder):
 @cache
 def valid_kernel(folder):
     """The HDF5 data of a small results file of a kernel study."""
-    results = make_results(types=("I", "III"), vertices=(1, 8), delta=(1.0,), count=5)
-    write_results(folder / "valid-kernel.h5", attrs.evolve(results, kernel=some_kernel()))
+    kernel = some_kernel()
+    vertices = tuple(kernel.vertices.tolist())
+    results = make_results(types=("I", "III"), vertices=vertices, delta=(1.0,), count=5)
+    write_results(folder / "valid-kernel.h5", attrs.evolve(results, kernel=kernel))
     return read_sealed(folder / "valid-kernel.h5")
 
 

@@ -32,7 +32,6 @@ from flocsim.ensembles.storage.unfinished import ASKED, Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.io.groups import run_of
-from flocsim.io.hdf5 import Dataset
 from flocsim.io.records import CHUNK, Record, matches
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import failures_of, opened
@@ -47,7 +46,7 @@ def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
     if tuple(failures_of(file)) != as_words(FAILURES):
         raise ValueError("its failure codes have other meanings")
     axes = (file.read(f"replicates/{axis}") for axis in ("type", "vertices", "delta"))
-    columns = {name: Dataset.of(file, f"replicates/{name}") for name in kind.COLUMNS}
+    columns = {name: file.node(f"replicates/{name}") for name in kind.COLUMNS}
     count = file.node("replicates/replicate").shape[0]
     return OldTable(columns, kind.places_in(*axes), count, run_of(file))
 

@@ -101,7 +101,8 @@ def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[
     """{column: value} of one replicate, at (type, vertices, delta, replicate); FileError as
     `read_results`, and for values that no run can have given."""
     with opened(path) as file:
-        found = {name: file.read(f"replicates/{name}", place)[()] for name in REPLICATES}
+        at = (*place[:-1], slice(place[-1], place[-1] + 1))
+        found = {name: file.read(f"replicates/{name}", at)[0] for name in REPLICATES}
         checks.check_rows(lambda name: np.asarray(found[name]), len(failures_of(file)), 0)
         return found
 
@@ -195,6 +196,6 @@ def opened(path: str | os.PathLike) -> Iterator[File]:
                 f"{path} is not a results file{found}: name one written by flocsim ensemble"
             )
         check_version(path, file, SCHEMA_VERSION)
-        checks.check_structure(file.nodes)
+        checks.check_structure(file)
         checks.check_coordinates(file)
         yield file

@@ -141,7 +141,7 @@ def read_strengths(path: str | os.PathLike) -> Strengths:
         if not isinstance(known, dict):
             raise ValueError("its attribute about is not a table")
         wanted = {name: group.arrays for name, group in GROUPS.items()}
-        hold_against(file.nodes, wanted, wanted, {"quantile": len(QUANTILES)})
+        hold_against(file, wanted, wanted, {"quantile": len(QUANTILES)})
         doublets, conditions = (group.read(file, name) for name, group in GROUPS.items())
         for axis in AXES:
             if np.any((doublets[axis] < 0) | (doublets[axis] >= len(conditions[axis]))):

@@ -228,8 +228,8 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
     with opened_file(path, lambda why: f"{path} has no readable results of a swarm: {why}") as file:
         check_format(path, file, FORMAT, SCHEMA_VERSION)
         wanted = {name: group.arrays for name, group in GROUPS.items()}
-        wanted["run"] = scalars_in(file.nodes, "run")
-        hold_against(file.nodes, wanted, wanted)
+        wanted["run"] = scalars_in(file, "run")
+        hold_against(file, wanted, wanted)
         scales: dict[str, np.ndarray] = {}
         groups: dict[str, dict[str, np.ndarray]] = {}
         for name, group in GROUPS.items():

@@ -21,6 +21,7 @@ from flocsim.io.groups import (
     check_format,
     hold_against,
     opened_file,
+    scalar_of,
     write_groups,
 )
 from flocsim.io.hdf5 import Node
@@ -96,25 +97,25 @@ def read_sweep(
         lambda reason: f"{path} has no readable sweep: {reason}; join it again with --resume",
     ) as file:
         check_format(path, file, FORMAT, SCHEMA_VERSION, "swept")
-        about, nodes = read_json(file.attributes["swept"], {}), file.nodes
+        about = read_json(file.attributes["swept"], {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept does not name any keys")
-        joined, lengths = next((each for each in known if each[0].keys() <= nodes.keys()), ({}, {}))
+        joined, lengths = next((each for each in known if each[0].keys() <= file.keys()), ({}, {}))
         if not joined:
             raise ValueError("it has no group of a sweep")
-        declared = {name: joined_group(each, name, about, nodes) for name, each in joined.items()}
+        declared = {name: joined_group(each, name, about, file) for name, each in joined.items()}
         wanted = {name: group.arrays for name, group in declared.items()}
-        source = {name: Declared("text") for name in SOURCE if f"run/{name}" in nodes}
+        source = {name: Declared("text") for name in SOURCE if f"run/{name}" in file}
         run = {"run": {"plan": Declared("text")} | source}
-        hold_against(nodes, wanted | run, list(joined), lengths)
+        hold_against(file, wanted | run, list(joined), lengths)
         groups = {name: group.labelled(group.read(file, name)) for name, group in declared.items()}
         first = next(iter(groups.values())).axes
         swept = {
             name: Swept(each["key"], first[name].values.tolist(), each["unit"])
             for name, each in about.items()
         }
-        plan = file.scalar("run/plan") if "run" in file else ""
-        about_all = {name: file.scalar(f"run/{name}") for name in source}
+        plan = scalar_of(file, "run/plan") if "run" in file else ""
+        about_all = {name: scalar_of(file, f"run/{name}") for name in source}
         return SweepResults(Path(path), swept, groups, str(plan), about_all)
 
 

@@ -68,8 +68,8 @@ def read_lone(path: str | os.PathLike) -> LoneResults:
     complaint = f"{path} holds no readable results of single flocs: "
     with opened_file(path, lambda why: complaint + why) as file:
         check_format(path, file, FORMAT, SCHEMA_VERSION)
-        wanted = {"flocs": GROUP.arrays, "run": scalars_in(file.nodes, "run")}
-        hold_against(file.nodes, wanted, wanted)
+        wanted = {"flocs": GROUP.arrays, "run": scalars_in(file, "run")}
+        hold_against(file, wanted, wanted)
         found = GROUP.read(file, "flocs")
         run = run_of(file)
         return LoneResults(found["vertices"], {name: found[name] for name in COLUMNS}, run)
