@@ -92,10 +92,8 @@ def limit(name: str, most: int) -> None:
 def described(h5py: Any, root_only: bool) -> dict[str, tuple]:
     """Return {path: (type, shape, offset of its values, attributes, text)} of all groups, of type
     None, and datasets; "" is the root."""
-    # Opened anew, where that is possible: else both processes have one place in the file.
-    proc = "/proc/self/fd/0"
-    source = proc if os.path.exists(proc) else open(0, "rb", 0, closefd=False)  # noqa: SIM115
-    with h5py.File(source, "r", locking=False) as file:
+    # Not by its name, under which another file may lie by now.
+    with open(0, "rb", 0, closefd=False) as source, h5py.File(source, "r") as file:
         if os.name != "nt":
             limit("NOFILE", 0)  # from here on nothing else can be opened
         nodes = {"": (None, (), None, attributes(file), None)}
