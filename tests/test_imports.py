@@ -95,7 +95,7 @@ INNER_ROWS = {
         ["fit_report"],
         ["shape_library", "trajectory"],
         ["images", "results", "journal"],
-        ["outputs", "groups", "records"],
+        ["outputs", "groups", "json_text"],
         ["files", "hdf5", "labelled", "confidence", "terminal"],
         ["seals", "hdf5_child"],
     ],

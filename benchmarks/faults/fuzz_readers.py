@@ -164,24 +164,22 @@ class SwarmJournalReader:
     """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
 
     def __init__(self, folder):
-        from flocsim.ensembles.kind import chunk_record, kept_record
+        from flocsim.ensembles.storage.row_store import key_of
         from flocsim.ensembles.swarms.study import SwarmStudy
-        from flocsim.io.records import CHUNK, SNAPSHOT, record_at
+        from flocsim.io.journal import CHUNK, PART
         from tests.helpers.swarm_study import swarm_config
 
         self.study, self.identity, self.parts = SwarmStudy(swarm_config(folder)), {"seed": 1}, []
-        [condition], key = self.study.conditions, short(self.identity)
+        [condition], known = self.study.conditions, {"identity": short(self.identity)}
         for replicate in range(2):
-            records = []
+            key, records = (key_of(condition), replicate), []
 
-            def keep(about, data, counts, replicate=replicate, records=records):
-                encoded = kept_record(condition, replicate, about, data, key)
-                records.append((SNAPSHOT, record_at(encoded, 0).description, data))
+            def keep(name, about, data, key=key, records=records):
+                records.append((PART, *key, known | about | {"name": name}, data))
 
             row, _ = self.study.run_task(self.study.places[0], replicate, lambda: False, None, keep)
             rows = np.array([tuple(row[name] for name in self.study.row.names)], self.study.row)
-            about = record_at(chunk_record(condition, replicate, rows, key), 0).description
-            self.parts += [*records, (CHUNK, about, rows.tobytes())]
+            self.parts += [*records, (CHUNK, *key, known, rows.tobytes())]
 
     def make(self, rng, folder):
         """A hostile journal."""
@@ -189,7 +187,7 @@ class SwarmJournalReader:
 
     def read(self, path):
         """Take what it has, and make results of it where all is there."""
-        from flocsim.ensembles.storage.resume import Beginning, take_journal
+        from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.ensembles.swarms.kind import results
         from flocsim.io.journal import Journal
@@ -197,17 +195,18 @@ class SwarmJournalReader:
 
         journal = Journal(path)
         try:
-            if not journal.is_journal:
-                raise FileError("it is no journal")  # as a run that begins says
+            if journal.problem:
+                raise FileError(journal.problem)  # as a run that begins says
             store = RowStore(journal, self.study.conditions, self.study.row)
             start = Beginning(store, self.identity)
+            refuse_other_sessions(start, self.study)
             take_journal(start, self.study)
             assert all(remark.isprintable() for remark in start.remarks), start.remarks
-            for records in store.parts.values():
-                left = self.study.left_of(records, journal.read)
+            for parts in store.parts.values():
+                left = self.study.left_of(parts)
                 assert left is None or np.isfinite(left.state["motion"]).all()
             if store.intervals(0) == [(0, 2)]:
-                table_of(results(self.study, start, 2, {}, None, None, print, True))
+                table_of(results(self.study, start, 2, {}, None, True))
             if start.remarks:
                 raise FileError(start.remarks[0])  # a part of it was refused
         finally:
@@ -250,19 +249,21 @@ class JournalReader:
     def read(self, path):
         """Take its rows and look at them."""
         from flocsim.ensembles.collision.draw import FAILURES
-        from flocsim.ensembles.kind import ROW
-        from flocsim.ensembles.storage.resume import Beginning, take_journal
+        from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.io.journal import Journal
         from flocsim.io.results.checks import check_rows
 
         journal = Journal(path)
         try:
+            if journal.problem:
+                raise FileError(journal.problem)
             start = Beginning(RowStore(journal, self.study.conditions), self.identity)
+            refuse_other_sessions(start, self.study)
             take_journal(start, self.study)
             for place in range(len(self.study.conditions)):
                 for first, stop in start.store.intervals(place):
-                    rows = {n: start.store.read(place, n, first, stop) for n in ROW.names}
+                    rows = start.store.rows(place, first, stop)
                     check_rows(rows.__getitem__, len(FAILURES), 0)
             assert all(remark.isprintable() for remark in start.remarks), start.remarks
         finally:

@@ -12,11 +12,12 @@ from pathlib import Path
 import attrs
 
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
-from flocsim.io.journal import journal_path
-from flocsim.io.records import CHUNK, Record, scan
+from flocsim.io.journal import CHUNK, journal_path
 from flocsim.io.results.file import read_results
+from tests.helpers.journals import records_in
 from tests.helpers.results_files import same_data
 
 BESIDE_PYTHON = Path(sys.executable).parent
@@ -123,10 +124,10 @@ class Job:
     def wait_for_journal(self):
         """Until the run has begun to write, or has ended."""
         path = self.folder / "study.h5.journal"
-        before = path.stat().st_size if path.exists() else 0
+        before = len(records_in(path)) if path.exists() else 0
         until = time.monotonic() + PATIENCE
         while self.process.poll() is None and time.monotonic() < until:
-            if path.exists() and path.stat().st_size > before:
+            if path.exists() and len(records_in(path)) > before:
                 return
             time.sleep(0.005)
 
@@ -211,14 +212,17 @@ def whole_rows(folder):
     path = journal_path(folder / "study.h5")
     if not path.exists():
         return 0
-    with open(path, "rb") as file:
-        chunks = [each for each in scan(file) if isinstance(each, Record) and each.kind == CHUNK]
+    return len(finished_in(path))
+
+
+def finished_in(path):
+    """{(condition, replicate)} of the chunks in a journal."""
     done = set()
-    for each in chunks:
-        about = each.description
-        numbers = range(about["first"], about["first"] + about["count"])
-        done |= {(about["type"], about["delta"], number) for number in numbers}
-    return len(done)
+    for each in records_in(path):
+        if each.kind == CHUNK:
+            count = len(each.data) // ROW.itemsize
+            done |= {(each.condition, each.first + k) for k in range(count)}
+    return done
 
 
 def verdict(folder, reference):

@@ -23,14 +23,15 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from benchmarks.faults.job import KINDS, PATIENCE, STUDY, Tally, alive, descendants
+from benchmarks.faults.job import KINDS, PATIENCE, STUDY, Tally, alive, descendants, finished_in
 from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.errors import FlocsimError
-from flocsim.io.records import CHUNK, SESSION, Record, scan
+from flocsim.io.journal import SESSION
 from flocsim.io.results.file import read_results
+from tests.helpers.journals import records_in
 from tests.helpers.results_files import same_data
 
 SEEDS = (3, 5)
@@ -133,14 +134,8 @@ def race(folder, rng):
 
 def seed_and_rows(path):
     """(seeds of the runs that wrote a journal, replicates that it has whole)."""
-    with open(path, "rb") as file:
-        records = [each for each in scan(file) if isinstance(each, Record)]
-    seeds = {each.description["identity"]["seed"] for each in records if each.kind == SESSION}
-    rows = set()
-    for about in (each.description for each in records if each.kind == CHUNK):
-        numbers = range(about["first"], about["first"] + about["count"])
-        rows |= {(about["type"], about["delta"], number) for number in numbers}
-    return seeds, len(rows)
+    sessions = [each.about for each in records_in(path) if each.kind == SESSION]
+    return {each["identity"]["seed"] for each in sessions}, len(finished_in(path))
 
 
 def what_is_there(folder, references):
@@ -151,7 +146,7 @@ def what_is_there(folder, references):
         if apart := same_data(references[seed], path):
             raise ValueError(f"{path.name} is not the study of seed {seed}: {apart[:3]}")
         there[seed] = read_results(path).replicates["outcome"].size
-    for number, path in enumerate(sorted(folder.glob("study.h5.journal*"))):
+    for number, path in enumerate(sorted(folder.glob("study.h5.journal*[l0-9]"))):
         seeds, rows = seed_and_rows(path)
         if not rows:
             continue
@@ -241,7 +236,7 @@ def unfinished_journal(root, references):
         job = subprocess.Popen(words, cwd=folder, stderr=subprocess.DEVNULL)
         while job.poll() is None and rows_so_far(path) < half:
             time.sleep(0.01)
-        job.kill()
+        job.terminate()  # so that it is one file
         job.wait()
     return path
 
@@ -249,10 +244,7 @@ def unfinished_journal(root, references):
 def rows_so_far(path):
     """Replicates in a journal that is being written; 0 where there is none, which may change
     between a look and the next."""
-    try:
-        return seed_and_rows(path)[1]
-    except FileNotFoundError:
-        return 0
+    return seed_and_rows(path)[1]
 
 
 if __name__ == "__main__":

@@ -5,8 +5,7 @@
 *ranks*: `mpirun -n 2` and `--jobs 2` against two independent serial runs of half the replicates at
 the same time. *memory*: the largest resident set of each rank. *simulation*: the Schedule that runs
 studies hands out replicates whose costs were measured here, to simulated ranks; rank 0 answers one
-request at a time, in the time that was measured for taking in a chunk and writing it. Then all make
-the results file, in times measured here; what the file system does is assumed (`assembly_costs`).
+request at a time, in the time that was measured for taking in a chunk and writing it.
 """
 
 import json
@@ -17,7 +16,6 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.reporting import Table, parse_arguments, print_heading
-from benchmarks.speed.assembly_costs import BANDWIDTHS, measure_assembly
 from benchmarks.speed.scaling_simulation import measure_costs, measure_rank_zero, simulate
 
 BESIDE_PYTHON = Path(sys.executable).parent
@@ -117,16 +115,14 @@ def simulate_all(folder, quick, table, about):
     """Rows of the simulation; ``about`` receives what was measured for it."""
     costs = measure_costs(20 if quick else 60)
     rank_zero = measure_rank_zero(folder)
-    assembly = measure_assembly(folder)
     about.add(
-        costs.number, 1e3 * costs.mean, costs.spread, 1e6 * rank_zero.answer, rank_zero.rows / 1e6,
-        assembly.writing / 1e6, assembly.counting / 1e6,
-    )  # fmt: skip
+        costs.number, 1e3 * costs.mean, costs.spread, 1e6 * rank_zero.answer, rank_zero.rows / 1e6
+    )
     for ranks in RANKS[: 4 if quick else None]:
         for per_rank in (1e2, 1e4, 1e5):
             if ranks * per_rank > 1e10:
                 continue
-            table.add(*simulate(ranks, int(ranks * per_rank), costs, rank_zero, assembly))
+            table.add(*simulate(ranks, int(ranks * per_rank), costs, rank_zero))
 
 
 def main():
@@ -152,12 +148,10 @@ def main():
             )
         if "simulation" in arguments.only:
             columns = ("costs measured", "mean [ms]", "largest/median", "answer [µs]",
-                       "taken in [1e6 rows/s]", "written by a rank [1e6 rows/s]",
-                       "counted by a rank [1e6 rows/s]")  # fmt: skip
+                       "taken in [1e6 rows/s]")  # fmt: skip
             about = Table("What the simulation works with", columns)
             columns = ("ranks", "replicates", "ideal [s]", "handed out in [s]", "efficiency",
-                       "rank 0 busy", "assembly: rank 0 [s]", "a rank [s]",
-                       *(f"with assembly, {speed:g} GB/s" for speed in BANDWIDTHS))  # fmt: skip
+                       "rank 0 busy")  # fmt: skip
             table = Table("Simulated ranks", columns)
             simulate_all(folder, quick, table, about)
             tables += [about, table]

@@ -6,9 +6,8 @@ import time
 import attrs
 import numpy as np
 
-from benchmarks.speed.assembly_costs import BANDWIDTHS
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.kind import ROW, Condition, chunk_record
+from flocsim.ensembles.kind import ROW, Condition
 from flocsim.ensembles.parallel.communicator import SLEEP, ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState, chunk_seconds
 from flocsim.ensembles.storage.row_store import RowStore
@@ -86,13 +85,12 @@ def measure_rank_zero(folder):
         store = RowStore(Journal(path), conditions)
         schedule = Schedule.of([[]], [10**9], 1000)
         state = StudyState(schedule, store, lambda stop: False, 1e9)
-        record = chunk_record(conditions[0], 0, np.zeros(rows, ROW), "key")
-        start = len(record) - rows * ROW.itemsize
+        table = np.zeros(rows, ROW)
         began = time.perf_counter()
         for _ in range(count):
             chunk = state.next_chunk()
             chunk = chunk._replace(stop=chunk.first + rows)
-            state.take_in(ChunkResult(chunk, rows, record, start))
+            state.take_in(ChunkResult(chunk, table))
         store.journal.sync()
         rates[rows] = (time.perf_counter() - began) / count
     per_row = (rates[8192] - rates[1]) / 8191
@@ -113,7 +111,7 @@ def run_length(cost, chunk, seconds, rng):
     return done, took * done / count
 
 
-def simulate(ranks, replicates, costs, rank_zero, assembly):
+def simulate(ranks, replicates, costs, rank_zero):
     """A row of the table: a study of so many replicates on so many ranks."""
     rng = np.random.default_rng(ranks)
     every = [np.array(each) for each in costs.conditions]
@@ -122,23 +120,17 @@ def simulate(ranks, replicates, costs, rank_zero, assembly):
     seconds = chunk_seconds(ranks)
     # (time at which a request arrives, rank, its chunk, how much of that is done)
     requests = [(LATENCY, rank, None, 0) for rank in range(ranks)]
-    free, busy, work, idle, chunks = 0.0, 0.0, 0.0, [], 0
+    free, busy, work, idle = 0.0, 0.0, 0.0, []
     while requests:
         now, rank, chunk, done = heapq.heappop(requests)
         served = rank_zero.answer + done / rank_zero.rows
         free, busy = max(now, free) + served, busy + served
         if chunk is not None:
             schedule.give_back(chunk, done)
-            chunks += 1
         idle.append(rank)
         while idle and (new := schedule.take()) is not None:
             count, took = run_length(every[new.condition], new, seconds, rng)
             work += took
             heapq.heappush(requests, (free + took + 2.0 * LATENCY, idle.pop(), new, count))
     ideal = work / ranks
-    parts = assembly.parts(ranks, len(every), per_condition, chunks)
-    ends = [free + parts.total(speed) for speed in BANDWIDTHS]
-    return (
-        ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free,
-        parts.rank_zero, parts.others, *(ideal / end for end in ends),
-    )  # fmt: skip
+    return ranks, f"{replicates:.0e}", ideal, free, ideal / free, busy / free

@@ -205,7 +205,7 @@ def unfinished_text(found: Any) -> str:
     kind, last = contents_of(found.kind), found.sessions[-1]
     facts = [*kind.so_far(found), ("begun", f"{last['date']} by {last['command']}")]
     if found.unread:
-        facts.append(("damaged", f"{found.unread} bytes of {found.noun}, left out"))
+        facts.append(("damaged", f"{found.unread} records, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)
     lines = [f"{found.path}: {found.progress}", *filter(None, [str(last.get("source", ""))]), ""]
     lines += fact_lines(facts)

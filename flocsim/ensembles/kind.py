@@ -3,7 +3,7 @@ and stored, and the contract of a kind, what differs between pairs, rates and sw
 
 A chunk is a run of replicates of one condition, the unit of handing out, writing and resuming. A
 row is what a finished replicate comes to, of the columns of its kind of study; those of pairs are
-ROW. What is kept of an unfinished one goes into records of its own. Replicates of one condition are
+ROW. What is saved of an unfinished one are its parts, by name. Replicates of one condition are
 kept as intervals: sorted, disjoint pairs [first, stop).
 
 A kind gives a StudyKind, its conditions, draws and runs, which every rank has, and a Kind, the
@@ -13,8 +13,8 @@ and processes, resuming, identities, signals and progress exist once and ask the
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import cache
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -25,8 +25,7 @@ import numpy as np
 from flocsim.ensembles.config import STUDIES
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import visible
-from flocsim.io.records import CHUNK, SNAPSHOT, Record, encode, matches
-from flocsim.io.results.run_group import NOTE, SOURCE, package_version
+from flocsim.io.results.run_group import SOURCE, package_version
 from flocsim.io.results.schema import REPLICATES
 
 MOST_ROWS = 16_384
@@ -36,14 +35,6 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 """One replicate: its row of the results file."""
 
 COLUMNS = tuple(REPLICATES)
-
-DESCRIPTION = {
-    "type": str, "vertices": int, "delta": float, "first": int, "count": int, "identity": str
-}  # fmt: skip
-"""A chunk's, as a pattern."""
-
-KEPT = {"type": str, "vertices": int, "delta": float, "replicate": int, "identity": str}
-"""Of what is kept of an unfinished replicate, likewise."""
 
 LARGEST_REPLICATE = 2**40
 
@@ -59,8 +50,8 @@ Code = tuple[int, int]
 Place = tuple[int, int, float]
 """Of a condition: place of the type, N, share of δ_max."""
 
-Keep = Callable[[dict, bytes, bool], object]
-"""Takes what is kept of an unfinished replicate: description, data, whether progress counts it."""
+Keep = Callable[[str, dict, bytes], object]
+"""Saves a part of an unfinished replicate: name, description, data."""
 
 Going = Callable[[str], object]
 """Is told in words how far a replicate is."""
@@ -93,76 +84,18 @@ class Chunk(NamedTuple):
     left: Any = None
 
 
-def chunk_record(
-    condition: Condition, first: int, rows: np.ndarray, identity: str, notes: Iterable[dict] = ()
-) -> bytes:
-    """The record of finished rows, for the journal: column by column.
-
-    ``identity`` is the digest of all that the rows follow from; ``notes`` tell of failed ones.
-    """
-    description = {**condition._asdict(), "first": first, "count": len(rows), "identity": identity}
-    if notes:
-        description["notes"] = list(notes)
-    return encode(CHUNK, description, b"".join(rows[name].tobytes() for name in starts(rows.dtype)))
-
-
-def kept_record(
-    condition: Condition, replicate: int, description: dict, data: bytes, identity: str
-) -> bytes:
-    """The record of what is kept of an unfinished replicate."""
-    about = {**condition._asdict(), "replicate": replicate, "identity": identity}
-    return encode(SNAPSHOT, about | description, data)
-
-
-def condition_of(description: dict) -> Condition:
-    return Condition(description["type"], description["vertices"], description["delta"])
-
-
-def is_chunk(description: dict | None) -> bool:
-    """Whether a record's description, whoever wrote it, can be that of a chunk."""
-    if not matches(description, DESCRIPTION):
-        return False
-    assert description is not None, "it has keys"
-    first, count = description["first"], description["count"]
+def named(condition: Sequence, first: int, count: int) -> str:
+    """Return a chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
+    name, vertices, delta = condition
     return (
-        0 <= first < first + count <= LARGEST_REPLICATE
-        and matches(description.get("notes", []), [NOTE])
-    )  # fmt: skip
-
-
-def named(description: dict | None) -> str:
-    """A chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
-    if not is_chunk(description):
-        return "what it held is unknown"
-    assert description is not None, "it is a chunk's"
-    last = description["first"] + description["count"] - 1
-    name = visible(description["type"], keep="")
-    return (
-        f"type {name}, N = {description['vertices']}, delta "
-        f"{description['delta']:g}, replicates {description['first']} to {last}"
+        f"type {visible(name, keep='')}, N = {vertices}, delta {delta:g}, replicates {first} to "
+        f"{first + count - 1}"
     )
-
-
-def fits(description: dict, length: int, row: np.dtype = ROW) -> bool:
-    """Whether a description is that of a chunk, and its data are as long as it says."""
-    return is_chunk(description) and length == description["count"] * row.itemsize
-
-
-def rows_of(data: bytes, row: np.dtype = ROW) -> dict[str, np.ndarray]:
-    """{column: values} of a chunk's data."""
-    count = len(data) // row.itemsize
-    return {name: np.frombuffer(data, row[name], count, count * start)
-            for name, start in starts(row).items()}  # fmt: skip
-
-
-def starts(row: np.dtype) -> dict[str, int]:
-    """Column → bytes of a row that lie in the columns before it: a chunk holds them one by one."""
-    return {name: about[1] for name, about in (row.fields or {}).items()}
 
 
 def layout(row: np.dtype = ROW) -> str:
     """The columns of a chunk as text, to tell another version's."""
-    return json.dumps([[name, row[name].str] for name in starts(row)])
+    return json.dumps([[name, row[name].str] for name in row.names or ()])
 
 
 def merged(intervals: Iterable[Interval]) -> list[Interval]:
@@ -321,20 +254,35 @@ class StudyKind:
         """Which rows are of failed replicates."""
         raise NotImplementedError
 
-    def check_part(self, description: dict, data: bytes) -> None:
-        """ValueError for what cannot have been kept of a replicate."""
+    def check_part(self, name: str, description: dict, data: bytes) -> None:
+        """ValueError for what cannot have been saved of a replicate."""
         raise ValueError("unfinished replicates cannot be saved")
 
-    def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
-        """ValueError where what is kept of the replicates of rows is not all there."""
+    def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
+        """ValueError where what is saved of the replicate of a row is not all there; ``parts``:
+        the names of what there is."""
 
-    def counts_part(self, description: dict) -> bool:
-        """Whether progress counts what was kept."""
+    def counts_part(self, name: str) -> bool:
+        """Whether progress counts a part."""
         return False
 
-    def left_of(self, parts: list[Record], read: Callable[[int, int], bytes]) -> Any:
-        """Where a replicate goes on, by the records of what was kept of it; None: it begins."""
+    def left_of(self, parts: Any) -> Any:
+        """Where a replicate goes on, by its Parts; None: it begins."""
         return None
+
+
+@attrs.frozen(eq=False)
+class OldResults:
+    """A results file that is to be extended: the replicates of its ``conditions``, of which it has
+    ``count`` each (where not ``sparse``), as ``chunks`` (condition, first replicate, rows);
+    ``run``, its scalars; ``found``, what else its kind of study takes from it."""
+
+    conditions: Collection[Condition]
+    count: int
+    chunks: Iterable[tuple[Condition, int, np.ndarray]]
+    run: Mapping[str, Any]
+    found: Any = None
+    sparse: bool = False
 
 
 @attrs.frozen(eq=False)
@@ -350,15 +298,15 @@ class Kind:
     """(study, facts of the machine or None) → all that its rows follow from."""
     code: Sequence[str]
     """Modules of flocsim whose code decides what is in a row."""
-    old_rows: Callable[[Any, ExitStack], Any]
-    """(path, resources) → the rows of its results file that is to be extended, an OldTable."""
+    old_rows: Callable[[Any], AbstractContextManager["OldResults"]]
+    """(path) → its results file that is to be extended, open as OldResults."""
     results: Callable[..., Any]
-    """(study, beginning, count, run, communicator, output or None, warn, whether all rows are to
-    be in memory) → results, written to the output."""
+    """(study, beginning, count, run, output or None, whether all rows are to be in memory) →
+    results, written to the output."""
     total: Callable[[Any], int]
     """How many replicates results have."""
     so_far: Callable[..., Any]
-    """(path, sessions, records) of a journal → Unfinished, what it has so far."""
+    """(journal, sessions) → Unfinished, what it has so far."""
     flocs: Callable[[Config], list] = lambda config: []
     """The flocs that a config's study needs, grown or read."""
     check: Callable[[Config], object] = lambda config: None

@@ -20,9 +20,17 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.estimates.statistics import borders
-from flocsim.ensembles.kind import StudyKind, flocs_of, identity_of, kind_of, merged, study_of
+from flocsim.ensembles.kind import (
+    MOST_ROWS,
+    StudyKind,
+    flocs_of,
+    identity_of,
+    kind_of,
+    merged,
+    study_of,
+    total,
+)
 from flocsim.ensembles.parallel.agreement import Facts, disagreement
-from flocsim.ensembles.parallel.assembly import assist
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
     ExitCode,
@@ -31,12 +39,11 @@ from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinato
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.preflight import said_doubts
-from flocsim.ensembles.storage.identity import short
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import refuse_other_part
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.io.journal import MemoryJournal
+from flocsim.io.journal import Journal
 from flocsim.io.results.run_group import (
     distinct,
     mixture_warnings,
@@ -81,7 +88,7 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
         study, identity, cpus = join(config, comm)
         if comm.rank > 0:
             return follow(study, comm).results
-        store = RowStore(MemoryJournal(), study.conditions, study.row)
+        store = RowStore(Journal(), study.conditions, study.row)
         start = Beginning(store, identity, cpus_now=cpus)
         return lead(study, start, comm, progress_of(study, quiet)).results
     except SharedError as error:
@@ -115,7 +122,6 @@ def run_to_file(
                 study, identity, output, mode, journal, kind_of(config).old_rows, cpus,
                 overwrite,
             )  # fmt: skip
-        resources.enter_context(start.resources)
         # Once nothing else stands in the way: what is refused is refused in one line.
         doubts = kind_of(config).doubts(study)
         said = (f"warning: {line}" for line in said_doubts(config, doubts))
@@ -177,12 +183,11 @@ def hear(comm: Communicator, value: Any) -> Any:
 
 def follow(study: StudyKind, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
-    remaining, key = hear(comm, None)
-    if remaining:
+    if hear(comm, None):
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
-    run_chunks(study, RemoteCoordinator(comm), key)
-    code = assist(study, comm).code
+    run_chunks(study, RemoteCoordinator(comm))
+    code = comm.receive(0, heed_signals=False).code
     if code not in (0, STOPPED):
         raise RankZeroFailed(code)
     return Ended(code)
@@ -202,11 +207,10 @@ def lead(
     if output is not None:
         INTERRUPTION.kept = partial(kept_words, start, state)
     remaining = state.schedule.remaining
-    key = short(start.identity)
     progress.say(announcement(study, comm.size, study.size - remaining))
     if study.remark:
         progress.say(study.remark)
-    comm.broadcast((remaining, key))
+    comm.broadcast(remaining)
     if remaining:
         for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
             progress.warn(line)
@@ -215,7 +219,7 @@ def lead(
     coordinator = Coordinator(comm, state, progress.report)
     with sharing_errors(comm, coordinator):
         coordinator.start()
-        run_chunks(study, coordinator, key)
+        run_chunks(study, coordinator)
         coordinator.finish()
         start.journal.sync()
         progress.finish()
@@ -223,14 +227,14 @@ def lead(
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, count=final)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
-            ended.results = make_results(study, start, state, ended, comm, output, progress)
+            ended.results = make_results(study, start, state, ended, comm.size, output)
     comm.broadcast(ExitCode(ended.code))
     return ended
 
 
 def kept_words(start: Beginning, state: StudyState) -> str:
     """Say what the journal has of a study that is stopped."""
-    count, begun = start.store.there(in_journal=True), len(state.begun)
+    count, begun = sum(map(total, start.store.computed)), len(state.begun)
     if not count and not begun:
         return "no replicate was finished"
     others = f" and the states of {begun} others" if begun else ""
@@ -266,9 +270,10 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     replicates, stop = study.config.replicates, study.config.stop
     found, failed = start.found(replicates), 0
     for place, intervals in enumerate(found):
-        for each in intervals:
-            read = partial(start.store.read, place, first=each[0], stop=each[1])
-            failed += int(np.sum(study.has_failed(read)))
+        for first, stop_at in intervals:
+            for low in range(first, stop_at, MOST_ROWS):
+                rows = start.store.rows(place, low, min(low + MOST_ROWS, stop_at))
+                failed += int(np.sum(study.has_failed(rows.__getitem__)))
     done = [merged([*each, *study.unneeded(place)]) for place, each in enumerate(found)]
     # Where the rule looks, and nowhere below what the results file has of each condition.
     looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
@@ -280,28 +285,30 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
         failed=failed,
         notes=start.notes,
         pieces=study.pieces,
-        left_of=lambda records: study.left_of(records, start.journal.read),
-    )  # fmt: skip
-    for task, records in start.store.parts.items():
+        left_of=study.left_of,
+        counts_part=study.counts_part,
+        about=start.about,
+    )
+    for task, parts in start.store.parts.items():
         place, replicate = task
         there = any(first <= replicate < end for first, end in found[place])
         if replicate < replicates and not there:
-            state.begun[task] = sum(study.counts_part(each.description) for each in records)
+            state.begun[task] = sum(map(study.counts_part, parts.ids))
     return state
 
 
 def make_results(
-    study: StudyKind, start: Beginning, state: StudyState, ended: Ended, comm: Communicator,
-    output: str | Path | None, progress: Progress,
+    study: StudyKind, start: Beginning, state: StudyState, ended: Ended, ranks: int,
+    output: str | Path | None,
 ) -> Any:  # fmt: skip
-    """The results of a finished study; written to ``output``, by all ranks, where there is one."""
+    """The results of a finished study; written to ``output``, where there is one."""
     count, kind, in_memory = state.schedule.final, kind_of(study.config), output is None
-    if output and (old := start.store.old) is not None and start.is_covered(count):
-        if (tuple(old.places), old.count) == (study.conditions, count):
+    if output and (old := start.old) is not None and start.is_covered(count):
+        if (tuple(old.conditions), old.count) == (study.conditions, count):
             return file_kind(output).read(output)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
-    run = facts(study, start, state.notes, ended, comm.size)
-    return kind.results(study, start, count, run, comm, output, progress.warn, in_memory)
+    run = facts(study, start, state.notes, ended, ranks)
+    return kind.results(study, start, count, run, output, in_memory)
 
 
 def facts(study, start, notes, ended, ranks):

@@ -1,7 +1,6 @@
 """Files written whole or not at all."""
 
 import contextlib
-import ctypes
 import enum
 import errno
 import itertools
@@ -14,9 +13,6 @@ from typing import BinaryIO
 
 from flocsim.errors import FileError
 from flocsim.io.seals import digest_of
-
-NO_SPACE_TAKEN = {errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
-"""What file systems answer that cannot take the space of a file beforehand."""
 
 UNFINISHED = ".unfinished"
 """How the name of a file that is still being written ends."""
@@ -248,24 +244,6 @@ def set_aside(path: str | os.PathLike) -> Path | None:
     except OSError as error:
         raise unwritable(path, error) from error
     return aside
-
-
-def reserve(descriptor, size):
-    """Take the space of a file on the disk, where the system can; OSError where it is full.
-
-    Not by posix_fallocate, which writes a byte to every block where the file system cannot.
-    """
-    try:
-        fallocate = ctypes.CDLL(None, use_errno=True).fallocate
-    except (AttributeError, OSError, TypeError):
-        return
-    fallocate.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64)
-    while fallocate(descriptor, 0, 0, size):
-        number = ctypes.get_errno()
-        if number in NO_SPACE_TAKEN:
-            return  # a full disk shows when it is written to
-        if number != errno.EINTR:
-            raise OSError(number, os.strerror(number))
 
 
 def ordinary_target(path: str | os.PathLike) -> Path:

@@ -1,13 +1,10 @@
-"""The seals of HDF5 files: checksums, by which damage is found before HDF5 parses anything.
+"""The seals of HDF5 files: a checksum by which damage is found before HDF5 parses anything.
 
-A seal lies behind the end of the HDF5 data, where every HDF5 library ignores it: a damaged HDF5
-file can crash its reader or keep it busy for ever, a wrong checksum cannot. One kind is the digest
-of all data. The other, of a file that several processes write, has a digest of each piece, and one
-of all digests: behind the data lies a table, for each piece its length (u8, little-endian) and its
-blake2b-256 (32 bytes), and behind that the last line: PIECES_MARK, the number of pieces (16 hex
-digits), a blank, the blake2b-256 of the table (64 hex digits), a line feed. The pieces follow each
-other from the first byte to the last; whoever writes one computes its digest, so nobody reads all
-of it again.
+It lies behind the end of the HDF5 data, where every HDF5 library ignores it: a damaged HDF5 file
+can crash its reader or keep it busy for ever, a wrong checksum cannot. Files that were written
+before the first release may end in a table instead, of the length (u8, little-endian) and the
+blake2b-256 of each of their pieces, from the first byte to the last, and a last line: PIECES_MARK,
+the number of pieces (16 hex digits), a blank, the blake2b-256 of the table (64 hex digits).
 """
 
 import contextlib
@@ -41,18 +38,6 @@ def digest_of(data: bytes | memoryview, size: int = 32) -> bytes:
     return hashlib.blake2b(data, digest_size=size).digest()
 
 
-def seal_of_pieces(table: np.ndarray) -> bytes:
-    """What comes behind the data of a file whose pieces are the entries (PIECE) of a table."""
-    content = table.tobytes()
-    line = f"{len(table):016x} {digest_of(content).hex()}\n"
-    return content + PIECES_MARK + line.encode()
-
-
-def seal_size(pieces: int) -> int:
-    """Bytes of the seal of so many pieces."""
-    return pieces * PIECE.itemsize + PIECES_LINE
-
-
 def is_in_pieces(file: BinaryIO) -> bool:
     """Whether an open file ends in a seal of this kind, be it right or wrong."""
     file.seek(max(file.seek(0, os.SEEK_END) - PIECES_LINE, 0))
@@ -62,7 +47,7 @@ def is_in_pieces(file: BinaryIO) -> bool:
 def size_of_pieces(file: BinaryIO) -> int | None:
     """How many bytes lie before the seal of an open file, every piece of which is whole.
 
-    None where anything is not as it was written. Read a block at a time: memory stays flat.
+    None where anything is not as it was written.
     """
     end = file.seek(0, os.SEEK_END) - PIECES_LINE
     file.seek(max(end, 0))
@@ -74,35 +59,22 @@ def size_of_pieces(file: BinaryIO) -> int | None:
     size = end - number * PIECE.itemsize
     if number < 1 or size < 0:
         return None
-    found, total = hashlib.blake2b(digest_size=32), 0
-    for entries in table_blocks(file, size, number):
-        found.update(entries.tobytes())
-        total += sum(entries["length"].tolist())
-    expected = f"{number:016x} {found.hexdigest()}\n".encode()
-    if line != PIECES_MARK + expected or total != size:
+    file.seek(size)
+    table = file.read(number * PIECE.itemsize)
+    if line != PIECES_MARK + f"{number:016x} {digest_of(table).hex()}\n".encode():
         return None
     place = 0
-    for entries in table_blocks(file, size, number):
-        for length, digest in entries.tolist():
-            if digest_at(file, place, length) != (digest, length):
-                return None
-            place += length
-    return size
+    for length, digest in np.frombuffer(table, PIECE).tolist():
+        if digest_at(file, place, length) != (digest, length):
+            return None
+        place += length
+    return size if place == size else None
 
 
-def table_blocks(file: BinaryIO, start: int, number: int) -> Iterator[np.ndarray]:
-    """The table of pieces that begins at a place, some thousand entries at a time."""
-    step = BLOCK // PIECE.itemsize
-    for first in range(0, number, step):
-        file.seek(start + first * PIECE.itemsize)
-        data = file.read(min(step, number - first) * PIECE.itemsize)
-        yield np.frombuffer(data[: len(data) // PIECE.itemsize * PIECE.itemsize], PIECE)
-
-
-def digest_at(file: BinaryIO, place: int, length: int, size: int = 32) -> tuple[bytes, int]:
+def digest_at(file: BinaryIO, place: int, length: int) -> tuple[bytes, int]:
     """(digest, length) of the data at a place in an open file, which may be shorter than asked
     for."""
-    found, left = hashlib.blake2b(digest_size=size), length
+    found, left = hashlib.blake2b(digest_size=32), length
     file.seek(place)
     while left and (block := file.read(min(left, BLOCK))):
         found.update(block)
@@ -149,6 +121,14 @@ def end_of(file):
 def seal(data: bytes) -> bytes:
     """The bytes of an HDF5 file with their checksum appended."""
     return data + seal_of(digest_of(data))
+
+
+def seal_file(file: BinaryIO) -> None:
+    """Append the checksum of an open file to it."""
+    file.flush()
+    digest, _ = digest_at(file, 0, file.seek(0, os.SEEK_END))
+    file.seek(0, os.SEEK_END)
+    file.write(seal_of(digest))
 
 
 @contextlib.contextmanager

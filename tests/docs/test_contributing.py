@@ -25,7 +25,6 @@ CONCERNED = {
         "tests/commands/test_plot.py", "tests/docs/test_schema_tables.py",
         "tests/ensembles/test_study.py", "tests/ensembles/storage/test_unfinished.py",
         "tests/ensembles/estimates", "tests/ensembles/test_comparison.py",
-        "tests/ensembles/parallel/test_assembly.py",
         "tests/ensembles/storage/test_rows_only_get_more.py",
     ],
     "Add a figure": ["tests/io/plots/test_results.py", "tests/commands/test_plot.py"],

@@ -11,7 +11,7 @@ from flocsim.ensembles.runner import announcement, lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
-from flocsim.io.journal import MemoryJournal
+from flocsim.io.journal import Journal
 from flocsim.io.results.file import read_results
 from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results
@@ -28,7 +28,7 @@ def study(tmp_path_factory):
 
 def beginning(study):
     """A study's start with nothing."""
-    return Beginning(RowStore(MemoryJournal(), study.conditions), {"seed": study.config.seed})
+    return Beginning(RowStore(Journal(), study.conditions), {"seed": study.config.seed})
 
 
 def results_of(study):
@@ -64,7 +64,7 @@ def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone,
     assert state.schedule.remaining == 0
     assert state.phase is Phase.FINISHED
     assert state.computed == study.size
-    assert same_arrays(Reader(start.store, study.shape).arrays(alone), alone)
+    assert same_arrays(Reader(start.store, study.shape).table(), alone)
 
 
 def test_angles_are_the_same_in_all_conditions(alone):

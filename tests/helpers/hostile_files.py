@@ -19,10 +19,11 @@ from PIL import Image
 
 from flocsim import Sphere
 from flocsim.ensembles.contents import open_any
-from flocsim.ensembles.kind import Condition, chunk_record, layout
+from flocsim.ensembles.kind import Condition, layout
+from flocsim.ensembles.storage.row_store import key_of
 from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
-from flocsim.io.records import CHUNK, SESSION, encode
+from flocsim.io.journal import CHUNK, SESSION
 from flocsim.io.results.schema import POOLED, blank
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
@@ -31,6 +32,7 @@ from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from flocsim.io.trajectory import write_trajectory
 from tests.helpers.compound_shapes import beads, cross, framed
+from tests.helpers.journals import write_records
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed
 from tests.helpers.small_rates import mixed, some_kernel
@@ -326,19 +328,18 @@ def trajectory_file(rng, folder):
 
 
 def journal_parts(identity, key, rows):
-    """[(kind, description, data)] of a valid journal."""
+    """[(kind, condition, first, description, data)] of a valid journal."""
     session = {
         "identity": identity, "short": key, "layout": layout(), "date": "2020", "command": "x",
         "cpus": [{"cpu": "a", "compiled_for": "a", "features": [], "numpy": [], "libm": []}],
     }  # fmt: skip
     note = {"type": "I", "vertices": 1, "delta": 0.0, "replicate": 1, "why": "odd"}
-    chunks = []
-    for name in ("I", "III"):
-        record = chunk_record(Condition(name, 1, 0.0), 0, rows, key, [note])
-        description = {"type": name, "vertices": 1, "delta": 0.0, "first": 0, "count": len(rows),
-                       "identity": key, "notes": [note]}  # fmt: skip
-        chunks.append((CHUNK, description, record[-rows.nbytes :]))
-    return [(SESSION, session, b""), *chunks]
+    about = {"identity": key, "session": 1, "notes": [note]}
+    return [
+        (SESSION, "", 0, session, b""),
+        *((CHUNK, key_of(Condition(name, 1, 0.0)), 0, about, rows.tobytes())
+          for name in ("I", "III")),
+    ]  # fmt: skip
 
 
 def change_json(rng, value):
@@ -357,21 +358,17 @@ def change_json(rng, value):
     return rng.choice(ODD_VALUES)
 
 
-def encode_words(kind, words, data):
-    """A record of any words, with right checksums."""
-    template = encode(kind, {}, data)
-    from flocsim.io.records import CHECKED, HEAD
-    from flocsim.io.seals import digest_of
-
-    mark, kind, _, length, data_digest, _ = HEAD.unpack_from(template)
-    head = HEAD.pack(mark, kind, len(words), length, data_digest, b"")[:CHECKED]
-    return b"".join([head, digest_of(head + words, 8), words, data])
+def odd_condition(rng, condition, first):
+    """Another name of a condition, or another number of a replicate."""
+    if rng.random() < 0.5:
+        return json.dumps(change_json(rng, json.loads(condition or "[]"))), first
+    return condition, rng.choice([-1, 1, 2**40, 2**62])
 
 
 def journal_file(rng, folder, parts):
     """A hostile journal of the ``parts`` of a valid one."""
     records = []
-    for kind, description, data in parts:
+    for kind, condition, first, description, data in parts:
         if rng.random() < 0.5:
             description = change_json(rng, description)
         words = json.dumps(description).encode()
@@ -380,11 +377,15 @@ def journal_file(rng, folder, parts):
         if rng.random() < 0.3 and data:
             data = flip(rng, data)
         if rng.random() < 0.05:
-            kind = rng.randrange(2**32)
-        records.append(encode_words(kind, words, data))
+            kind = rng.choice(["", "else", "session", "part"])
+        if rng.random() < 0.1:
+            condition, first = odd_condition(rng, condition, first)
+        records.append((kind, condition, first, words, data))
     rng.shuffle(records) if rng.random() < 0.2 else None
-    whole = b"".join(records)
-    return written(folder, "j.h5.journal", flip(rng, whole) if rng.random() < 0.3 else whole)
+    path = write_records(folder / "j.h5.journal", records)
+    if rng.random() < 0.3:
+        path.write_bytes(flip(rng, path.read_bytes()))
+    return path
 
 
 # Pictures and masks ----------------------------------------------------------------------------

@@ -22,7 +22,6 @@ import h5py
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.io.records import Record, scan
 from flocsim.io.seals import seal
 from tests.helpers.config_mutations import tables_of, toml
 from tests.helpers.hostile_files import (
@@ -310,12 +309,9 @@ def kept_journal(path, parts, name):
 
     def remove(journal):
         if Path(journal.path).name == path.name:
-            data = path.read_bytes()
-            with open(path, "rb") as file:
-                found = [each for each in scan(file) if isinstance(each, Record)]
             parts[name] = [
-                (each.kind, each.description, data[each.offset : each.offset + each.length])
-                for each in found
+                (each.kind, each.condition, each.first, each.about, each.data)
+                for each in journal.records()
             ]
         original(journal)
 

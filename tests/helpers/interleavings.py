@@ -9,6 +9,7 @@ import contextlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import sys
@@ -22,15 +23,18 @@ import numpy as np
 from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.config.sources import digest_of
-from flocsim.ensembles.kind import ROW, fits, rows_of
+from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.storage.identity import short
+from flocsim.ensembles.storage.row_store import condition_of
 from flocsim.ensembles.study import Study
+from flocsim.ensembles.swarms.study import ROW as SWARM_ROW
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
-from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, Record, scan
+from flocsim.io.journal import CHUNK, PART, SESSION
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.process import install
+from tests.helpers.journals import records_in, rows_in
 from tests.helpers.small_study import write_star_library
 
 PAIRS = """\
@@ -359,7 +363,7 @@ class World:
         """{(identity, displacement, replicate)} of all that any file has, which has to be right."""
         found = set()
         for path in self.folder.iterdir():
-            if ".journal" in path.name:
+            if re.search(r"\.journal(\.\d+)?$", path.name):
                 found |= self.tasks_of_journal(path)
             elif path.name.startswith("out") and path.suffix == ".h5":
                 found |= self.tasks_of_results(path)
@@ -389,27 +393,28 @@ class World:
                f"{path.name} keeps the source of another module")  # fmt: skip
         return {(found.key, *task) for task in found.rows}
 
+    @property
+    def row(self):
+        return ROW if self.kind == "pairs" else SWARM_ROW
+
     def tasks_of_journal(self, path):
-        with open(path, "rb") as file:
-            records = [each for each in scan(file) if isinstance(each, Record)]
-        data, found = path.read_bytes(), set()
-        keys = {each.description.get("short") for each in records if each.kind == SESSION}
+        records, found = records_in(path), set()
+        keys = {each.about.get("short") for each in records if each.kind == SESSION}
         for each in records:
-            about = each.description
             if each.kind != CHUNK:
                 continue
-            key, first = about["identity"], about["first"]
+            key, first, share = each.about["identity"], each.first, condition_of(each.condition)[2]
+            count = len(each.data) // self.row.itemsize
             demand(key in keys, f"{path.name} has a chunk of no session")
-            found |= {(key, about["delta"], first + k) for k in range(about["count"])}
+            found |= {(key, share, first + k) for k in range(count)}
             physics = self.truths.by_identity(key)
             demand(physics is not None, f"{path.name} is of no physics that there was")
-            if self.kind == "pairs" and fits(about, each.length):
-                rows = rows_of(data[each.offset : each.offset + each.length])
+            if self.kind == "pairs":
+                rows = np.frombuffer(each.data, ROW)
                 truth = self.truths.of(physics)
-                for k in range(about["count"]):
-                    row = row_bytes({name: values[k] for name, values in rows.items()})
-                    known = truth.rows.get((about["delta"], first + k))
-                    demand(known == row, f"{path.name} has a row of other physics: {about}")
+                for k in range(count):
+                    known = truth.rows.get((share, first + k))
+                    demand(known == row_bytes(rows[k]), f"{path.name} has a row of other physics")
         return found
 
     # What happens -----------------------------------------------------------------------------
@@ -444,10 +449,9 @@ class World:
         finished tasks are."""
         if not self.journal.exists():
             return False
-        with open(self.journal, "rb") as file:
-            records = [each for each in scan(file) if isinstance(each, Record)]
-        sessions = {each.description.get("short") for each in records if each.kind == SESSION}
-        return sessions != {key} and any(each.kind == SNAPSHOT for each in records)
+        records = records_in(self.journal)
+        sessions = {each.about.get("short") for each in records if each.kind == SESSION}
+        return sessions != {key} and any(each.kind == PART for each in records)
 
     def wanted(self):
         delta = self.asked.delta if self.kind == "pairs" else (0.0,)
@@ -537,7 +541,7 @@ class World:
 
     def has_kept(self):
         with contextlib.suppress(OSError):
-            return b'"first"' in self.journal.read_bytes()
+            return rows_in(self.journal, self.row) > 0
         return False
 
     def kill(self):

@@ -2,31 +2,10 @@
 
 from pathlib import Path
 
-import numpy as np
-
-from flocsim.io.files import Rule, keep
 from flocsim.io.results.file import opened, parts_of
-from flocsim.io.results.layout import ROWS, new_row_file
-from flocsim.io.results.schema import Results
+from flocsim.io.results.layout import write_results
 
-
-def write_results(path: str | Path, results: Results, rule: Rule = keep) -> None:
-    """Write ``results`` to ``path``, whole or not at all; FileError if that is impossible.
-
-    ``rule`` says what becomes of a file that is there. A table of replicates that is larger than
-    the memory: `flocsim.io.results.layout`.
-    """
-    flat = {
-        name: np.ascontiguousarray(array, array.dtype.newbyteorder("<")).reshape(-1)
-        for name, array in (results.replicates or {}).items()
-    }
-    with new_row_file(path, results, rule) as file:
-        digests = {}
-        for block in range(file.plan.blocks):
-            rows = slice(block * ROWS, (block + 1) * ROWS)
-            columns = {name: values[rows] for name, values in flat.items()}
-            digests[block] = file.write_block(block, columns)
-        file.complete(results, digests)
+__all__ = ["same_data", "write_results"]
 
 
 def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:

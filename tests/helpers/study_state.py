@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from flocsim.ensembles.kind import ROW, Condition, chunk_record
+from flocsim.ensembles.kind import ROW, Condition
 from flocsim.ensembles.parallel.communicator import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.io.journal import MemoryJournal
+from flocsim.io.journal import Journal
 
 CONDITION = Condition("I", 1, 0.0)
 NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}
@@ -15,7 +15,7 @@ NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate":
 def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
     """The state of a study of one condition on one rank, none of it done."""
     schedule = Schedule.of([[]], list(borders), 1)
-    return StudyState(schedule, RowStore(MemoryJournal(), (CONDITION,)), is_enough, allowed)
+    return StudyState(schedule, RowStore(Journal(), (CONDITION,)), is_enough, allowed)
 
 
 def result_of(chunk, count=None, failed=0):
@@ -23,6 +23,4 @@ def result_of(chunk, count=None, failed=0):
     count = chunk.stop - chunk.first if count is None else count
     rows = np.zeros(count, ROW)
     rows["steps"] = chunk.first + np.arange(count)
-    record = chunk_record(CONDITION, chunk.first, rows, "key")
-    start = len(record) - count * ROW.itemsize
-    return ChunkResult(chunk, count, record, start, failed, (NOTE,) * failed)
+    return ChunkResult(chunk, rows, failed, (NOTE,) * failed)

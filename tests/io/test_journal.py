@@ -1,221 +1,308 @@
-"""The journal: records whole or not at all, every damage found, nothing wrong believed."""
+"""The journal of a study that runs: an SQLite database that one job writes and any number read."""
 
-import errno
-import hashlib
-import io
 import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from flocsim.errors import FileError
-from flocsim.io.journal import Journal, MemoryJournal, journal_path
-from flocsim.io.records import (
-    CHUNK,
-    HEAD,
-    MARK,
-    SESSION,
-    Damage,
-    Record,
-    encode,
-    scan,
-)
+from flocsim.io import journal as module
+from flocsim.io.journal import CHUNK, PART, SESSION, Journal, Record, journal_of, read_journal
+from tests.helpers.journals import leave
 
-RECORDS = [
-    encode(SESSION, {"short": "abc"}),
-    encode(CHUNK, {"first": 0, "type": "κ"}, bytes(range(256)) * 3),
-    encode(CHUNK, {"first": 1}, MARK + b"data that look like a head"),
-    encode(CHUNK, {"first": 2}, b""),
-]
-WHOLE = b"".join(RECORDS)
+WRITER = """
+import sys
+from pathlib import Path
+from flocsim.io.journal import CHUNK, Journal
+journal, first = Journal(Path(sys.argv[1])), int(sys.argv[2])
+while True:
+    journal.add(CHUNK, "c", first, {"n": first}, first.to_bytes(8, "little") * 500)
+    print(first, flush=True)
+    first += 1
+"""
 
 
-def read(data):
-    """What a scan finds in bytes."""
-    return list(scan(io.BytesIO(data)))
+@pytest.fixture
+def path(tmp_path):
+    """Where the journal is."""
+    return tmp_path / "r.h5.journal"
 
 
-def firsts(found):
-    """The chunks among what was found."""
-    return [r.description["first"] for r in found if isinstance(r, Record) and r.kind == CHUNK]
-
-
-def test_what_is_written_is_read():
-    found = read(WHOLE)
-    assert [record.kind for record in found] == [SESSION, CHUNK, CHUNK, CHUNK]
-    assert found[1].description == {"first": 0, "type": "κ"}
-    for record in found[1:]:
-        assert WHOLE[record.offset :][: record.length] in RECORDS[firsts([record])[0] + 1]
-
-
-@given(st.integers(0, len(WHOLE) - 1), st.integers(0, 7))
-def test_any_flipped_bit_is_found_and_costs_one_record(place, bit):
-    data = bytearray(WHOLE)
-    data[place] ^= 1 << bit
-    found = read(bytes(data))
-    damaged = [each for each in found if isinstance(each, Damage)]
-    assert damaged
-    assert len([each for each in found if isinstance(each, Record)]) == 3
-    assert all(each.start <= place < each.stop or len(damaged) > 1 for each in damaged)
-
-
-@given(st.integers(0, len(WHOLE)))
-def test_what_is_cut_off_costs_what_it_cuts(place):
-    found = read(WHOLE[:place])
-    ends = [sum(map(len, RECORDS[: k + 1])) for k in range(4)]
-    assert len([each for each in found if isinstance(each, Record)]) == sum(
-        end <= place for end in ends
-    )
-    assert any(isinstance(each, Damage) for each in found) == (place not in [0, *ends])
-
-
-@given(st.binary(max_size=300))
-def test_any_bytes_can_be_scanned(data):
-    stops = [each.stop for each in read(data) if isinstance(each, Damage)]
-    assert stops == ([len(data)] if data else []) or MARK in data
-
-
-def test_a_damaged_chunk_is_named():
-    data = bytearray(WHOLE)
-    data[len(RECORDS[0]) + len(RECORDS[1]) - 1] ^= 1
-    [damage] = [each for each in read(bytes(data)) if isinstance(each, Damage)]
-    assert damage.description["first"] == 0
-    assert (damage.start, damage.stop) == (len(RECORDS[0]), len(RECORDS[0]) + len(RECORDS[1]))
-
-
-def written(folder, data):
-    """A journal file with these bytes."""
-    path = folder / "r.h5.journal"
-    path.write_bytes(data)
-    return path
-
-
-def test_a_half_written_record_is_cut_off_by_the_next(tmp_path):
-    path = written(tmp_path, WHOLE[:-5])
+def filled(path, count=20, kind=CHUNK):
+    """A journal with some records, open."""
     journal = Journal(path)
-    assert (len(journal.records), len(journal.damage)) == (3, 1)
-    offset = journal.append(RECORDS[1])
-    assert offset == sum(map(len, RECORDS[:3]))
-    assert journal.read(offset, len(RECORDS[1])) == RECORDS[1]
+    for first in range(count):
+        journal.add(kind, '["I", 4, 0.5]', first, {"n": first}, bytes([first]) * 5000)
+    return journal
+
+
+def copied(journal, folder):
+    """The files of an open journal in a folder of their own, as a kill would leave them."""
+    folder.mkdir()
+    for each in journal.path.parent.glob(f"{journal.path.name}*"):
+        (folder / each.name).write_bytes(each.read_bytes())
+    return folder / journal.path.name
+
+
+def firsts(journal):
+    return [record.first for record in journal.records()]
+
+
+def test_what_is_written_is_read(path):
+    journal = Journal(path)
+    number = journal.add(SESSION, "", 0, {"words": "é"})
+    journal.add(PART, "[1]", 7, {"name": "state"}, b"old")
+    assert journal.add(PART, "[1]", 7, {"name": "state"}, b"new", 2) == 2
+    expected = [
+        Record(number, SESSION, "", 0, {"words": "é"}, b""),
+        Record(2, PART, "[1]", 7, {"name": "state"}, b"new"),
+    ]
+    assert list(journal.records()) == expected
     journal.release()
-    assert firsts(read(path.read_bytes())) == [0, 1, 0]
+    assert list(Journal(path).records()) == expected
+    assert list(Journal().records()) == []
 
 
-def test_damage_in_the_middle_stays_where_it_is(tmp_path):
-    data = bytearray(WHOLE)
-    data[len(RECORDS[0]) + 100] ^= 1
-    journal = Journal(written(tmp_path, bytes(data)))
-    journal.append(RECORDS[1])
-    journal.release()
-    assert journal.path.read_bytes() == bytes(data) + RECORDS[1]
-
-
-def test_a_full_disk_leaves_the_journal_as_it_was(tmp_path, monkeypatch):
-    journal = Journal(tmp_path / "r.h5.journal")
-
-    def pwrite(descriptor, data, place, original=os.pwrite):
-        if place > 10:  # it takes a few bytes, then none
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return original(descriptor, bytes(data)[:20], place)
-
-    monkeypatch.setattr(os, "pwrite", pwrite)
-    with pytest.raises(FileError, match="No space left") as caught:
-        journal.append(RECORDS[1])
-    assert caught.value.exit_code == 74
-    assert journal.path.read_bytes() == b""
-    assert journal.end == 0
-    monkeypatch.undo()
-    assert journal.append(RECORDS[1]) == 0
-    journal.release()
-    assert journal.path.read_bytes() == RECORDS[1]
-
-
-def test_a_journal_without_a_whole_chunk_holds_nothing(tmp_path):
-    for data in (b"", MARK[:3], RECORDS[0], RECORDS[0] * 2 + RECORDS[1][:-1]):
-        journal = Journal(written(tmp_path, data))
-        assert journal.is_blank
-        journal.begin_anew()
-        journal.append(RECORDS[0])
-        assert journal.path.read_bytes() == RECORDS[0]
+def test_a_killed_writer_loses_no_acknowledged_record(path):
+    rng, acknowledged = random.Random(1), -1
+    for _ in range(6):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path), str(acknowledged + 1)],
+            stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert writer.stdout is not None
+        writer.stdout.readline()
+        time.sleep(rng.uniform(0.0, 0.3))
+        writer.send_signal(signal.SIGKILL)
+        lines = writer.communicate()[0].split("\n")[:-1]
+        acknowledged = max(acknowledged + 1, *(int(line) for line in lines), 0)
+        journal = Journal(path)
+        found = list(journal.records())
+        assert [each.first for each in found][: acknowledged + 1] == list(range(acknowledged + 1))
+        assert all(each.data == each.first.to_bytes(8, "little") * 500 for each in found)
+        assert (journal.lost, journal.damaged, journal.salvaged) == (0, [], None)
+        acknowledged = found[-1].first
         journal.release()
-        assert not journal.path.exists()
 
 
-def test_a_journal_with_rows_or_with_damage_stays(tmp_path):
-    flipped = RECORDS[0] + RECORDS[1][:-1] + b"?"
-    for data in (WHOLE, RECORDS[1], flipped, b"Dear diary,", flipped + RECORDS[0]):
-        journal = Journal(written(tmp_path, data))
-        assert not journal.is_blank
+def test_one_job_writes_and_others_read(path, monkeypatch):
+    journal = filled(path)
+    with read_journal(path) as reader:
+        journal.add(CHUNK, "c", 99, {}, b"after the reader began")
+        journal.sync()
+        assert firsts(reader) == list(range(20))
+    monkeypatch.setattr(module, "LOCK_SECONDS", 0.1)
+    with pytest.raises(FileError, match=r"r.h5.journal is being written by another job"):
+        Journal(path)
+    journal.release()
+    assert [each.name for each in path.parent.iterdir()] == [path.name]
+    with read_journal(path) as reader:
+        assert firsts(reader)[-1] == 99
+
+
+def test_any_damage_costs_what_it_hits_and_nothing_wrong_is_read(path, tmp_path):
+    filled(path).release()
+    rng, data = random.Random(2), path.read_bytes()
+    whole = list(Journal(path).records())
+    for number in range(40):
+        damaged = bytearray(data)
+        for _ in range(rng.choice((1, 1, 50))):
+            damaged[rng.randrange(100, len(data))] ^= 1 << rng.randrange(8)
+        place = tmp_path / str(number) / path.name
+        place.parent.mkdir()
+        place.write_bytes(damaged)
+        journal = Journal(place)
+        if journal.problem:
+            continue
+        found = list(journal.records())
+        assert all(each in whole for each in found)
+        assert len(found) == len(whole) or journal.damaged or journal.salvaged
+        journal.discard(journal.damaged)
+        journal.add(CHUNK, "c", 0, {}, b"goes on")
         journal.release()
-        assert journal.path.read_bytes() == data
+        assert [*found][:-1] == list(Journal(place).records())[: len(found) - 1]
 
 
-def test_a_first_chunk_makes_it_stay(tmp_path):
-    journal = Journal(tmp_path / "r.h5.journal")
-    journal.append(RECORDS[0])
+def test_a_chunk_that_is_damaged_while_it_is_needed_is_refused(path):
+    filled(path).release()
+    data = bytearray(path.read_bytes())
+    data[data.index(bytes([7]) * 1000) + 10] ^= 1
+    path.write_bytes(data)
+    with read_journal(path) as reader:
+        with pytest.raises(FileError, match="is damaged, or was changed after it was written"):
+            list(reader.chunks('["I", 4, 0.5]', -1, 20))
+        assert [each.first for each in reader.chunks('["I", 4, 0.5]', 9, 12)] == [10, 11]
+
+
+def test_a_journal_that_is_only_looked_at_stays_as_it_is(path):
+    filled(path).release()
+    before = path.read_bytes()
+    journal = Journal(path)
+    list(journal.records())
+    journal.release()
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.99])
+def test_a_journal_that_was_cut_short_keeps_what_is_before_the_cut(path, share):
+    filled(path).release()
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    journal = Journal(path)
+    assert journal.problem == ""
+    found = firsts(journal)
+    # Half a page is a damaged record, and a page a damaged database.
+    assert journal.damaged or journal.salvaged == path.with_name(f"{path.name}.1")
+    assert set(found) < set(range(20))
+    journal.release()
+
+
+def test_the_loss_of_the_log_is_noticed(path, tmp_path):
+    journal = filled(path)
+    place = copied(journal, tmp_path / "copy")
+    place.with_name(f"{place.name}-wal").unlink()
+    copy = Journal(place)
+    assert copy.lost == 20 - len(firsts(copy))
+    assert copy.lost > 0
+    journal.release()
+
+
+@pytest.mark.parametrize("what", ["nothing", "another"])
+def test_the_log_of_another_database_is_not_taken_for_its_own(path, what):
+    first = filled(path, count=5)
+    aside = first.put_aside()
+    for number in range(50, 90):
+        first.add(CHUNK, "c", number, {}, bytes(5000))
+    leave(first)
+    if what == "nothing":
+        path.unlink()
+    else:
+        os.replace(aside, path)
+    assert path.with_name(f"{path.name}-wal").exists()
+    assert firsts(Journal(path)) == ([] if what == "nothing" else list(range(5)))
+
+
+def test_a_full_disk_leaves_the_journal_as_it_was(path):
+    journal = filled(path)
+    journal.db.execute(f"PRAGMA max_page_count={journal.path.stat().st_size // 4096 + 40}")
+    with pytest.raises(FileError, match="could not be written: database or disk is full"):
+        for first in range(20, 100):
+            journal.add(CHUNK, "c", first, {}, bytes(5000))
+    there = firsts(journal)
+    assert there == list(range(len(there)))
+    journal.release()
+    assert firsts(Journal(path)) == there
+
+
+def test_a_journal_without_anything_computed_is_removed(path):
+    journal = Journal(path)
+    journal.add(SESSION, "", 0, {})
     assert journal.is_blank
-    journal.append(RECORDS[1])
     journal.release()
-    assert journal.path.read_bytes() == RECORDS[0] + RECORDS[1]
+    assert list(path.parent.iterdir()) == []
+    path.write_bytes(b"")  # left by a job that was killed as it began
+    assert Journal(path).is_blank
 
 
-def test_what_another_program_writes_there_is_found_before_it_is_written_over(tmp_path):
-    journal = Journal(tmp_path / "r.h5.journal")
-    journal.append(RECORDS[0])
-    with open(journal.path, "ab") as other:
-        other.write(RECORDS[2])
-    with pytest.raises(FileError, match="was changed by another program"):
-        journal.append(RECORDS[1])
-    journal.release()
-    assert firsts(read(journal.path.read_bytes())) == [1]
-
-
-def test_a_journal_that_was_deleted_is_written_back_when_it_is_synced(tmp_path):
-    journal = Journal(written(tmp_path, WHOLE))
-    journal.path.unlink()
-    journal.append(RECORDS[1])
+def test_a_journal_that_was_deleted_is_written_back(path):
+    journal = filled(path)
+    for each in path.parent.glob(f"{path.name}*"):
+        each.unlink()
     journal.sync()
-    journal.append(RECORDS[1])
-    assert journal.path.read_bytes() == WHOLE + RECORDS[1] * 2
-    journal.remove()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_journal_put_aside_makes_room_for_a_new_one(tmp_path):
-    journal = Journal(written(tmp_path, WHOLE))
-    aside = journal.put_aside()
-    journal.append(RECORDS[0])
-    assert aside.read_bytes() == WHOLE
-    assert journal.path.read_bytes() == RECORDS[0]
+    journal.add(CHUNK, "c", 20, {}, b"more")
     journal.release()
-    assert [path.name for path in tmp_path.iterdir()] == ["r.h5.journal.1"]
+    assert firsts(Journal(path)) == list(range(21))
 
 
-def test_many_marks_are_one_damaged_stretch():
-    # Each promises a description as long as all that follows.
-    head = HEAD.pack(MARK, CHUNK, 2**23, 0, b"", b"")
-    data = head * 100_000
-    assert [(each.start, each.stop) for each in read(data)] == [(0, len(data))]
+def test_a_journal_that_was_replaced_is_kept_under_another_name(path):
+    journal = filled(path)
+    path.with_name("other").write_bytes(b"mine")
+    os.replace(path.with_name("other"), path)
+    with pytest.raises(FileError, match=r"was replaced by another file .* is in .*\.journal\.1"):
+        journal.sync()
+    journal.release()
+    assert path.read_bytes() == b"mine"
+    assert firsts(Journal(path.with_name(f"{path.name}.1"))) == list(range(20))
 
 
-@pytest.mark.parametrize("words", [b"[" * 100_000, b"[]", b"1", b"\xff", b"{" + b"9" * 9999])
-def test_a_description_that_no_flocsim_wrote_is_damage(words):
-    head = HEAD.pack(MARK, CHUNK, len(words), 0, hashlib.blake2b(b"", digest_size=16).digest(), b"")
-    checked = head[: HEAD.size - 8]
-    record = checked + hashlib.blake2b(checked + words, digest_size=8).digest() + words
-    [damage] = read(record)
-    assert isinstance(damage, Damage)
+def test_what_another_program_writes_is_noticed(path):
+    journal = filled(path)
+    with sqlite3.connect(path) as other:
+        other.execute("DELETE FROM record WHERE first=3")
+    with pytest.raises(FileError, match="was changed by another program while this run wrote"):
+        journal.add(CHUNK, "c", 20, {}, b"")
 
 
-def test_a_journal_that_cannot_be_opened_is_told(tmp_path):
-    with pytest.raises(FileError, match="could not be written"):
-        Journal(tmp_path / "missing" / "r.h5.journal")
-    (tmp_path / "r.h5").symlink_to(tmp_path / "elsewhere.h5")
-    assert journal_path(tmp_path / "r.h5") == tmp_path / "elsewhere.h5.journal"
+def test_a_journal_put_aside_makes_room_for_a_new_one(path):
+    journal = filled(path)
+    aside = journal.put_aside()
+    assert aside == path.with_name(f"{path.name}.1")
+    assert firsts(journal) == []
+    journal.release()
+    os.replace(aside, path)
+    assert firsts(Journal(path)) == list(range(20))
 
 
-def test_a_journal_in_memory_reads_what_it_was_given():
-    journal = MemoryJournal()
-    assert [journal.append(record) for record in RECORDS[:2]] == [0, len(RECORDS[0])]
-    assert journal.read(len(RECORDS[0]), len(RECORDS[1])) == RECORDS[1]
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"garbage" * 100, "is not a journal of flocsim, or is damaged at its start"),
+        (b"\x93FLOCREC" + bytes(100), "was written by a version of flocsim that was never"),
+        (b"SQLite format 3\0" + bytes(5000), "is not a journal of flocsim"),
+    ],
+)
+def test_what_is_no_journal_is_left_alone(path, content, said):
+    path.write_bytes(content)
+    journal = Journal(path)
+    assert said in journal.problem
+    with pytest.raises(FileError), read_journal(path) as reader:
+        firsts(reader)
+    journal.release()
+    assert path.read_bytes() == content
+    assert Journal(path).put_aside().read_bytes() == content
+
+
+def test_a_database_of_another_program_is_no_journal(path):
+    with sqlite3.connect(path) as other:
+        other.execute("CREATE TABLE record(id INTEGER)")
+    other.close()
+    assert "is not a journal" in Journal(path).problem
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link", "dangling link", "folder", "device"])
+def test_what_is_no_ordinary_file_is_refused_and_left_alone(path, kind):
+    precious = path.with_name("precious")
+    precious.write_text("mine")
+    makers = {
+        "pipe": lambda: os.mkfifo(path),
+        "link": lambda: path.symlink_to(precious),
+        "dangling link": lambda: path.symlink_to("elsewhere"),
+        "folder": lambda: path.mkdir(),
+        "device": lambda: path.symlink_to("/dev/zero"),
+    }
+    makers[kind]()
+    with pytest.raises(FileError, match="is not an ordinary file"):
+        Journal(path)
+    assert precious.read_text() == "mine"
+    assert not path.with_name("elsewhere").exists()
+
+
+def test_a_file_system_without_locks_is_known(path, monkeypatch):
+    monkeypatch.setattr(module, "lock", lambda descriptor: None)
+    journal = filled(path)
+    assert not journal.has_lock
+    with read_journal(path) as reader:
+        assert firsts(reader) == list(range(20))
+    journal.release()
+    assert firsts(Journal(path)) == list(range(20))
+
+
+def test_a_journal_is_found_beside_its_results(path):
+    assert journal_of(path.with_name("r.h5")) is None
+    filled(path).release()
+    assert journal_of(path.with_name("r.h5")) == journal_of(path) == path

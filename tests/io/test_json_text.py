@@ -2,7 +2,7 @@
 
 import pytest
 
-from flocsim.io.records import matches, read_json
+from flocsim.io.json_text import matches, read_json
 
 
 def test_what_fits_is_read():

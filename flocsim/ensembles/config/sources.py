@@ -23,14 +23,14 @@ import attrs
 
 from flocsim.ensembles.config.toml_text import read_text_file
 from flocsim.errors import ConfigError
-from flocsim.io.records import matches, read_json
+from flocsim.io.json_text import matches, read_json
 from flocsim.io.seals import held
 
 LONGEST_SOURCE = 2**20
 """Bytes of a module that are kept as text; of longer ones the digest is."""
 
 KEPT = {"digest": str, "source": str}
-"""What a file keeps of a module, as a pattern of `flocsim.io.records`."""
+"""What a file keeps of a module, as a pattern of `flocsim.io.json_text`."""
 
 
 def digest_of(source: bytes) -> str:

@@ -408,8 +408,8 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
     radii = np.full(len(labels), np.nan)
     for place, (condition, n, _) in enumerate(study.places):
         m, i, j = scene.conditions[condition]
-        known = store.known(place)
-        rows = {name: store.read(place, name, 0, count, known) for name in COLUMNS}
+        table = store.rows(place, 0, count)
+        rows = {name: table[name] for name in COLUMNS}
         points_here = weighted(study, (condition, n), rows, points)
         meeting = scene.meeting[m]
         found[m, vertices.index(n), i, j] = estimate(

@@ -191,8 +191,8 @@ class StopRule:
     def __call__(self, replicates: int) -> bool:
         """Whether the study may end with this many, all of which exist."""
         for place in range(len(self.store.conditions)):
-            codes = (self.store.read(place, name, self.seen, replicates) for name in CODES)
-            more = count(*codes)
+            rows = self.store.rows(place, self.seen, replicates)
+            more = count(*(rows[name] for name in CODES))
             if place == len(self.counts):
                 self.counts.append(more)
             else:

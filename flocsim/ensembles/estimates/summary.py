@@ -6,7 +6,7 @@ one of paired proportions, over the replicates that count both times. The interv
 reaches from the lower 95 % bound of the one change to the upper bound of the other, and holds 0.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -88,26 +88,31 @@ class Reader:
     store: RowStore
     shape: tuple[int, ...]
     scrambles: int = 0
-    known: list[np.ndarray] = attrs.field(init=False)
-
-    def __attrs_post_init__(self):
-        self.known = [self.store.known(place) for place in range(len(self.store.conditions))]
-
-    def block(self, name: str, first: int, stop: int) -> np.ndarray:
-        """Some values of all conditions (type, vertices, delta, replicate)."""
-        parts = [
-            self.store.read(place, name, first, stop, known)
-            for place, known in enumerate(self.known)
-        ]
-        return np.stack(parts).reshape(*self.shape[:3], stop - first)
 
     def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
         """COUNTED of replicates [first, stop) of all conditions: Codes."""
-        return tuple(self.block(name, first, stop) for name in statistics.COUNTED)
+        found: dict[str, list[np.ndarray]] = {name: [] for name in statistics.COUNTED}
+        for place in range(len(self.store.conditions)):
+            rows = self.store.rows(place, first, stop)
+            for name, columns in found.items():
+                columns.append(rows[name].copy())  # not the rows, which are much larger
+        shape = *self.shape[:3], stop - first
+        return tuple(np.stack(columns).reshape(shape) for columns in found.values())
 
-    def arrays(self, columns: Iterable[str]) -> dict[str, np.ndarray]:
-        """{name: array (type, vertices, delta, replicate)}, in memory."""
-        return {name: self.block(name, 0, self.shape[-1]) for name in columns}
+    def part(self, where: Sequence[slice]) -> np.ndarray:
+        """Rows of a part of the table (type, vertices, delta, replicate)."""
+        *outer, replicates = where
+        places = np.arange(len(self.store.conditions)).reshape(self.shape[:3])[tuple(outer)]
+        parts = [
+            self.store.rows(place, replicates.start, replicates.stop)
+            for place in places.ravel().tolist()
+        ]
+        return np.stack(parts).reshape(*places.shape, -1)
+
+    def table(self) -> dict[str, np.ndarray]:
+        """{column: array (type, vertices, delta, replicate)} of all rows, in memory."""
+        rows = self.part([slice(0, length) for length in self.shape])
+        return {name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()}
 
 
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]

@@ -1,10 +1,8 @@
 """Studies of pairs and of rates, as rank 0 has them: checks, what they tell, tables from rows."""
 
 import json
-from collections.abc import Callable
-from contextlib import ExitStack
-from functools import partial
-from itertools import accumulate
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,61 +19,65 @@ from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
 from flocsim.ensembles.estimates.statistics import COUNTED, StopRule
 from flocsim.ensembles.kernels import KernelStudy, study_of
-from flocsim.ensembles.kind import Kind
-from flocsim.ensembles.parallel.assembly import assemble
-from flocsim.ensembles.parallel.communicator import Communicator
+from flocsim.ensembles.kind import Kind, OldResults
+from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
 from flocsim.ensembles.storage.identity import PHYSICS, identity_of
 from flocsim.ensembles.storage.resume import Beginning
-from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
-from flocsim.ensembles.storage.unfinished import ASKED, Unfinished, store_of
+from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import Study, flocs_of
 from flocsim.errors import FlocsimError
 from flocsim.io.groups import run_of
-from flocsim.io.records import CHUNK, Record, matches
+from flocsim.io.journal import JournalReader
 from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import failures_of, opened
-from flocsim.io.results.layout import FORMAT, new_row_file
+from flocsim.io.results.layout import FORMAT, write_results
 from flocsim.io.results.schema import Results, as_words
-from flocsim.process import WITHHELD
+from flocsim.process import INTERRUPTION, WITHHELD, stop_requested
 
 
-def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
-    """The table of replicates of a results file, open until the resources are closed."""
-    file = resources.enter_context(opened(output))
-    if tuple(failures_of(file)) != as_words(FAILURES):
-        raise ValueError("its failure codes have other meanings")
-    axes = (file.read(f"replicates/{axis}") for axis in ("type", "vertices", "delta"))
-    columns = {name: file.node(f"replicates/{name}") for name in kind.COLUMNS}
-    count = file.node("replicates/replicate").shape[0]
-    return OldTable(columns, kind.places_in(*axes), count, run_of(file))
+@contextmanager
+def old_rows(output: str | Path) -> Iterator[OldResults]:
+    """Open a results file that is to be extended, its rows read a condition at a time."""
+    with opened(output) as file:
+        if tuple(failures_of(file)) != as_words(FAILURES):
+            raise ValueError("its failure codes have other meanings")
+        places = kind.places_in(
+            *(file.read(f"replicates/{axis}") for axis in ("type", "vertices", "delta"))
+        )
+        count = file.node("replicates/replicate").shape[0]
+
+        def chunks() -> Iterator[tuple[kind.Condition, int, np.ndarray]]:
+            for condition, place in places.items():
+                for first in range(0, count, kind.MOST_ROWS):
+                    stop = min(first + kind.MOST_ROWS, count)
+                    rows = np.empty(stop - first, kind.ROW)
+                    for name in kind.COLUMNS:
+                        rows[name] = file.read(f"replicates/{name}", (*place, slice(first, stop)))
+                    yield condition, first, rows
+
+        yield OldResults(list(places), count, chunks(), run_of(file))
 
 
 def results(
-    study: Study, start: Beginning, count: int, run: dict, comm: Communicator,
-    output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
+    study: Study, start: Beginning, count: int, run: dict, output: str | Path | None,
+    in_memory: bool,
 ) -> Results:  # fmt: skip
-    """The Results of so many replicates; written to ``output``, if any, by all ranks."""
+    """The Results of so many replicates; written to ``output``, if any."""
     reader = summary.Reader(start.store, (*study.shape[:3], count), study.scrambles)
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
-    if output is None:
-        sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
-        rows = reader.arrays(kind.COLUMNS) if in_memory else None
-        return summary.results_of(study, count, sums, run, rows, kernel)
-    # Where the rows go follows from the places of all tables. Of a large study these have no values
-    # yet; few rows are counted at once, so that the tables need not be made twice.
-    few = count * len(study.conditions) <= summary.BLOCK_ROWS
-    first = summary.sums_of(
-        reader.codes, len(study.conditions), 0, count if few else 0, study.scrambles
-    )
-    draft = summary.results_of(study, count, first, run, kernel=kernel)
-    with new_row_file(output, draft, start.replacing) as file:
-        sums, digests = assemble(reader, file, comm, warn)
-        same = few and sums.keys() == first.keys() and all(
-            np.array_equal(sums[name], values) for name, values in first.items()
-        )  # fmt: skip
-        found = draft if same else summary.results_of(study, count, sums, run, kernel=kernel)
-        file.complete(found, digests)
+    sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
+    rows = reader.table() if in_memory else None
+    found = summary.results_of(study, count, sums, run, rows, kernel)
+
+    def part(where: Sequence[slice]) -> np.ndarray:
+        if stop_requested():
+            raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
+        return reader.part(where)
+
+    if output is not None:
+        write_results(output, found, start.replacing, part)
     return found
 
 
@@ -103,42 +105,27 @@ def verdict(found: Results) -> tuple[int, str]:
     return (WITHHELD if report.too_many_undecided(found) else 0), f"warning: {line}"
 
 
-def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
+def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     """What a journal has of pairs: their counts and probabilities."""
-    axes = axes_of(sessions[-1], [
-        kind.condition_of(each.description) for each in found
-        if each.kind == CHUNK and kind.fits(each.description, each.length)
-    ])  # fmt: skip
-    checked = partial(check_rows, failures=len(FAILURES), flocs=2**31)
-    with ReadOnlyJournal(str(path)) as journal:
-        store, notes, unread = store_of(journal, sessions, found, axes, kind.ROW, checked)
-        table = tables(store, tuple(len(axes[name]) for name in kind.ORDER))
+    asked = sessions[-1]["asked"]
+
+    def check(rows: np.ndarray) -> None:
+        check_rows(rows.__getitem__, failures=len(FAILURES), flocs=2**31)
+
+    store, notes, unread = store_of(journal, sessions, kind.ROW, check)
+    table = tables(store, tuple(len(asked[name]) for name in kind.ORDER))
     made = Results(
-        types=axes["types"], vertices=axes["vertices"], delta=axes["delta"], replicates=None,
+        types=asked["types"], vertices=asked["vertices"], delta=asked["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
     )  # fmt: skip
-    asked = axes["replicates"] * len(store.conditions)
-    return Unfinished(path, FORMAT, made, store.there(), asked, notes, sessions, unread)
-
-
-def axes_of(session: dict, found: list[kind.Condition]) -> dict[str, Any]:
-    """ASKED of a session; of one that does not say it, what was found, and 0 replicates."""
-    asked = session.get("asked")
-    if matches(asked, ASKED):
-        assert asked is not None
-        return asked
-    return {
-        "types": list(dict.fromkeys(each.type for each in found)),
-        "vertices": sorted({each.vertices for each in found}),
-        "delta": sorted({each.delta for each in found}),
-        "replicates": 0,
-    }
+    many = asked["replicates"] * len(store.conditions)
+    return Unfinished(journal.path, FORMAT, made, store.there(), many, notes, sessions, unread)
 
 
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     """The table of probabilities from all rows of a store, whose conditions have this shape."""
     many = len(store.conditions)
-    known = {place: counts_of(store, place) for place in range(many) if store.counts[place]}
+    known = {place: counts_of(store, place) for place in range(many) if store.intervals(place)}
     counts = {}
     for name, values in next(iter(known.values())).items():
         axis = leading_axes(name)
@@ -151,23 +138,11 @@ def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
 
 
 def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
-    """What is counted of a condition (…, 1, 1, 1, …), its replicates in whatever pieces they are
-    there."""
-
-    def codes(first: int, stop: int) -> tuple[np.ndarray, ...]:
-        """Of the rows from the ``first`` of those that there are: their numbers may be anything."""
-        columns = {name: np.empty(stop - first, "i8") for name in COUNTED}
-        for (a, b), before in zip(runs, begins, strict=True):
-            low, high = a + max(first - before, 0), min(b, a + stop - before)
-            for number, rows in store.rows(place, low, high, known) if low < high else ():
-                start = before + number - a - first
-                for name in COUNTED:
-                    columns[name][start : start + len(rows[name])] = rows[name]
-        return tuple(values.reshape(1, 1, 1, -1) for values in columns.values())
-
-    runs, known = store.intervals(place), store.known(place)
-    begins = [0, *accumulate(stop - first for first, stop in runs)][:-1]
-    sums = summary.sums_of(codes, 1, 0, kind.total(runs))
+    """What is counted of a condition (…, 1, 1, 1, …), of whatever replicates of it are there."""
+    sums: summary.Sums = {}
+    for rows in store.all_rows(place):
+        codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
+        sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
     return {
         name: values for name, values in sums.items()
         if name not in (*summary.POOLED_NAMES, summary.JOINT)

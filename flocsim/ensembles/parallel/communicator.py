@@ -68,29 +68,24 @@ class StopRequested(FlocsimError):
 
 @attrs.frozen
 class ChunkResult:
-    """What came of a chunk: its first ``count`` replicates, as a record of the journal.
-
-    ``data_start``: bytes of the record before the rows; ``failed``: how many replicates have
-    failed; ``notes``: what is known of them.
-    """
+    """What came of a chunk: the ``rows`` of its first replicates; how many have ``failed``, and
+    ``notes`` on them."""
 
     chunk: "Chunk"
-    count: int
-    record: bytes
-    data_start: int
+    rows: Any
     failed: int = 0
     notes: tuple[dict, ...] = ()
 
 
 @attrs.frozen
 class Kept:
-    """What is kept of an unfinished replicate of the condition at a place, as a record of the
-    journal; whether progress counts it."""
+    """A part of an unfinished replicate of the condition at a place, which is to be saved."""
 
     condition: int
     replicate: int
-    record: bytes
-    counts: bool
+    name: str
+    about: dict
+    data: bytes
 
 
 @attrs.frozen

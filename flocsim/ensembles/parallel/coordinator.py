@@ -12,7 +12,7 @@ from collections.abc import Callable
 import attrs
 import numpy as np
 
-from flocsim.ensembles.kind import Chunk, StudyKind, chunk_record, kept_record
+from flocsim.ensembles.kind import Chunk, StudyKind
 from flocsim.ensembles.parallel.communicator import (
     SLEEP,
     ChunkResult,
@@ -89,6 +89,8 @@ class Coordinator:
         """Whether rank 0 is to give up the replicate at hand; serves where no thread does."""
         if self.error is not None:
             raise self.error
+        with self.lock:
+            self.state.store.writer.sync_when_due()
         if self.comm.size > 1 and self.thread is None:
             self.serve()
         return not self.state.is_running or stop_requested()
@@ -121,6 +123,8 @@ class Coordinator:
     def serve_on(self):
         try:
             while self.present and self.state.phase is not Phase.GIVEN_UP:
+                with self.lock:
+                    self.state.store.writer.sync_when_due()
                 if not self.serve():
                     time.sleep(SLEEP)
         except BaseException as error:
@@ -192,16 +196,16 @@ MOST_NOTES = 20
 """Notes on failed replicates that go with one chunk."""
 
 
-def run_chunks(study: StudyKind, coordinator: Coordinator | RemoteCoordinator, key: str) -> None:
-    """Run chunks until the coordinator has none left; ``key`` marks the records as the study's."""
+def run_chunks(study: StudyKind, coordinator: Coordinator | RemoteCoordinator) -> None:
+    """Run chunks until the coordinator has none left."""
     seconds = chunk_seconds(coordinator.comm.size)
     result = None
     while (chunk := coordinator.exchange(result)) is not None:
-        result = run_chunk(study, chunk, coordinator.is_halted, seconds, key, coordinator.tell)
+        result = run_chunk(study, chunk, coordinator.is_halted, seconds, coordinator.tell)
 
 
 def run_chunk(
-    study: StudyKind, chunk: Chunk, halted: Callable[[], bool], seconds: float, key: str,
+    study: StudyKind, chunk: Chunk, halted: Callable[[], bool], seconds: float,
     tell: Callable[[Kept | Going], object] = lambda message: None,
 ) -> ChunkResult:  # fmt: skip
     """Run a chunk until it is done, its time [s] is up or ``halted()``: a ChunkResult.
@@ -209,7 +213,7 @@ def run_chunk(
     ``tell`` takes what is kept of a replicate while it runs, and how far it is.
     """
     rows = np.zeros(chunk.stop - chunk.first, study.row)
-    condition, place = study.conditions[chunk.condition], study.places[chunk.condition]
+    place = study.places[chunk.condition]
     notes: list[dict] = []
     count = 0
     until = time.monotonic() + seconds
@@ -217,9 +221,8 @@ def run_chunk(
         if halted() or (count and time.monotonic() > until):
             break
 
-        def keep(description: dict, data: bytes, counts: bool, replicate: int = replicate) -> None:
-            record = kept_record(condition, replicate, description, data, key)
-            tell(Kept(chunk.condition, replicate, record, counts))
+        def keep(name: str, about: dict, data: bytes, replicate: int = replicate) -> None:
+            tell(Kept(chunk.condition, replicate, name, about, data))
 
         row, note = study.run_task(
             place, replicate, halted, chunk.left, keep, lambda words: tell(Going(words))
@@ -230,7 +233,5 @@ def run_chunk(
         notes += [note] if note else []
         count += 1
     rows, notes = rows[:count], notes[:MOST_NOTES]
-    record = chunk_record(condition, chunk.first, rows, key, notes)
     failed = int(np.sum(study.has_failed(rows.__getitem__)))
-    return ChunkResult(chunk._replace(left=None), count, record, len(record) - rows.nbytes, failed,
-                       tuple(notes))  # fmt: skip
+    return ChunkResult(chunk._replace(left=None), rows, failed, tuple(notes))

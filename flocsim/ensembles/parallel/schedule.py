@@ -19,7 +19,6 @@ from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
-from flocsim.io.records import data_digest, record_at
 from flocsim.io.results.run_group import describe_note
 
 SHORTEST_SECONDS = 0.25
@@ -143,8 +142,9 @@ class StudyState:
     ``is_enough(replicates)``: whether the study may end with so many of each condition;
     ``allowed``: how many may fail; ``failed``, ``notes``: how many have, and what is known of
     them; ``computed``: how many this run has taken in. ``pieces`` of a replicate are what progress
-    counts, ``begun`` has how many are there of unfinished ones; ``left_of(records)``: where a
-    replicate goes on of which these were kept.
+    counts, ``begun`` has how many are there of unfinished ones, of parts that ``counts_part``;
+    ``left_of(parts)``: where a replicate goes on of which these were saved. ``about``: what the
+    journal says of each chunk.
     """
 
     schedule: Schedule
@@ -157,7 +157,9 @@ class StudyState:
     phase: Phase = Phase.RUNNING
     pieces: int = 1
     begun: Counter[tuple[int, int]] = attrs.Factory(Counter)
-    left_of: Callable[[list], Any] = lambda records: None
+    left_of: Callable[[Any], Any] = lambda parts: None
+    counts_part: Callable[[str], bool] = lambda name: False
+    about: dict[str, Any] = attrs.Factory(dict)
 
     @property
     def missing(self) -> int:
@@ -170,18 +172,18 @@ class StudyState:
 
     def next_chunk(self) -> Chunk | None:
         chunk = self.schedule.take() if self.is_running else None
-        if chunk is None or not (records := self.store.parts.get(chunk[:2])):
+        if chunk is None or not (parts := self.store.parts.get(chunk[:2])):
             return chunk
-        return chunk._replace(left=self.left_of(records))
+        return chunk._replace(left=self.left_of(parts))
 
     def keep(self, kept: Kept) -> None:
         """Write down what was kept of an unfinished replicate."""
         if self.phase is Phase.GIVEN_UP:
             return
-        offset = self.store.journal.append(kept.record)
         task = kept.condition, kept.replicate
-        self.store.parts[task].append(record_at(kept.record, offset))
-        self.begun[task] += kept.counts
+        is_new = kept.name not in self.store.parts[task]
+        self.store.add_part(*task, kept.name, self.about | kept.about, kept.data)
+        self.begun[task] += is_new and self.counts_part(kept.name)
 
     def take_in(self, result: ChunkResult) -> None:
         """Write a ChunkResult down, and see whether that is enough.
@@ -190,15 +192,14 @@ class StudyState:
         """
         if self.phase is Phase.GIVEN_UP:
             return
-        if result.count:
-            condition, first = result.chunk[:2]
-            offset = self.store.journal.append(result.record) + result.data_start
-            digest = data_digest(result.record)
-            self.store.add(condition, first, first + result.count, offset, digest)
-            for replicate in range(first, first + result.count) if self.begun else ():
+        count, (condition, first) = len(result.rows), result.chunk[:2]
+        if count:
+            about = self.about | ({"notes": list(result.notes)} if result.notes else {})
+            self.store.add(condition, first, result.rows, about)
+            for replicate in range(first, first + count) if self.begun else ():
                 self.begun.pop((condition, replicate), None)
-        self.computed += result.count
-        self.schedule.give_back(result.chunk, result.count)
+        self.computed += count
+        self.schedule.give_back(result.chunk, count)
         self.failed += result.failed
         self.notes += result.notes[: MOST_NOTES - len(self.notes)]
         if self.failed > self.allowed:

@@ -27,6 +27,7 @@ from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import COUNTED
+from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.pilot.trials import (
     Job,
     Task,
@@ -45,8 +46,7 @@ from flocsim.integrators import Overdamped
 from flocsim.io.confidence import wilson
 from flocsim.io.results import schema
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.layout import frame_of, plan_of
-from flocsim.io.seals import seal_size
+from flocsim.io.results.layout import image_of
 from flocsim.system import System
 
 MOST = 900
@@ -285,10 +285,9 @@ def file_size(study: Study, count: int) -> float:
     shape = study.shape[:3]
     none = (np.zeros((*shape, 0), "u1"),) * len(COUNTED)
     sums = summary.sums_of(lambda *_: none, math.prod(shape), 0, 0, study.scrambles)
-    draft = summary.results_of(study, count, sums, {})
-    plan = plan_of(frame_of(draft), math.prod(shape) * count)
+    tables = len(image_of(summary.results_of(study, 0, sums, {}), {}).getbuffer())
     run = RUN_BYTES + len(config.text) + FLOC_BYTES * len(study.flocs)
-    return float(plan.size + run + seal_size(len(plan.cuts())))
+    return float(tables + run + count * (math.prod(shape) * ROW.itemsize + 8))
 
 
 class Part(NamedTuple):

@@ -4,27 +4,28 @@ First comes the lock (`claim`), then everything else is looked at. Rows only eve
 journal or a results file has beyond what is asked for stays where it is, or the run is refused.
 """
 
-import contextlib
 import os
 import shlex
 import sys
+from collections import Counter
 from collections.abc import Callable, Sequence
-from functools import partial
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 
 from flocsim.ensembles import kind
-from flocsim.ensembles.kind import StudyKind
+from flocsim.ensembles.kind import OldResults, StudyKind
 from flocsim.ensembles.storage.identity import differences, short
-from flocsim.ensembles.storage.row_store import OldTable, RowStore, stamp
+from flocsim.ensembles.storage.row_store import RowStore, condition_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
-from flocsim.io.journal import Journal, MemoryJournal, journal_path
+from flocsim.io.journal import CHUNK, OLD, PART, SESSION, Journal, Record, journal_path
+from flocsim.io.json_text import matches
 from flocsim.io.outputs import extension_rule, in_the_way
-from flocsim.io.records import CHUNK, SESSION, SNAPSHOT, encode, matches
 from flocsim.io.results.run_group import distinct, is_session, now, source_line, stored
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
@@ -37,8 +38,6 @@ WAYS = (
 """What a user can do about a file in the place of the results."""
 
 MOST_DIFFERENCES = 5
-BLOCK = 262_144
-"""Rows of a results file that are looked at together."""
 HISTORY = ("date", "command")
 """What is kept of a run that contributed to a results file."""
 
@@ -51,10 +50,11 @@ class Beginning:
     ``history`` has date and command of the runs before. ``cpus_now`` are the kinds of CPU that
     this run computes on, ``cpus_found`` those that the found rows are of; ``replacing`` says what
     becomes of a file at the place of the results when they are written. ``rule`` is the rule that
-    ends the study early, as the journal has it; ``unasked`` says what rows the journal has of other
+    ends the study early, as the journal has it; ``unasked`` says that the journal has rows of other
     conditions, and ``farthest`` how far it has them of these (those beyond the end of a run with
     the same rule left out): they are not to go with it. ``at_least``: replicates that each
-    condition has in the results file already.
+    condition has in the results file already. ``old``: the results file that is extended, its rows
+    being in the journal by now; ``session``, the record of this run.
     """
 
     store: RowStore
@@ -63,31 +63,36 @@ class Beginning:
     notes: list[dict] = attrs.Factory(list)
     history: list[dict] = attrs.Factory(list)
     rule: list | None = None
-    unasked: list[kind.Condition] = attrs.Factory(list)
+    unasked: bool = False
     farthest: int = 0
     at_least: int = 0
     cpus_now: list[dict] = attrs.Factory(list)
     cpus_found: list[dict] = attrs.Factory(list)
     replacing: Rule = keep
-    resources: contextlib.ExitStack = attrs.Factory(lambda: contextlib.ExitStack())
+    old: OldResults | None = None
+    session: int = 0
 
     def remark(self, words: str) -> None:
         """Say something of what is in the journal."""
         self.remarks.append(f"{self.journal.path}: {words}")
 
     @property
-    def journal(self) -> Journal | MemoryJournal:
+    def journal(self) -> Journal:
         """Where finished chunks go."""
-        return self.store.journal
+        return self.store.writer
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the journal says of each chunk and part of this run."""
+        return {"identity": short(self.identity), "session": self.session}
 
     def is_covered(self, count: int) -> bool:
         """Whether the older results file has so many replicates of all conditions already."""
-        old = self.store.old
         return (
-            old is not None
-            and old.there is None
-            and count <= old.count
-            and all(condition in old.places for condition in self.store.conditions)
+            self.old is not None
+            and not self.old.sparse
+            and count <= self.old.count
+            and set(self.store.conditions) <= set(self.old.conditions)
         )
 
     def found(self, count: int) -> list[list[kind.Interval]]:
@@ -119,10 +124,8 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
             journal.begin_anew()
         elif mode == RESTART:
             remarks.append(f"the unfinished run is kept as {journal.put_aside()}")
-        elif not journal.is_journal:
-            raise FileError(
-                f"{path} is not a journal of flocsim, or is damaged at its start: move it away"
-            )
+        elif journal.problem:
+            raise FileError(f"{path} {journal.problem}")
         elif mode == NEW:
             raise UsageError(
                 f"{path} holds an unfinished run: continue it with --resume, or start over with "
@@ -136,7 +139,8 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 
 def begin(
     study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
-    old_rows: Callable[..., OldTable], cpus: Sequence[dict] = (), overwrite: bool = False,
+    old_rows: Callable[[Any], AbstractContextManager[OldResults]], cpus: Sequence[dict] = (),
+    overwrite: bool = False,
 ) -> Beginning:  # fmt: skip
     """The Beginning of a study, run on these kinds of CPU, with results in the file ``output``.
 
@@ -149,21 +153,16 @@ def begin(
     start.cpus_now = list(cpus)
     if (stop := study.config.stop).half_width is not None:
         start.rule = [stop.half_width, list(stop.of), stop.least]  # as JSON gives it back
-    start.resources.callback(journal.release)
-    take_rows = partial(take_results, start, study, output, old_rows)
-    try:
-        take_journal(start, study)
-        take_place(start, output, mode, overwrite, take_rows)
-        refuse_fewer(start, output, study.config.replicates)
-        session = {
-            "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
-            "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
-            "rule": start.rule, "asked": study.asked(), "source": source_line(study.source),
-        }  # fmt: skip
-        journal.append(encode(SESSION, session))
-    except Exception:
-        start.resources.close()
-        raise
+    refuse_other_sessions(start, study)
+    take_place(start, output, mode, overwrite, lambda: take_results(start, study, output, old_rows))
+    take_journal(start, study)
+    refuse_fewer(start, output, study.config.replicates)
+    start.session = journal.add(SESSION, "", 0, {
+        "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
+        "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
+        "rule": start.rule, "asked": study.asked(), "source": source_line(study.source),
+    })  # fmt: skip
+    journal.sync()
     return start
 
 
@@ -195,11 +194,11 @@ def take_place(
 
 def refuse_fewer(start, output, replicates):
     """UsageError where the results file has rows that a new one in its place would not have."""
-    old = start.store.old
+    old = start.old
     if old is None or start.is_covered(replicates):
         return
     asked = set(start.store.conditions)
-    left_out = [condition for condition in old.places if condition not in asked]
+    left_out = [condition for condition in old.conditions if condition not in asked]
     if left_out or old.count > replicates:
         what = [f"{old.count} replicates of each"] if old.count > replicates else []
         if left_out:
@@ -211,51 +210,6 @@ def refuse_fewer(start, output, replicates):
             "others: ask for all of them together, or name another output"
         )
     start.at_least = old.count
-
-
-def take_journal(start: Beginning, study: StudyKind) -> None:
-    """Find the chunks in the journal; UsageError where they are those of another study."""
-    journal: Any = start.journal
-    sessions = [record.description for record in journal.records if record.kind == SESSION]
-    if not all(is_session(each) for each in sessions):
-        raise FileError(f"{journal.path} was not begun by flocsim: move it away")
-    start.history += [{key: each[key] for key in HISTORY} for each in sessions]
-    for description in sessions:
-        refuse_other(start, journal.path, description["identity"])
-        if description["layout"] != kind.layout(study.row):
-            raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
-    known = {*(short(each["identity"]) for each in sessions), short(start.identity)}
-    session: dict = {}
-    for record in journal.records:
-        if record.kind == SESSION:
-            session = record.description
-        elif record.kind == SNAPSHOT:
-            take_part(start, study, record, known)
-        elif record.kind == CHUNK and kind.fits(record.description, record.length, study.row):
-            take_chunk(start, study, record, known, session)
-        elif record.kind == CHUNK:
-            told = kind.named(record.description)
-            start.remark(f"{told}: its form is unknown: computed again")
-    for each in journal.damage:
-        start.remark(
-            f"damaged from byte {each.start} to {each.stop} ({kind.named(each.description)}); "
-            "what is missing is computed again"
-        )
-
-
-def take_part(start, study, record, known):
-    """Note what was kept of an unfinished replicate, if it can be of this study."""
-    about = record.description
-    try:
-        if not matches(about, kind.KEPT) or about["identity"] not in known:
-            raise ValueError("what was kept of a replicate cannot be verified")
-        place = start.store.places.get(kind.condition_of(about))
-        study.check_part(about, start.journal.read(record.offset, record.length))
-    except ValueError as error:
-        start.remark(f"{error}: it is left out")
-        return
-    if place is not None:
-        start.store.parts[place, about["replicate"]].append(record)
 
 
 ELSEWHERE = "name another output"
@@ -272,69 +226,133 @@ def refuse_other(start, path, stored, remedy=REMEDY):
         raise UsageError(f"{path} belongs to another study: {shown}{more}; {remedy}")
 
 
-def take_chunk(start, study, record, known, session):
-    """Note where a chunk's rows lie, if they are of a condition of this study.
+def sessions_of(journal: Journal) -> dict[int, dict]:
+    """{id: description} of the runs that wrote a journal."""
+    return {each.id: each.about for each in journal.records(SESSION)}
 
-    ``session``: the description of the run that wrote it.
-    """
-    about = record.description
-    if about["identity"] not in known:
-        start.remark(f"{kind.named(about)} cannot be verified: computed again")
-        return
-    place = start.store.places.get(kind.condition_of(about))
-    if place is None:
-        start.unasked.append(kind.condition_of(about))
-        return
 
-    def check(rows):
+def refuse_other_sessions(start: Beginning, study: StudyKind) -> None:
+    """UsageError where a journal was written by runs of another study."""
+    for session in sessions_of(start.journal).values():
+        if not is_session(session):
+            raise FileError(f"{start.journal.path} was not begun by flocsim: move it away")
+        refuse_other(start, start.journal.path, session["identity"])
+        if session["layout"] != kind.layout(study.row):
+            raise UsageError(
+                f"{start.journal.path} was written by another version of flocsim: {REMEDY}"
+            )
+
+
+def take_journal(start: Beginning, study: StudyKind) -> None:
+    """Take the rows and parts that a journal has; what is damaged or of unknown origin is deleted,
+    so that it is computed again."""
+    journal, sessions = start.journal, sessions_of(start.journal)
+    start.history += [{key: each[key] for key in HISTORY} for each in sessions.values()]
+    known = {*(short(each["identity"]) for each in sessions.values()), short(start.identity)}
+    refused: Counter[str] = Counter()
+    discarded = []
+    for record in journal.records():
+        if record.kind == SESSION:
+            continue
+        try:
+            about = record.about
+            if record.kind == OLD:
+                take_record(start, study, record, {})
+            elif matches(about, ABOUT) and about["identity"] in known:
+                take_record(start, study, record, sessions.get(about["session"], {}))
+            else:
+                raise ValueError(f"{title_of(record, study)} cannot be verified")
+        except ValueError as error:
+            refused[str(error)] += 1
+            discarded.append(record.id)
+    for words, times in refused.items():
+        more = f" ({times} times)" if times > 1 else ""
+        start.remark(f"{words}{more}: computed again")
+    if discarded or journal.damaged:
+        journal.discard([*discarded, *journal.damaged])
+    there = f"the {start.store.there()} finished replicates that are intact are used"
+    if journal.salvaged is not None:
+        start.remark(
+            f"damaged: {there}, what is missing is computed again; the damaged file is kept as "
+            f"{journal.salvaged}"
+        )
+    elif journal.damaged or journal.lost:
+        start.remark(
+            f"{len(journal.damaged) + journal.lost} records of it are damaged, or were lost with "
+            f"the end of {journal.path.name}-wal: {there}, what is missing is computed again"
+        )
+
+
+ABOUT = {"identity": str, "session": int}
+"""What the journal says of a chunk or part, as a pattern."""
+
+
+def title_of(record: Record, study: StudyKind) -> str:
+    """A record for messages."""
+    if record.kind == PART:
+        return "what was saved of a replicate"
+    return kind.named(
+        condition_of(record.condition), record.first, len(record.data) // study.row.itemsize
+    )
+
+
+def take_record(start: Beginning, study: StudyKind, record: Record, session: dict) -> None:
+    """Take the rows or the part of a record, written by a run of this description; ValueError
+    where no run can have given them."""
+    store, title = start.store, title_of(record, study)
+
+    def check(rows: np.ndarray) -> None:
         study.check_rows(rows.__getitem__)
-        study.check_whole(rows, start.store.parts.get((place, about["first"]), []))
+        if record.kind == CHUNK or start.old is None:
+            study.check_whole(rows, store.parts.get((place, record.first), ()))
 
+    place = store.indices.get(record.condition, -1)
     try:
-        start.store.add_chunk(record, place, check)
+        if record.kind == PART:
+            study.check_part(record.about.get("name", ""), record.about, record.data)
+        taken = store.take(record, check)
     except ValueError as error:
-        start.remark(f"{kind.named(about)}: {error}: computed again")
+        raise ValueError(f"{title}: {error}") from error
+    if record.kind != CHUNK:
         return
-    start.notes += about.get("notes", [])
+    if taken is None:
+        start.unasked = True
+        return
+    start.notes += record.about.get("notes", [])
     start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])
     # What is computed beyond the end that a rule has set is nobody's: so it is on any machine.
     if start.rule is None or session.get("rule") != start.rule:
-        start.farthest = max(start.farthest, about["first"] + about["count"])
+        stop = record.first + len(record.data) // study.row.itemsize
+        start.farthest = max(start.farthest, stop)
 
 
-def take_results(start, study, output, old_rows):
-    """Use the rows of an older results file; FlocsimError if they are not of this study."""
-    before = stamp(os.fspath(output))
+def take_results(
+    start: Beginning, study: StudyKind, output: str | Path,
+    old_rows: Callable[[Any], AbstractContextManager[OldResults]],
+) -> None:  # fmt: skip
+    """Copy the rows of an older results file into the journal; FlocsimError if they are not of
+    this study."""
+    resources = ExitStack()
     try:
-        old = old_rows(output, start.resources)
-        run, count = old.run, old.count
-        if "identity" not in run:
+        old = resources.enter_context(old_rows(output))
+        if "identity" not in old.run:
             raise UsageError(f"{output} does not record what it was made from: {ELSEWHERE}")
-        refuse_other(start, output, stored(run, "identity"), ELSEWHERE)
-        found = {name: stored(run, name) for name in ("failed", "cpus", "history")}
-        check_old(study, old)
+        refuse_other(start, output, stored(old.run, "identity"), ELSEWHERE)
+        found = {name: stored(old.run, name) for name in ("failed", "cpus", "history")}
+        with start.journal.together():
+            before = [each.id for each in start.journal.records(OLD)]
+            start.journal.discard([*before, *start.journal.damaged])
+            for condition, first, rows in old.chunks:
+                study.check_rows(rows.__getitem__)
+                start.store.copy(condition, first, rows)
     except UNREADABLE as error:
         if isinstance(error, FlocsimError):
             raise
         raise FileError(f"{output} has no readable results: {error}; {ELSEWHERE}") from error
-    for place, condition in enumerate(start.store.conditions):
-        if condition in old.places and count:
-            for interval in [(0, count)] if old.there is None else old.there[condition]:
-                start.store.add(place, *interval, -1)
-    start.store.old = attrs.evolve(old, path=os.fspath(output), before=before)
+    finally:
+        resources.close()
+    start.old = old
     start.notes += found["failed"]
     start.cpus_found = distinct([*found["cpus"], *start.cpus_found])
-    earlier = {key: run[key] for key in HISTORY if key in run}
+    earlier = {key: old.run[key] for key in HISTORY if key in old.run}
     start.history = [*found["history"], earlier, *start.history]
-
-
-def check_old(study: StudyKind, old: OldTable) -> None:
-    """ValueError for rows of a results file that no run can have given."""
-    for condition in study.conditions:
-        for first in range(0, old.count if condition in old.places else 0, BLOCK):
-            part = (*old.places[condition], slice(first, first + BLOCK))
-
-            def column(name: str, part: tuple = part) -> Any:
-                return old.columns[name][part]
-
-            study.check_rows(column)

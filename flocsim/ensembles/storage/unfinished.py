@@ -1,8 +1,7 @@
 """What an unfinished study has so far, and what the parts of an unfinished sweep have to become.
 
-A study is read from its journal, which is neither locked nor changed: the job that writes it only
-ever appends to it, so that what is whole in it stays as it is. A kind of study reads its rows from
-it.
+A study is read from its journal in one state, while the job that writes it goes on. A kind of study
+makes of its rows what it makes of those of a finished one.
 
 A sweep has a plan, all that the rows of each of its parts follow from, and their axes, fixed when
 it begins; what is found or made in the place of a part is compared with it. A file sweep.json
@@ -21,12 +20,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.kind import ORDER, Condition, condition_of, fits, kinds, layout
+from flocsim.ensembles.kind import ORDER, Condition, kinds, layout
 from flocsim.ensembles.storage.identity import differences
-from flocsim.ensembles.storage.row_store import ReadOnlyJournal, RowStore
+from flocsim.ensembles.storage.row_store import Check, RowStore
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Old, write_file
-from flocsim.io.records import CHUNK, SESSION, Record, matches, read_json, scan
+from flocsim.io.journal import PART, SESSION, JournalReader, read_journal
+from flocsim.io.json_text import matches, read_json
 from flocsim.io.results.run_group import is_session
 
 Facts = dict[str, Any]
@@ -47,8 +47,7 @@ class Unfinished:
     """What a journal holds. ``results``, as in a file of this ``kind``, have what is finished so
     far, of pairs without replicates and pooled tables; ``done`` of ``asked`` replicates (0:
     unknown), or what the ``noun`` says, are finished; ``notes`` tell of the failed ones;
-    ``sessions`` describe the runs that wrote it; ``unread`` bytes of chunks are damaged or of other
-    columns."""
+    ``sessions`` describe the runs that wrote it; ``unread`` records are damaged or of no run."""
 
     path: Path
     kind: str
@@ -68,11 +67,14 @@ class Unfinished:
 
 
 def store_of(
-    journal: ReadOnlyJournal, sessions: list[dict], found: list[Record], axes: dict[str, Any],
-    row: np.dtype, check: Callable[[Callable[[str], np.ndarray]], None],
+    journal: JournalReader, sessions: list[dict], row: np.dtype, check: Check,
+    check_part: Callable[[str, dict, bytes], object] | None = None,
 ) -> tuple[RowStore, list[dict], int]:  # fmt: skip
-    """(rows of a journal that can be believed, notes on failed ones, bytes that are damaged);
-    FileError where there is none."""
+    """(what of a journal can be believed, notes on failed replicates, records that are damaged or
+    of no run); FileError where there is nothing."""
+    axes = sessions[-1]["asked"]
+    if sessions[-1]["layout"] != layout(row):
+        raise FileError(f"{journal.path} was written by another version of flocsim: use that one")
     many = math.prod(len(axes[name]) for name in ORDER)
     if many > MOST_CONDITIONS:
         raise FileError(
@@ -83,43 +85,35 @@ def store_of(
         raise FileError(f"{journal.path} has the same condition twice")
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
     store, notes, unread = RowStore(journal, conditions, row), [], 0
-    current = any(each["layout"] == layout(row) for each in sessions)
-    for each in found if current else ():
-        about = each.description
-        if each.kind != CHUNK or not fits(about, each.length, row):
-            continue
-        if (place := store.places.get(condition_of(about))) is None:
+    for each in journal.records():
+        if each.kind == SESSION or (each.kind == PART and check_part is None):
             continue
         try:
-            store.add_chunk(each, place, lambda rows: check(rows.__getitem__))
+            if each.kind == PART and check_part is not None:
+                check_part(each.about.get("name", ""), each.about, each.data)
+            if store.take(each, check) is not None:
+                notes += each.about.get("notes", [])
         except ValueError:
-            unread += each.length
-            continue
-        notes += about.get("notes", [])
-    if not store.there():
+            unread += 1
+    if not store.there() and not store.parts:
         raise FileError(f"{journal.path} has no finished replicate yet: try again later")
-    return store, notes, unread
+    return store, notes, unread + len(journal.damaged)
 
 
 def read_unfinished(path: str | Path) -> Unfinished:
     """What the journal at ``path`` holds; FileError where it holds no finished replicate."""
-    path = Path(path)
-    try:
-        with open(path, "rb") as file:
-            records = [each for each in scan(file) if isinstance(each, Record)]
-    except OSError as error:
-        raise FileError(f"{path} could not be read: {error.strerror}") from error
-    sessions = [each.description for each in records if each.kind == SESSION]
-    sessions = [each for each in sessions if is_session(each)]
-    if not sessions:
-        raise FileError(
-            f"{path} is not a journal of an unfinished run, or has only just begun: try again"
-        )
-    asked = sessions[-1].get("asked")
-    # Pairs come first, and are all that says nothing of itself.
-    first, *others = kinds().values()
-    said = [each for each in others if each.asked and matches(asked, ASKED | each.asked)]
-    return (said or [first])[0].so_far(path, sessions, records)
+    with read_journal(Path(path)) as journal:
+        sessions = [each.about for each in journal.records(SESSION) if is_session(each.about)]
+        asked = sessions[-1].get("asked") if sessions else None
+        if not matches(asked, ASKED):
+            raise FileError(
+                f"{path} is not a journal of an unfinished run, or has only just begun: try again"
+            )
+        # Pairs come first, and are all that says nothing more of itself.
+        first, *others = kinds().values()
+        known = [each for each in others if each.asked and matches(asked, each.asked)]
+        found: Unfinished = (known or [first])[0].so_far(journal, sessions)
+        return found
 
 
 def plan_text(plan: Plan) -> str:

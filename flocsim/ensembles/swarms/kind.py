@@ -4,8 +4,8 @@ run, results from records.
 
 import hashlib
 import json
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +14,19 @@ import numpy as np
 
 from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kind import Condition, Kind, is_chunk
+from flocsim.ensembles.kind import Condition, Kind, OldResults
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.preflight import names_in
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import Beginning
-from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal
-from flocsim.ensembles.storage.unfinished import Unfinished
+from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.scene import SwarmScene
-from flocsim.ensembles.swarms.study import SwarmStudy, flocs_of
+from flocsim.ensembles.swarms.study import ROW, SwarmStudy, flocs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.explain import force_lines, scale_lines
-from flocsim.fields import is_whole
 from flocsim.forces import ContactForce
-from flocsim.io.records import CHUNK, SNAPSHOT, Record
+from flocsim.io.journal import JournalReader
 from flocsim.io.results import swarm_file
 from flocsim.io.terminal import duration
 from flocsim.plausibility import doubts_of, settled
@@ -158,28 +156,33 @@ def doubts(study: SwarmStudy) -> list[str]:
     return doubts_of([largest_pair(study.first)], names)
 
 
-def old_rows(output: str | Path, resources: ExitStack) -> OldTable:
-    """The replicates of a results file."""
+@contextmanager
+def old_rows(output: str | Path) -> Iterator[OldResults]:
+    """Open a results file that is to be extended."""
     found = swarm_file.read_swarm(output)
     ends, run = found.groups["ends"], found.run
     count, vertices = len(ends["finished"]), int(run.get("vertices", 0))
-    return OldTable(ends, {Condition("swarm", vertices, 0.0): ()}, count, run, found)
+    rows = np.zeros(count, ROW)
+    for name, values in ends.items():
+        rows[name] = values
+    condition = Condition("swarm", vertices, 0.0)
+    yield OldResults([condition], count, [(condition, 0, rows)], run, found)
 
 
 def results(
-    study: SwarmStudy, start: Beginning, count: int, run: dict, comm: Communicator,
-    output: str | Path | None, warn: Callable[[str], object], in_memory: bool,
+    study: SwarmStudy, start: Beginning, count: int, run: dict, output: str | Path | None,
+    in_memory: bool,
 ) -> swarm_file.SwarmResults:  # fmt: skip
     """The SwarmResults of so many replicates; written to ``output`` where there is one."""
     store, form, groups = start.store, study.form, {}
-    begun = min(store.old.count, count) if store.old else 0
-    if store.old:
-        groups = first_of(store.old.more, begun)
+    begun = min(start.old.count, count) if start.old else 0
+    if start.old:
+        groups = first_of(start.old.found, begun)
     if begun < count:
-        found = [records.Found.of(store.parts[0, replicate]) for replicate in range(begun, count)]
-        new = records.groups_of(form, found, store.journal.read)
+        new = records.groups_of(form, [store.parts[0, each] for each in range(begun, count)])
         groups = records.appended(groups, new) if groups else new
-    groups["ends"] = {name: store.read(0, name, 0, count) for name in swarm_file.ENDS}
+    rows = store.rows(0, 0, count)
+    groups["ends"] = {name: rows[name].copy() for name in swarm_file.ENDS}
     made = records.results_from(form, groups, run)
     if output is not None:
         swarm_file.write_swarm(output, made, start.replacing)
@@ -213,40 +216,37 @@ def verdict(found: swarm_file.SwarmResults) -> tuple[int, str]:
     return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
 
 
-def so_far(path: Path, sessions: list[dict], found: list[Record]) -> Unfinished:
+def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     """What a journal has of swarms, of which those appear that have begun."""
-    told = sessions[-1]["asked"]
-    asked, unread = told["replicates"], 0
+    path, told = journal.path, sessions[-1]["asked"]
+    asked = told["replicates"]
     form = records.Form(**{name: told["swarm"][name] for name in records.FORM})
     if not form.times or form.bodies < 1:
         raise FileError(f"{path} does not record what is kept of a swarm")
-    parts: dict[int, list[Record]] = {}
-    notes: list[dict] = []
-    with ReadOnlyJournal(str(path)) as journal:
-        for each in found:
-            about = each.description
-            if each.kind == CHUNK:
-                notes += about.get("notes", []) if is_chunk(about) else []
-            if each.kind != SNAPSHOT:
-                continue
-            try:
-                records.check_part(records.part_in(each, journal.read), form)
-            except ValueError:
-                unread += each.length
-                continue
-            replicate: Any = about.get("replicate")
-            if is_whole(replicate) and 0 <= replicate < asked:
-                parts.setdefault(replicate, []).append(each)
-        swarms = {number: records.Found.of(each) for number, each in sorted(parts.items())}
-        swarms = {replicate: each for replicate, each in swarms.items() if each.bodies}
-        done = sum(len(each.moments) for each in swarms.values())
-        if not done:
-            raise FileError(f"{path} has no snapshot yet: try again later")
-        known = max(max(each.moments, default=0) for each in swarms.values()) + 1
-        if known > done:
-            raise FileError(f"{path} has no readable swarms: snapshots of it are missing")
-        seen = attrs.evolve(form, times=form.times[:known])
-        groups = records.groups_of(seen, list(swarms.values()), journal.read)
+
+    def check(rows: np.ndarray) -> None:
+        records.check_ends(rows.__getitem__)
+
+    def check_part(name: str, about: dict, data: bytes) -> None:
+        records.check_part(name, records.part_of(about, data), form)
+
+    store, notes, unread = store_of(journal, sessions, ROW, check, check_part)
+    swarms = {
+        replicate: parts for (_, replicate), parts in sorted(store.parts.items())
+        if records.BODIES in parts and replicate < asked
+    }  # fmt: skip
+    seen_of = [
+        [place for place in range(form.moments) if records.moment_name(place) in parts]
+        for parts in swarms.values()
+    ]
+    done = sum(map(len, seen_of))
+    if not done:
+        raise FileError(f"{path} has no snapshot yet: try again later")
+    known = max(max(each, default=0) for each in seen_of) + 1
+    if known > done:
+        raise FileError(f"{path} has no readable swarms: snapshots of it are missing")
+    seen = attrs.evolve(form, times=form.times[:known])
+    groups = records.groups_of(seen, list(swarms.values()))
     groups["ends"] = {
         name: np.zeros(len(swarms), kind) for name, (kind, _, _) in swarm_file.ENDS.items()
     }

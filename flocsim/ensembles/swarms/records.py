@@ -1,13 +1,13 @@
-"""What of a replicate goes into the journal: its bodies, its snapshots, its state now and then.
+"""What of a replicate goes into the journal: its bodies, its snapshots, its last state.
 
-A record is a description and arrays, one after another, whose names, types and shapes the
-description lists. The last state of a replicate is what it goes on from.
+A part is a description and arrays, one after another, whose names, types and shapes the
+description lists. A replicate goes on from its state.
 A journal may have been written by anyone: `check_part` refuses what no swarm can have left. Results
 are replicates put together, old ones first.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any
 
 import attrs
@@ -15,8 +15,9 @@ import numpy as np
 
 import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
+from flocsim.ensembles.storage.row_store import Parts
 from flocsim.fields import is_number, is_whole
-from flocsim.io.records import Record, matches
+from flocsim.io.json_text import matches
 from flocsim.io.results import swarm_file
 from flocsim.swarms.progress import Effort
 
@@ -35,8 +36,13 @@ class Part:
     arrays: dict[str, np.ndarray]
     facts: dict[str, Any] = attrs.Factory(dict)
 
-    def described(self) -> tuple[dict[str, Any], bytes]:
-        """(description, data) of the record."""
+    @property
+    def name(self) -> str:
+        """By which a later part takes the place of an earlier one."""
+        return moment_name(self.facts["place"]) if self.of == MOMENT else self.of
+
+    def described(self) -> tuple[str, dict[str, Any], bytes]:
+        """(name, description, data), as they are saved."""
         listed = [
             [name, array.dtype.str[1:], list(array.shape)] for name, array in self.arrays.items()
         ]
@@ -46,11 +52,7 @@ class Part:
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in self.facts.items()
         }
-        return {"of": self.of, "arrays": listed, "facts": facts}, data
-
-
-Read = Callable[[int, int], bytes]
-"""Bytes of the journal: (offset, length)."""
+        return self.name, {"of": self.of, "arrays": listed, "facts": facts}, data
 
 
 @attrs.frozen(eq=False)
@@ -61,44 +63,23 @@ class Left:
     state: dict[str, np.ndarray]
 
 
-@attrs.define(eq=False)
-class Found:
-    """What a journal has of a replicate: records of its bodies, of its snapshots by place, and of
-    its last state."""
-
-    bodies: Record | None = None
-    moments: dict[int, Record] = attrs.Factory(dict)
-    state: Record | None = None
-
-    @classmethod
-    def of(cls, records: Iterable[Record]) -> "Found":
-        """What these records are, which were checked."""
-        found = cls()
-        for record in records:
-            about = record.description
-            if about["of"] == MOMENT:
-                found.moments[about["facts"]["place"]] = record
-            else:
-                setattr(found, about["of"], record)
-        return found
-
-    def left(self, read: Read) -> Left | None:
-        """Where it goes on; None where it begins anew."""
-        if self.state is None or self.bodies is None:
-            return None
-        state = part_in(self.state, read)
-        count = state.facts["moments"]
-        return Left(count, state.arrays) if self.has(count) else None
-
-    def has(self, moments: int) -> bool:
-        """Whether its bodies and first snapshots are there."""
-        return self.bodies is not None and all(place in self.moments for place in range(moments))
+def moment_name(place: int) -> str:
+    """The name of the part that has a snapshot."""
+    return f"{MOMENT} {place}"
 
 
-def part_in(record: Record | None, read: Read) -> Part:
-    """The Part of a record that is there."""
-    assert record is not None, "a replicate that was read must have its bodies"
-    return part_of(record.description, read(record.offset, record.length))
+def has(parts: Container[str], moments: int) -> bool:
+    """Whether the bodies of a replicate and its first snapshots are there."""
+    return BODIES in parts and all(moment_name(place) in parts for place in range(moments))
+
+
+def left_of(parts: Parts) -> Left | None:
+    """Where a replicate goes on; None where it begins anew."""
+    if STATE not in parts:
+        return None
+    state = part_of(*parts.read(STATE))
+    count = state.facts["moments"]
+    return Left(count, state.arrays) if has(parts, count) else None
 
 
 def part_of(about: dict[str, Any], data: bytes) -> Part:
@@ -159,15 +140,16 @@ class Form:
 
 
 FORM = {"bodies": int, "bounds": [float], "times": [float], "periodic": str}
-"""Form.asked, as a pattern of `flocsim.io.records`."""
+"""Form.asked, as a pattern of `flocsim.io.json_text`."""
 
 
-def check_part(part: Part, form: Form) -> None:
-    """ValueError where a Part is none of a study of this Form."""
+def check_part(name: str, part: Part, form: Form) -> None:
+    """ValueError where a Part is none of a study of this Form, or has not this name."""
     checks = {BODIES: check_bodies, MOMENT: check_moment, STATE: check_state}
     if part.of not in checks:
         raise ValueError("a record is of an unknown kind")
     checks[part.of](part, form)
+    demand(name == part.name, "name")
 
 
 def check_shapes(part: Part, shapes: Mapping[str, tuple[Any, ...]]) -> None:
@@ -262,9 +244,9 @@ PLACED = ("bond_replicate", "cluster_replicate", "event_replicate")
 Groups = dict[str, dict[str, np.ndarray]]
 
 
-def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
+def groups_of(form: Form, found: list[Parts]) -> Groups:
     """{group: {column: array}} of replicates, one after another, but for their ends."""
-    per_body = [part_in(own.bodies, read).arrays for own in found]
+    per_body = [part_of(*own.read(BODIES)).arrays for own in found]
     points = max(len(each["points"]) for each in per_body)
     counts = np.array([each["count"] for each in per_body])
     groups: Groups = {}
@@ -284,8 +266,10 @@ def groups_of(form: Form, found: list[Found], read: Read) -> Groups:
     bonds = [np.zeros((0, len(swarm_file.BONDS)), dtype=np.int32)]
     rows = [np.zeros((0, len(swarm_file.CLUSTERS)))]
     for row, own in enumerate(found):
-        for place, record in own.moments.items():
-            part = part_in(record, read)
+        for place in range(form.moments):
+            if moment_name(place) not in own:
+                continue
+            part = part_of(*own.read(moment_name(place)))
             for name, values in numbers.items():
                 value = part.facts.get(name)
                 values[row, place] = np.nan if value is None else value

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable
 from typing import Any, ClassVar
 
 import attrs
@@ -14,13 +14,13 @@ from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, neares
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
+from flocsim.ensembles.storage.row_store import Parts
 from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.records import Record
 from flocsim.io.results.swarm_file import ENDS
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
 from flocsim.swarms.swarm import Swarm, stops_of
@@ -147,11 +147,10 @@ class SwarmStudy(StudyKind):
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
         """One replicate from where it was left; its bodies and snapshots are kept as they come."""
-        kept = keep or (lambda description, data, counts: None)
+        kept = keep or (lambda name, description, data: None)
         ended = run_replicate(
-            self, replicate, lambda part: kept(*part.described(), part.of == records.MOMENT),
-            left, halted, going,
-        )  # fmt: skip
+            self, replicate, lambda part: kept(*part.described()), left, halted, going
+        )
         if ended is None:
             return None, None
         finished = ended["status"] == Status.FINISHED.name
@@ -168,20 +167,19 @@ class SwarmStudy(StudyKind):
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         return column("finished") == 0
 
-    def check_part(self, description: dict, data: bytes) -> None:
-        records.check_part(records.part_of(description, data), self.form)
+    def check_part(self, name: str, description: dict, data: bytes) -> None:
+        records.check_part(name, records.part_of(description, data), self.form)
 
-    def check_whole(self, rows: Mapping[str, np.ndarray], parts: list[Record]) -> None:
+    def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
         """ValueError where bodies or snapshots of a finished replicate are not there."""
-        [*finished] = rows["finished"]
-        if len(finished) > 1 or not records.Found.of(parts).has(self.pieces if finished[0] else 0):
+        if len(rows) > 1 or not records.has(parts, self.pieces if rows["finished"][0] else 0):
             raise ValueError("some of its snapshots are missing")
 
-    def counts_part(self, description: dict) -> bool:
-        return description["of"] == records.MOMENT
+    def counts_part(self, name: str) -> bool:
+        return name.startswith(records.MOMENT)
 
-    def left_of(self, parts: list[Record], read: records.Read) -> records.Left | None:
-        return records.Found.of(parts).left(read)
+    def left_of(self, parts: Parts) -> records.Left | None:
+        return records.left_of(parts)
 
     def generator(self, replicate: int) -> np.random.Generator:
         """The random numbers of a replicate."""

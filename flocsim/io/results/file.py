@@ -5,8 +5,8 @@ dimension scales, and every dataset a ``units`` and a ``long_name``; codes carry
 ``flag_meanings``. ``flocs`` has the names of the flocs that ``replicates/floc_i`` and ``floc_j``
 number, ``run`` scalars: config text, versions, machine, wall times. All that may differ between two
 runs of one config is in ``run``, so the rest can be compared byte for byte. The file ends in
-checksums behind the HDF5 data (see `flocsim.io.seals`), is checked before HDF5 parses it, and is
-written a block at a time (see `flocsim.io.results.layout`).
+a checksum behind the HDF5 data (see `flocsim.io.seals`), is checked before HDF5 parses it, and is
+written by `flocsim.io.results.layout`.
 """
 
 import contextlib

@@ -18,14 +18,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
-from flocsim.io.records import matches, read_json
+from flocsim.io.json_text import matches, read_json
 
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
-"""What is kept of a failed replicate, as a pattern of `flocsim.io.records`."""
+"""What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
 CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm": [str]}
 SESSION = {"identity": {}, "short": str, "layout": str, "date": str, "command": str}
-"""The description of a journal's session, as a pattern of `flocsim.io.records`."""
+"""The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
 SETTLED = {
     "type": str, "body": str, "radius": float, "speed": float, "reynolds": float, "stokes": float,

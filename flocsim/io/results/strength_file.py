@@ -21,8 +21,8 @@ import numpy as np
 
 from flocsim.io.files import Rule, keep
 from flocsim.io.groups import Group, check_format, declared, hold_against, opened_file, write_groups
+from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.records import read_json
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 
 FORMAT = "flocsim strength"

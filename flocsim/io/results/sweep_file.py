@@ -25,8 +25,8 @@ from flocsim.io.groups import (
     write_groups,
 )
 from flocsim.io.hdf5 import Node
+from flocsim.io.json_text import matches, read_json
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.records import matches, read_json
 from flocsim.io.results.run_group import SOURCE
 
 FORMAT = "flocsim sweep"

@@ -17,7 +17,7 @@ from flocsim.ensembles.parallel.communicator import (
     Communicator,
     Heartbeat,
 )
-from flocsim.io.records import CHUNK, Record, scan
+from tests.helpers.journals import rows_in
 from tests.helpers.small_study import command, mpirun, problems, run_command, write_small
 from tests.helpers.tiers import rest_slow
 from tests.helpers.waiting import PATIENCE, wait_until
@@ -149,13 +149,6 @@ def test_the_time_is_a_number_of_seconds(seconds, capsys):
     [line] = capsys.readouterr().err.splitlines()
     assert "--heartbeat must be 0 s or more" in line
     assert SECONDS == 300.0  # as docs/cluster.md says
-
-
-def rows_in(path):
-    """How many replicates a journal holds."""
-    with open(path, "rb") as file:
-        found = [each for each in scan(file) if isinstance(each, Record) and each.kind == CHUNK]
-    return sum(each.description["count"] for each in found)
 
 
 @pytest.mark.parametrize(

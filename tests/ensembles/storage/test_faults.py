@@ -79,7 +79,7 @@ def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
     assert code == 74
     errors = errors_of(folder).read_text()
     assert len(problems(errors)) == 1
-    assert "study.h5.journal could not be written: File too large" in errors
+    assert "study.h5.journal could not be written: " in errors
     assert verdict(folder, reference) == ""
 
 

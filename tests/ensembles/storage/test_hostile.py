@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from benchmarks.faults.fuzz_readers import JournalReader
-from flocsim.ensembles.kind import ROW, named
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
-from flocsim.ensembles.storage.resume import NEW, RESUME, Beginning, take_journal
+from flocsim.ensembles.storage.resume import (
+    NEW,
+    RESUME,
+    Beginning,
+    refuse_other_sessions,
+    take_journal,
+)
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, FlocsimError
-from flocsim.io.journal import Journal
-from flocsim.io.records import CHUNK, SESSION
+from flocsim.io.journal import CHUNK, SESSION, Journal
 from flocsim.io.seals import seal
-from tests.helpers.hostile_files import encode_words
+from tests.helpers.journals import write_records
 from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import small_config
 
@@ -32,16 +36,16 @@ def reader(tmp_path_factory):
 
 
 def taken(reader, folder, records):
-    """(Beginning, number of rows) of a journal of these (kind, description or words, data)."""
-    encoded = [
-        encode_words(kind, what if isinstance(what, bytes) else json.dumps(what).encode(), data)
-        for kind, what, data in records
-    ]
-    path = folder / "j.h5.journal"
-    path.write_bytes(b"".join(encoded))
+    """(Beginning, number of rows) of a journal of these (kind, condition, first, description or
+    words, data)."""
+    path = write_records(folder / "j.h5.journal", [
+        (*key, about if isinstance(about, bytes) else json.dumps(about).encode(), data)
+        for *key, about, data in records
+    ])  # fmt: skip
     journal = Journal(path)
     try:
         start = Beginning(RowStore(journal, reader.study.conditions), reader.identity)
+        refuse_other_sessions(start, reader.study)
         take_journal(start, reader.study)
         return start, sum(stop - first for each in start.found(2**50) for first, stop in each)
     finally:
@@ -56,20 +60,20 @@ def test_a_sound_journal_is_taken(reader, tmp_path):
 @pytest.mark.parametrize(
     "change",
     [
-        {"first": -1}, {"first": "0"}, {"first": 2**62}, {"count": 0}, {"count": -2},
-        {"count": 2.0}, {"count": True}, {"count": 10**40}, {"type": 1}, {"type": None},
-        {"vertices": "1"},
-        {"delta": "0"}, {"delta": None}, {"delta": []}, {"identity": 5}, {"notes": 1},
-        {"notes": [1]}, {"notes": [{"why": 1}]}, {"notes": {"a": 1}},
+        {"first": -1}, {"first": 2**62}, {"data": b""}, {"data": b"1"}, {"condition": "[1, 1, 0]"},
+        {"condition": '["I", "1", 0.0]'}, {"condition": '["I", 1]'}, {"condition": "null"},
+        {"condition": "["}, {"identity": 5}, {"notes": 1}, {"notes": [1]},
+        {"notes": [{"why": 1}]}, {"notes": {"a": 1}},
     ],
 )  # fmt: skip
 def test_a_chunk_of_another_form_is_passed_over(reader, tmp_path, change):
-    session, first, second = reader.parts
-    kind, description, data = first
-    start, rows = taken(reader, tmp_path, [session, (kind, description | change, data), second])
+    session, (kind, condition, first, about, data), second = reader.parts
+    key = kind, change.get("condition", condition), change.get("first", first)
+    words = {name: each for name, each in change.items() if name in ("identity", "notes")}
+    changed = *key, about | words, change.get("data", data)
+    start, rows = taken(reader, tmp_path, [session, changed, second])
     assert rows == 2
     assert start.remarks and all(remark.isprintable() for remark in start.remarks)
-    assert named(description | change)
 
 
 @pytest.mark.parametrize(
@@ -80,8 +84,9 @@ def test_a_chunk_of_another_form_is_passed_over(reader, tmp_path, change):
 )  # fmt: skip
 @pytest.mark.parametrize("kind", [SESSION, CHUNK])
 def test_a_description_that_is_none_is_damage(reader, tmp_path, kind, words):
-    session, first, second = reader.parts
-    start, rows = taken(reader, tmp_path, [session, (kind, words, first[2]), second])
+    session, (_, condition, first, _, data), second = reader.parts
+    odd = kind, condition, first, words, data
+    start, rows = taken(reader, tmp_path, [session, odd, second])
     assert rows == 2
     assert "computed again" in start.remarks[0]
 
@@ -92,9 +97,9 @@ def test_a_description_that_is_none_is_damage(reader, tmp_path, kind, words):
      {"command": []}, {"cpus": 1}, {"cpus": [{}]}, {"cpus": [{"cpu": 1}]}],
 )  # fmt: skip
 def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
-    (kind, description, data), *chunks = reader.parts
+    (*key, about, data), *chunks = reader.parts
     with pytest.raises(FileError, match="not begun by flocsim"):
-        taken(reader, tmp_path, [(kind, description | change, data), *chunks])
+        taken(reader, tmp_path, [(*key, about | change, data), *chunks])
 
 
 @pytest.mark.parametrize(
@@ -108,11 +113,10 @@ def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
      ("closer_outcome", 8), ("wider_inside", 2), ("wider_bond", 0)],
 )  # fmt: skip
 def test_rows_that_no_run_has_given_are_computed_again(reader, tmp_path, column, value):
-    session, (kind, description, _), second = reader.parts
+    session, (*key, about, _), second = reader.parts
     rows = reader.rows()
     rows[column][1] = value
-    data = b"".join(rows[name].tobytes() for name in ROW.names)
-    start, count = taken(reader, tmp_path, [session, (kind, description, data), second])
+    start, count = taken(reader, tmp_path, [session, (*key, about, rows.tobytes()), second])
     assert count == 2
     assert f"replicates/{column} are impossible: computed again" in start.remarks[0]
 

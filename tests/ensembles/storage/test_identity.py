@@ -36,7 +36,7 @@ NOT_PHYSICS = {
     "process.py": "what the system allows; a row is what comes without an error",
     "io/files.py": "how files are written",
     "io/seals.py": "how files are sealed",
-    "io/records.py": "how rows are stored, sealed by checksums",
+    "io/json_text.py": "how descriptions in files are parsed",
     "ensembles/config/": "reads values, and these are compared themselves",
 }
 """What a replicate imports without its rows depending on it, and why."""

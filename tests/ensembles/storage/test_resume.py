@@ -1,7 +1,9 @@
 """Stopped, damaged, extended: what exists is used, what is missing is run, nothing else is."""
 
+import contextlib
 import json
 import shutil
+import sqlite3
 
 import attrs
 import numpy as np
@@ -16,9 +18,10 @@ from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
-from flocsim.io.records import encode
+from flocsim.io.journal import CHUNK
 from flocsim.io.results.file import read_results
 from flocsim.process import INTERRUPTION, STOPPED
+from tests.helpers.journals import records_in, write_records
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config
 from tests.helpers.tiers import rest_slow
@@ -185,38 +188,49 @@ def test_other_flocs_are_refused(tmp_path, monkeypatch):
         run_to_file(config, Communicator(), tmp_path / "r.h5", RESUME)
 
 
-def test_a_damaged_chunk_is_named_and_run_again(stopped, whole, capsys):
+def test_a_damaged_chunk_is_told_and_run_again(stopped, whole, capsys):
     path = stopped / "r.h5.journal"
+    chunk = [each for each in records_in(path) if each.kind == CHUNK][-1]
     data = bytearray(path.read_bytes())
-    data[data.rindex(b"\x93FLOCREC") - 1] ^= 4  # the last byte of the last chunk but one
+    data[data.index(chunk.data[:200]) + 100] ^= 4
     path.write_bytes(data)
     assert go_on(stopped).computed == 51
     said = capsys.readouterr().err
-    assert "r.h5.journal: damaged from byte " in said
-    assert "(type I, N = 1, delta " in said
+    assert "r.h5.journal: 1 records of it are damaged" in said
+    assert "the 29 finished replicates that are intact are used" in said
     assert same_data(stopped / "r.h5", whole) == []
 
 
-@pytest.mark.parametrize(
-    "share", rest_slow([0.0, 0.001, 0.02, 0.5, 0.9999], lambda share: share == 0.5)
-)
-def test_a_journal_cut_anywhere_goes_on(stopped, whole, share):
+@pytest.mark.parametrize("share", rest_slow([0.0, 0.3, 0.5, 0.99], lambda share: share == 0.5))
+def test_a_journal_cut_anywhere_goes_on(stopped, whole, share, capsys):
     path = stopped / "r.h5.journal"
     data = path.read_bytes()
     path.write_bytes(data[: int(share * len(data))])
     go_on(stopped)
     assert same_data(stopped / "r.h5", whole) == []
+    said = capsys.readouterr().err
+    assert share == 0.0 or "the damaged file is kept as" in said
+    assert (stopped / "r.h5.journal.1").exists() == (share > 0.0)
 
 
-def test_chunks_without_a_session_to_vouch_for_them_are_run_again(stopped, whole, capsys):
+def test_chunks_without_a_session_to_vouch_for_them_are_known_by_their_own_identity(stopped, whole):
     path = stopped / "r.h5.journal"
-    other = {"short": "other", "identity": {"seed": 1}, "layout": ""}
-    data = path.read_bytes()
-    first = data.index(b"\x93FLOCREC", 1)
-    assert encode(1, other)[:8] == data[:8]
-    path.write_bytes(data[first:].replace(b"nothing", b"nothing"))
-    # Of this very study they are believed by their own digest.
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("DELETE FROM record WHERE kind='session'")
     assert go_on(stopped).computed == 50
+    assert same_data(stopped / "r.h5", whole) == []
+
+
+def test_rows_of_another_study_in_the_journal_are_computed_again(stopped, whole, capsys):
+    path = stopped / "r.h5.journal"
+    found = records_in(path)
+    write_records(path, [
+        (each.kind, each.condition, each.first,
+         json.dumps(each.about | ({"identity": "other"} if each.kind == CHUNK else {})).encode(),
+         each.data) for each in found
+    ])  # fmt: skip
+    assert go_on(stopped).computed == 80
+    assert "cannot be verified: computed again" in capsys.readouterr().err
     assert same_data(stopped / "r.h5", whole) == []
 
 

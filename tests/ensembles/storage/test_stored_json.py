@@ -13,14 +13,14 @@ from flocsim.ensembles.pairs import kind as pairs
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
-from flocsim.io.journal import journal_path
-from flocsim.io.records import SESSION, scan
+from flocsim.io.journal import SESSION, journal_path
 from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import (
     describe_kind,
     distinct,
     mixture_warnings,
 )
+from tests.helpers.journals import records_in
 from tests.helpers.small_study import problems, small_config
 from tests.helpers.tiers import rest_slow
 
@@ -125,12 +125,11 @@ def test_a_journal_resumed_on_another_kind_says_so_and_records_both(tmp_path, mo
     (tmp_path / "r.h5").unlink()
     with monkeypatch.context() as patch:
         # All is in the journal, and the results file cannot be written.
-        patch.setattr(pairs, "new_row_file", lambda *words: 1 / 0)
+        patch.setattr(pairs, "write_results", lambda *words: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             run_on(tmp_path, patch, HERE, NEW)
-    with open(journal_path(tmp_path / "r.h5"), "rb") as file:
-        [session] = [each.description for each in scan(file) if each.kind == SESSION]
-    assert session["cpus"] == [HERE]
+    found = records_in(journal_path(tmp_path / "r.h5"))
+    assert [each.about["cpus"] for each in found if each.kind == SESSION] == [[HERE]]
     assert run_on(tmp_path, monkeypatch, OTHER, replicates=6).computed == 1
     [line] = problems(capsys.readouterr().err)
     assert "and this is znver2: the file will have rows of both kinds" in line

@@ -6,11 +6,11 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS
-from flocsim.ensembles.kind import COLUMNS, ROW, Condition, chunk_record, layout
+from flocsim.ensembles.kind import COLUMNS, ROW, Condition, layout
+from flocsim.ensembles.storage.row_store import key_of
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
-from flocsim.io.journal import Journal, journal_of
-from flocsim.io.records import SESSION, encode
+from flocsim.io.journal import CHUNK, SESSION, Journal, journal_of
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tabulate import tabulate
 
@@ -25,7 +25,7 @@ def write_journal(path, asked=ASKED):
         "asked": asked,
     }  # fmt: skip
     journal = Journal(path)
-    journal.append(encode(SESSION, session))
+    journal.add(SESSION, "", 0, session)
     pieces = [((0, v, d), 0, 40) for v in range(2) for d in range(2)] + [((1, 1, 0), 10, 25)]
     for (t, v, d), first, stop in pieces:
         rows = np.zeros(stop - first, ROW)
@@ -37,13 +37,17 @@ def write_journal(path, asked=ASKED):
         )  # fmt: skip
         # Some replicates twice, as a run that was killed while it wrote leaves them.
         for part in ([0, 30], [20, 40]) if first == 0 else ([0, 15],):
-            journal.append(chunk_record(condition, first + part[0], rows[slice(*part)], "k"))
+            add_rows(journal, condition, first + part[0], rows[slice(*part)])
     return journal
+
+
+def add_rows(journal, condition, first, rows):
+    journal.add(CHUNK, key_of(condition), first, {"identity": "k"}, rows.tobytes())
 
 
 def test_the_counts_are_those_of_the_rows_there_are(tmp_path):
     journal = write_journal(tmp_path / "r.h5.journal")
-    before = (tmp_path / "r.h5.journal").read_bytes()
+    before = {each: each.read_bytes() for each in tmp_path.glob("r.h5.journal*")}
     found = read_unfinished(tmp_path / "r.h5.journal")
     codes = [RESULTS.replicates[name] for name in ("outcome", "inside", "bond")]
     again = [RESULTS.replicates[name] for name in EXACT_RUNS[3:]]
@@ -61,8 +65,9 @@ def test_the_counts_are_those_of_the_rows_there_are(tmp_path):
         [[0, 0], [15, 0]],
     ]
     assert found.progress == "unfinished: 175 of 320 replicates so far"
-    assert (tmp_path / "r.h5.journal").read_bytes() == before and journal.is_as_left()
-    journal.file.close()
+    now = {each: each.read_bytes() for each in tmp_path.glob("r.h5.journal*")}
+    assert {k.name for k in before if before[k] != now[k]} <= {"r.h5.journal-shm"}
+    journal.release()
 
 
 def test_info_and_plot_of_results_that_are_not_there_yet(tmp_path, capsys, monkeypatch):
@@ -75,24 +80,18 @@ def test_info_and_plot_of_results_that_are_not_there_yet(tmp_path, capsys, monke
         assert "0 to 40 in each of 8 conditions, 40 planned" in told
     assert main(["plot", "r.h5", "--figures", "delta,efficiency"]) == 0
     assert capsys.readouterr().out.split() == ["r-delta.png", "r-efficiency.png"]
-    journal.file.close()
-
-
-def test_a_journal_that_does_not_say_what_was_asked_tells_what_it_has(tmp_path):
-    write_journal(tmp_path / "r.h5.journal", asked=None).file.close()
-    found = read_unfinished(tmp_path / "r.h5.journal")
-    assert found.results.types == ("I", "III") and found.asked == 0
-    assert found.progress == "unfinished: 175 replicates so far"
+    journal.release()
 
 
 def test_what_has_no_replicate_yet_is_said_in_one_line(tmp_path):
-    Journal(tmp_path / "r.h5.journal").file.close()
+    journal = Journal(tmp_path / "r.h5.journal")
     with pytest.raises(FileError, match="has only just begun"):
         read_unfinished(tmp_path / "r.h5.journal")
+    journal.release()
 
 
 def test_finished_results_are_read_themselves(tmp_path):
-    write_journal(tmp_path / "r.h5.journal").file.close()
+    write_journal(tmp_path / "r.h5.journal").release()
     assert journal_of(tmp_path / "r.h5") == tmp_path / "r.h5.journal"
     (tmp_path / "r.h5").write_bytes(b"")
     assert journal_of(tmp_path / "r.h5") is None
@@ -109,7 +108,7 @@ def test_finished_results_are_read_themselves(tmp_path):
     ],
 )
 def test_a_journal_of_too_many_conditions_is_refused_at_once(tmp_path, asked, said):
-    write_journal(tmp_path / "r.h5.journal", asked=ASKED | asked).file.close()
+    write_journal(tmp_path / "r.h5.journal", asked=ASKED | asked).release()
     with pytest.raises(FileError, match=said):
         read_unfinished(tmp_path / "r.h5.journal")
 
@@ -121,8 +120,8 @@ def test_what_is_read_grows_with_the_rows_and_not_with_their_numbers(tmp_path, m
     for name in COLUMNS:
         rows[name] = RESULTS.replicates[name][1, 0, 0, :4]
     rows["failure"] = 0
-    journal.append(chunk_record(Condition("III", 1, 0.0), 2**40 - 4, rows, "k"))
-    journal.file.close()
+    add_rows(journal, Condition("III", 1, 0.0), 2**40 - 4, rows)
+    journal.release()
     ends = []
     original = summary.sums_of
     monkeypatch.setattr(

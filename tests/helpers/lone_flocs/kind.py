@@ -1,8 +1,7 @@
 """Studies of single flocs past a wall: their draw and run, and what rank 0 asks of them."""
 
-from collections.abc import Callable, Iterable
-from contextlib import ExitStack
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 import attrs
@@ -13,7 +12,7 @@ from flocsim.ensembles.lone.scene import LoneScene
 import flocsim.arrays as at
 from flocsim.body import Body
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kind import Code, Condition, Kind, Place, StudyKind
+from flocsim.ensembles.kind import Code, Condition, Kind, OldResults, Place, StudyKind
 from flocsim.ensembles.storage.identity import (
     PHYSICS,
     config_facts,
@@ -21,12 +20,13 @@ from flocsim.ensembles.storage.identity import (
     machine_facts,
     shape_numbers,
 )
-from flocsim.ensembles.storage.row_store import OldTable, ReadOnlyJournal, RowStore
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import Unfinished, store_of
 from flocsim.ensembles.study import flocs_of
 from flocsim.errors import FileError
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.integrators.base import Status
+from flocsim.io.journal import JournalReader
 from flocsim.swarms.placement import wall
 from flocsim.system import System
 
@@ -103,25 +103,28 @@ def identity_of(study: LoneStudy, machine: dict | None = None) -> dict:
     return facts | (machine or machine_facts(CODE))
 
 
-def old_rows(output: Any, resources: ExitStack) -> OldTable:
-    """The flocs of a results file."""
+@contextmanager
+def old_rows(output: Any) -> Iterator[OldResults]:
+    """Open a results file that is to be extended."""
     found = read_lone(output)
-    places = {Condition("lone", n, 0.0): (k,) for k, n in enumerate(found.vertices.tolist())}
-    return OldTable(found.columns, places, found.count, found.run, found)
+    conditions = [Condition("lone", n, 0.0) for n in found.vertices.tolist()]
+    rows = np.zeros((len(conditions), found.count), ROW)
+    for name, values in found.columns.items():
+        rows[name] = values
+    chunks = [(condition, 0, each) for condition, each in zip(conditions, rows, strict=True)]
+    yield OldResults(conditions, found.count, chunks, found.run)
 
 
 def results_in(store: RowStore, count: int, run: dict) -> LoneResults:
     """The first so many flocs of each number of vertices that a store has."""
-    places = range(len(store.conditions))
-    columns = {name: np.stack([store.read(place, name, 0, count) for place in places])
-               for name in ROW.names or ()}  # fmt: skip
+    rows = np.stack([store.rows(k, 0, count) for k in range(len(store.conditions))])
+    columns = {name: rows[name].copy() for name in ROW.names or ()}
     return LoneResults(np.array([each.vertices for each in store.conditions]), columns, run)
 
 
 def results(
-    study: LoneStudy, start: Any, count: int, run: dict, comm: Any, output: Any, warn: Any,
-    in_memory: bool,
-) -> LoneResults:  # fmt: skip
+    study: LoneStudy, start: Any, count: int, run: dict, output: Any, in_memory: bool
+) -> LoneResults:
     """The LoneResults of so many replicates, written to the output if there is one."""
     found = results_in(start.store, count, run)
     if output is not None:
@@ -129,17 +132,18 @@ def results(
     return found
 
 
-def so_far(path: Path, sessions: list[dict], found: list) -> Unfinished:
+def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     """What a journal has: as many flocs as there are of each number of vertices."""
-    asked = sessions[-1]["asked"]
-    with ReadOnlyJournal(str(path)) as journal:
-        store, notes, unread = store_of(journal, sessions, found, asked, ROW, check_rows)
-        runs = [store.intervals(place)[:1] for place in range(len(store.conditions))]
-        there = min(each[0][1] if each and each[0][0] == 0 else 0 for each in runs)
-        if there == 0:
-            raise FileError(f"{path} has no floc of some number of vertices yet: try again later")
-        made = results_in(store, there, {})
-    return Unfinished(path, FORMAT, made, store.there(), asked["lone"], notes, sessions, unread)
+    store, notes, unread = store_of(
+        journal, sessions, ROW, lambda rows: check_rows(rows.__getitem__)
+    )
+    runs = [store.intervals(place)[:1] for place in range(len(store.conditions))]
+    there = min(each[0][1] if each and each[0][0] == 0 else 0 for each in runs)
+    path, asked = journal.path, sessions[-1]["asked"]["lone"]
+    if there == 0:
+        raise FileError(f"{path} has no floc of some number of vertices yet: try again later")
+    made = results_in(store, there, {})
+    return Unfinished(path, FORMAT, made, store.there(), asked, notes, sessions, unread)
 
 
 KIND = Kind(
