@@ -10,6 +10,7 @@ The file is standard input, its description goes to standard output as JSON. Thi
 its path, and imports nothing of flocsim, so that such a process starts quickly.
 """
 
+import codecs
 import json
 import math
 import os
@@ -95,28 +96,32 @@ def described(h5py: Any, root_only: bool) -> dict[str, tuple]:
     # Not by its name, under which another file may lie by now.
     with open(0, "rb", 0, closefd=False) as source, h5py.File(source, "r") as file:
         if os.name != "nt":
+            codecs.lookup("ascii")  # which Python loads from a file, and h5py asks for
             limit("NOFILE", 0)  # from here on nothing else can be opened
-        nodes = {"": (None, (), None, attributes(file), None)}
+        root = h5py.h5o.open(file.id, b"/")
+        nodes = {"": (None, (), None, attributes(h5py, root), None)}
         if not root_only:
-            walk(h5py, file, "", nodes, [os.fstat(0).st_size])
+            walk(h5py, root, "", nodes, [os.fstat(0).st_size])
     return nodes
 
 
 def walk(h5py: Any, group: Any, above: str, nodes: dict[str, tuple], left: list[int]) -> None:
     """Add all that is in a group to the nodes; ``left``: bytes of the file that may have values."""
-    for name in group:
-        path = above + name
+    names: list[bytes] = []
+    group.links.iterate(names.append)
+    for name in names:
+        path = above + name.decode()
         if not path.isprintable():
             raise Refused("it has unprintable names")
         if len(nodes) >= MOST_OBJECTS or path.count("/") > MOST_LEVELS:
             raise Refused("its groups are nested too deep, or too many")
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        if group.links.get_info(name).type != h5py.h5l.TYPE_HARD:
             raise Refused(f"{path} is a link, which flocsim never writes")
-        each = group[name]
-        if isinstance(each, h5py.Group):
-            nodes[path] = (None, (), None, attributes(each), None)
+        each = h5py.h5o.open(group, name)
+        if isinstance(each, h5py.h5g.GroupID):
+            nodes[path] = (None, (), None, attributes(h5py, each), None)
             walk(h5py, each, f"{path}/", nodes, left)
-        elif isinstance(each, h5py.Dataset):
+        elif isinstance(each, h5py.h5d.DatasetID):
             nodes[path] = dataset(h5py, path, each, left)
         else:
             raise Refused(f"{path} is neither a group nor a dataset")
@@ -124,26 +129,27 @@ def walk(h5py: Any, group: Any, above: str, nodes: dict[str, tuple], left: list[
 
 def dataset(h5py: Any, path: str, each: Any, left: list[int]) -> tuple:
     """Return the node of a dataset whose values lie in the file in one piece."""
-    words = h5py.check_string_dtype(each.dtype)
-    kind = "text" if words and words.length is None else TYPES.get(each.dtype.str)
-    if kind is None or each.shape is None:
+    dtype, shape = each.dtype, each.shape
+    words = h5py.check_string_dtype(dtype)
+    kind = "text" if words and words.length is None else TYPES.get(dtype.str)
+    if kind is None or each.get_space().get_simple_extent_type() == h5py.h5s.NULL:
         raise Refused(f"{path} has a type or a shape that flocsim does not write")
-    plan = each.id.get_create_plist()
+    plan = each.get_create_plist()
     whole = plan.get_layout() == h5py.h5d.CONTIGUOUS and not plan.get_nfilters()
     if not whole or plan.get_external_count():
         raise Refused(f"the values of {path} are packed, in pieces, or in another file or dataset")
-    size = math.prod(each.shape) * (16 if words else each.dtype.itemsize)
-    offset, text = each.id.get_offset(), None
-    if size and (offset is None or each.id.get_storage_size() != size):
+    size = math.prod(shape) * (16 if words else dtype.itemsize)
+    offset, text = each.get_offset(), None
+    if size and (offset is None or each.get_storage_size() != size):
         raise Refused(f"the values of {path} are missing")
     take(size, left)
     if words:
         os.lseek(0, offset or 0, os.SEEK_SET)
         lengths = memoryview(os.read(0, size)).cast("I")[::4]
         take(sum(lengths), left)
-        values = each.asstr(errors="strict")[()]
-        text = values.ravel().tolist() if each.shape else [values]
-    return kind, each.shape, offset, attributes(each), text
+        values = h5py.Dataset(each).asstr(errors="strict")[()]
+        text = values.ravel().tolist() if shape else [values]
+    return kind, shape, offset, attributes(h5py, each), text
 
 
 def take(size: int, left: list[int]) -> None:
@@ -154,14 +160,24 @@ def take(size: int, left: list[int]) -> None:
         raise Refused("it promises more values than it has bytes")
 
 
-def attributes(owner: Any) -> dict[str, Any]:
+def attributes(h5py: Any, owner: Any) -> dict[str, Any]:
     """Return {name: value} of all attributes; None for those of UNREAD."""
-    return {name: None if name in UNREAD else owner.attrs[name] for name in owner.attrs}
+    names: list[bytes] = []
+    h5py.h5a.iterate(owner, names.append)
+    found: dict[str, Any] = dict.fromkeys(name.decode() for name in names)
+    if wanted := found.keys() - UNREAD:
+        kind = h5py.Group if isinstance(owner, h5py.h5g.GroupID) else h5py.Dataset
+        found |= {name: kind(owner).attrs[name] for name in wanted}
+    return found
 
 
 def plain(value: Any) -> Any:
     """Return a value of numpy as Python has it, for JSON."""
-    return value.tolist() if hasattr(value, "tolist") else value.decode()
+    if isinstance(value, bytes):
+        return value.decode()
+    if not hasattr(value, "tolist"):
+        raise Refused("an attribute has a value that flocsim does not write")
+    return value.tolist()
 
 
 if __name__ == "__main__":

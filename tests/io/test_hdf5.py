@@ -15,12 +15,16 @@ import h5py
 import numpy as np
 import pytest
 
+from flocsim.ensembles.sweep import read_joined
 from flocsim.errors import FileError
 from flocsim.io import hdf5
 from flocsim.io.groups import kind_of
 from flocsim.io.results.file import opened, read_overview, read_results
+from flocsim.io.results.strength_file import read_strengths
+from flocsim.io.results.swarm_file import read_swarm
 from flocsim.io.seals import seal
 from flocsim.io.shape_library import read_library, read_settings
+from flocsim.io.trajectory import read_trajectory
 from tests.helpers import hostile_files
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed
@@ -324,11 +328,29 @@ def test_a_part_of_an_array_is_that_part(results, part):
             file.read("replicates/angle_i", (2, 0, 0, part))
 
 
-MAKERS = {
-    name: getattr(hostile_files, f"{name}_file") for name in (
-        "results", "library", "compounds", "kernel", "strengths", "swarm", "sweep", "trajectory",
-    )
+MAKERS = (
+    "results", "library", "compounds", "kernel", "strengths", "swarm", "sweep", "trajectory",
+)  # fmt: skip
+"""Names of what makes files, in hostile_files."""
+
+
+READERS = {
+    "library": read_library, "compounds": read_library, "strengths": read_strengths,
+    "swarm": read_swarm, "sweep": read_joined, "trajectory": read_trajectory,
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_all_that_flocsim_writes_is_read(tmp_path, name, monkeypatch):
+    """By a forked process, and by one that is started anew."""
+    valid = getattr(hostile_files, f"valid_{name}")(tmp_path)
+    path = hostile_files.written(tmp_path, "v.h5", seal(valid))
+    read = READERS.get(name, read_results)
+    forked = read(path)
+    monkeypatch.setenv("PMI_RANK", "0")
+    started = read(path)
+    assert type(forked) is type(started)
+    assert kind_of(path).startswith("flocsim")
 
 
 @pytest.mark.parametrize("name", rest_slow(MAKERS, lambda name: name == "results"))

@@ -23,6 +23,7 @@ NOT_PHYSICS = {
     "geometry/fit/": "makes flocs, and these are compared themselves",
     "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",
+    "io/hdf5_child.py": "reads flocs, and these are compared themselves",
     "ensembles/kind.py": "what is asked of studies, and how rows are stored",
     "io/results/checks.py": "what is believed of files",
     "io/results/run_group.py": "text for people",
