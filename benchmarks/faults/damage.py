@@ -4,7 +4,6 @@ import shutil
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from benchmarks.faults.job import Tally, make_study, run_here
@@ -15,6 +14,7 @@ from flocsim.ensembles.storage.resume import Beginning, take_journal
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError
+from flocsim.io import groups
 from flocsim.io.journal import Journal
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
@@ -113,8 +113,8 @@ def damage_results(root, reference, count, rng):
     data = Path(reference).read_bytes()
     path = root / "damaged.h5"
     tallies = {"results flipped": Tally(), "results truncated": Tally()}
-    opened, parse = [], h5py.File
-    h5py.File = lambda *words, **more: opened.append(words) or parse(*words, **more)
+    opened, parse = [], groups.open_hdf5
+    groups.open_hdf5 = lambda *words, **more: opened.append(words) or parse(*words, **more)
     try:
         for _ in range(count):
             changed, kind = damaged(data, rng)
@@ -122,7 +122,7 @@ def damage_results(root, reference, count, rng):
             began = time.monotonic()
             tallies[f"results {kind}"].add(read_wrong(path, opened), time.monotonic() - began)
     finally:
-        h5py.File = parse
+        groups.open_hdf5 = parse
     return tallies
 
 
