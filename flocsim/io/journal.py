@@ -152,6 +152,17 @@ def has_tables(db: sqlite3.Connection) -> bool:
     return bool(found)
 
 
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what SQLite or the system says of a failed write into a FileError."""
+    try:
+        yield
+    except FileError:
+        raise
+    except (OSError, sqlite3.Error) as error:
+        raise unwritable(path, error) from error
+
+
 class JournalReader:
     """The records of an open journal; ``damaged`` has the ids of those that cannot be read."""
 
@@ -200,6 +211,8 @@ class JournalReader:
         except sqlite3.Error:
             found = [(-1,)]
         for (id,) in found:
+            if id in self.damaged:  # which is known by now
+                continue
             if (record := self.record(id)) is None:
                 raise FileError(
                     f"{self.path} is damaged, or was changed after it was written: run it again "
@@ -216,18 +229,14 @@ def read_journal(path: Path) -> Iterator[JournalReader]:
             raise FileError(f"{path} {problem}")
         # Without a log nothing is locked, and none is made: the folder may be read-only.
         db = connect(path, "?mode=ro" if beside(path, WAL_SUFFIX).exists() else "?immutable=1")
-    except sqlite3.Error as error:
-        raise FileError(f"{path} could not be read: {error}") from error
-    except OSError as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{path} could not be read: {error.strerror}") from error
+        db.execute("BEGIN")  # all that follows sees one state of a journal that grows
+        is_begun = has_tables(db)
+    except FileError:
+        raise
+    except (OSError, sqlite3.Error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path} could not be read: {reason}") from error
     with contextlib.closing(db):
-        try:
-            db.execute("BEGIN")  # all that follows sees one state of a journal that grows
-            is_begun = has_tables(db)
-        except sqlite3.Error as error:
-            raise FileError(f"{path} could not be read as a journal: {error}") from error
         if not is_begun:
             raise FileError(f"{path} has only just begun: try again")
         yield JournalReader(path, db)
@@ -258,12 +267,11 @@ class Journal(JournalReader):
         self.path = path
         self.lock = Lock(beside(path, LOCK_SUFFIX))
         try:
-            self.open()
-        except (OSError, sqlite3.Error) as error:
+            with writing(path):
+                self.open()
+        except FileError:
             self.lock.close()
-            if isinstance(error, FileError):
-                raise
-            raise unwritable(path, error) from error
+            raise
 
     @property
     def has_lock(self) -> bool:
@@ -366,7 +374,7 @@ class Journal(JournalReader):
         """Append a record, or replace that with this id; its id. FileError where that fails, and
         then the journal is what it was before."""
         rest = kind, condition, first, as_json(about), data
-        try:
+        with writing(self.path):
             self.begin_log()
             self.refuse_others()
             found = self.db.execute(
@@ -377,8 +385,6 @@ class Journal(JournalReader):
             self.last = max(self.last, found)
             if not self.db.in_transaction:
                 self.acknowledge()
-        except sqlite3.Error as error:
-            raise unwritable(self.path, error) from error
         self.sync_when_due()
         return found
 
@@ -396,26 +402,23 @@ class Journal(JournalReader):
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
         """Add many records at once, all or none."""
-        try:
+        with writing(self.path):
             self.begin_log()
             self.db.execute("BEGIN")
-            try:
-                yield
-            except BaseException:
-                self.db.execute("ROLLBACK")
-                raise
+        try:
+            yield
+        except BaseException:
+            self.db.execute("ROLLBACK")
+            raise
+        with writing(self.path):
             self.db.execute("COMMIT")
-            self.acknowledge()
-        except sqlite3.Error as error:
-            raise unwritable(self.path, error) from error
+        self.acknowledge()
 
     def discard(self, ids: list[int]) -> None:
         """Delete records, which are damaged or of no use."""
-        try:
+        with writing(self.path):
             self.db.executemany("DELETE FROM record WHERE id=?", [(id,) for id in ids])
             self.note_last()
-        except sqlite3.Error as error:
-            raise unwritable(self.path, error) from error
         self.acknowledge()
 
     def sync_when_due(self) -> None:
@@ -431,12 +434,10 @@ class Journal(JournalReader):
         self.synced = time.monotonic()
         if self.lock is None:
             return
-        try:
+        with writing(self.path):
             self.db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
             if not (self.is_in_place() and self.lock.is_in_place()):
                 self.put_back()
-        except sqlite3.Error as error:
-            raise unwritable(self.path, error) from error
 
     def is_in_place(self) -> bool:
         """Whether the name still leads to this very database."""
@@ -482,13 +483,9 @@ class Journal(JournalReader):
         """Return the path of a new empty file, the first of NAME.1, NAME.2, … to be had."""
         for number in range(1, MOST_COPIES):
             path = beside(self.path, f".{number}")
-            try:
+            with writing(path), contextlib.suppress(FileExistsError):
                 os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666))
                 return path
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise unwritable(path, error) from error
         raise FileError(f"{self.path}.1 to .{MOST_COPIES - 1} exist: move some of them away")
 
     def begin_anew(self) -> None:
@@ -506,14 +503,12 @@ class Journal(JournalReader):
         if not self.problem:
             self.fold_log()
         target = self.free_file()
-        try:
+        with writing(self.path):
             for suffix in (WAL_SUFFIX, ""):
                 if os.path.lexists(beside(self.path, suffix)):
                     os.replace(beside(self.path, suffix), beside(target, suffix))
             self.remove_log()
             sync_folder(self.path.parent)
-        except OSError as error:
-            raise unwritable(self.path, error) from error
         return target
 
     def fold_log(self) -> bool:
@@ -558,11 +553,9 @@ def open_regular(path: Path) -> int:
 
     FileError for a link, a pipe or a device; nothing here waits for the other end of a pipe.
     """
-    try:
+    with writing(path):
         if not os.path.lexists(path) or stat.S_ISREG(os.lstat(path).st_mode):
             return os.open(path, OPEN | os.O_CREAT, 0o666)
-    except (OSError, ValueError) as error:
-        raise unwritable(path, error) from error
     raise FileError(f"{path} is not an ordinary file: move it away, or name another output")
 
 
@@ -583,11 +576,8 @@ class Lock:
         until = time.monotonic() + LOCK_SECONDS
         while True:
             self.descriptor = open_regular(path)
-            try:
+            with writing(path):
                 locked = lock(self.descriptor)
-            except OSError as error:
-                self.close()
-                raise unwritable(path, error) from error
             if locked is not False and self.is_in_place():
                 break
             self.close()
@@ -599,11 +589,8 @@ class Lock:
             if locked is False:
                 time.sleep(POLL_SECONDS)
         self.is_locked = bool(locked)
-        try:
+        with writing(path):
             sync_folder(path.parent)
-        except OSError as error:
-            self.close()
-            raise unwritable(path, error) from error
 
     @property
     def text(self) -> str:

@@ -158,7 +158,7 @@ def test_every_block_runs_as_pasted_in_an_empty_folder(page, tmp_path, monkeypat
                 if words is None or any(each in command for each in LONG):
                     continue
                 globbed = [found for word in words for found in sorted(glob.glob(word)) or [word]]
-                # A check may find a scene's motion too sensitive: that is its finding, and its code 1.
+                # A check may find that a scene's motion is too sensitive: exit code 1.
                 expected = (0, 1) if words[0] == "check" else (0,)
                 assert main(globbed) in expected, (line, command, capsys.readouterr().err)
         elif language == "toml":

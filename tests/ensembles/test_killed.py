@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.ensembles.test_matrix import PAIRS
+from tests.helpers.journals import has_begun
 from tests.helpers.swarm_study import SWARM
 from tests.helpers.tiers import rest_slow
 from tests.helpers.waiting import PATIENCE, wait_until
@@ -54,7 +55,7 @@ def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
         path = tmp_path / shows
         # Looked at first: once there are rows, a quick machine may soon be done with all.
         assert wait_until(lambda: len(members(running.pid)) > 1)
-        assert wait_until(lambda: path.exists() and b'"first"' in path.read_bytes())
+        assert wait_until(lambda: has_begun(path))
         running.send_signal(signal.SIGKILL)
         running.wait()
         assert wait_until(lambda: not members(running.pid)), members(running.pid)

@@ -19,6 +19,7 @@ from flocsim.__main__ import main
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers import parts_here
+from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import mpirun
 from tests.helpers.swarm_study import SWARM
@@ -124,21 +125,20 @@ def under_mpirun(cell):
     assert cell.same("new.h5", cell.file)
 
 
-def begun(cell, word):
-    """The command, killed when what it has kept has the word in it."""
+def killed(cell):
+    """Kill the command once something was computed."""
     words = [sys.executable, "-m", "flocsim", *cell.kind.words, "-o", "new.h5"]
     with subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True) as running:
         until = time.monotonic() + PATIENCE
         while running.poll() is None and time.monotonic() < until:
-            found = [each for each in ("new.h5.journal", "new.h5") if os.path.exists(each)]
-            if found and word in Path(found[0]).read_bytes():
+            if has_begun(Path("new.h5.journal")):
                 break
             time.sleep(0.002)
         running.send_signal(signal.SIGKILL)
 
 
 def resume(cell):
-    begun(cell, b"FLOCREC")
+    killed(cell)
     assert cell.run("--resume") == 0
     assert cell.same("new.h5", cell.file)
 
@@ -151,7 +151,7 @@ def extend(cell):
 
 
 def read_while_running(cell):
-    begun(cell, b'"place"' if cell.kind.name == "swarms" else b'"count"')
+    killed(cell)
     assert os.path.exists("new.h5.journal")
     assert main(["info", "new.h5"]) == 0
     assert main(["plot", "new.h5"]) == 0
@@ -244,21 +244,9 @@ def test_every_kind_has_every_ability_or_says_why_not(
 
 
 @pytest.mark.parametrize("kind", ["pairs", "rates", "swarms"])
-def test_what_rows_are_of_is_told_and_held(home, tmp_path, monkeypatch, kind):
-    """Kinds of CPU are recorded; what comes out otherwise than before is not added to."""
+def test_the_origin_of_rows_is_recorded(home, tmp_path, monkeypatch, kind):
     shutil.copytree(home, tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
     cell, file = Cell(KINDS[kind], f"{kind}.h5"), f"{kind}.h5"
     run = cell.kind.read(file).run
     assert '"features"' in run["cpus"] and run["identity"] and run["history"] == "[]"
-    from flocsim.ensembles.parallel import agreement
-
-    original = agreement.stored_rows
-
-    def other(study, store):
-        return {code: each[::-1] + b"x" for code, each in original(study, store).items()}
-
-    monkeypatch.setattr(agreement, "stored_rows", other)
-    before = Path(file).read_bytes()
-    assert cell.run(*cell.kind.more, "--resume", output=file) == 2
-    assert Path(file).read_bytes() == before

@@ -11,6 +11,7 @@ import h5py
 import pytest
 
 from tests.ensembles.test_matrix import PAIRS
+from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import BESIDE_PYTHON, mpirun
 from tests.helpers.swarm_study import SWARM
@@ -54,7 +55,7 @@ def stopped(command, journal, number):
     ) as job:
         until = time.monotonic() + 300.0
         while time.monotonic() < until and job.poll() is None:
-            if journal.exists() and b'"first"' in journal.read_bytes():
+            if has_begun(journal):
                 job.send_signal(number)
                 break
             time.sleep(0.01)

@@ -6,6 +6,7 @@ from flocsim.io.journal import (
     CHUNK,
     INDEX_SUFFIX,
     LOCK_SUFFIX,
+    PART,
     WAL_SUFFIX,
     connect,
     digest_over,
@@ -21,6 +22,11 @@ def records_in(path):
             return list(journal.records())
     except FileError:
         return []
+
+
+def has_begun(path):
+    """Return True once something was computed for a journal."""
+    return path.exists() and any(each.kind in (CHUNK, PART) for each in records_in(path))
 
 
 def rows_in(path, row=ROW):

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -109,9 +110,7 @@ def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     """What a journal has of pairs: their counts and probabilities."""
     asked = sessions[-1]["asked"]
 
-    def check(rows: np.ndarray) -> None:
-        check_rows(rows.__getitem__, failures=len(FAILURES), flocs=2**31)
-
+    check = partial(check_rows, failures=len(FAILURES), flocs=2**31)
     store, notes, unread = store_of(journal, sessions, kind.ROW, check)
     table = tables(store, tuple(len(asked[name]) for name in kind.ORDER))
     made = Results(

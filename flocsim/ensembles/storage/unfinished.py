@@ -22,7 +22,7 @@ import numpy as np
 
 from flocsim.ensembles.kind import ORDER, Condition, kinds, layout
 from flocsim.ensembles.storage.identity import differences
-from flocsim.ensembles.storage.row_store import Check, RowStore
+from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Old, write_file
 from flocsim.io.journal import PART, SESSION, JournalReader, read_journal
@@ -67,7 +67,8 @@ class Unfinished:
 
 
 def store_of(
-    journal: JournalReader, sessions: list[dict], row: np.dtype, check: Check,
+    journal: JournalReader, sessions: list[dict], row: np.dtype,
+    check: Callable[[Callable[[str], np.ndarray]], object],
     check_part: Callable[[str, dict, bytes], object] | None = None,
 ) -> tuple[RowStore, list[dict], int]:  # fmt: skip
     """(what of a journal can be believed, notes on failed replicates, records that are damaged or
@@ -84,20 +85,20 @@ def store_of(
     if any(len(set(axes[name])) < len(axes[name]) for name in ORDER):
         raise FileError(f"{journal.path} has the same condition twice")
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
-    store, notes, unread = RowStore(journal, conditions, row), [], 0
+    store, notes = RowStore(journal, conditions, row), []
     for each in journal.records():
         if each.kind == SESSION or (each.kind == PART and check_part is None):
             continue
         try:
             if each.kind == PART and check_part is not None:
                 check_part(each.about.get("name", ""), each.about, each.data)
-            if store.take(each, check) is not None:
+            if store.take(each, lambda rows: check(rows.__getitem__)) is not None:
                 notes += each.about.get("notes", [])
         except ValueError:
-            unread += 1
+            journal.damaged.append(each.id)
     if not store.there() and not store.parts:
         raise FileError(f"{journal.path} has no finished replicate yet: try again later")
-    return store, notes, unread + len(journal.damaged)
+    return store, notes, len(journal.damaged)
 
 
 def read_unfinished(path: str | Path) -> Unfinished:

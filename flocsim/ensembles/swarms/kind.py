@@ -224,13 +224,10 @@ def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     if not form.times or form.bodies < 1:
         raise FileError(f"{path} does not record what is kept of a swarm")
 
-    def check(rows: np.ndarray) -> None:
-        records.check_ends(rows.__getitem__)
-
     def check_part(name: str, about: dict, data: bytes) -> None:
         records.check_part(name, records.part_of(about, data), form)
 
-    store, notes, unread = store_of(journal, sessions, ROW, check, check_part)
+    store, notes, unread = store_of(journal, sessions, ROW, records.check_ends, check_part)
     swarms = {
         replicate: parts for (_, replicate), parts in sorted(store.parts.items())
         if records.BODIES in parts and replicate < asked

@@ -21,6 +21,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io import terminal
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
+from tests.helpers.journals import records_in
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
 from tests.helpers.waiting import PATIENCE
 
@@ -91,7 +92,7 @@ def run_parts(config, halts=(), left=None, replicate=0):
     ended = run_replicate(study, replicate, parts.append, left, lambda: next(looks) in halts)
     for part in parts:
         # What is written is taken when it is read.
-        check_part(part_of_encoded(part), study.form)
+        check_part(part.name, part_of_encoded(part), study.form)
     return parts, ended
 
 
@@ -178,14 +179,14 @@ def test_what_leaves_is_told_and_resumed(tmp_path, leaving):
 
 def part_of_encoded(part):
     """A Part, written and read."""
-    return part_of(*part.described())
+    return part_of(*part.described()[1:])
 
 
 def test_records_come_back_as_they_were():
     arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.zeros((0, 2), dtype=np.int64),
               "c": np.arange(3, dtype=np.int32)}  # fmt: skip
-    found = part_of_encoded(Part("moment", arrays, {"x": 1.5, "nan": float("nan")}))
-    assert (found.of, found.facts) == ("moment", {"x": 1.5, "nan": None})
+    found = part_of_encoded(Part("state", arrays, {"x": 1.5, "nan": float("nan")}))
+    assert (found.of, found.facts) == ("state", {"x": 1.5, "nan": None})
     for name, values in arrays.items():
         assert found.arrays[name].dtype == values.dtype
         np.testing.assert_array_equal(found.arrays[name], values)
@@ -225,7 +226,7 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
         until = time.monotonic() + PATIENCE
         journal = tmp_path / "swarm.h5.journal"
         while time.monotonic() < until and process.poll() is None:
-            if journal.exists() and b'"state"' in journal.read_bytes():
+            if any(each.about.get("name") == "state" for each in records_in(journal)):
                 process.send_signal(number)
                 break
             time.sleep(0.002)

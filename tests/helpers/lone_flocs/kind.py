@@ -134,9 +134,7 @@ def results(
 
 def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
     """What a journal has: as many flocs as there are of each number of vertices."""
-    store, notes, unread = store_of(
-        journal, sessions, ROW, lambda rows: check_rows(rows.__getitem__)
-    )
+    store, notes, unread = store_of(journal, sessions, ROW, check_rows)
     runs = [store.intervals(place)[:1] for place in range(len(store.conditions))]
     there = min(each[0][1] if each and each[0][0] == 0 else 0 for each in runs)
     path, asked = journal.path, sessions[-1]["asked"]["lone"]
