@@ -100,22 +100,22 @@ def beside(path: Path, suffix: str) -> Path:
     return path.with_name(path.name + suffix)
 
 
-def problem_of(path: Path) -> str:
-    """Return why a file is no journal, judged by its first bytes; "" where it may be one."""
+def head_of(path: Path) -> tuple[str, str]:
+    """Return why a file is no journal ("" where it may be one), and the mark that a database got
+    as it was made."""
     with open(path, "rb") as file:
-        head = file.read(len(HEADER))
+        data = file.read(64)
+    return problem_of(data[: len(HEADER)]), str(int.from_bytes(data[60:], "big"))
+
+
+def problem_of(head: bytes) -> str:
+    """Return why a file that begins so is no journal."""
     if head.startswith(BEFORE_SQLITE):
         return (
             "was written by a version of flocsim that was never released: finish the run with "
             "that version, or start over with --restart, which keeps it under another name"
         )
     return "" if head in (b"", HEADER) else NO_JOURNAL
-
-
-def mark_in(path: Path) -> int:
-    """Return the number that a database has got as it was made; it lies in the file's header."""
-    with open(path, "rb") as file:
-        return int.from_bytes(file.read(64)[60:], "big")
 
 
 NO_JOURNAL = "is not a journal of flocsim, or is damaged at its start: move it away"
@@ -225,7 +225,8 @@ class JournalReader:
 def read_journal(path: Path) -> Iterator[JournalReader]:
     """Open a journal for reading, also while a run writes it; FileError if that is impossible."""
     try:
-        if problem := problem_of(path):
+        problem, _ = head_of(path)
+        if problem:
             raise FileError(f"{path} {problem}")
         # Without a log nothing is locked, and none is made: the folder may be read-only.
         db = connect(path, "?mode=ro" if beside(path, WAL_SUFFIX).exists() else "?immutable=1")
@@ -280,14 +281,14 @@ class Journal(JournalReader):
 
     def open(self) -> None:
         """Open the database and see that it is whole; what is intact of a damaged one is kept."""
-        self.problem, self.lost, self.salvaged = "", 0, None
         os.close(open_regular(self.path))
-        if problem := problem_of(self.path):
-            self.problem = problem
+        self.lost, self.salvaged = 0, None
+        self.problem, mark = head_of(self.path)
+        if self.problem:
             return
         assert self.lock is not None, "a journal on the disk"
         words = self.lock.text.split()
-        if len(words) == 2 and words[0] != str(mark_in(self.path)):
+        if len(words) == 2 and words[0] != mark:
             self.remove_log()  # of a database that was in this place before
         self.connect()
         try:

@@ -276,10 +276,10 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
             f"damaged: {there}, what is missing is computed again; the damaged file is kept as "
             f"{journal.salvaged}"
         )
-    elif journal.damaged or journal.lost:
+    elif count := len(journal.damaged) + journal.lost:
         start.remark(
-            f"{len(journal.damaged) + journal.lost} records of it are damaged, or were lost with "
-            f"the end of {journal.path.name}-wal: {there}, what is missing is computed again"
+            f"{count} damaged or missing record{'s' * (count != 1)} (the end of its -wal file may "
+            f"be missing): {there}, what is missing is computed again"
         )
 
 
