@@ -172,10 +172,6 @@ class RowStore:
             )
         return found
 
-    def read(self, place: int, name: str, first: int, stop: int) -> np.ndarray:
-        """Return the values of a column for replicates [first, stop)."""
-        return self.rows(place, first, stop)[name]
-
     def all_rows(self, place: int) -> Iterable[np.ndarray]:
         """Yield the rows of all replicates of a condition that there are, some at a time."""
         for first, stop in self.runs[place]:

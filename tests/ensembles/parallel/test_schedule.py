@@ -104,7 +104,7 @@ def test_a_study_runs_until_all_is_there():
     state = make_state()
     run_all(state)
     assert (state.phase, state.computed, state.schedule.final) == (Phase.FINISHED, 4, 4)
-    assert list(state.store.read(0, "steps", 0, 4)) == [0, 1, 2, 3]
+    assert list(state.store.rows(0, 0, 4)["steps"]) == [0, 1, 2, 3]
 
 
 def test_a_study_may_end_at_an_earlier_stage():
