@@ -36,7 +36,8 @@ def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
     code, output, errors = call(capsys, "small.toml", *words)
     assert (code, errors) == (0, [])
     assert output[0].startswith("type III, N = 4, delta = 0, replicate 0: A; collision at ")
-    assert output[1:] == ["small-III-4-0-0.png", "d.svg", "motion.h5"]
+    assert "flocs grown by flocsim · preset tang2014 · flocsim" in output[1]
+    assert output[2:] == ["small-III-4-0-0.png", "d.svg", "motion.h5"]
     assert (folder / "small-III-4-0-0.png").read_bytes().startswith(b"\x89PNG")
     assert b"<svg" in (folder / "d.svg").read_bytes()
     with h5py.File(folder / "motion.h5") as file:
@@ -50,7 +51,7 @@ def test_a_strip_of_frames_the_distance_and_the_motion(folder, capsys):
 def test_a_figure_can_be_written_in_several_formats(folder, capsys):
     words = ["--type", "III", "--vertices", 1, "-o", "a.pdf", "a.svg"]
     code, output, errors = call(capsys, "small.toml", *words)
-    assert (code, errors, output[1:]) == (0, [], ["a.pdf", "a.svg"])
+    assert (code, errors, output[2:]) == (0, [], ["a.pdf", "a.svg"])
     assert (folder / "a.pdf").read_bytes().startswith(b"%PDF")
 
 
@@ -60,7 +61,7 @@ def test_forces_and_an_animation(folder, monkeypatch, capsys):
     monkeypatch.setattr(trajectory, "ANIMATION_FRAMES", 4)
     words = ["--type", "III", "--vertices", 1, "--forces", "f.png", "--animation", "a.gif"]
     code, output, errors = call(capsys, "small.toml", *words, "--set", "scene.start_gap=1e-6")
-    assert (code, errors, output[2:]) == (0, [], ["f.png", "a.gif"])
+    assert (code, errors, output[3:]) == (0, [], ["f.png", "a.gif"])
     with Image.open(folder / "a.gif") as animation:
         assert animation.n_frames == 4
         assert animation.info["loop"] == 0
@@ -96,7 +97,7 @@ def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
 def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
     one = call(capsys, "small.toml", "--scene", "III,4,1.0", "-o", "a.png")
     words = ["--type", "III", "--vertices", 4, "--delta", 1, "-o", "a.png"]
-    assert one == call(capsys, "small.toml", *words)
+    assert one == call(capsys, "small.toml", *words, "--overwrite")
     assert one[0] == 0
     for wrong in (["--scene", "III,4"], ["--scene", "III,x,1"], ["--scene", "I,4,1", "--delta", 1]):
         code, _, [line] = call(capsys, "small.toml", *wrong)

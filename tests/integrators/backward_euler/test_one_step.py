@@ -184,7 +184,8 @@ def energy_of(stage, bodies, contact):
     rows = np.arange(work.tally[at.CANDIDATES])
     overlap = np.maximum(-work.geometry[at.NOW, rows, at.GAP], 0.0)
     slip = np.where(overlap > 0.0, work.slip[at.NOW, rows], 0.0)
-    springs = contact.k_n * np.sum(overlap**2) + contact.shear * np.sum(slip**2)
+    shear = 0.0 if contact.frictionless else contact.k_t
+    springs = contact.k_n * np.sum(overlap**2) + shear * np.sum(slip**2)
     return 0.5 * (np.sum(mass[free] * stage.velocity[free] ** 2) + springs)
 
 
