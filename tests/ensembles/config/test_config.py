@@ -236,11 +236,12 @@ def test_commented_settings_of_the_example_are_valid_too(tmp_path):
         "import attrs\nfrom flocsim.forces import CentreForce\n\n\n@attrs.frozen\n"
         "class Yukawa(CentreForce):\n    @staticmethod\n    def kernel(pair):\n        return 0.0\n"
     )
-    text = uncommented((init.TEMPLATES / "study.toml").read_text("utf-8"))
+    text = (init.TEMPLATES / "study.toml").read_text("utf-8")
+    text = uncommented(init.with_values_of_preset(text))
     text = text.replace("What follows", "# What follows").replace("\ndistance", "\n# distance")
-    text = text.replace("\ncentre", "\n# centre")
+    text = text.replace("\ncentre", "\n# centre").replace("\ndepth", "\n# depth")
     path = tmp_path / "study.toml"
     path.write_text(text)
     config = load_config(path)
-    assert config.fluid.buoyancy
+    assert not config.fluid.buoyancy
     assert config.force_names == ("van_der_waals", "double_layer", "contact", "mine")

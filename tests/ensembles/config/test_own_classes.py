@@ -257,6 +257,7 @@ def test_two_configs_may_have_modules_of_the_same_name(tmp_path, own_module):
     folder = tmp_path / "other"
     folder.mkdir()
     (folder / "own.py").write_text(OWN_MODULE.replace("SCALE * strength", "0.5 * strength"))
+    (folder / "neighbour.py").write_bytes(own_module.with_name("neighbour.py").read_bytes())
     text = OWN.format("own:Yukawa", "strength = 1")
     (folder / "study.toml").write_text(text)
     kernels = [

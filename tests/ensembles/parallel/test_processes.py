@@ -129,7 +129,6 @@ def test_each_rank_compiles_its_own_kinds_in_a_copy(tmp_path, monkeypatch, rank)
     compiled = tmp_path / "compiled"
     monkeypatch.setattr(type(study), "uncompiled", lambda self, kinds: list(kinds))
     monkeypatch.setattr(type(study), "compile", lambda self, kinds: note(compiled, kinds))
-    monkeypatch.setattr(runner.agreement, "packed", lambda study, rows: b"")
     comm = SimpleNamespace(
         rank=rank,
         size=2,
