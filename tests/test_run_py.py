@@ -116,7 +116,7 @@ def test_demo_installs_once_then_runs_and_draws(stage, capsys):
     study, plot = stage.run("demo")[0]
     python = ".venv/bin/python -m flocsim.ensemble examples/quickstart.toml"
     assert study == ".venv/bin/mpirun -n 2 " + python + " --resume"
-    assert plot == ".venv/bin/flocsim plot quickstart.h5 --figures overview"
+    assert plot == ".venv/bin/flocsim plot quickstart.h5 --figures overview --overwrite"
     told = capsys.readouterr().out
     assert str(stage.folder / "quickstart.h5") in told and "quickstart_overview.png" in told
 
