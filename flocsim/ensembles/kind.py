@@ -180,10 +180,6 @@ class StudyKind:
         """What stands for the kinds of compiled code that the study needs."""
         return [(0, self.config.shapes.vertices[0])]
 
-    def unneeded(self, place: int) -> list[Interval]:
-        """Replicates of a condition that are not to be run."""
-        return []
-
     @property
     def title(self) -> str:
         """The study in a few words, before "on 2 ranks"."""

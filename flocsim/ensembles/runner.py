@@ -274,7 +274,7 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
             for low in range(first, stop_at, MOST_ROWS):
                 rows = start.store.rows(place, low, min(low + MOST_ROWS, stop_at))
                 failed += int(np.sum(study.has_failed(rows.__getitem__)))
-    done = [merged([*each, *study.unneeded(place)]) for place, each in enumerate(found)]
+    done = [merged(each) for each in found]
     # Where the rule looks, and nowhere below what the results file has of each condition.
     looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
     state = StudyState(
