@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.reporting import Table, parser_of, print_heading
 from flocsim import Body, Fluid, Sphere, Swarm, System, floor
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.swarms.study import SwarmStudy, trial_of
+from flocsim.ensembles.swarms.study import SwarmStudy, run_briefly
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.base import Status
@@ -64,7 +64,7 @@ def swarm_of(number, fraction, vertices, duration=10.0, extra=""):
             text = text.replace(f"area_fraction = {fraction}", extra)
         path.write_text(text, "utf-8")
         swarm, _, _ = SwarmStudy(load_any_config(path)).swarm(0)
-    trial_of(swarm)  # compiled
+    run_briefly(swarm)  # compiled
     return swarm
 
 

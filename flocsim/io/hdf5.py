@@ -164,8 +164,10 @@ def run_forked(file: int, writing: int, root_only: bool, mask: Any) -> None:
     """Describe the file; never returns. All else that this process has open belongs to another."""
     try:
         signal.set_wakeup_fd(-1)
+        # Signals of a terminal are the parent's business; the limit of CPU time is this process's.
         for number in SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
+            own_limit = number == getattr(signal, "SIGXCPU", None)
+            signal.signal(number, signal.SIG_DFL if own_limit else signal.SIG_IGN)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         own = os.dup(file), os.dup(writing), os.open(os.devnull, os.O_WRONLY)
         for place, each in enumerate(own):

@@ -140,5 +140,6 @@ def test_run_is_the_whole_way(tmp_path, capsys):
 
 def test_the_run_is_announced_in_one_line(study):
     line = "36 replicates: 2 types x 3 vertex counts x 2 displacements x 3, on "
-    assert announcement(study, 1) == line + "1 rank"
-    assert announcement(study, 4, 7) == line + "4 ranks; 7 of them exist already"
+    source = "; 2 synthetic flocs grown by flocsim · preset tang2014 · flocsim "
+    assert announcement(study, 1).startswith(line + "1 rank" + source)
+    assert announcement(study, 4, 7).startswith(line + "4 ranks; 7 of them exist already" + source)
