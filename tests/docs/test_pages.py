@@ -28,6 +28,7 @@ OTHER_PROGRAMS = ("python3 run.py", "python3 -m venv", ".venv/bin/", "srun ", "p
 
 NOT_RUN = {
     "docs/cluster.md": "one study, started in four ways, three of which need a machine for them",
+    "docs/kernels.md": "1,024 points of each pair of classes: many minutes",
     "docs/presets.md": "a sweep of a study that is the reader's",
     "docs/real_flocs.md": "minutes to hours, on pictures that are not in the repository",
     "docs/reproduction.md": "hours",
@@ -41,9 +42,10 @@ LONG = ("settling_kernel", "settling_swarm")
 
 GIVEN = {
     "README.md": ["frames"],
+    "docs/config.md": ["modules"],
     "docs/formats.md": ["study.toml", "run.vtkhdf"],
     "docs/images.md": ["frames", "masks", "monday.h5"],
-    "docs/kernels.md": ["examples"],
+    "docs/own_integrator.md": ["modules"],
     "docs/results.md": ["study.h5"],
 }
 """What a page takes for granted in the reader's folder."""
@@ -189,6 +191,9 @@ def give(page, folder):
             labels = np.asarray(drawn(3)) < 128
             np.savez(folder / "masks.npz", labels.astype("u1"))
             Image.fromarray(labels.astype("u1")).save(folder / "labels.tif")
+        elif name == "modules":
+            for module in EXAMPLES.glob("*.py"):
+                shutil.copy(module, folder)
         elif name == "examples":
             shutil.copytree(EXAMPLES, folder / "examples")
         elif name == "monday.h5":
