@@ -43,6 +43,9 @@ WORDS = {
 
 WARNING = "flocsim: warning: "
 
+ROOT = Path(__file__).resolve().parents[2]
+"""The folder that holds the package."""
+
 INSTALLED = ("site-packages", "dist-packages")
 """Folders in which installed packages lie."""
 
@@ -63,9 +66,8 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
     environment = os.environ | {"PYTHONUNBUFFERED": "1"}
-    package = Path(__file__).resolve().parents[3]
-    if package.name not in INSTALLED:  # this flocsim is not installed, but lies in a folder
-        known = filter(None, [str(package), os.environ.get("PYTHONPATH")])
+    if ROOT.name not in INSTALLED:  # this flocsim is not installed, but lies in a folder
+        known = filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])
         environment["PYTHONPATH"] = os.pathsep.join(known)
     # On Windows a virtual environment's Python is the child of a process that starts it.
     ends_with_this = [] if os.name == "nt" else ["--parent", str(os.getpid())]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import flocsim
-from flocsim.ensembles import run
+from flocsim.ensembles import run, script_study
 from flocsim.ensembles.config.toml_text import toml_text
 from flocsim.ensembles.script_study import settings_of
 from flocsim.errors import ConfigError, PlausibilityWarning, UsageError
@@ -246,3 +246,8 @@ def test_what_is_no_study_is_done_by_one_rank(tmp_path):
     alone = run_command(tmp_path, *words, module="flocsim")
     assert done.stdout == alone.stdout
     assert done.stderr.count("runs on one rank only, and the other") == 1
+
+
+def test_the_processes_of_a_study_find_the_package():
+    """Not its parent: a checkout in a folder named flocsim would hide the package in it."""
+    assert (script_study.ROOT / "flocsim" / "__init__.py").is_file()
