@@ -86,7 +86,11 @@ def run(args: Namespace) -> int:
     try:
         work.test([each for each in doublets if each not in work.tested], args.jobs)
     except KeyboardInterrupt as error:
-        kept = f"{len(work.tested)} tested doublets are in {output}" if work.tested else "none"
+        kept = (
+            f"{len(work.tested)} tested doublets are in {output}"
+            if work.tested
+            else "no doublet was tested"
+        )
         if work.tested:
             work.write()
         who = str(error) or "stopped by SIGINT"

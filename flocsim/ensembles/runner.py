@@ -26,7 +26,6 @@ from flocsim.ensembles.kind import (
     flocs_of,
     identity_of,
     kind_of,
-    merged,
     study_of,
     total,
 )
@@ -274,11 +273,10 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
             for low in range(first, stop_at, MOST_ROWS):
                 rows = start.store.rows(place, low, min(low + MOST_ROWS, stop_at))
                 failed += int(np.sum(study.has_failed(rows.__getitem__)))
-    done = [merged(each) for each in found]
     # Where the rule looks, and nowhere below what the results file has of each condition.
     looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
     state = StudyState(
-        Schedule.of(done, looks, ranks, study.most_rows),
+        Schedule.of(found, looks, ranks, study.most_rows),
         start.store,
         kind_of(study.config).enough(study, start.store),
         allowed=study.allowed,
