@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import io
-import math
 import os
 import re
 import shlex
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import units
-from flocsim.ensembles.parallel.communicator import SECONDS, Communicator, StopRequested
+from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
@@ -45,11 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
     )
-    parser.add_argument(
-        "--heartbeat", type=float, default=SECONDS, metavar="SECONDS",
-        help="end the job when a rank has been silent for this time, because it is stopped or its "
-        f"machine is gone (default {SECONDS:g}; 0: wait forever)",
-    )  # fmt: skip
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument(
         "--resume", action="store_const", const="resume", default="new", dest="mode",
@@ -210,7 +204,6 @@ def end_all(comm: Communicator, text: str, code: int) -> int:
 
 def guarded(comm, arguments):
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
-    comm.watch(arguments.heartbeat)
     try:
         config, code = agree(comm, arguments)
         if config is not None and not arguments.dry_run:
@@ -242,9 +235,7 @@ def guarded(comm, arguments):
 
 
 def what_is_wrong(arguments, comm):
-    """What is wrong with --jobs or --heartbeat here; "" where nothing is."""
-    if not 0.0 <= arguments.heartbeat < math.inf:
-        return f"--heartbeat must be 0 s or more, found {arguments.heartbeat:g}"
+    """Return what is wrong with --jobs or --pilot here; "" where nothing is."""
     if arguments.jobs < 1:
         return f"--jobs must be at least 1, found {arguments.jobs}"
     if arguments.pilot and not arguments.dry_run:

@@ -14,6 +14,7 @@ import numpy as np
 
 from flocsim.ensembles.kind import Chunk, StudyKind
 from flocsim.ensembles.parallel.communicator import (
+    SILENCE_LIMIT,
     SLEEP,
     ChunkResult,
     Communicator,
@@ -21,12 +22,17 @@ from flocsim.ensembles.parallel.communicator import (
     Halt,
     Kept,
     Request,
+    Silence,
 )
 from flocsim.ensembles.parallel.schedule import Phase, StudyState, chunk_seconds
+from flocsim.errors import FlocsimError
 from flocsim.process import stop_requested
 
 GOING_SECONDS = 1.0
 """Seconds between two messages of a rank that say how far it is."""
+
+SIGNS = 6
+"""Signs of life that a rank gives within the time after which it is given up."""
 
 FAREWELL = 5.0
 """Seconds in which the other ranks leave by themselves, once the study is given up."""
@@ -37,14 +43,15 @@ class Coordinator:
     """Rank 0's: takes in results and hands out chunks, its own and those of all other ranks.
 
     A thread serves the others where MPI has threads; elsewhere rank 0 does between two of its own
-    replicates. ``report(missing, going)`` tells the user. Of the other ranks ``present`` have not
-    been dismissed yet, ``computing`` have a chunk and no Halt, ``waiting`` want a chunk.
+    replicates. ``report(missing, going)`` tells the user. Of the other ranks ``computing`` have a
+    chunk and no Halt, ``waiting`` want a chunk, and ``silence`` has those that owe a message. Who
+    is in neither of the last two has been dismissed.
     """
 
     comm: Communicator
     state: StudyState
     report: Callable[..., object]
-    present: int = attrs.field(init=False)
+    silence: Silence = attrs.field(init=False)
     computing: set[int] = attrs.Factory(set)
     waiting: list[int] = attrs.Factory(list)
     lock: threading.Lock = attrs.Factory(threading.Lock)
@@ -52,7 +59,12 @@ class Coordinator:
     error: BaseException | None = None
 
     def __attrs_post_init__(self):
-        self.present = self.comm.size - 1
+        self.silence = Silence(range(1, self.comm.size))
+
+    @property
+    def present(self) -> int:
+        """How many of the other ranks have not been dismissed yet."""
+        return len(self.silence.seconds) + len(self.waiting)
 
     def start(self) -> None:
         self.state.look_at_stages()
@@ -68,10 +80,12 @@ class Coordinator:
             self.thread.join()
 
     def give_up(self) -> bool:
-        """Dismiss all other ranks, taking nothing in any more; whether they went in time."""
+        """Dismiss all other ranks, taking nothing in any more; return True if they went in time."""
         self.state.give_up()
         if self.thread is not None:
-            self.thread.join()
+            self.thread.join(FAREWELL)
+            if self.thread.is_alive():
+                return False
         until = time.monotonic() + FAREWELL
         while self.present and time.monotonic() < until:
             if not self.serve():
@@ -80,24 +94,39 @@ class Coordinator:
 
     def exchange(self, result: ChunkResult | None) -> Chunk | None:
         """Hand in what rank 0 has done, None at first; its next Chunk, None at the end."""
+        self.raise_error()
         self.take_in(result, stop_requested())
         while (chunk := self.next_chunk()) is None and self.state.is_running:
             self.wait_a_little()
         return chunk
 
     def is_halted(self) -> bool:
-        """Whether rank 0 is to give up the replicate at hand; serves where no thread does."""
-        if self.error is not None:
-            raise self.error
+        """Return True if rank 0 is to give up the replicate at hand; serves where no thread does.
+
+        An error is raised by the next `exchange`: here it would count as one of the replicate.
+        """
         with self.lock:
             self.state.store.writer.sync_when_due()
         if self.comm.size > 1 and self.thread is None:
             self.serve()
-        return not self.state.is_running or stop_requested()
+        self.look()
+        return self.error is not None or not self.state.is_running or stop_requested()
 
-    def wait_a_little(self):
+    def look(self):
+        """Note a silent rank as the error; in the main thread, as the other may wait for it."""
+        with self.lock:
+            try:
+                self.silence.look()
+            except FlocsimError as error:
+                self.error = self.error or error
+
+    def raise_error(self):
         if self.error is not None:
             raise self.error
+
+    def wait_a_little(self):
+        self.look()
+        self.raise_error()
         if self.thread is not None or not self.serve():
             time.sleep(SLEEP)
 
@@ -135,29 +164,33 @@ class Coordinator:
         before = len(self.waiting)
         for rank, request in self.comm.messages():
             if isinstance(request, Kept | Going):
+                with self.lock:
+                    self.silence.seconds[rank] = 0.0
                 self.tell(request)
                 continue
             self.computing.discard(rank)
-            self.waiting.append(rank)
+            with self.lock:
+                self.waiting.append(rank)
+                self.silence.seconds.pop(rank, None)
             self.take_in(request.result, request.interrupted)
         busy = len(self.waiting) > before
-        self.waiting = [rank for rank in self.waiting if not self.answer(rank)]
+        for rank in list(self.waiting):
+            self.answer(rank)
         while self.computing and not self.state.is_running:
             self.comm.send(self.computing.pop(), Halt())
         return busy
 
     def answer(self, rank):
-        """Send a rank its next chunk, or home at the end; False where there is neither yet."""
+        """Send a rank its next chunk, or home at the end; nothing where there is neither yet."""
         chunk = self.next_chunk()
-        if chunk is not None:
-            self.computing.add(rank)
-            self.comm.send(rank, chunk)
-        elif self.state.is_running:
-            return False
-        else:
-            self.comm.send(rank, None)
-            self.present -= 1
-        return True
+        if chunk is None and self.state.is_running:
+            return
+        with self.lock:
+            self.waiting.remove(rank)
+            if chunk is not None:
+                self.computing.add(rank)
+                self.silence.seconds[rank] = 0.0
+        self.comm.send(rank, chunk)
 
 
 @attrs.define(eq=False)
@@ -185,7 +218,10 @@ class RemoteCoordinator:
         return answer
 
     def is_halted(self) -> bool:
-        """Whether the replicate at hand is to be given up."""
+        """Return True if the replicate at hand is to be given up; says now and then that this rank
+        is at work."""
+        if time.monotonic() - self.said > SILENCE_LIMIT / SIGNS:
+            self.tell(Going(""))
         self.comm.take_in()
         if self.comm.inbox[0]:  # while a rank works, rank 0 says nothing but Halt
             self.halted = True

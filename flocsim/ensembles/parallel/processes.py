@@ -2,12 +2,10 @@
 MPI: `--jobs 4`. The only importer of mpi4py."""
 
 import contextlib
-import faulthandler
 import multiprocessing
 import os
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection, wait
@@ -31,16 +29,6 @@ LAUNCHER_SIZES = (
 )  # fmt: skip
 """Environment variables in which launchers tell a process how many ranks there are. Slurm's is the
 last: where mpirun runs inside a step, it counts mpirun's own helpers."""
-
-WORDS, LIFE = 0, 1
-"""Tags of messages, and of signs of life."""
-
-JOINING = 900.0
-"""Seconds in which all ranks have to come to MPI's start, where a rank waits without being able to
-do anything else: on a large machine loading Python alone takes minutes."""
-
-LEAVING = 60.0
-"""Seconds in which all ranks have to come to MPI's end."""
 
 LAST_WORDS = 0.5
 """Seconds for the launcher to forward what was printed: it drops what comes with an abort."""
@@ -74,20 +62,14 @@ def find_communicator() -> Communicator:
 
 def load_mpi() -> Any:
     """mpi4py's MPI module; UsageError where it or its library is missing."""
-    # MPI's start waits for all ranks and holds the interpreter's lock: no thread of Python's could
-    # end that.
-    with open(os.devnull, "w") as nowhere:
-        faulthandler.dump_traceback_later(JOINING, exit=True, file=nowhere)
-        try:
-            from mpi4py import MPI
-        except (ImportError, RuntimeError) as error:
-            raise UsageError(
-                f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
-                "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
-                "the launcher"
-            ) from None
-        finally:
-            faulthandler.cancel_dump_traceback_later()
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise UsageError(
+            f"started by an MPI launcher, but mpi4py cannot be loaded ({error}): install "
+            "flocsim[mpi] (wheels) or flocsim[mpi-system] (your cluster's MPI), or run without "
+            "the launcher"
+        ) from None
     return MPI
 
 
@@ -102,8 +84,6 @@ class MpiCommunicator(Communicator):
         self.rank = self.world.rank
         self.size = self.world.size
         self.threads = self.mpi.Query_thread() >= self.mpi.THREAD_SERIALIZED
-        self.concurrent = self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE
-        self.given: dict[int, Any] = {}
         if launched is not None and launched != self.size:
             if launched_rank() > 0:
                 raise SystemExit(UsageError.exit_code)  # the first says it for all
@@ -113,57 +93,19 @@ class MpiCommunicator(Communicator):
                 "environment, or srun --mpi=pmi2 (MPICH, Intel MPI) or --mpi=pmix (Open MPI)"
             )
         INTERRUPTION.speaks = self.rank == 0
-        if self.concurrent:
+        if self.mpi.Query_thread() == self.mpi.THREAD_MULTIPLE:
             # Where one rank just goes, the launcher kills the others, and says so by its code.
             INTERRUPTION.leave = self.abort
         end_with_parent()
 
     def send(self, to: int, message: Any) -> None:
-        with self.calling(to):
-            self.world.send(message, to, tag=WORDS)
+        self.world.send(message, to)
 
     def arrived(self) -> Iterator[tuple[int, Any]]:
         status = self.mpi.Status()
-        while self.world.Iprobe(tag=WORDS, status=status):
+        while self.world.Iprobe(status=status):
             source = status.Get_source()
-            with self.calling(source):
-                message = self.world.recv(source=source, tag=WORDS)
-            yield source, message
-
-    @contextlib.contextmanager
-    def calling(self, rank: int) -> Iterator[None]:
-        """A call of MPI that returns when a rank does its part, which a lost one never does."""
-        self.called, self.calls = rank, self.calls + 1
-        try:
-            yield
-        finally:
-            self.called = None
-
-    def beat(self, sign: bytes) -> None:
-        for rank in range(1, self.size) if self.rank == 0 else (0,):
-            # To who does not take the last sign there is no use in sending another.
-            if rank not in self.given or self.given[rank].Test():
-                self.given[rank] = self.world.isend(sign, rank, tag=LIFE)
-
-    def signs(self) -> Iterator[tuple[int, bytes]]:
-        status = self.mpi.Status()
-        while self.world.Iprobe(tag=LIFE, status=status):
-            source = status.Get_source()
-            yield source, self.world.recv(source=source, tag=LIFE)
-
-    def close(self) -> None:
-        """Go together, and leave no sign of life behind that MPI would wait for."""
-        if self.heartbeat is None:
-            return
-        self.barrier(heed_signals=False)
-        self.unwatch()
-        # From here on nobody looks after the others, but MPI's end waits for all of them.
-        end = threading.Timer(max(LEAVING, self.heartbeat.seconds), os._exit, (STOPPED,))
-        end.daemon = True
-        end.start()
-        self.barrier(heed_signals=False)
-        for _ in self.signs():
-            pass
+            yield source, self.world.recv(source=source)
 
     def abort(self, code: int) -> None:
         sys.stdout.flush()
@@ -179,18 +121,13 @@ class LostRank(FlocsimError):
 class ProcessCommunicator(Communicator):
     """One process of several, with a pipe to rank 0 or, on rank 0, to each of the others."""
 
-    ends_all = False
-
     def __init__(
         self, rank: int, size: int, pipes: Mapping[int, Connection],
-        others: Sequence[BaseProcess] = (), life: Mapping[int, Connection] | None = None,
+        others: Sequence[BaseProcess] = (),
     ) -> None:  # fmt: skip
-        """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started;
-        ``life``: {rank: connection} for signs of life, which get by themselves."""
+        """``pipes``: {rank: connection}; ``others``: the processes that rank 0 has started."""
         super().__init__()
-        self.rank, self.size = rank, size
-        self.pipes, self.life = pipes, dict(life or {})
-        self.others = others
+        self.rank, self.size, self.pipes, self.others = rank, size, pipes, others
 
     def send(self, to: int, message: Any) -> None:
         try:
@@ -208,19 +145,6 @@ class ProcessCommunicator(Communicator):
             except (EOFError, OSError):
                 self.lose(ranks[pipe])
 
-    def beat(self, sign: bytes) -> None:
-        for pipe in self.life.values():
-            with contextlib.suppress(OSError):  # who has gone is found out by `arrived`
-                pipe.send_bytes(sign)
-
-    def signs(self) -> Iterator[tuple[int, bytes]]:
-        for rank, pipe in list(self.life.items()):
-            try:
-                while pipe.poll():
-                    yield rank, pipe.recv_bytes()
-            except (EOFError, OSError):
-                del self.life[rank]
-
     def lose(self, rank):
         """A process has gone: without rank 0 there is nobody to tell."""
         if self.rank > 0:
@@ -236,7 +160,7 @@ class ProcessCommunicator(Communicator):
 
     def close(self) -> None:
         """Wait for the other processes, which have nothing more to do."""
-        self.unwatch()
+        super().close()
         for process in self.others:
             process.join(LAST_SECONDS)
         self.end_others()
@@ -259,19 +183,16 @@ def start_processes(
     """Start ``jobs`` − 1 processes that call ``target(communicator, arguments)``; rank 0's own."""
     context = multiprocessing.get_context("spawn")
     pipes: dict[int, Connection] = {}
-    life: dict[int, Connection] = {}
     others: list[BaseProcess] = []
     for rank in range(1, jobs):
         pipes[rank], far_end = context.Pipe()
-        life[rank], far_life = context.Pipe()
         process = context.Process(
-            target=join_job, args=(target, rank, jobs, far_end, far_life, arguments), daemon=True
+            target=join_job, args=(target, rank, jobs, far_end, arguments), daemon=True
         )
         process.start()
         far_end.close()
-        far_life.close()
         others.append(process)
-    comm = ProcessCommunicator(0, jobs, pipes, others, life)
+    comm = ProcessCommunicator(0, jobs, pipes, others)
     INTERRUPTION.leave = comm.abort
     return comm
 
@@ -316,9 +237,9 @@ def as_copy(work, silent):
         work()
 
 
-def join_job(target, rank, jobs, pipe, life, arguments):
+def join_job(target, rank, jobs, pipe, arguments):
     """Where a process that rank 0 has started begins."""
     install()
     end_with_parent()
     INTERRUPTION.speaks = False
-    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}, life={0: life}), arguments))
+    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}), arguments))
