@@ -1,5 +1,4 @@
-"""Hostile files of every kind are read or refused in one line: a fast part of the fuzzing that
-benchmarks/faults/fuzz_readers.py does, in this process."""
+"""Hostile files of every kind are read or refused in one line."""
 
 import os
 import random
@@ -11,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.faults.fuzz_readers import KINDS, made, outcome, reader
 from flocsim.__main__ import main
 from tests.helpers import hostile_files
+from tests.helpers.hostile_readers import KINDS, made, outcome, reader
 from tests.helpers.tiers import rest_slow
 
 EXAMPLES = settings().max_examples // 2

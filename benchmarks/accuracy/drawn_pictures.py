@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, label
 
 from benchmarks.pictures import PICTURES, checked, silhouettes
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim.io.images.outlines import EIGHT, filled
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.reading import read_grey
@@ -170,14 +170,13 @@ def soot_table(images):
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__, images=PICTURES)
+    arguments = begin(__doc__, packages=["scikit-image"], images=PICTURES)
     images = checked(arguments.images, "soot_tem", "silhouettes")
-    print_heading(["scikit-image"])
-    soot_table(images).print(arguments.markdown)
-    layered_table(range(2 if arguments.quick else 8)).print(arguments.markdown)
+    soot_table(images).print()
+    layered_table(range(2 if arguments.quick else 8)).print()
     masks = [mask for mask, _ in silhouettes(images) if max(mask.shape) < 72][:80]
-    blurred_table(masks).print(arguments.markdown)
-    crowded_table(masks, range(1 if arguments.quick else 3)).print(arguments.markdown)
+    blurred_table(masks).print()
+    crowded_table(masks, range(1 if arguments.quick else 3)).print()
 
 
 if __name__ == "__main__":

@@ -7,17 +7,15 @@ CPU time, as another job on the machine would stretch the clock on the wall. Goa
 1.5 on all of them; how many lie inside the interval is printed.
 """
 
-import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.reporting import ROOT, Table, parser_of, print_heading
+from benchmarks.reporting import EXAMPLES, Table, begin, cpu_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.dry_run import forecast_study
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 
-EXAMPLES = ROOT / "examples"
 GOAL = 1.5
 
 STUDIES = {
@@ -57,12 +55,8 @@ def judge(name, factor, table):
     source, replicates = STUDIES[name]
     with TemporaryDirectory() as folder:
         config = config_of(source, folder, max(round(factor * replicates), 12))
-        began = time.process_time()
-        study, found, _ = forecast_study(config, 1)
-        pilot = time.process_time() - began
-        began = time.process_time()
-        run_to_file(config, Communicator(), config.output.file, "new")
-        truth = time.process_time() - began
+        pilot, (study, found, _) = cpu_of(forecast_study, config, 1)
+        truth, _ = cpu_of(run_to_file, config, Communicator(), config.output.file, "new")
         size = Path(config.output.file).stat().st_size
     hours = 3600.0 * found.hours.value
     ratio, of_size = hours / truth, found.size.value / size
@@ -80,19 +74,15 @@ def judge(name, factor, table):
 
 def main():
     """Print the table, and what is the furthest off."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--replicates-of", type=float, default=1.0, metavar="F",
-                        help="so many times the replicates of each study")  # fmt: skip
-    parser.add_argument("--studies", nargs="+", choices=STUDIES, default=list(STUDIES))
-    arguments = parser.parse_args()
-    print_heading()
+    studies = {"nargs": "+", "choices": STUDIES, "default": list(STUDIES)}
+    arguments = begin(__doc__, replicates_of=1.0, studies=studies)
     columns = ("study", "replicates", "of them in the pilot", "pilot [s]", "forecast [s]",
                "95 %", "truth [s]", "ratio", "file, forecast [kB]", "truth [kB]", "ratio ",
                "both inside")  # fmt: skip
     table = Table("--dry-run against the study itself, CPU time of one core", columns)
     factor = arguments.replicates_of * (0.25 if arguments.quick else 1.0)
     found = [judge(name, factor, table) for name in arguments.studies]
-    table.print(arguments.markdown)
+    table.print()
     hours, size = max(each[0] for each in found), max(each[1] for each in found)
     inside = sum(each[2] for each in found)
     print(f"off by at most {hours:.2f} times (goal {GOAL}) in time and {size:.2f} in size; "

@@ -1,6 +1,6 @@
 """Where the two finders of `flocsim fit` differ on real pictures.
 
-    python -m benchmarks.accuracy.finders [--images DIR] [--markdown] [--overlays FOLDER]
+    python -m benchmarks.accuracy.finders [--images DIR] [--markdown]
 
 Flocs found by each, their mean r_eq, and the overlap of the areas: intersection over union of the
 pixels of all flocs. The pictures are those listed in docs/images.md.
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.pictures import PICTURES, checked
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim.io.images.paper import segment_as_paper
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.reading import read_grey
@@ -35,26 +35,10 @@ def covered(found):
     return seen
 
 
-def draw(grey, found, path):
-    """Write a picture with its flocs outlined in red."""
-    from PIL import Image
-    from scipy.ndimage import binary_dilation
-
-    seen = covered(found)
-    rim = binary_dilation(seen, iterations=2) & ~seen
-    colours = np.repeat((255.0 * grey).astype(np.uint8)[..., None], 3, axis=2)
-    colours[rim] = (255, 0, 0)
-    picture = Image.fromarray(colours)
-    picture.thumbnail((900, 900))
-    picture.save(path)
-
-
 def main():
     """Print the table."""
-    folder = {"default": None, "metavar": "FOLDER", "help": "write overlays of both finders"}
-    arguments = parse_arguments(__doc__, images=PICTURES, overlays=folder)
+    arguments = begin(__doc__, packages=("scikit-image",), images=PICTURES)
     images = checked(arguments.images, "safas", "flocpy", "soot_tem")
-    print_heading(("scikit-image",))
     table = Table(
         "Finders",
         ("picture", "shows", "steepest: flocs", "r_eq [px]", "paper: flocs", "r_eq [px] ",
@@ -70,10 +54,7 @@ def main():
             sizes = [region.equivalent_radius for region in each.regions]
             row += [len(sizes), f"{np.mean(sizes):.1f}" if sizes else "-"]
         table.add(Path(name).stem, shows, *row, f"{overlap:.2f}")
-        if arguments.overlays:
-            for finder, each in zip(("steepest", "paper"), found, strict=True):
-                draw(grey, each, Path(arguments.overlays, f"{Path(name).stem}-{finder}.png"))
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

@@ -20,14 +20,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.runner import run
 from flocsim.io.confidence import wilson
 from flocsim.io.plots.style import house_style, new_figure, save, set_probability_axis
 from flocsim.io.results.schema import OUTCOMES
 
-QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
 PRESETS = ("tang2014", "clay")
 HAMAKER = (1e-23, 1e-22, 1e-21, 1e-20, 1e-19, 1e-18)
 LAWS = ("spheres", "outline")
@@ -47,7 +46,7 @@ def outcomes_of(preset, vertices, law, varied, value, args):
             each["law"] = law
     if preset in args.film:
         forces["lubrication"] = {}
-    config = load_config(QUICKSTART, {
+    config = load_config(EXAMPLES / "quickstart.toml", {
         "preset": preset, "seed": 1, "replicates": args.replicates, "forces": forces,
         # The zone divides outcomes, which is not asked for here; its root moves with H_A.
         "zone": {"distance": 5.925e-6 if preset == "tang2014" else 1e-8},
@@ -100,19 +99,13 @@ def draw(rows, varied, path):
 
 def main():
     """Print the table, and draw it."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--replicates", type=int, default=30)
-    parser.add_argument("--type", default="I")
-    parser.add_argument("--preset", nargs="+", default=PRESETS)
-    parser.add_argument("--vertices", nargs="+", type=int, default=(16,))
-    parser.add_argument("--hamaker", nargs="+", type=float, default=HAMAKER)
-    parser.add_argument("--potential", nargs="+", type=float)
-    parser.add_argument("--film", nargs="*", default=())
-    parser.add_argument("--figure", type=Path)
-    args = parser.parse_args()
+    args = begin(
+        __doc__, replicates=30, type="I", preset=PRESETS, vertices=(16,), hamaker=HAMAKER,
+        potential={"nargs": "+", "type": float}, film={"nargs": "*", "default": ()},
+        figure={"type": Path},
+    )  # fmt: skip
     if args.quick:
         args.replicates = 6
-    print_heading()
     varied = "potential" if args.potential else "hamaker"
     _, label, unit = VARIED[varied]
     columns = "preset", "N", "law", label, "Pr[A]", "95 %", *OUTCOMES, "s"
@@ -123,7 +116,7 @@ def main():
         p, low, high = aggregated(counts)
         interval = f"{low:.2f} to {high:.2f}"
         table.add(*case[:3], f"{unit * case[3]:.3g}", p, interval, *counts.values(), spent)
-    table.print(args.markdown)
+    table.print()
     if args.figure:
         draw(rows, varied, args.figure)
 

@@ -6,12 +6,12 @@
 
 runs Types I to III, N = 1, 16, 64 and δ from 0 to 1 at each preset, stiffness k_n [N/m] (k_t a
 tenth of it) and tolerance, at those of its second and third runs, and at 1e-12 m, taken for the
-truth. What has been run is kept in a folder and not run again; ``--stored``: nothing is run, and
-what the folder does not have is left out. Small studies of ``--size`` replicates, by default as
-many as there are, are drawn from these, with replacement, and of each those are run again that the
-study itself would run again. Of each probability: in how many of them its interval of the change
-holds the true one, in the worst condition and in the mean. Goals: in 93 % of them in each
-condition, and at most 20 % of the time for second and third runs at 1,000 replicates.
+truth. What has been run is kept in a folder and not run again. Small studies of ``--size``
+replicates, by default as many as there are, are drawn from these, with replacement, and of each
+those are run again that the study itself would run again. Of each probability: in how many of them
+its interval of the change holds the true one, in the worst condition and in the mean. Goals: in
+93 % of them in each condition, and at most 20 % of the time for second and third runs at 1,000
+replicates.
 """
 
 import itertools
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.collision.draw import TIGHTER, further_runs, third_tolerance
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.numerical import change_intervals, count_changes
@@ -28,7 +28,7 @@ from flocsim.ensembles.runner import run
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 
-QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
+QUICKSTART = EXAMPLES / "quickstart.toml"
 DELTA = [0.0, 0.25, 0.5, 0.75, 1.0]
 GOAL, MOST_TIME, AT_COUNT = 0.93, 0.2, 1000
 TRUTH = 1e-12
@@ -39,16 +39,10 @@ ENOUGH = 0.5
 """Share of the small studies in which a condition has trials, for it to count."""
 
 
-class NotThere(Exception):
-    """What the folder does not have."""
-
-
 def outcomes_at(arguments, preset, stiffness, tolerance):
-    """({column: codes}, steps, CPU time [s]) of all replicates at a tolerance; NotThere."""
+    """({column: codes}, steps, CPU time [s]) of all replicates at a tolerance."""
     path = Path(arguments.folder) / f"{preset}_{stiffness:g}_{tolerance:g}_1.npz"
     if not path.exists():
-        if arguments.stored:
-            raise NotThere(path.name)
         steps = load_config(QUICKSTART).integrator.max_steps
         steps *= MORE_STEPS if tolerance < 1e-10 else 1
         rows = run(load_config(QUICKSTART, {
@@ -118,20 +112,14 @@ def cost(levels, steps, rng):
 
 def main():
     """Print the table, and whether the goals are reached."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--presets", nargs="+", default=["tang2014", "si"])
-    parser.add_argument("--k-n", type=float, nargs="+", default=[20.0, 2e3, 2e5])
-    parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-6, 1e-7, 1e-8, 1e-9])
-    parser.add_argument("--replicates", type=int, default=400)
-    parser.add_argument("--choices", type=int, default=100)
-    parser.add_argument("--size", type=int)
-    parser.add_argument("--folder", default="numerical_error")
-    parser.add_argument("--stored", action="store_true")
-    arguments = parser.parse_args()
+    arguments = begin(
+        __doc__, presets=("tang2014", "si"), k_n=(20.0, 2e3, 2e5),
+        tolerances=(1e-6, 1e-7, 1e-8, 1e-9), replicates=400, choices=100, size=0,
+        folder="numerical_error",
+    )  # fmt: skip
     if arguments.quick:
         arguments.replicates, arguments.tolerances = 20, [1e-6]
         arguments.presets, arguments.k_n, arguments.choices = ["tang2014"], [20.0], 10
-    print_heading()
     rng = np.random.default_rng(1)
     columns = ("preset", "k_n", "tolerance", "flips", "missed by 2nd", "conditions", "entries",
                "below goal", "least", "mean", "half-width pr_a", "steps [%]")  # fmt: skip
@@ -140,12 +128,8 @@ def main():
     for preset, stiffness, tolerance in itertools.product(
         arguments.presets, arguments.k_n, arguments.tolerances
     ):
-        try:
-            truth, _ = outcomes_at(arguments, preset, stiffness, TRUTH)
-            levels, steps = zip(*levels_of(arguments, preset, stiffness, tolerance), strict=True)
-        except NotThere as what:
-            print(f"left out: {what}")
-            continue
+        truth, _ = outcomes_at(arguments, preset, stiffness, TRUTH)
+        levels, steps = zip(*levels_of(arguments, preset, stiffness, tolerance), strict=True)
         first, second, exact = levels[0][0], levels[1][0], truth[0]
         found = held(levels, truth, arguments.choices, arguments.size or truth[0].shape[-1], rng)
         shares, half = [], []
@@ -164,7 +148,7 @@ def main():
             int(np.sum(share < GOAL)), share.min(), share.mean(), np.mean(half),
             100.0 * dearest[-1],
         )  # fmt: skip
-    table.print(arguments.markdown)
+    table.print()
     if worst:
         reached = "reached" if min(worst) >= GOAL else "not reached"
         print(

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim.forces import VanDerWaals
 from flocsim.geometry.contact.attraction import attraction_energy
 from flocsim.geometry.shapes.pieces import outline_pieces
@@ -37,17 +37,14 @@ def off_by(random, low, high):
 
 def main():
     """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--poses", type=int, default=1000)
-    args = parser.parse_args()
-    print_heading()
+    args = begin(__doc__, poses=1000)
     poses, random = (40 if args.quick else args.poses) // (len(GAPS) - 1), np.random.default_rng(0)
     columns = "gap from [m]", "to", "poses", "median", "90 %", "99 %", "largest"
     table = Table("How far forces are off the slopes of their energy", columns)
     for low, high in pairwise(GAPS):
         found = [off_by(random, low, high) for _ in range(poses)]
         table.add(low, high, poses, *map(float, np.quantile(found, (0.5, 0.9, 0.99, 1.0))))
-    table.print(args.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

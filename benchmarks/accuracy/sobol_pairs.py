@@ -8,33 +8,24 @@ a scramble's mean of 64, 128, … points is the ratio that a study of 16 such sc
 studies of 16 scrambles, drawn from all with replacement, say how often their 95 % intervals hold
 the mean of all. Goals: a ratio of 2 in the mean over the types with 1,024 points, and intervals
 that hold it in 93 to 97 %.
-
---shares says instead what there is to gain: of which the variance of aggregation is made, on a grid
-of orientations for some pairs of flocs. Only what is common to many points of a scramble becomes
-even: the mean of a pair of flocs, and what all pairs do alike at the same two orientations.
 """
-
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim.ensembles.collision.draw import Draw
+from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.pair_scene import SOBOL, SOBOL_SCRAMBLES
 from flocsim.ensembles.runner import run
-from flocsim.ensembles.study import Study
 from flocsim.io.confidence import scrambled_proportion
 from flocsim.io.results.events import events
 
-QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
 TYPES = ("I", "II", "III")
 NAMES = ("pr_inside", "pr_a")
 
 
 def scrambles_of(seed, points, pool):
     """{probability: (3, type, points, scramble)} of trials, successes and unknown, flags."""
-    config = load_config(QUICKSTART, {
+    config = load_config(EXAMPLES / "quickstart.toml", {
         "seed": seed, "sampling": SOBOL, "replicates": points * SOBOL_SCRAMBLES,
         "scene": {"types": list(TYPES), "delta": [0.5]},
         # Flocs that are grown differ from seed to seed.
@@ -45,30 +36,6 @@ def scrambles_of(seed, points, pool):
     found = events(*(rows[name][:, 0, 0] for name in ("outcome", "inside", "bond")))
     return {name: np.stack(found[name]).reshape(3, len(TYPES), points, SOBOL_SCRAMBLES)
             for name in NAMES}  # fmt: skip
-
-
-def shares_of_variance(pool, pairs=40, grid=12):
-    """{type: (share between pairs of flocs, share of orientations alike in all pairs)}."""
-    config = load_config(QUICKSTART, {
-        "scene": {"types": list(TYPES), "delta": [0.5]},
-        "shapes": {"source": "library", "file": "synthetic", "vertices": [16], "pool": pool},
-        "integrator": {"tolerance": 1e-7},
-    })  # fmt: skip
-    study, rng = Study(config), np.random.default_rng(1)
-    angles = (np.arange(grid) + 0.5) / grid
-    found = {}
-    for place, name in enumerate(TYPES):
-        held = np.zeros((pairs, grid, grid))
-        for k, chosen in enumerate(rng.random((pairs, 2))):
-            for i, j in np.ndindex(grid, grid):
-                numbers = np.array([angles[i], angles[j], *chosen, 0.0])
-                encounter = study.encounter(place, 16, numbers)
-                draw = Draw(encounter, encounter.orientations(numbers), 0.5)
-                row = draw.run(study.driver(encounter), config.integrator.max_steps)
-                held[k, i, j] = row["outcome"] in (0, 2)
-        found[name] = (held.mean(axis=(1, 2)).var() / held.var(),
-                       held.mean(axis=0).var() / held.var())  # fmt: skip
-    return found
 
 
 def variance_ratio(sums):
@@ -89,24 +56,9 @@ def coverage(sums, studies, rng):
 
 def main():
     """Print the table, and whether the goals are reached."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--points", type=int, default=64)
-    parser.add_argument("--pool", type=int, default=10)
-    parser.add_argument("--studies", type=int, default=1000)
-    parser.add_argument("--shares", action="store_true")
-    arguments = parser.parse_args()
+    arguments = begin(__doc__, seeds=6, points=64, pool=10, studies=1000)
     if arguments.quick:
         arguments.seeds, arguments.points = 2, 16
-    print_heading()
-    if arguments.shares:
-        table = Table(
-            "Shares of the variance of aggregation", ("type", "pairs", "orientations", "rest")
-        )
-        for name, (of_pairs, alike) in shares_of_variance(arguments.pool).items():
-            table.add(name, of_pairs, alike, 1.0 - of_pairs - alike)
-        table.print(arguments.markdown)
-        return
     parts = [
         scrambles_of(seed, arguments.points, arguments.pool)
         for seed in range(1, 1 + arguments.seeds)
@@ -134,7 +86,7 @@ def main():
                 np.mean([width for _, width in held.values()]), plain,
             )  # fmt: skip
         points *= 2
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

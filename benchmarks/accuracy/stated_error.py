@@ -1,7 +1,10 @@
 """Whether the stated error covers the true one, on random runs of every family.
 
     python -m benchmarks.accuracy.stated_error [--runs 2000] [--processes 2] [--families …]
-                                               [--seconds S] [--first K]
+                                               [--seconds S] [--first K] [--worst N]
+
+``--first`` is the number of the first run, ``--seconds`` the most for a family, ``--worst`` how
+many of the worst runs are listed.
 
 A run at the default tolerance is held against the same at 1e-12 m, and a companion of that, nudged
 by 1e-10 m, says by how much the motion amplifies a difference; runs that amplify it more than ten
@@ -19,7 +22,7 @@ from tempfile import TemporaryDirectory
 import attrs
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim import Body, Swarm, System, wall
 from flocsim.constants import STANDARD_GRAVITY
 from flocsim.ensembles.config.loader import load_config
@@ -253,17 +256,12 @@ def judged(family, tolerance, runs, processes, seconds, first=0):
 
 def main():
     """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--runs", type=int, default=2000)
-    parser.add_argument("--tolerance", type=float, default=1e-9)
-    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--first", type=int, default=0, help="number of the first run: go on there")
-    parser.add_argument("--seconds", type=float, default=math.inf, help="at most, for a family")
-    parser.add_argument("--worst", type=int, default=0, help="list so many of the worst runs")
-    arguments = parser.parse_args()
+    families = {"nargs": "+", "choices": FAMILIES, "default": list(FAMILIES)}
+    arguments = begin(
+        __doc__, runs=2000, tolerance=1e-9, families=families, processes=1, first=0,
+        seconds=math.inf, worst=0,
+    )  # fmt: skip
     runs = 20 if arguments.quick else arguments.runs
-    print_heading()
     columns = ("family", "numbers", "runs", "amplified", "not ended", "covered [%]",
                "median true/stated", "99th percentile", "largest")  # fmt: skip
     table = Table(f"True error over stated error at {arguments.tolerance:g} m", columns)
@@ -280,7 +278,7 @@ def main():
         )  # fmt: skip
         for each in sorted(shares, reverse=True)[: arguments.worst]:
             print(family, *(f"{value:.3g}" for value in each))
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

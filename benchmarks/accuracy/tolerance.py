@@ -7,7 +7,7 @@ runs the config's study at every tolerance, in one process, and compares each wi
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import Table, begin
 from examples.tang2014.changes import OutcomeChanges, changes_between
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.runner import run
@@ -64,14 +64,10 @@ def compare(found, exact):
 
 def main():
     """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("config")
-    parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-7, 1e-8, 1e-9, 1e-10])
-    parser.add_argument("--replicates", type=int)
-    arguments = parser.parse_args()
+    tolerances = 1e-7, 1e-8, 1e-9, 1e-10
+    arguments = begin(__doc__, ("config", {}), tolerances=tolerances, replicates=0)
     if arguments.quick:
         arguments.replicates, arguments.tolerances = 2, [1e-8, 1e-9]
-    print_heading()
     results = {tolerance: study(arguments, tolerance) for tolerance in arguments.tolerances}
     exact = results[min(results)]
     columns = ("tolerance [m]", "aggregation flip [%]", "zone flip [%]", "any, inner delta [%]",
@@ -80,7 +76,7 @@ def main():
     for tolerance, found in sorted(results.items(), reverse=True):
         rate = found.replicates["outcome"].size / found.run["wall_time"]
         table.add(f"{tolerance:g}", *map(float, compare(found, exact)), rate)
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

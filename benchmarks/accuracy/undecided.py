@@ -9,12 +9,10 @@ that gives nan at chosen orientations of i (nan). The truth is what the large st
 95 % intervals of each probability, efficiency and rate hold it in 95 % of the small studies.
 """
 
-from pathlib import Path
-
 import attrs
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.capture import estimate, weighted
@@ -30,7 +28,6 @@ from flocsim.io.results.kernel_group import ESTIMATES
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES, POOLED_PROBABILITIES, PROBABILITIES
 from tests.helpers.tabulate import tabulate
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 DELTA = [0.0, 0.5, 1.0]
 PAIRS = {
     "replicates": 2000, "scene": {"delta": DELTA}, "shapes": {"vertices": [16], "pool": 10},
@@ -156,13 +153,9 @@ def rate_samples(arguments):
 
 def main():
     """Print the table, and whether the goal is reached."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--studies", type=int, default=1000)
-    parser.add_argument("--shares", type=float, nargs="+", default=[0.0, 0.01, 0.05, 0.2, 0.6])
-    arguments = parser.parse_args()
+    arguments = begin(__doc__, studies=1000, shares=(0.0, 0.01, 0.05, 0.2, 0.6))
     if arguments.quick:
         arguments.studies = min(arguments.studies, 100)
-    print_heading()
     columns = ("of", "what", *(f"{100.0 * share:g} % {how}" for share in arguments.shares
                for how in ("budget", "nan")))  # fmt: skip
     table = Table(
@@ -184,7 +177,7 @@ def main():
         for what, values in shown.items():
             table.add(name, what, *values)
             least = min(least, np.nanmin(values[2:]))
-    table.print(arguments.markdown)
+    table.print()
     print(f"least with undecided ones: {least:.1f} % (goal: {GOAL:g} %: "
           f"{'reached' if least >= GOAL else 'not reached'})")  # fmt: skip
 

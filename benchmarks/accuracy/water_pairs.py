@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.pictures import PICTURES, checked, silhouettes
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from tests.helpers.real_pairs import (
     Resistance,
     line_mobilities,
@@ -49,10 +49,9 @@ def table_of(count, images):
 
 def main():
     """Print the table."""
-    arguments = parse_arguments(__doc__, images=PICTURES)
+    arguments = begin(__doc__, images=PICTURES)
     images = checked(arguments.images, "silhouettes")
-    print_heading()
-    table_of(4 if arguments.quick else 20, images).print(arguments.markdown)
+    table_of(4 if arguments.quick else 20, images).print()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ The error of a run is how far any point of an outline ends from where the refere
 
 import numpy as np
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from benchmarks.speed.measure import distance, measure, reference
 from benchmarks.speed.scenes import all_scenes
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
@@ -93,12 +93,10 @@ def draw(scenes, path):
 
 def main():
     """Print the table, draw the figure."""
-    figure = {"help": "where to draw, e.g. docs/figures/work_precision.png"}
-    arguments = parse_arguments(__doc__, figure=figure)
-    print_heading()
+    arguments = begin(__doc__, figure="")
     table = Table("Error against run time", COLUMNS)
     scenes = {s.name: measure_scene(s, table, arguments.quick) for s in all_scenes()}
-    table.print(arguments.markdown)
+    table.print()
     if arguments.figure:
         draw(scenes, arguments.figure)
         print(f"drawn: {arguments.figure}")

@@ -1,2 +1,2 @@
-"""What goes wrong and costs nothing: kills, signals, full disks, damaged files, odd config files,
+"""What goes wrong and costs nothing: two jobs for one output, launchers, a batch system,
 other processors."""

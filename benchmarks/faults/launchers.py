@@ -21,8 +21,8 @@ from pathlib import Path
 
 import attrs
 
-from benchmarks.faults.job import BESIDE_PYTHON
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
+from tests.helpers.jobs import BESIDE_PYTHON
 
 ROOT = Path(__file__).resolve().parents[2]
 TESTS = ["tests/ensembles/parallel", "tests/ensembles/storage/test_faults.py"]
@@ -100,12 +100,10 @@ def run_tests(place, kind, tests):
 
 def main():
     """Print the table; exit code 1 if a test has failed."""
-    arguments = parse_arguments(
-        __doc__,
+    arguments = begin(
+        __doc__, packages=("h5py", "mpi4py", "mpich"), folder={"type": Path},
         only={"nargs": "+", "default": list(KINDS), "choices": list(KINDS)},
-        folder={"type": Path, "help": "where the environments are made, and kept"},
-    )
-    print_heading(("h5py", "mpi4py", "mpich"))
+    )  # fmt: skip
     folder = arguments.folder or Path(tempfile.mkdtemp())
     columns = ("MPI", "library", "tests", "failed", "skipped", "s")
     table, failed = Table("Tests under other launchers", columns), []
@@ -122,7 +120,7 @@ def main():
     finally:
         if arguments.folder is None:
             shutil.rmtree(folder)
-    table.print(arguments.markdown)
+    table.print()
     print(*failed, sep="\n")
     return 1 if failed else 0
 

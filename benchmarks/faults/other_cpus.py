@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-from benchmarks.reporting import ROOT, Table, parser_of, print_heading
+from benchmarks.reporting import ROOT, Table, begin
 
 QUICK = ["tests/commands/test_trajectory.py", "tests/ensembles/collision", "tests/geometry"]
 """What crosses from numpy to compiled code most."""
@@ -69,18 +69,16 @@ def outcome(variables, cache, tests):
 
 def main():
     """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("tests", nargs="*", help="files or folders of tests, default: all")
-    arguments = parser.parse_args()
+    tests = "tests", {"nargs": "*", "help": "files or folders of tests, default: all"}
+    arguments = begin(__doc__, tests, packages=("pytest",))
     tests = arguments.tests or (QUICK if arguments.quick else [])
-    print_heading(("pytest",))
     table = Table("The tests by setting", ("setting", "passed", "failed", "s"))
     with tempfile.TemporaryDirectory() as folder:
         for number, (name, variables) in enumerate(settings().items()):
             # What numba compiles is the same under all settings but its own.
             cache = f"{folder}/{number if 'NUMBA_CPU_NAME' in variables else 0}"
             table.add(name, *outcome(variables, cache, tests))
-    table.print(arguments.markdown)
+    table.print()
     return 1 if any(row[2] != "0" for row in table.rows) else 0
 
 

@@ -23,14 +23,15 @@ from pathlib import Path
 import attrs
 import numpy as np
 
-from benchmarks.faults.job import KINDS, PATIENCE, STUDY, Tally, alive, descendants, finished_in
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.faults.tally import Tally
+from benchmarks.reporting import Table, begin
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
 from flocsim.errors import FlocsimError
 from flocsim.io.journal import SESSION
 from flocsim.io.results.file import read_results
+from tests.helpers.jobs import KINDS, PATIENCE, STUDY, alive, descendants, finished_in
 from tests.helpers.journals import records_in
 from tests.helpers.results_files import same_data
 
@@ -188,12 +189,7 @@ def verdict(folder, racers, before, references):
 
 def main():
     """Print the table; exit code 1 if anything was lost or mixed."""
-    arguments = parse_arguments(
-        __doc__,
-        pairs={"type": int, "default": 200, "help": "how many pairs"},
-        seed={"type": int, "default": 1, "help": "seed of the moments"},
-    )
-    print_heading(("h5py", "mpi4py", "mpich"))
+    arguments = begin(__doc__, packages=("h5py", "mpi4py", "mpich"), pairs=200, seed=1)
     rng = np.random.default_rng(arguments.seed)
     columns = ("before", "pairs", "whole", "hangs", "slowest [s]", "both 0", "one refused")
     table = Table("Two jobs for one output", columns)
@@ -219,7 +215,7 @@ def main():
             shutil.rmtree(folder)
     for kind, tally in tallies.items():
         table.add(kind, tally.faults, tally.right, tally.hangs, tally.slowest, *ends[kind])
-    table.print(arguments.markdown)
+    table.print()
     wrong = [problem for tally in tallies.values() for problem in tally.wrong]
     print(*wrong, sep="\n")
     return 1 if wrong else 0

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.faults.other_cpus import settings
-from benchmarks.reporting import ROOT, Table, parser_of, print_heading
+from benchmarks.reporting import ROOT, Table, begin
 
 CONFIG = """\
 preset = "tang2014"
@@ -105,8 +105,7 @@ def in_one_job(folder, variables, environment):
 
 def main():
     """Print the table."""
-    arguments = parser_of(__doc__).parse_args()
-    print_heading(("numpy", "numba"))
+    arguments = begin(__doc__)
     replicates = 3 if arguments.quick else 80
     table = Table("Rows by setting, against this machine as it is", COLUMNS)
     bad = False
@@ -135,7 +134,7 @@ def main():
             differ = any(not text.startswith("0/") for text in found[:2])
             bad |= differ and mixed != ["refused", "refused"]
             table.add(name, *found, *mixed)
-    table.print(arguments.markdown)
+    table.print()
     return 1 if bad else 0
 
 

@@ -27,8 +27,9 @@ from pathlib import Path
 
 import attrs
 
-from benchmarks.faults.job import BESIDE_PYTHON, STUDY, Tally, run_here
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.faults.tally import Tally
+from benchmarks.reporting import Table, begin
+from tests.helpers.jobs import BESIDE_PYTHON, STUDY, run_here
 from tests.helpers.results_files import same_data
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -208,12 +209,8 @@ def run_once(folder, env, way, rng, reference):
 
 def main():
     """Print the table; exit code 1 if anything was lost."""
-    arguments = parse_arguments(
-        __doc__,
-        mpi={"default": "pmi2", "choices": ["pmi2", "pmix"], "help": "default: %(default)s"},
-        rounds={"type": int, "default": 0, "help": "jobs of each kind (default: 5, quick: 1)"},
-    )
-    print_heading(("h5py", "mpi4py", "mpich"))
+    mpi = {"default": "pmi2", "choices": ["pmi2", "pmix"], "help": "default: %(default)s"}
+    arguments = begin(__doc__, packages=("h5py", "mpi4py", "mpich"), mpi=mpi, rounds=5)
     rng = random.Random()
     tallies = {way: Tally() for way in WAYS}
     with tempfile.TemporaryDirectory() as name:
@@ -224,7 +221,7 @@ def main():
         reference = run_here(root / "reference")
         (root / "slurm").mkdir()
         with cluster(root / "slurm", arguments.mpi) as env:
-            for number in range(arguments.rounds or (1 if arguments.quick else 5)):
+            for number in range(1 if arguments.quick else arguments.rounds):
                 for way in WAYS:
                     began = time.monotonic()
                     folder = root / f"{way.replace(' ', '-')}{number}"
@@ -237,7 +234,7 @@ def main():
     table = Table("Jobs of Slurm", ("stopped by", "jobs", "same bytes", "hangs", "longest [s]"))
     for way, tally in tallies.items():
         table.add(way, tally.faults, tally.right, tally.hangs, tally.slowest)
-    table.print(arguments.markdown)
+    table.print()
     return 1 if any(tally.wrong for tally in tallies.values()) else 0
 
 

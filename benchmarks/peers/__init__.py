@@ -1,3 +1,3 @@
 """Other codes and solvers on the same pair of bodies: SciPy's stiff solvers on flocsim's compiled
-forces, LAMMPS and pymunk with their own.
+forces, LAMMPS with its own.
 """

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import ROOT, Table, parser_of, print_heading
+from benchmarks.reporting import ROOT, Table, begin
 
 TYPES = {
     "settling": ("I", "II", "III"),
@@ -108,10 +108,8 @@ REPLICATES = 40, 240
 class Child:
     """A process that runs a program with the flocsim of a folder and answers line by line."""
 
-    def __init__(self, tree, program, *arguments, folder, cache=None):
-        environment = {**os.environ, "PYTHONPATH": str(tree)}
-        if cache is not None:
-            environment["FLOCSIM_CACHE"] = str(cache)
+    def __init__(self, tree, program, *arguments, folder, cache):
+        environment = {**os.environ, "PYTHONPATH": str(tree), "FLOCSIM_CACHE": str(cache)}
         self.process = subprocess.Popen(
             [sys.executable, "-c", program, *map(str, arguments)],
             env=environment, cwd=folder, text=True,
@@ -158,13 +156,10 @@ def compare(there, here, condition, groups):
 
 def main():
     """Print the table."""
-    parser = parser_of(__doc__)
-    parser.add_argument("commit", help="the other commit")
-    parser.add_argument("--meeting", choices=list(TYPES), default="settling")
-    parser.add_argument("--vertices", type=int, default=64, metavar="N", help="default: 64")
-    parser.add_argument("--preset", default="tang2014", help="default: tang2014")
-    arguments = parser.parse_args()
-    print_heading()
+    arguments = begin(
+        __doc__, ("commit", {"help": "the other commit"}), vertices=64, preset="tang2014",
+        meeting={"choices": list(TYPES), "default": "settling"},
+    )  # fmt: skip
     meeting = arguments.meeting
     groups = 10 if arguments.quick else 60
     table = Table(
@@ -190,7 +185,7 @@ def main():
         add(table, "all", np.concatenate(every))
         there.close()
         here.close()
-    table.print(arguments.markdown)
+    table.print()
 
 
 def add(table, kind, found):

@@ -7,7 +7,7 @@ sphere without inertia, one with inertia at x = ζτ/m = 1, and two spheres that
 import math
 import time
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import DoubleLayer, StokesDrag, Thermal
 from flocsim.integrators import Implicit, Overdamped
@@ -51,13 +51,12 @@ def measured(system, kick, steps):
 
 def main():
     """Print the table."""
-    arguments = parse_arguments(__doc__)
+    arguments = begin(__doc__)
     steps = 50_000 if arguments.quick else 500_000
-    print_heading()
     table = Table("Kicks of one core", ("scene", "steps", "kicks a second"))
     for what, system, kick in cases():
         table.add(what, *measured(system, kick, steps))
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

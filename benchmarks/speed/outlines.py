@@ -13,11 +13,10 @@ for their ratio: .4.
 
 import time
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
+from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim import Body, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
@@ -36,7 +35,6 @@ FORCES = {
     "both, thick": (PULL, THICK),
 }  # fmt: skip
 
-QUICKSTART = Path(__file__).parents[2] / "examples" / "quickstart.toml"
 ZONES = {"tang2014": 5.925e-6, "clay": 1e-8}
 """{preset: D_0 [m]}, which divides outcomes and moves with the law where it follows from it."""
 
@@ -71,7 +69,7 @@ def cost(one, other, pose, forces, count):
 def study_of(preset, law, film, replicates):
     """A Study of all types, compiled."""
     forces = {"van_der_waals": law, "double_layer": law} | ({"lubrication": {}} if film else {})
-    config = load_config(QUICKSTART, {
+    config = load_config(EXAMPLES / "quickstart.toml", {
         "preset": preset, "seed": 1, "replicates": replicates, "forces": forces,
         "zone": {"distance": ZONES[preset]}, "shapes": {"vertices": [16]},
         "scene": {"types": ["I", "II", "III"], "delta": [0.5]}, "integrator": {"check_share": 0.0},
@@ -94,7 +92,7 @@ def run_all(study, replicates):
     return spent, steps
 
 
-def print_studies(replicates, markdown):
+def print_studies(replicates):
     """The table of studies."""
     table = Table("Replicates a second, N = 16",
                   ("preset", "water between", "as it is", "outlines", "ratio", "steps", "outlines")
@@ -106,17 +104,13 @@ def print_studies(replicates, markdown):
         (plain, steps), (along, more) = whole
         table.add(preset, "yes" if film else "no", count / plain, count / along, plain / along,
                   steps / count, more / count)  # fmt: skip
-    table.print(markdown)
+    table.print()
 
 
 def main():
     """Print all tables."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--pairs", type=int, default=8)
-    parser.add_argument("--replicates", type=int, default=20, help="of each type")
-    args = parser.parse_args()
+    args = begin(__doc__, pairs=8, replicates=20)
     pairs, count = (2, 500) if args.quick else (args.pairs, 2000)
-    print_heading()
     table = Table("A force evaluation at touch, median of pairs",
                   ("N", "forces", "µs", "least", "most", "over the goal"))  # fmt: skip
     made = Table("Made once a shape, r_eq of some 16 µm, 1/κ = 0.98 µm",
@@ -138,9 +132,9 @@ def main():
         times.append(time.perf_counter())
         spent = 1e3 * np.diff(times)
         made.add(n, len(known), float(spent[0]), len(nodes), float(spent[1]))
-    table.print(args.markdown)
-    made.print(args.markdown)
-    print_studies(2 if args.quick else args.replicates, args.markdown)
+    table.print()
+    made.print()
+    print_studies(2 if args.quick else args.replicates)
 
 
 if __name__ == "__main__":

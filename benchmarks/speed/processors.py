@@ -7,15 +7,12 @@ for flocsim.compiler.processor.BASELINE as they are by default, over that where 
 this processor. Both in turn, three times.
 """
 
-import os
-import resource
-import subprocess
 import sys
 import tempfile
 
 import llvmlite.binding as llvm
 
-from benchmarks.reporting import ROOT, Table, parse_arguments, print_heading
+from benchmarks.reporting import ROOT, Table, begin, spent_by
 
 CONFIG = """\
 preset = "{preset}"
@@ -44,17 +41,12 @@ def cpu_seconds(folder, variables, replicates):
     """CPU time of the study with so many replicates [s]."""
     words = [sys.executable, "-m", "flocsim.ensemble", "c.toml", "--quiet", "--restart",
              "--overwrite", "--replicates", str(replicates), "--output", "r.h5"]  # fmt: skip
-    env = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(words, cwd=folder, env=env, check=True, stderr=subprocess.DEVNULL)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return spent_by(words, folder, PYTHONPATH=str(ROOT), **variables).cpu
 
 
 def main():
     """Print the table."""
-    arguments = parse_arguments(__doc__)
-    print_heading(("numba",))
+    arguments = begin(__doc__)
     columns = ("study", "for its kind [s]", "for this one [s]", "ratio")
     table = Table("CPU time of 600 replicates", columns)
     ways = {}, {"NUMBA_CPU_NAME": llvm.get_host_cpu_name()}
@@ -68,7 +60,7 @@ def main():
             for _ in range(1 if arguments.quick else 3):
                 found = [cpu_seconds(folder, w, high) - cpu_seconds(folder, w, low) for w in ways]
                 table.add(name, *found, found[0] / found[1])
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

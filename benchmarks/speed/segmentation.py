@@ -1,27 +1,16 @@
-"""Finding flocs: time and outcome on real pictures, r_eq on known outlines, `flocsim fit --jobs`.
+"""Finding flocs: time and outcome on real pictures, r_eq on known outlines.
 
     python -m benchmarks.speed.segmentation [--quick] [--markdown] [--images DIR]
 
 Known outlines: real silhouettes put on a 1920×1080 frame with a vignette, blurred by 1 px, with
 noise; large frames: the same on 20 megapixels, with specks of one to three pixels.
-
---jobs: wall times in alternate runs, load of the machine beside them; where others keep the cores
-busy, two processes get no more of them than one.  The ratio on free cores is what does not depend
-on that: CPU time of one process / (CPU of the parent + half of the two workers').
 """
-
-import os
-import subprocess
-import sys
-import tempfile
-import time
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from benchmarks.pictures import PICTURES, checked, silhouettes
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin, cpu_of
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.reading import read_grey
 
@@ -48,9 +37,7 @@ def picture_table(images):
     segment(read_grey(images / SEGMENTED[-1]))
     for name in SEGMENTED:
         grey = read_grey(images / name)
-        began = time.process_time()
-        found = segment(grey)
-        spent = time.process_time() - began
+        spent, found = cpu_of(segment, grey)
         left = found.rejected_by_reason()
         both = (found.foreground & human, found.foreground | human) if "soot" in name else None
         table.add(
@@ -124,62 +111,19 @@ def large_table(flocs):
         "Frames of 20 megapixels at the default options", ("frame", "CPU s", "flocs", "left out")
     )
     for name, grey in large_frames(flocs):
-        began = time.process_time()
-        found = segment(grey)
-        spent = time.process_time() - began
+        spent, found = cpu_of(segment, grey)
         table.add(name, spent, len(found.regions), len(found.rejected))
-    return table
-
-
-RUN = """
-import resource, sys, time
-from flocsim.__main__ import main
-began = time.perf_counter()
-failed = main(sys.argv[1:])
-wall = time.perf_counter() - began
-spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-print(wall, *(usage.ru_utime + usage.ru_stime for usage in spent))
-sys.exit(failed)
-"""
-
-
-def fit_seconds(images, jobs, folder):
-    """(wall time, CPU time of the parent, of its workers) of a run of `flocsim fit` [s]."""
-    words = ["fit", images / "flocpy", images / "safas", "--pixel-size", "1e-6", "--jobs", jobs,
-             "--vertices", "8,16,28,64", "-o", f"{folder}/{jobs}.h5"]  # fmt: skip
-    command = [sys.executable, "-c", RUN, *map(str, words)]
-    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return [float(word) for word in done.stdout.split()[-3:]]
-
-
-def jobs_table(images, rounds):
-    """Times with one and two processes."""
-    table = Table(
-        "flocsim fit on eight pictures, N = 8, 16, 28, 64, [s]",
-        ("wall, 1 job", "wall, 2 jobs", "ratio", "CPU, 1 job", "CPU, 2 jobs: parent", "workers",
-         "ratio on free cores", "same bytes", "load average"),
-    )  # fmt: skip
-    for _ in range(rounds):
-        with tempfile.TemporaryDirectory() as folder:
-            one, two = (fit_seconds(images, jobs, folder) for jobs in (1, 2))
-            same = Path(folder, "1.h5").read_bytes() == Path(folder, "2.h5").read_bytes()
-            load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
-            free = (one[1] + one[2]) / (two[1] + two[2] / 2)
-            table.add(one[0], two[0], one[0] / two[0], one[1] + one[2], two[1], two[2], free,
-                      "yes" if same else "no", load)  # fmt: skip
     return table
 
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__, images=PICTURES)
+    arguments = begin(__doc__, packages=["scikit-image"], images=PICTURES)
     images = checked(arguments.images)
-    print_heading(["scikit-image"])
-    picture_table(images).print(arguments.markdown)
+    picture_table(images).print()
     known = silhouettes(images)
-    known_table(known).print(arguments.markdown)
-    large_table(known).print(arguments.markdown)
-    jobs_table(images, 1 if arguments.quick else 3).print(arguments.markdown)
+    known_table(known).print()
+    large_table(known).print()
 
 
 if __name__ == "__main__":

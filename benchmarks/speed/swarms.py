@@ -3,7 +3,7 @@
     python -m benchmarks.speed.swarms [--quick] [--parts cost flocs bed pile pairs threads …]
 
 Swarms are those of studies (`[scene] kind = "swarm"`, preset `si`, van der Waals cut at 1 um). CPU
-time of this process, compiled code warm.
+time of this process, compiled code warm. ``--seconds``: CPU time of a run at most.
 """
 
 import gc
@@ -12,11 +12,10 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import attrs
 import numpy as np
 
-from benchmarks.reporting import Table, parser_of, print_heading
-from flocsim import Body, Fluid, Sphere, Swarm, System, floor
+from benchmarks.reporting import Table, begin
+from flocsim import Body, Fluid, Sphere, SpheroPolygon, Swarm, System, floor
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.swarms.study import SwarmStudy, run_briefly
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
@@ -47,7 +46,6 @@ debye_length = "9.6 nm"
 """
 
 WATER = Fluid(buoyancy=True)
-PARTS = ("cost", "flocs", "bed", "pile", "pairs", "threads", "verlet", "memory")
 SMALL, LARGE = 5e-6, 1.4
 """Radius of the smaller discs of a bed [m], and that of the larger ones over it."""
 
@@ -55,13 +53,11 @@ SAFE = 0.2
 """Verlet's step over 1/ω of the contact: at 2 it is unstable, at .2 its error is some percent."""
 
 
-def swarm_of(number, fraction, vertices, duration=10.0, extra=""):
-    """The Swarm of replicate 0 of such a study, with more lines in its scene."""
+def swarm_of(number, fraction, vertices, duration=10.0):
+    """The Swarm of replicate 0 of such a study."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "swarm.toml"
         text = STUDY.format(number=number, fraction=fraction, vertices=vertices, duration=duration)
-        if extra:
-            text = text.replace(f"area_fraction = {fraction}", extra)
         path.write_text(text, "utf-8")
         swarm, _, _ = SwarmStudy(load_any_config(path)).swarm(0)
     run_briefly(swarm)  # compiled
@@ -183,20 +179,52 @@ def bed(arguments, table):
                   1e6 * spent / effort.body_steps, speed, fraction, found.status.name)  # fmt: skip
 
 
+SPHERORADIUS, POLYGON = 0.08, 6e-6
+"""Of the polygons of a pile: spheroradius over radius, and mean radius [m]."""
+
+
+def rough_polygon(count, radius, rng, rough=0.4):
+    """Return a star-shaped polygon of so many vertices, their distances from the centre within a
+    fraction ``rough`` of the radius [m]."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    reach = radius * (1.0 + rough * rng.uniform(-1.0, 1.0, count))
+    points = np.column_stack([reach * np.cos(angles), reach * np.sin(angles)])
+    return SpheroPolygon(points, radius=SPHERORADIUS * radius)
+
+
+def pile_of(number, friction, attraction, tolerance, seed=0):
+    """Return a Swarm of polygons above a periodic floor, with an attraction or without."""
+    rng = np.random.default_rng(seed)
+    shapes = [
+        rough_polygon(10, POLYGON * math.exp(0.25 * rng.normal()), rng) for _ in range(number)
+    ]
+    widest = 2.0 * max(shape.bounding_radius for shape in shapes)
+    width = widest * max(4.0, 0.5 * math.sqrt(number))
+    height = max(sum(shape.area for shape in shapes) / (0.3 * width), 3.0 * widest)
+    places = place_at_random(shapes, (width, height), rng, (True, False))
+    bodies = [
+        Body(shape, (x, y), angle=angle, density=2650.0)
+        for shape, (x, y, angle) in zip(shapes, places.tolist(), strict=True)
+    ]
+    forces = [Gravity(), StokesDrag(), Contact(friction=friction)]
+    if attraction:
+        forces.append(VanDerWaals(hamaker=4.7e-20, gap="surface", cut=1e-6))
+    bottom = floor(width, beyond=widest)
+    return Swarm([bottom, *bodies], forces, Implicit(tolerance), WATER, box=(width, None))
+
+
 def pile(arguments, table):
-    """Flocs of N = 16 come to rest on a floor; and lie there as long again."""
-    number, until = (50 if arguments.quick else 500), 40.0
-    box = f'floor = true\nperiodic = "x"\nbox = ["{max(100.0, 0.6 * number)} um", "700 um"]'
-    swarm = attrs.evolve(swarm_of(number, 0.2, 16, extra=box), integrator=Implicit(1e-8))
-    progress = swarm.begin(2.0 * until)
-    began, row = time.process_time(), [number]
-    for stop in (until, 2.0 * until):
-        while (status := progress.advance(stop)) == Status.PAUSED:
-            if time.process_time() - began > arguments.seconds:
-                break
-        speed = float(np.hypot(*progress.swarm.motion[progress.free][:, 3:5].T).max())
-        row += [progress.time, time.process_time() - began, progress.effort.body_steps, speed]
-    table.add(*row, status.name)
+    """Polygons settle on a floor and rest, by friction, with attraction and without."""
+    few = 10 if arguments.quick else 50
+    cases = [(few, friction, 3.0) for friction in ("none", 0.0, 0.01, 0.4)]
+    cases += [] if arguments.quick else [(500, 0.4, 8.0)]
+    for number, friction, until in cases:
+        for attraction in (True, False):
+            swarm = pile_of(number, friction, attraction, 1e-9)
+            spent, _, found = run(swarm, until, most=arguments.seconds)
+            speed = float(np.hypot(*found.velocity[-1, 1:, :2].T).max())
+            table.add(number, friction, "with" if attraction else "without", float(found.t[-1]),
+                      spent, found.effort.steps, speed, found.status.name)  # fmt: skip
 
 
 def threads(arguments, table):
@@ -276,9 +304,9 @@ TABLES = {
     "bed": (bed, "Frictionless discs of 5 and 7 um settle, tolerance 10 nm", (
         "bodies", "time [s]", "CPU [s]", "body steps", "us/body step", "fastest [m/s]",
         "bulk fraction", "ended")),
-    "pile": (pile, "Flocs of N = 16 on a floor, tolerance 10 nm", (
-        "bodies", "time [s]", "CPU [s]", "body steps", "fastest [m/s]", "time [s]", "CPU [s]",
-        "body steps", "fastest [m/s]", "ended")),
+    "pile": (pile, "Polygons settle on a floor and rest", (
+        "polygons", "friction", "attraction", "time [s]", "CPU [s]", "steps", "fastest [m/s]",
+        "ended")),
     "memory": (memory, "Memory of flocs of N = 16", (
         "bodies", "area fraction", "largest island", "swarm [kB a body]", "islands [kB a body]",
         "process [kB a body]")),
@@ -287,16 +315,13 @@ TABLES = {
 
 def main():
     """Print the tables."""
-    parser = parser_of(__doc__)
-    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--seconds", type=float, default=900.0, help="CPU time of a run at most")
-    arguments = parser.parse_args()
-    print_heading(used="one used but for threads")
+    parts = {"nargs": "+", "choices": TABLES, "default": list(TABLES)}
+    arguments = begin(__doc__, parts=parts, seconds=900.0, used="one used but for threads")
     for part in arguments.parts:
         measure, title, columns = TABLES[part]
         table = Table(title, columns)
         measure(arguments, table)
-        table.print(arguments.markdown)
+        table.print()
 
 
 if __name__ == "__main__":

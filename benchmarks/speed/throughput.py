@@ -11,7 +11,7 @@ import time
 import attrs
 import numpy as np
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from benchmarks.speed.evaluations import costs
 from benchmarks.speed.scenes import collisions
 from flocsim.ensembles.study import Study
@@ -85,7 +85,7 @@ def joined(all_runs):
     return Runs(*(np.concatenate([getattr(r, f) for r in all_runs]) for f in fields))
 
 
-def rates(study, markdown):
+def rates(study):
     """Print rates by type and N; {type: Runs at the largest N}."""
     table = Table(
         f"Replicates at tolerance {study.config.integrator.tolerance:g} m, "
@@ -99,7 +99,7 @@ def rates(study, markdown):
         for name, runs in found.items():
             rate_rows(table, name, vertices, runs)
         rate_rows(table, "all", vertices, joined(list(found.values())))
-    table.print(markdown)
+    table.print()
     return found
 
 
@@ -108,7 +108,7 @@ def flips(found, exact, deltas):
     return dict(zip(deltas, 100.0 * np.mean(found.outcome != exact.outcome, axis=1), strict=True))
 
 
-def print_flips(study, exact_study, found, markdown):
+def print_flips(study, exact_study, found):
     """Print the share of flipped outcomes by type and displacement."""
     deltas = study.config.scene.delta
     tight = exact_study.config.integrator.tolerance
@@ -124,10 +124,10 @@ def print_flips(study, exact_study, found, markdown):
         mean = float(np.mean(list(shares)))
         table.add(name, *map(float, shares), mean, float(exact.cpu.sum() / runs.cpu.sum()))
     table.add("all", *([""] * len(deltas)), 100.0 * total / count, "")
-    table.print(markdown)
+    table.print()
 
 
-def print_costs(quick, markdown):
+def print_costs():
     """Print µs per force evaluation."""
     table = Table(
         "µs per force evaluation, contact search and list upkeep included, Type I",
@@ -139,7 +139,7 @@ def print_costs(quick, markdown):
             contact, near, far = costs(preset, vertices, 20_000)
             each = (contact.microseconds, near.microseconds, far.microseconds)
             table.add(preset, vertices, *each, contact.listed, contact.per_list, contact.touching)
-    table.print(markdown)
+    table.print()
 
 
 def make_study(arguments, share):
@@ -159,17 +159,11 @@ def make_study(arguments, share):
 
 def main():
     """Print the three tables."""
-    arguments = parse_arguments(
-        __doc__,
-        preset={"default": "tang2014"},
-        replicates={"type": int, "default": 40, "help": "of each condition"},
-        tolerance={"type": float, "help": "[m], default: the integrator's own"},
-    )
-    print_heading()
+    arguments = begin(__doc__, preset="tang2014", replicates=40, tolerance={"type": float})
     study = make_study(arguments, 1.0)
-    found = rates(study, arguments.markdown)
-    print_flips(study, make_study(arguments, 0.01), found, arguments.markdown)
-    print_costs(arguments.quick, arguments.markdown)
+    found = rates(study)
+    print_flips(study, make_study(arguments, 0.01), found)
+    print_costs()
 
 
 if __name__ == "__main__":

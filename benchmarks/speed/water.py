@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
+from benchmarks.reporting import Table, begin
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kernels import study_of
 from flocsim.hydrodynamics import Meeting, SpherePair, prism_drag
@@ -122,11 +122,10 @@ def study_table(count):
 
 def main():
     """Print the tables."""
-    arguments = parse_arguments(__doc__)
-    print_heading()
-    pair_table().print(arguments.markdown)
-    outline_table(6 if arguments.quick else 24).print(arguments.markdown)
-    study_table(40 if arguments.quick else 400).print(arguments.markdown)
+    arguments = begin(__doc__)
+    pair_table().print()
+    outline_table(6 if arguments.quick else 24).print()
+    study_table(40 if arguments.quick else 400).print()
 
 
 if __name__ == "__main__":

@@ -4,20 +4,16 @@
 
 draws the cases with a fixed seed, runs each in a process that is killed after --limit seconds, and
 holds it against a reference (see benchmarks/stability/families.py) and against invariants. --case
-reruns one case and prints everything about it.
+reruns one case and prints everything about it; --family runs the cases of one family only.
 """
 
-import json
 import sys
 import time
 from collections import Counter
-from pathlib import Path
 
-import attrs
 import numpy as np
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
-from benchmarks.stability.case import RANGES
+from benchmarks.reporting import Table, begin
 from benchmarks.stability.families import FAMILIES, case_of, family_of
 from benchmarks.stability.verdict import KINDS, judge
 from benchmarks.stability.workers import judge_all
@@ -25,24 +21,9 @@ from benchmarks.stability.workers import judge_all
 BAD = ("wrong", "not finite", "crash", "hang")
 
 
-def arguments():
-    """The command line."""
-    return parse_arguments(
-        __doc__,
-        cases={"type": int, "default": 2000, "help": "with --quick: 200"},
-        first={"type": int, "default": 0, "help": "index of the first case"},
-        case={"type": int, "help": "rerun this one and print everything"},
-        limit={"type": float, "default": 30.0, "help": "seconds for a case"},
-        workers={"type": int, "default": 2},
-        family={"choices": list(FAMILIES), "help": "cases of this family only"},
-        save={"help": "also write every verdict to this file, one JSON a line"},
-        again={"help": "rerun the offenders of such a file only"},
-    )
-
-
 def show_case(index):
     """Run one case here and print all that is known of it."""
-    case, places = case_of(index)
+    case, _ = case_of(index)
     for body in case.bodies:
         shape = body.shape
         print(
@@ -54,7 +35,6 @@ def show_case(index):
     print(f"forces: {case.forces}\n{case.fluid}\nuntil {case.until!r} s, tolerance "
           f"{case.tolerance!r} m")  # fmt: skip
     print(case.system().explain())
-    print("places in the ranges:", {name: round(place, 3) for name, place in places.items()})
     print(judge(index))
 
 
@@ -73,10 +53,6 @@ def progress(total):
 
 def indices_of(options):
     """Indices of the cases to run."""
-    if options.again:
-        lines = Path(options.again).read_text("utf-8").splitlines()
-        verdicts = [json.loads(line) for line in lines]
-        return [verdict["index"] for verdict in verdicts if verdict["kind"] in BAD]
     count = 200 if options.quick else options.cases
     wanted = range(options.first, options.first + count)
     return [k for k in wanted if options.family in (None, family_of(k))]
@@ -121,26 +97,6 @@ def family_row(name, some):
     return list(map(str, cells))
 
 
-def decile_table(found):
-    """How the cases came out by the ranges that their numbers were drawn from."""
-    table = Table("right/typed/bad by decile of each range", ("range", *map(str, range(1, 11))))
-    for name, (low, high) in RANGES.items():
-        within = [[] for _ in range(10)]
-        for verdict in found:
-            if name in verdict.places:
-                within[min(max(int(10 * verdict.places[name]), 0), 9)].append(verdict)
-        if any(within):
-            table.rows.append([f"{name} {low:g}…{high:g}", *map(decile_cell, within)])
-    return table
-
-
-def decile_cell(some):
-    """right/typed/bad of one cell."""
-    names = {"stated": "right", **dict.fromkeys(BAD, "bad")}
-    kinds = Counter(names.get(v.kind, v.kind) for v in some)
-    return f"{kinds['right']}/{kinds['typed']}/{kinds['bad']}" if some else ""
-
-
 def offenders(found):
     """A line for every case that came out badly."""
     lines = [
@@ -154,21 +110,19 @@ def offenders(found):
 
 def main():
     """Print the table, or one case."""
-    options = arguments()
+    options = begin(
+        __doc__, cases=2000, first=0, case={"type": int}, limit=30.0, workers=2,
+        family={"choices": list(FAMILIES)}, used="two used",
+    )  # fmt: skip
     if options.case is not None:
         show_case(options.case)
         return
-    print_heading(used=f"{options.workers} used")
     began, indices = time.monotonic(), indices_of(options)
     found = judge_all(indices, options.workers, options.limit, progress(len(indices)))
     found.sort(key=lambda verdict: verdict.index)
     print(f"{len(found)} cases in {time.monotonic() - began:.0f} s.\n")
-    family_table(found).print(options.markdown)
-    decile_table(found).print(options.markdown)
+    family_table(found).print()
     print(offenders(found))
-    if options.save:
-        lines = [json.dumps(attrs.asdict(verdict), default=float) for verdict in found]
-        Path(options.save).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

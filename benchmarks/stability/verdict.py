@@ -47,14 +47,13 @@ class Verdict:
     amplification: float = float("nan")
     steps: int = 0
     wall: float = 0.0
-    places: dict = attrs.Factory(dict)
 
 
 def judge(index, tell=lambda stage: None):
     """The Verdict of a case; ``tell`` hears how far it has come."""
     verdict = Verdict(index, family_of(index))
     try:
-        case, verdict.places = case_of(index)
+        case, _ = case_of(index)
         verdict.tolerance = case.tolerance
         tell("running")
         run(case, verdict, tell)

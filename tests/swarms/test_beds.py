@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.accuracy.rest_of_piles import pile_of
-from benchmarks.speed.swarms import bulk_fraction
+from benchmarks.speed.swarms import bulk_fraction, pile_of
 from flocsim import Body, Sphere, Swarm, floor
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit, Status

@@ -1,8 +1,7 @@
 """Encounters that overlaps far below the tolerance decide, against what they come to at 1e-12 m.
 
-The truth is that of another version of the integrator, which followed every switch (1114ba2,
-benchmarks/accuracy/contact_scale.py), at tolerances from 1e-11 to 1e-13 m; where doublets rattle it
-ran out of 200,000 steps.
+The truth is that of another version of the integrator, which followed every switch (1114ba2),
+at tolerances from 1e-11 to 1e-13 m; where doublets rattle it ran out of 200,000 steps.
 """
 
 import functools

@@ -7,9 +7,9 @@ import subprocess
 
 import pytest
 
-from benchmarks.faults.job import alive, descendants, is_python
 from flocsim.ensembles.parallel import communicator
 from flocsim.ensembles.parallel.communicator import Silence, SilentRank
+from tests.helpers.jobs import alive, descendants, is_python
 from tests.helpers.journals import rows_in
 from tests.helpers.small_study import command, mpirun, write_small
 from tests.helpers.waiting import PATIENCE, wait_until

@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 import pytest
 
-from benchmarks.faults.fuzz_readers import JournalReader
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import (
@@ -22,6 +21,7 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, FlocsimError
 from flocsim.io.journal import CHUNK, SESSION, Journal
 from flocsim.io.seals import seal
+from tests.helpers.hostile_readers import JournalReader
 from tests.helpers.journals import write_records
 from tests.helpers.sealed import read_sealed
 from tests.helpers.small_study import small_config

@@ -1,7 +1,5 @@
 """Damaged and hostile caches of compiled code: no wrong row, no crash, no traceback, nothing run.
 
-    python -m benchmarks.faults.damage_cache [--quick] [--markdown] [--seed S]
-
 A cache that a small study of spheres has filled is damaged in one way at a time, and the study is
 run in a fresh process with it: it has to end with exit code 0 and the rows of an undisturbed run,
 at most one line on stderr, and without running what was planted.
@@ -12,19 +10,12 @@ import pickle
 import shutil
 import subprocess
 import sys
-import tempfile
-import time
-from pathlib import Path
 
-import numpy as np
-
-from benchmarks.faults.job import Tally, make_study
-from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.compiler.disk_cache import DIGEST_SIZE, MARK
 from flocsim.io.results.file import read_results
+from tests.helpers.jobs import make_study
 from tests.helpers.results_files import same_data
 
-COUNT, QUICK = 500, 24
 PATIENCE = 600.0
 """Seconds after which a run hangs: some have to compile an engine."""
 
@@ -110,8 +101,7 @@ WAYS = (flip, flip, cut, empty, swap, plant, link, pipe, open_file, open_folder,
 
 
 def run(folder, cache):
-    """(exit code, stderr, seconds) of the study in a fresh process; code None for a hang."""
-    began = time.monotonic()
+    """(exit code, stderr) of the study in a fresh process; code None for a hang."""
     words = [sys.executable, "-m", "flocsim.ensemble", "study.toml", "--quiet",
              "--replicates", "2"]  # fmt: skip
     try:
@@ -120,46 +110,43 @@ def run(folder, cache):
             capture_output=True, text=True, timeout=PATIENCE,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return None, "", PATIENCE
-    return done.returncode, done.stderr, time.monotonic() - began
+        return None, ""
+    return done.returncode, done.stderr
 
 
 def problem_of(folder, cache, mark, reference):
-    """(what is wrong with a run on a damaged cache, "" if nothing; seconds; whether it hangs)."""
+    """Return what is wrong with a run on a damaged cache; "" if nothing."""
     output = folder / "study.h5"
     output.unlink(missing_ok=True)
-    code, errors, seconds = run(folder, cache)
+    code, errors = run(folder, cache)
     if code is None:
-        return "hang", seconds, True
+        return "hang"
     if code != 0:
-        return f"exit code {code}: {errors[-300:]}", seconds, False
+        return f"exit code {code}: {errors[-300:]}"
     # What is implausible of the study itself is said whatever becomes of the cache.
     lines = [line for line in errors.splitlines() if not line.startswith("flocsim: warning: ")]
     if len(lines) > 1:
-        return f"several lines: {errors[-300:]}", seconds, False
+        return f"several lines: {errors[-300:]}"
     if mark.exists():
-        return "what was planted has been run", seconds, False
+        return "what was planted has been run"
     if apart := same_data(reference, output):
-        return f"wrong rows: {apart}", seconds, False
-    return "", seconds, False
+        return f"wrong rows: {apart}"
+    return ""
 
 
-def choose(cache, rng, kept):
-    """A file of the cache: a law mostly, which is compiled anew in a second, else an engine."""
-    files = sorted(cache.iterdir())
-    engines = [path for path in files if "scene" in path.name]
-    others = [path for path in files if path not in engines]
-    return rng.choice(engines if rng.random() < kept else others)
+def choose(cache, rng):
+    """Return a file of the cache, no engine: a law is compiled again in a second."""
+    return rng.choice([path for path in sorted(cache.iterdir()) if "scene" not in path.name])
 
 
-def damage_often(root, count, rng, engines=0.1):
-    """{way: Tally} of so many damages; this share of them hits an engine."""
+def damage_often(root, count, rng):
+    """Return what is wrong after so many damages, each in the next of `WAYS`."""
     folder, pristine = make_study(root / "study"), root / "pristine"
     assert run(folder, pristine)[0] == 0
     reference = root / "reference.h5"
     shutil.move(folder / "study.h5", reference)
     assert read_results(reference).replicates["outcome"].size
-    tallies = {way.__name__: Tally() for way in WAYS}
+    wrong = []
     for number in range(count):
         way = WAYS[number % len(WAYS)]
         # Of what nothing is taken, everything is compiled anew.
@@ -167,30 +154,8 @@ def damage_often(root, count, rng, engines=0.1):
         shutil.rmtree(cache, ignore_errors=True)
         shutil.copytree(pristine, cache)
         cache.chmod(0o755)
-        way(choose(cache, rng, engines), rng, mark)
-        problem, seconds, hang = problem_of(folder, cache, mark, reference)
-        problem = f"{way.__name__}: {problem}" if problem else ""
-        tallies[way.__name__].add(problem, seconds, hang)
+        way(choose(cache, rng), rng, mark)
+        if problem := problem_of(folder, cache, mark, reference):
+            wrong.append(f"{way.__name__}: {problem}")
         shutil.rmtree(mark, ignore_errors=True)
-    return tallies
-
-
-def main():
-    """Print the table; exit code 1 if anything was wrong."""
-    seed = {"type": int, "default": 1, "help": "of the damages"}
-    arguments = parse_arguments(__doc__, seed=seed)
-    print_heading()
-    rng = np.random.default_rng(arguments.seed)
-    table = Table(
-        "Damaged caches", ("way", "times", "same rows, nothing run", "hangs", "slowest [s]")
-    )
-    with tempfile.TemporaryDirectory() as name:
-        tallies = damage_often(Path(name), QUICK if arguments.quick else COUNT, rng)
-    for way, tally in tallies.items():
-        table.add(way, tally.faults, tally.right, tally.hangs, tally.slowest)
-    table.print(arguments.markdown)
-    return 1 if any(tally.wrong for tally in tallies.values()) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return wrong

@@ -24,9 +24,6 @@ BESIDE_PYTHON = Path(sys.executable).parent
 PATIENCE = 30.0
 """Seconds after which a job that does not end hangs."""
 
-REPORTED = 25
-"""Faults of a kind after which a line says how they went: the whole takes hours."""
-
 STUDY = """\
 preset = "tang2014"
 seed = 3
@@ -165,30 +162,6 @@ class Job:
         self.process.wait()
         self.errors.close()
         return None, PATIENCE
-
-
-@attrs.define
-class Tally:
-    """How faults of one kind have ended."""
-
-    faults: int = 0
-    right: int = 0
-    hangs: int = 0
-    slowest: float = 0.0
-    wrong: list = attrs.Factory(list)
-
-    def add(self, problem, seconds, hang=False):
-        """Count a fault; ``problem`` is "" where nothing was lost."""
-        self.faults += 1
-        self.right += not problem
-        self.hangs += hang
-        self.slowest = max(self.slowest, seconds)
-        if problem:
-            self.wrong.append(problem)
-            print(problem, file=sys.stderr, flush=True)
-        if self.faults % REPORTED == 0:
-            counted = f"{self.faults} of a kind, {len(self.wrong)} wrong, {self.hangs} hangs"
-            print(f"{counted}, slowest {self.slowest:.1f} s", file=sys.stderr, flush=True)
 
 
 def make_study(folder):

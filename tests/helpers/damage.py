@@ -1,12 +1,10 @@
 """Byte flips and truncations of journals and results files: all found, nothing wrong believed."""
 
 import shutil
-import time
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.faults.job import Tally, make_study, run_here
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.storage.identity import identity_of
@@ -17,6 +15,7 @@ from flocsim.errors import FlocsimError
 from flocsim.io import groups
 from flocsim.io.journal import Journal
 from flocsim.io.results.file import read_results
+from tests.helpers.jobs import make_study, run_here
 from tests.helpers.results_files import same_data
 
 WHOLE_RERUNS = 25
@@ -46,22 +45,22 @@ def a_journal(root):
 
 
 def damage_journal(root, reference, count, rng):
-    """{kind: Tally} of faults in a journal."""
+    """Return what is wrong with how so many faults in a journal end."""
     folder, data = a_journal(root)
     (folder / "study.h5").unlink()
     study = Study(load_config(folder / "study.toml"))
     identity = identity_of(study)
     truth = read_results(reference).replicates
-    tallies = {"journal flipped": Tally(), "journal truncated": Tally()}
+    wrong = []
     for number in range(count):
         changed, kind = damaged(data, rng)
-        began = time.monotonic()
         (folder / "study.h5.journal").write_bytes(changed)
         problem = believed_wrong(folder, study, identity, truth, changed)
         if not problem and number < WHOLE_RERUNS:
             problem = finished_wrong(folder, changed, reference)
-        tallies[f"journal {kind}"].add(problem, time.monotonic() - began)
-    return tallies
+        if problem:
+            wrong.append(f"journal {kind}: {problem}")
+    return wrong
 
 
 def believed_wrong(folder, study, identity, truth, changed):
@@ -109,21 +108,21 @@ def finished_wrong(folder, changed, reference):
 
 
 def damage_results(root, reference, count, rng):
-    """{kind: Tally} of faults in a results file: each is found before HDF5 parses the file."""
+    """Return what is wrong with how a results file with so many faults is refused: each is found
+    before HDF5 parses the file."""
     data = Path(reference).read_bytes()
     path = root / "damaged.h5"
-    tallies = {"results flipped": Tally(), "results truncated": Tally()}
-    opened, parse = [], groups.open_hdf5
+    wrong, opened, parse = [], [], groups.open_hdf5
     groups.open_hdf5 = lambda *words, **more: opened.append(words) or parse(*words, **more)
     try:
         for _ in range(count):
             changed, kind = damaged(data, rng)
             path.write_bytes(changed)
-            began = time.monotonic()
-            tallies[f"results {kind}"].add(read_wrong(path, opened), time.monotonic() - began)
+            if problem := read_wrong(path, opened):
+                wrong.append(f"results {kind}: {problem}")
     finally:
         groups.open_hdf5 = parse
-    return tallies
+    return wrong
 
 
 def read_wrong(path, opened):

@@ -1,44 +1,16 @@
-"""Hostile files of every kind: each is read, or refused with one line; no crash, no hang.
-
-    python -m benchmarks.faults.fuzz_readers [--quick] [--markdown] [--only results …]
-                                             [--count N] [--seconds S]
-
-Valid files are changed through h5py, in their bytes, in their JSON, and sealed again
-(tests/helpers/hostile_files.py), from a fixed seed. They are read in processes of their own, with
-a limit on memory and 5 s of CPU time for each file: a process that ends by a signal is a crash.
-What was accepted is looked at: NaN where there was none, codes without a word. Files that something
-was found with are kept in the folder flocsim-fuzz among the temporary ones. (Atheris guides by the
-coverage of Python code, but what crashes and hangs is C, which it does not see.)
-"""
+"""Readers of every kind of file, each with the maker of hostile ones: valid files that are changed
+through h5py, in their bytes, in their JSON, and sealed again (tests/helpers/hostile_files.py)."""
 
 import math
-import multiprocessing
-import os
 import random
-import resource
-import shutil
-import sys
-import tempfile
-import time
 import traceback
 import warnings
-from collections import Counter
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.reporting import Table, parse_arguments, print_heading
 from flocsim.ensembles.storage.identity import short
 from flocsim.errors import ConfigError, FileError, FlocsimError
 from tests.helpers import hostile_files
-
-COUNT, QUICK = 5000, 250
-LONGEST, LONGEST_WAIT = 5.0, 60.0
-"""Seconds of CPU time, and of any time, from which on a file is a hang."""
-
-WARM = 25
-MEMORY = 6 * 2**30
-KEPT = Path(tempfile.gettempdir()) / "flocsim-fuzz"
 
 
 def read_results_file(path):
@@ -326,112 +298,3 @@ def made(make, name, number, folder):
         except Exception:
             continue
     raise RuntimeError(f"no file of {name} could be made")
-
-
-def work(name, first, count, folder, pipe):
-    """Read the files of numbers from ``first`` on, telling the parent about each."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 2)  # decoders speak there
-    folder.mkdir(parents=True, exist_ok=True)
-    make, read = reader(name, folder)
-    for number in range(WARM):
-        # The first of all import what they need, which takes seconds on a busy machine.
-        outcome(read, made(make, f"{name} warm", number, folder))
-    for number in range(first, count):
-        path = made(make, name, number, folder)
-        pipe.send(("begin", str(path), ""))
-        pipe.send((*outcome(read, path), ""))
-    pipe.send(("end", "", ""))
-
-
-def throw(name, count, seconds, root):
-    """(Counter of outcomes, longest time [s], what was wrong) of so many files of a kind."""
-    context = multiprocessing.get_context("spawn")
-    counts, slowest, wrong, number = Counter(), 0.0, [], 0
-    until = time.monotonic() + seconds
-    while number < count and time.monotonic() < until:
-        receiving, sending = context.Pipe(duplex=False)
-        job = context.Process(target=work, args=(name, number, count, root / name, sending))
-        job.start()
-        sending.close()
-        path, began, cpu, ended = "", time.monotonic(), 0.0, ""
-        while not ended:
-            if not receiving.poll(0.5):
-                waited = time.monotonic() - began
-                busy = cpu_seconds(job.pid) - cpu
-                if (path and (busy > LONGEST or waited > LONGEST_WAIT)) or waited > 300.0:
-                    ended = "hang"
-                continue
-            try:
-                what, text, _ = receiving.recv()
-            except EOFError:
-                ended = "crash"
-                break
-            if what == "begin":
-                path, began, cpu = text, time.monotonic(), cpu_seconds(job.pid)
-            elif what == "end":
-                ended = "end"
-            else:
-                slowest = max(slowest, time.monotonic() - began)
-                counts[what] += 1
-                number += 1
-                if what not in ("read", "refused"):
-                    wrong.append((what, text))
-                    keep(path, f"{what}-{number}")
-                if time.monotonic() > until:
-                    ended = "time"
-        job.join(20.0 if ended == "crash" else 0.0)
-        job.kill()
-        job.join()
-        if ended in ("hang", "crash"):
-            counts[ended] += 1
-            number += 1
-            wrong.append((ended, f"{path}: exit code {job.exitcode}"))
-            keep(path, f"{ended}-{number}")
-    return counts, slowest, wrong
-
-
-def cpu_seconds(pid):
-    """CPU time [s] that a process has used; 0 where it has gone."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def keep(path, name):
-    """Keep a file that something was found with."""
-    if path:
-        KEPT.mkdir(exist_ok=True)
-        shutil.copy(path, KEPT / f"{name.replace(' ', '-')}-{Path(path).name}")
-
-
-def main():
-    """Print the table; exit code 1 where a file was neither read nor refused as it should be."""
-    most = {"type": float, "default": math.inf, "help": "seconds for each kind of file"}
-    arguments = parse_arguments(
-        __doc__, seconds=most, count={"type": int, "default": 0, "help": "files of each kind"},
-        only={"nargs": "+", "default": list(KINDS), "choices": KINDS},
-    )  # fmt: skip
-    print_heading(("h5py", "pillow", "tifffile"))
-    count = arguments.count or (QUICK if arguments.quick else COUNT)
-    columns = ("read", "refused", "traceback", "not one plain line", "wrongly accepted", "hang",
-               "crash")  # fmt: skip
-    table = Table("Hostile files", ("reader", "files", *columns, "slowest [s]"))
-    found = []
-    with tempfile.TemporaryDirectory() as name:
-        for kind in arguments.only:
-            counts, slowest, wrong = throw(kind, count, arguments.seconds, Path(name))
-            table.add(kind, counts.total(), *(counts[each] for each in columns), slowest)
-            found += wrong
-    table.print(arguments.markdown)
-    for (what, text), number in Counter(found).most_common(20):
-        print(f"{number} × {what}: {text}\n")
-    return 1 if found else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
