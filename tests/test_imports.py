@@ -83,7 +83,6 @@ INNER_ROWS = {
         ["estimates"],
         ["contents"],
         ["storage"],
-        ["kernels"],
         ["study"],
         ["preflight"],
         ["collision"],

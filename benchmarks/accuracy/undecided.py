@@ -21,7 +21,7 @@ from flocsim.ensembles.estimates.statistics import (
     pooled_sums,
     probabilities,
 )
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.runner import run
 from flocsim.io.confidence import efficiency
 from flocsim.io.results.kernel_group import ESTIMATES

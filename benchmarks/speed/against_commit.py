@@ -54,7 +54,7 @@ def group_of(group):
 """,
     "shear": """\
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 
 config = load_any_config(Path(sys.argv[1]))
 study = study_of(config)

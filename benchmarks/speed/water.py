@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.reporting import Table, begin
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.hydrodynamics import Meeting, SpherePair, prism_drag
 from flocsim.hydrodynamics.two_spheres import functions_of
 from flocsim.io.shape_library import SHIPPED, read_library

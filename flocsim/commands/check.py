@@ -21,9 +21,9 @@ import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES, TIGHTER, Draw, exact_method
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.study import Study, flocs_of
+from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError, FlocsimError, UsageError
 from flocsim.fields import read_number
 from flocsim.forces import Contact

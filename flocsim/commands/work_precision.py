@@ -22,7 +22,7 @@ from flocsim.ensembles.collision.draw import MORE_STEPS
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.pairs.opened import one_count_study, with_one_count
 from flocsim.ensembles.pilot.trials import (
     Job,

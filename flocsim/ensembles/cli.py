@@ -161,7 +161,7 @@ def own_config(comm, arguments):
 
 def study(config, comm, arguments):
     """Run the study and write its results; the exit code."""
-    from flocsim.ensembles.contents import file_kind
+    from flocsim.ensembles.config import contents_of
     from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
 
@@ -180,14 +180,14 @@ def study(config, comm, arguments):
         return STOPPED
     if comm.rank > 0:
         return 0
-    kind, found, seconds = kind_of(config), ended.results, ended.wall_time
+    shown = contents_of(kind_of(config).format)
+    found, seconds = ended.results, ended.wall_time
     if not arguments.quiet:
-        shown = file_kind(output)
         tell((shown.told or shown.table)(found))
         tell(shown.source(found))
-        tell(f"{output}: {kind.total(found)} replicates, {ended.computed} of them run in "
+        tell(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
-    code, line = kind.verdict(found)
+    code, line = shown.verdict(found)
     if line:
         tell(f"flocsim: {line}; the rows are in {output}", sys.stderr)
     return code
@@ -209,10 +209,11 @@ def guarded(comm, arguments):
         if config is not None and not arguments.dry_run:
             code = study(config, comm, arguments)
         elif config is not None and comm.rank == 0:
+            from flocsim.ensembles.config import contents_of
             from flocsim.ensembles.kind import kind_of
 
-            ranks = max(comm.size, arguments.jobs)
-            tell(kind_of(config).dry_run(config, ranks, arguments.pilot))
+            shown = contents_of(kind_of(config).format)
+            tell(shown.dry_run(config, max(comm.size, arguments.jobs), arguments.pilot))
         comm.close()
         return code
     except StopRequested:

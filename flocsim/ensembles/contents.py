@@ -88,6 +88,21 @@ class Joined:
     below: Callable[[Any], list[str]] = lambda swept: []
 
 
+def later(module: str, name: str) -> Callable[..., Any]:
+    """A function of a module of flocsim that is loaded when it is called: what shows a file has no
+    need of the engine."""
+    return lambda *args, **more: getattr(importlib.import_module(f"flocsim.{module}"), name)(
+        *args, **more
+    )
+
+
+def title_of(config: Any) -> str:
+    """Return what a study of a config would do, in a few words."""
+    from flocsim.ensembles.kind import study_of  # which needs the engine
+
+    return str(study_of(config, []).title)
+
+
 @attrs.frozen(eq=False, kw_only=True)
 class Contents:
     """What the commands ask of a kind of file; ``found`` is what `read` gives."""
@@ -138,16 +153,26 @@ class Contents:
     """(path, allowed modules) → lines on what slow flow makes of it."""
     run: Any = None
     """(found) → scalars of the group ``run``."""
-    so_far: Any = None
+    running: Any = None
     """(Unfinished) → facts of a study that has not ended."""
 
-
-def later(module: str, name: str) -> Callable[..., Any]:
-    """A function of a module of flocsim that is loaded when it is called: what shows a file has no
-    need of the engine."""
-    return lambda *args, **more: getattr(importlib.import_module(f"flocsim.{module}"), name)(
-        *args, **more
-    )
+    # What rank 0 asks of a kind of study; the functions may need the engine.
+    results: Any = None
+    """(study, beginning, count, run, output or None, whether all rows are to be in memory) →
+    results of so many replicates of each condition, written to the output."""
+    old_rows: Any = None
+    """(path) → context manager of a results file that is to be extended, as OldResults."""
+    so_far: Any = None
+    """(store, what the study's session asked for) → (results so far, how many of those that
+    progress counts are there, and of how many)."""
+    facts: Callable[[Any], dict[str, Any]] = lambda study: {}
+    """(study) → what the results say of it besides their tables, as JSON can hold it."""
+    verdict: Callable[[Any], tuple[int, str]] = lambda found: (0, "")
+    """(results) → (exit code, what to say of replicates without an outcome; "" for nothing)."""
+    stop_rule: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda n: False
+    """(study, store) → whether so many replicates of each condition are enough."""
+    dry_run: Callable[[Any, int, bool], str] = lambda config, *_: title_of(config)
+    """(config, ranks, with a pilot) → what a study would do."""
 
 
 def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:
@@ -203,7 +228,7 @@ def text_of(path: str | os.PathLike) -> str:
 def unfinished_text(found: Any) -> str:
     """What an Unfinished has so far; nothing of it is final."""
     kind, last = contents_of(found.kind), found.sessions[-1]
-    facts = [*kind.so_far(found), ("begun", f"{last['date']} by {last['command']}")]
+    facts = [*kind.running(found), ("begun", f"{last['date']} by {last['command']}")]
     if found.unread:
         facts.append(("damaged", f"{found.unread} records, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)

@@ -26,7 +26,7 @@ from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.pairings import class_facts, pairings_of
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import BAND, Config
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.pilot.forecast import (
     Forecast,

@@ -6,15 +6,14 @@ row is what a finished replicate comes to, of the columns of its kind of study; 
 ROW. What is saved of an unfinished one are its parts, by name. Replicates of one condition are
 kept as intervals: sorted, disjoint pairs [first, stop).
 
-A kind gives a StudyKind, its conditions, draws and runs, which every rank has, and a Kind, the
-functions by which rank 0 checks, describes and writes such studies. The journal, dealing to ranks
-and processes, resuming, identities, signals and progress exist once and ask these two.
-`kinds` has all of them, by their scenes.
+A kind gives a subclass of StudyKind, the conditions, draws and runs of its replicates, which every
+rank has, and Contents (`flocsim.ensembles.contents`), what becomes of the rows of a study and what
+commands show of its files. The journal, dealing to ranks and processes, resuming, identities,
+signals and progress exist once and ask these two. `kinds` has all of them, by their scenes.
 """
 
 import json
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from functools import cache
 from itertools import product
 from typing import Any, ClassVar, NamedTuple
@@ -36,6 +35,16 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 
 COLUMNS = tuple(REPLICATES)
 
+PHYSICS = (
+    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "run.py",
+    "compiler", "bonds", "hydrodynamics", "forces", "integrators", "geometry/shapes",
+    "geometry/contact", "io/results/schema.py", "io/results/events.py",
+    "ensembles/collision", "ensembles/study.py",
+)  # fmt: skip
+"""Modules, or folders of such at any depth, whose code decides what becomes of two bodies.
+geometry/fit makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py
+holds this list against all that a replicate imports."""
+
 LARGEST_REPLICATE = 2**40
 
 ORDER = ("types", "vertices", "delta")
@@ -46,9 +55,6 @@ Interval = tuple[int, int]
 
 Code = tuple[int, int]
 """Place of a collision type, and N: they stand for all that runs the same compiled code."""
-
-Place = tuple[int, int, float]
-"""Of a condition: place of the type, N, share of δ_max."""
 
 Keep = Callable[[str, dict, bytes], object]
 """Saves a part of an unfinished replicate: name, description, data."""
@@ -128,19 +134,66 @@ def total(intervals: Iterable[Interval]) -> int:
 
 
 class StudyKind:
-    """What every rank asks of a study. All that is random follows from (seed, replicate).
+    """A study of one kind: `flocsim.ensembles.contents.Contents` is what becomes of its rows.
 
-    A subclass has ``config`` and ``flocs``, and gives `run_task`, `compile` and `check_rows`; the
-    rest has a default. A row is what a finished replicate comes to, numbers of the types ``row``.
+    A subclass gives ``scenes``, ``format``, ``row``, `run_task` and `has_failed`; an instance has
+    the ``config`` and the ``flocs`` of a study. All else has a default. All that is random follows
+    from (seed, replicate).
     """
 
     config: Config
     flocs: list
+    scenes: ClassVar[Sequence[type]]
+    """The classes of its [scene]."""
+    format: ClassVar[str]
+    """What its results files say that they are."""
+    code: ClassVar[Sequence[str]] = PHYSICS
+    """Modules of flocsim, or folders of such, whose code decides what is in a row."""
     row: ClassVar[np.dtype] = ROW
+    """Columns of a finished replicate: numbers."""
     most_rows: ClassVar[int] = MOST_ROWS
-    """Of a chunk; where it is 1 a replicate may go on from what was kept of it."""
+    """Of a chunk; where it is 1 a replicate may resume from its parts."""
     noun: ClassVar[str] = "replicates"
     """What progress counts."""
+    pieces: int = 1
+    """How many of these each replicate has."""
+    in_common: ClassVar[Sequence[str]] = ORDER
+    """Names in `asked` of what all parts of a sweep have to agree on."""
+
+    def run_task(
+        self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
+        keep: Keep | None = None, going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """Run one replicate: (row, None), (row, note) where it failed, (None, None) where halted.
+
+        ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
+        """
+        raise NotImplementedError
+
+    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Return flags of the rows of failed replicates; ``column(name)`` gives their values."""
+        raise NotImplementedError
+
+    @staticmethod
+    def flocs_of(config: Config) -> list:
+        """Grow or read the flocs that a config's study needs."""
+        return []
+
+    @staticmethod
+    def check(config: Config) -> None:
+        """Raise the FlocsimError that a config's study would meet."""
+
+    def prepare(self, comm: Any) -> None:
+        """Raise the same for what takes all ranks of a communicator to look at."""
+
+    def doubts(self) -> list[str]:
+        """Return lines on what is implausible in the study."""
+        return []
+
+    def identity_facts(self) -> dict[str, Any]:
+        """Return what rows follow from besides config, flocs, code and machine: numbers, text,
+        and arrays and lists of shapes, which are compared by their digests."""
+        return {}
 
     @property
     def scene(self) -> Any:
@@ -148,9 +201,10 @@ class StudyKind:
         return self.config.scene
 
     @property
-    def pieces(self) -> int:
-        """How many of these each replicate has."""
-        return 1
+    def conditions(self) -> tuple[Condition, ...]:
+        """All conditions, in the order of the results file."""
+        scene, vertices = self.config.scene, self.config.shapes.vertices
+        return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -162,23 +216,6 @@ class StudyKind:
     @property
     def size(self) -> int:
         return int(np.prod(self.shape))
-
-    @property
-    def conditions(self) -> tuple[Condition, ...]:
-        """All conditions, in the order of the results file."""
-        scene, vertices = self.config.scene, self.config.shapes.vertices
-        return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
-
-    @property
-    def places(self) -> tuple[Place, ...]:
-        """The Place of every condition."""
-        scene, vertices = self.config.scene, self.config.shapes.vertices
-        return tuple(product(range(len(scene.names)), vertices, scene.delta))
-
-    @property
-    def kinds(self) -> list[Code]:
-        """What stands for the kinds of compiled code that the study needs."""
-        return [(0, self.config.shapes.vertices[0])]
 
     @property
     def title(self) -> str:
@@ -212,47 +249,25 @@ class StudyKind:
             "delta": list(config.scene.delta), "replicates": config.replicates,
         }  # fmt: skip
 
-    def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """{name: what all parts of a sweep have in common} of what `asked` says of one of them."""
-        return {name: asked[name] for name in ORDER}
+    @property
+    def kinds(self) -> list[Code]:
+        """What stands for the kinds of compiled code that the study needs."""
+        return [(0, self.config.shapes.vertices[0])]
 
     def compile(self, kinds: Iterable[Code]) -> None:
-        """Compile, or load from the disk, what these kinds need."""
-        raise NotImplementedError
+        """Compile, or load from the disk, what these kinds need, by running a replicate of each."""
+        for place, vertices in kinds:
+            condition = Condition(self.scene.names[place], vertices, self.scene.delta[0])
+            self.run_task(condition, 0, lambda: False)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """Those that no run on this machine has compiled, as far as can be told before they are
         run."""
         return []
 
-    def run_task(
-        self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
-        keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """(row, None) of one replicate; (row, note) where it failed; row None where it was halted.
-
-        ``left``: what `left_of` found; ``keep`` and ``going`` are for replicates that take long.
-        """
-        raise NotImplementedError
-
-    def note(self, place: Place, replicate: int, why: str) -> dict[str, Any]:
+    def note(self, condition: Condition, replicate: int, why: str) -> dict[str, Any]:
         """What is needed to run a replicate again, and why one would, as JSON can hold it."""
-        condition, vertices, share = place
-        name = self.config.scene.names[condition]
-        about = {"type": name, "vertices": vertices, "delta": share}
-        return about | {"replicate": replicate, "why": why}
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        raise NotImplementedError
-
-    def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which rows are of failed replicates."""
-        raise NotImplementedError
-
-    def check_part(self, name: str, description: dict, data: bytes) -> None:
-        """ValueError for what cannot have been saved of a replicate."""
-        raise ValueError("unfinished replicates cannot be saved")
+        return condition._asdict() | {"replicate": replicate, "why": why}
 
     def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
         """ValueError where what is saved of the replicate of a row is not all there; ``parts``:
@@ -263,7 +278,7 @@ class StudyKind:
         return False
 
     def left_of(self, parts: Any) -> Any:
-        """Where a replicate goes on, by its Parts; None: it begins."""
+        """Where a replicate resumes, by its Parts; None: it begins anew."""
         return None
 
 
@@ -281,71 +296,24 @@ class OldResults:
     sparse: bool = False
 
 
-@attrs.frozen(eq=False)
-class Kind:
-    """What rank 0 asks about a kind of study; ``study`` is a StudyKind, ``results`` what the kind
-    makes of one."""
-
-    scenes: Sequence[type]
-    """The classes of its [scene]."""
-    make: Callable[..., Any]
-    """(config, flocs) → study."""
-    identity: Callable[..., dict]
-    """(study, facts of the machine or None) → all that its rows follow from."""
-    code: Sequence[str]
-    """Modules of flocsim whose code decides what is in a row."""
-    old_rows: Callable[[Any], AbstractContextManager["OldResults"]]
-    """(path) → its results file that is to be extended, open as OldResults."""
-    results: Callable[..., Any]
-    """(study, beginning, count, run, output or None, whether all rows are to be in memory) →
-    results, written to the output."""
-    total: Callable[[Any], int]
-    """How many replicates results have."""
-    so_far: Callable[..., Any]
-    """(journal, sessions) → Unfinished, what it has so far."""
-    flocs: Callable[[Config], list] = lambda config: []
-    """The flocs that a config's study needs, grown or read."""
-    check: Callable[[Config], object] = lambda config: None
-    """Raises the FlocsimError that a config's study would meet."""
-    prepare: Callable[[Any, Any], object] = lambda study, comm: None
-    """(study, communicator): the same, of what takes all ranks to look at."""
-    doubts: Callable[[Any], list[str]] = lambda study: []
-    """Lines on what is implausible in a study."""
-    facts: Callable[[Any], dict[str, Any]] = lambda study: {}
-    """(study) → what the results say of it besides their tables, as JSON can hold it."""
-    verdict: Callable[[Any], tuple[int, str]] = lambda found: (0, "")
-    """(exit code, what to say of replicates without an outcome; "" for nothing)."""
-    dry_run: Callable[[Config, int, bool], str] = lambda config, *_: study_of(config, []).title
-    """(config, ranks, with a pilot) → what a study would do."""
-    asked: dict[str, Any] = attrs.Factory(dict)
-    """What a session of a study of this kind alone says of what was asked, as a pattern."""
-    enough: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda count: False
-    """(study, store) → whether so many replicates of each condition are enough."""
-
-
 @cache
-def kinds() -> dict[type, Kind]:
-    """Class of [scene] → its Kind; rates are pairs with other draws and conditions."""
-    found = [folder.part("kind").KIND for folder in STUDIES.values()]
+def kinds() -> dict[type, type[StudyKind]]:
+    """Class of [scene] → its kind of study; rates are pairs with other draws and conditions."""
+    found = [each for folder in STUDIES.values() for each in folder.part("kind").KINDS]
     return {scene: each for each in found for scene in each.scenes}
 
 
-def kind_of(config: Config) -> Kind:
-    """The Kind of a config's study."""
+def kind_of(config: Config) -> type[StudyKind]:
+    """Return the kind of a config's study."""
     return kinds()[type(config.scene)]
 
 
-def study_of(config: Config, flocs: list | None = None) -> StudyKind:
-    """The study of a config of any kind; ``flocs`` are grown or read unless given."""
-    study: Any = kind_of(config).make(config, flocs_of(config) if flocs is None else flocs)
-    return study
+def study_of(config: Config, flocs: Sequence | None = None) -> Any:
+    """Return the study of a config of any kind; ``flocs`` are grown or read unless given."""
+    made: Any = kind_of(config)
+    return made(config, flocs_of(config) if flocs is None else list(flocs))
 
 
 def flocs_of(config: Config) -> list:
-    """The flocs that a config's study needs, grown or read."""
-    return kind_of(config).flocs(config)
-
-
-def identity_of(study: StudyKind, machine: dict | None = None) -> dict:
-    """{name: text or number} of all that the rows of a study follow from."""
-    return kind_of(study.config).identity(study, machine)
+    """Grow or read the flocs that a config's study needs."""
+    return kind_of(config).flocs_of(config)

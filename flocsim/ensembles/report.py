@@ -5,12 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.errors import visible
+from flocsim.errors import FlocsimError, visible
 from flocsim.io.confidence import efficiency, wilson
 from flocsim.io.results.events import HOOK, MOST_UNKNOWN
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
+from flocsim.process import WITHHELD
 
 ENDS = {
     "n_missed": ("mis-", "sed"),
@@ -260,6 +261,18 @@ def undecided_line(results: Results) -> str:
         f"of {total} {what} {ends}, up to {100.0 * share:.2g} % of {of_what}{limit}: intervals "
         f"include every outcome that they could have had{open_}{advice}{first}"
     )
+
+
+def verdict(found: Results) -> tuple[int, str]:
+    """0, or the code of an error where not one replicate has come to an outcome, or where more are
+    undecided than may be; and what to say of those that have none."""
+    line = undecided_line(found)
+    if not line:
+        return 0, ""
+    counts = found.probabilities
+    if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
+        return FlocsimError.exit_code, line
+    return (WITHHELD if too_many_undecided(found) else 0), f"warning: {line}"
 
 
 def checked_line(results: Results) -> str:

@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.processor import cpu_kind
+from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
@@ -24,8 +25,6 @@ from flocsim.ensembles.kind import (
     MOST_ROWS,
     StudyKind,
     flocs_of,
-    identity_of,
-    kind_of,
     study_of,
     total,
 )
@@ -38,6 +37,7 @@ from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinato
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.preflight import said_doubts
+from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import refuse_other_part
@@ -58,7 +58,7 @@ from flocsim.process import INTERRUPTION, STOPPED
 class Ended:
     """How a run ended: exit code 0 or STOPPED, on all ranks; on rank 0 the rest as well.
 
-    ``count``: with how many replicates of each condition the study has ended.
+    ``count``: with how many replicates of each condition the study has ended, ``total`` in all.
     """
 
     code: int = 0
@@ -66,6 +66,7 @@ class Ended:
     computed: int = 0
     wall_time: float = 0.0
     count: int = -1
+    total: int = 0
 
 
 class SharedError(Exception):
@@ -118,11 +119,11 @@ def run_to_file(
             if plan is not None:
                 refuse_other_part(plan, str(output), identity)
             start = begin(
-                study, identity, output, mode, journal, kind_of(config).old_rows, cpus,
+                study, identity, output, mode, journal, contents_of(study.format).old_rows, cpus,
                 overwrite,
             )  # fmt: skip
         # Once nothing else stands in the way: what is refused is refused in one line.
-        doubts = kind_of(config).doubts(study)
+        doubts = study.doubts()
         said = (f"warning: {line}" for line in said_doubts(config, doubts))
         for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
@@ -159,7 +160,7 @@ def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict
             raise UsageError(unlike[0] + more)
     cpus = distinct([kind for _, kind in answers or []])
     with sharing_errors(comm):
-        kind_of(config).prepare(study, comm)
+        study.prepare(comm)
     return study, leader.identity, cpus
 
 
@@ -224,6 +225,7 @@ def lead(
         progress.finish()
         final = state.schedule.final
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, count=final)
+        ended.total = final * len(study.conditions)
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm.size, output)
@@ -278,7 +280,7 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     state = StudyState(
         Schedule.of(found, looks, ranks, study.most_rows),
         start.store,
-        kind_of(study.config).enough(study, start.store),
+        contents_of(study.format).stop_rule(study, start.store),
         allowed=study.allowed,
         failed=failed,
         notes=start.notes,
@@ -300,17 +302,18 @@ def make_results(
     output: str | Path | None,
 ) -> Any:  # fmt: skip
     """The results of a finished study; written to ``output``, where there is one."""
-    count, kind, in_memory = state.schedule.final, kind_of(study.config), output is None
+    count, in_memory = state.schedule.final, output is None
     if output and (old := start.old) is not None and start.is_covered(count):
         if (tuple(old.conditions), old.count) == (study.conditions, count):
             return file_kind(output).read(output)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
     run = facts(study, start, state.notes, ended, ranks)
-    return kind.results(study, start, count, run, output, in_memory)
+    return contents_of(study.format).results(study, start, count, run, output, in_memory)
 
 
 def facts(study, start, notes, ended, ranks):
-    config, identity, kind = study.config, start.identity, kind_of(study.config)
+    config, identity = study.config, start.identity
+    more = contents_of(study.format).facts(study)
     added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
@@ -327,8 +330,8 @@ def facts(study, start, notes, ended, ranks):
         "computed": ended.computed,
         "wall_time": ended.wall_time,
         **{name: storable(each) for name, each in study.source.items()},
-        "warnings": storable(json.dumps(kind.doubts(study))),
-        **{k: storable(v) if isinstance(v, str) else v for k, v in kind.facts(study).items()},
+        "warnings": storable(json.dumps(study.doubts())),
+        **{k: storable(v) if isinstance(v, str) else v for k, v in more.items()},
     }
 
 

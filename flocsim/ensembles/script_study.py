@@ -225,9 +225,8 @@ class Study:
 
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""
-        kind = kind_of(self.config)
-        kind.check(self.config)
-        kind.prepare(study_of(self.config), Communicator())
+        kind_of(self.config).check(self.config)
+        study_of(self.config).prepare(Communicator())
 
     def replicate(
         self, replicate: int = 0, type: str | None = None, vertices: int | None = None,

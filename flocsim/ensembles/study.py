@@ -1,19 +1,26 @@
-"""A study: all conditions of a config, and any one replicate of them by its number."""
+"""Studies of pairs and of rates: all conditions of a config, and any one replicate of them.
 
+A study of rates draws its pairs at offsets that stand for all at which they come, and its
+replicates are points of a scrambled Sobol sequence.
+"""
+
+import hashlib
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from flocsim.compiler.composer import is_on_disk
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.draw import (
     CHECKED,
     FAILED,
     FAILURES,
     MORE_STEPS,
     NO_FLOC,
+    SAMPLE,
     THIRD,
     Draw,
     columns_of,
@@ -21,29 +28,31 @@ from flocsim.ensembles.collision.draw import (
     exact_methods,
     further_runs,
     point,
-    point_facts,
+    points_of,
     run_safely,
 )
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
+from flocsim.ensembles.collision.offsets import as_draws, offsets_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
 from flocsim.ensembles.collision.start import zone_distance
-from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.kernel_scene import KernelScene
+from flocsim.ensembles.config.pair_scene import BROWNIAN, PAIR_SCENES, SETTLING
 from flocsim.ensembles.config.schema import BAND, CUT, Config
-from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
+from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
+from flocsim.ensembles.preflight import (
+    check_study,
+    kinds,
+    placed_system,
+    sphere_pairs,
+    study_doubts,
+)
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
-from flocsim.io.results.checks import check_rows
+from flocsim.integrators.loop.driver import advance
 from flocsim.io.results.events import flips_easily
 from flocsim.io.results.run_group import class_words
 from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
-
-
-def flocs_of(config: Config) -> list[Floc]:
-    """The flocs that a config's study needs: none for spheres alone, unless of measured sizes."""
-    needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
-    return load_flocs(config.shapes, config.seed) if needed else []
-
 
 TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
 """Failures behind which more steps, or shorter ones, may come to an outcome."""
@@ -69,8 +78,11 @@ class Study(StudyKind):
 
     config: Config
     flocs: list[Floc] = attrs.field(
-        default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
+        default=attrs.Factory(lambda self: self.flocs_of(self.config), takes_self=True)
     )
+    scenes: ClassVar[Sequence[type]] = tuple(PAIR_SCENES.values())
+    format: ClassVar[str] = "flocsim results"
+    check = staticmethod(check_study)
     pairings: tuple[Pairing, ...] = attrs.field(init=False)
     zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
@@ -92,6 +104,61 @@ class Study(StudyKind):
             for each in self.pairings
         }
 
+    @staticmethod
+    def flocs_of(config: Config) -> list[Floc]:
+        """Grow or read the flocs of a study: none for spheres alone, unless of measured sizes."""
+        needed = any(n > 1 for n in config.shapes.vertices) or config.shapes.size == "own"
+        return load_flocs(config.shapes, config.seed) if needed else []
+
+    def doubts(self) -> list[str]:
+        """Return lines on what is implausible in the study."""
+        return study_doubts(self.config, self.flocs)
+
+    def identity_facts(self) -> dict[str, Any]:
+        """Return what rows follow from besides config, flocs, code and machine."""
+        config = self.config
+        facts: dict[str, Any] = {"integrator.check_share": config.integrator.check_share}
+        if self.point_scrambles:
+            first = points_of(config.seed, self.point_scrambles, 0, SAMPLE * self.point_scrambles)
+            facts["scene.points"] = first.sum(axis=0)
+        for pairing, (name, pair) in zip(
+            self.pairings, sphere_pairs(config, self.flocs), strict=True
+        ):
+            pieces = pair.system.pieces
+            facts[f"numbers.{name}"] = np.array([
+                *pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events,
+                *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
+                *(pieces.layer if pieces.layer[2] > 0.0 else ()),
+            ], float)  # fmt: skip
+            # A force of the user's own may compute what the zone follows from.
+            facts[f"types.{name}"] = [*pairing.radii, pair.zone_distance]
+            if config.shapes.own is not None and self.flocs:
+                # Its class computes how it grows at the sizes of each type.
+                [floc] = self.flocs
+                [n] = floc.shapes
+                facts[f"flocs.{n} at the sizes of {name}"] = [
+                    floc.resized(n, radius, config.shapes.radius) for radius in pairing.radii
+                ]
+        return facts | self.kernel_facts()
+
+    def kernel_facts(self) -> dict[str, str]:
+        """Return fingerprints of the compiled code for spheres and for polygons, by every method,
+        of a type for each way to meet."""
+        config, facts = self.config, {}
+        meetings = {each.meeting: place for place, each in reversed([*enumerate(self.pairings)])}
+        pairs = [pair for _, pair in sphere_pairs(config, self.flocs)]
+        several = [s for floc in self.flocs for s in floc.shapes.values() if s.is_compound]
+        for pair in (pairs[place] for place in sorted(meetings.values())):
+            for shapes in (*kinds(config, pair.shapes), *((each, each) for each in several[:1])):
+                system = placed_system(config, pair.system, shapes)
+                name = system.family + (f" in {pair.meeting}" * (pair.meeting != SETTLING))
+                laws = sorted(system.pieces.laws.items())
+                codes = [fingerprint(advance, system.fillings(pair.observer))]
+                codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
+                digest = hashlib.blake2b("\n".join(codes).encode(), digest_size=12)
+                facts[f"kernels.{name}"] = digest.hexdigest()
+        return facts
+
     @property
     def is_banded(self) -> bool:
         """Whether replicates are also run with their outlines cut closer and wider."""
@@ -108,10 +175,15 @@ class Study(StudyKind):
         """The size classes, where measured flocs are in any."""
         return class_words(class_facts(self.pairings))
 
+    @property
+    def point_scrambles(self) -> int:
+        """Of how many scrambles of Sobol's sequence the replicates are points; 0 for none."""
+        return self.scrambles
+
     def numbers(self, replicate: int) -> np.ndarray:
         """The random numbers of a replicate in [0, 1), see draws, or a point of Sobol's."""
-        if self.scrambles:
-            return point(self.config.seed, self.scrambles, replicate)
+        if self.point_scrambles:
+            return point(self.config.seed, self.point_scrambles, replicate)
         return draws(self.config.seed, replicate)
 
     @property
@@ -119,10 +191,6 @@ class Study(StudyKind):
         """Of how many scrambles the replicates of a condition are points; 0 for independent ones,
         and where rates follow from the points."""
         return self.config.scrambles
-
-    def facts(self) -> dict[str, Any]:
-        """{name: value} of what rows follow from besides the config."""
-        return point_facts(self.config.seed, self.scrambles) if self.scrambles else {}
 
     def share_of(
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
@@ -277,11 +345,6 @@ class Study(StudyKind):
         vertices = sorted({n > 1: n for n in self.config.shapes.vertices}.values())
         return [(0, n) for n in vertices]
 
-    def compile(self, kinds: Iterable[Code]) -> None:
-        """Compile, or load from the disk, what these kinds need, by running a replicate of each."""
-        for kind in kinds:
-            self.run(*kind, self.config.scene.delta[0], 0)
-
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
         """Those whose engine is not on the disk."""
         delta = self.config.scene.delta[0]
@@ -291,16 +354,40 @@ class Study(StudyKind):
         ]  # fmt: skip
 
     def run_task(
-        self, place: Place, replicate: int, halted: Callable[[], bool], left: Any = None,
+        self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """One replicate, whatever goes wrong in it."""
-        return run_safely(self, place, replicate, halted)
-
-    def check_rows(self, column: Callable[[str], np.ndarray]) -> None:
-        """ValueError for rows that no run can have given."""
-        check_rows(column, len(FAILURES), len(self.flocs))
+        """Run one replicate, whatever goes wrong in it."""
+        return run_safely(self, condition, replicate, halted)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
-        """Which rows are of failed replicates."""
+        """Return flags of the rows of failed replicates."""
         return column("outcome") == FAILED
+
+
+@attrs.define(eq=False)
+class KernelStudy(Study):
+    """Every replicate of a config whose scene is a KernelScene.
+
+    A replicate is a point of a scrambled Sobol sequence, the same in all conditions: orientations,
+    flocs, and the offset b of j's way from i's centre, which is share · (R_i + R_j).
+    """
+
+    scenes: ClassVar[Sequence[type]] = (KernelScene,)
+
+    @property
+    def point_scrambles(self) -> int:
+        """Of how many scrambles of Sobol's sequence the replicates are points."""
+        return self.scene.scrambles
+
+    def numbers(self, replicate: int) -> np.ndarray:
+        """The point of a replicate: two orientations, two choices of floc, the offset."""
+        return as_draws(super().numbers(replicate))
+
+    def share_of(
+        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
+    ) -> float:
+        """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
+        angles = np.array(encounter.orientations(numbers))[:, None]
+        offsets = offsets_of(encounter, angles[0], angles[1], np.array(numbers[4:]))
+        return float(offsets[0]) / encounter.outer

@@ -27,9 +27,9 @@ from flocsim.ensembles.contents import (
     stored_in,
     studies,
 )
-from flocsim.ensembles.kind import flocs_of, identity_of, kind_of, study_of
+from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.script_study import WAYS, Study
-from flocsim.ensembles.storage.identity import machine_facts
+from flocsim.ensembles.storage.identity import identity_of, machine_facts
 from flocsim.ensembles.storage.unfinished import (
     NAME,
     Facts,
@@ -147,12 +147,12 @@ def fixed(parts: Mapping[Path, Study]) -> Plan:
         if drawn[0] != (config.shapes, config.seed):
             drawn = (config.shapes, config.seed), flocs_of(config)
         study = study_of(config, drawn[1])
-        machine = machine or machine_facts(kind_of(config).code)
+        machine = machine or machine_facts(study.code)
         facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(study.asked()))}
         plan[path.name] = facts
-        first, own = (study.fixed(each["asked"]) for each in (next(iter(plan.values())), facts))
-        for axis, there in first.items():
-            if there != (here := own[axis]):
+        first = next(iter(plan.values()))["asked"]
+        for axis in study.in_common:
+            if (there := first[axis]) != (here := facts["asked"][axis]):
                 raise UsageError(
                     f"the parts of a sweep cannot be joined: {axis} are {listed(there)} in the "
                     f"first, {listed(here)} in {path}; run them one by one"

@@ -7,7 +7,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.preflight import check_study
-from flocsim.ensembles.swarms.kind import check_study as check_swarms
+from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library
@@ -82,7 +82,7 @@ def test_a_reduced_example_runs(path, examples, monkeypatch, capsys):
     "path", rest_slow(SWARMS, lambda path: path.stem == "swarm"), ids=lambda path: path.stem
 )
 def test_a_swarm_describes_itself(path, examples, capsys):
-    check_swarms(load_any_config(examples / path.name))
+    SwarmStudy.check(load_any_config(examples / path.name))
     assert main(["swarm", str(examples / path.name), "--dry-run"]) == 0
     said = capsys.readouterr()
     assert said.err == "" and "nothing was run" in said.out

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.pairs.contents import told
-from flocsim.ensembles.pairs.kind import verdict
+from flocsim.ensembles.report import verdict
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.process import WITHHELD
 from tests.helpers.synthetic_results import make_results

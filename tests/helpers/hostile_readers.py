@@ -149,7 +149,7 @@ class SwarmJournalReader:
             def keep(name, about, data, key=key, records=records):
                 records.append((PART, *key, known | about | {"name": name}, data))
 
-            row, _ = self.study.run_task(self.study.places[0], replicate, lambda: False, None, keep)
+            row, _ = self.study.run_task(condition, replicate, lambda: False, None, keep)
             rows = np.array([tuple(row[name] for name in self.study.row.names)], self.study.row)
             self.parts += [*records, (CHUNK, *key, known, rows.tobytes())]
 
@@ -220,11 +220,9 @@ class JournalReader:
 
     def read(self, path):
         """Take its rows and look at them."""
-        from flocsim.ensembles.collision.draw import FAILURES
         from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
         from flocsim.io.journal import Journal
-        from flocsim.io.results.checks import check_rows
 
         journal = Journal(path)
         try:
@@ -235,8 +233,7 @@ class JournalReader:
             take_journal(start, self.study)
             for place in range(len(self.study.conditions)):
                 for first, stop in start.store.intervals(place):
-                    rows = start.store.rows(place, first, stop)
-                    check_rows(rows.__getitem__, len(FAILURES), 0)
+                    start.store.rows(place, first, stop)
             assert all(remark.isprintable() for remark in start.remarks), start.remarks
         finally:
             journal.release()

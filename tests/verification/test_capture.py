@@ -10,9 +10,10 @@ import pytest
 
 from flocsim.body import Body, Fluid
 from flocsim.ensembles.collision.draw import Draw, points_of
+from flocsim.ensembles.collision.offsets import settling_interval
 from flocsim.ensembles.collision.start import place_pair
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kernels import settling_interval, study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.runner import run
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.shapes.shape import Sphere

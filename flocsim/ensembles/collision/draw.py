@@ -131,12 +131,6 @@ def points_of(seed: int, scrambles: int, first: int, stop: int) -> np.ndarray:
     return np.array([point(seed, scrambles, replicate) for replicate in range(first, stop)])
 
 
-def point_facts(seed: int, scrambles: int) -> dict[str, list[float]]:
-    """What rows follow from besides the config: the points themselves."""
-    first = points_of(seed, scrambles, 0, SAMPLE * scrambles)
-    return {"scene.points": [float(each) for each in first.sum(axis=0)]}
-
-
 def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
     """(outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
@@ -176,23 +170,21 @@ def replicate_row(status, angles, run):
 
 
 def run_safely(
-    study: Any, place: tuple[int, int, float], replicate: int,
-    halted: Callable[[], bool] | None = None,
-) -> tuple[dict | None, dict | None]:  # fmt: skip
+    study: Any, condition: Any, replicate: int, halted: Callable[[], bool] | None = None
+) -> tuple[dict | None, dict | None]:
     """(row, None) of one replicate, or (row, note) where it failed; row None where halted.
 
-    ``study``: a Study; ``place``: of a condition, as Study.places has it. Running out of memory is
-    nobody's fault but the machine's, and goes on.
+    ``study``: a Study. Running out of memory is nobody's fault but the machine's, and goes on.
     """
-    condition, vertices, share = place
+    name, vertices, share = condition
     try:
-        row = study.run(condition, vertices, share, replicate, halted=halted)
+        row = study.run(study.scene.names.index(name), vertices, share, replicate, halted=halted)
     except MemoryError:
         raise
     except Exception as error:
         angles = orientations(study.numbers(replicate))
         why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
-        return failed_row("exception", angles), study.note(place, replicate, why)
+        return failed_row("exception", angles), study.note(condition, replicate, why)
     if row is None:
         return None, None
     why = row.pop(WHY, "")
@@ -201,7 +193,7 @@ def run_safely(
         row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | drawn
     if row["outcome"] == FAILED:
         reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
-        return row, study.note(place, replicate, reason)
+        return row, study.note(condition, replicate, reason)
     return row, None
 
 

@@ -13,7 +13,8 @@ dimensions and every message stayed ours and its exceptions had to be turned bac
 
 All that a kind of study is lies in its folder, whose modules are loaded by name, when something of
 the kind is there: `scene` has the class of its [scene] as SCENE, where that has a `kind` of its
-own; `kind` what runs it as KIND, a `flocsim.ensembles.kind.Kind`; `contents` what its files hold as
+own; `kind` what runs it as KINDS, classes of
+`flocsim.ensembles.kind.StudyKind`; `contents` what its files hold as
 CONTENTS, a `flocsim.ensembles.contents.Contents`.
 """
 

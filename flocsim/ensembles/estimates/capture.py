@@ -36,6 +36,7 @@ import numpy as np
 
 from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.offsets import as_draws, bounds_of, offsets_of
 from flocsim.ensembles.config.pair_scene import SETTLING, SHEAR
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.numerical import (
@@ -48,8 +49,8 @@ from flocsim.ensembles.estimates.numerical import (
     run_so,
 )
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS, by_runs
-from flocsim.ensembles.kernels import KernelStudy, as_draws, bounds_of, offsets_of
 from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.study import KernelStudy
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import wilson
 from flocsim.io.results.events import AGGREGATED, KINDS, WITHOUT_OUTCOME, Events, kinds_of
@@ -406,7 +407,8 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
     points = points_of(study.config.seed, scene.scrambles, 0, count)
     found: dict[tuple, Estimated] = {}
     radii = np.full(len(labels), np.nan)
-    for place, (condition, n, _) in enumerate(study.places):
+    for place, (name, n, _) in enumerate(study.conditions):
+        condition = scene.names.index(name)
         m, i, j = scene.conditions[condition]
         table = store.rows(place, 0, count)
         rows = {name: table[name] for name in COLUMNS}

@@ -28,6 +28,7 @@ from flocsim.ensembles.estimates.numerical import (
     most_exact,
     run_so,
 )
+from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io import confidence
 from flocsim.io.confidence import scrambled_difference, wilson
@@ -208,6 +209,11 @@ class StopRule:
         table = probabilities(counts)
         widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]
         return not np.any(0.5 * np.array(widths) > self.stop.half_width)
+
+
+def stop_rule(study: StudyKind, store: RowStore) -> StopRule:
+    """Return the rule that may end a study early."""
+    return StopRule(study.config.stop, store)
 
 
 def of_each_scramble(first: int, scrambles: int) -> list[slice]:

@@ -233,7 +233,7 @@ def thermal(run):
     return [("thermal", f"{each['type']}: {run_group.sphere_words(each)}") for each in found]
 
 
-def so_far(found: Any) -> Facts:
+def running(found: Any) -> Facts:
     """[(name, value)] of the conditions of a study of pairs that still runs."""
     results = found.results
     planned = f", {found.asked // math.prod(results.shape)} planned" if found.asked else ""
@@ -275,6 +275,7 @@ def asked(results: Any) -> dict[str, Any]:
             "delta": results.delta.tolist(), "replicates": results.count}  # fmt: skip
 
 
+OF_KIND = partial(later, "ensembles.pairs.kind")
 OPENED = later("ensembles.pairs.opened", "open_results")
 
 CONTENTS = Contents(
@@ -287,7 +288,7 @@ CONTENTS = Contents(
             FIGURES,
         "a kernel study": KERNEL_FIGURES,
     },
-    with_rows=with_rows, rows_drawn=OF_ROWS, so_far=so_far, run=lambda found: found.run,
+    with_rows=with_rows, rows_drawn=OF_ROWS, running=running, run=lambda found: found.run,
     opened=OPENED, compare=later("ensembles.pairs.comparison", "compare"), compared=schema.COMPARED,
     joined=Joined(
         {name: schema.GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows,
@@ -295,6 +296,10 @@ CONTENTS = Contents(
         tuple(schema.RADII),
         lambda swept: report.graze_lines(swept.labelled("probabilities").axes["delta"].values),
     ),
+    results=OF_KIND("results"), old_rows=OF_KIND("old_rows"), so_far=OF_KIND("so_far"),
+    facts=OF_KIND("facts"), verdict=report.verdict,
+    stop_rule=later("ensembles.estimates.statistics", "stop_rule"),
+    dry_run=later("ensembles.dry_run", "dry_run"),
     rates=lambda found: found.kernel,
     water=lambda path, allowed: list(map(run_group.water_words, OPENED(path, allowed).in_water())),
 )  # fmt: skip

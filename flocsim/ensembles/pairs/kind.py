@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,30 +11,24 @@ import numpy as np
 from flocsim.ensembles import kind, report
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
-from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.pair_scene import PAIR_SCENES
-from flocsim.ensembles.dry_run import dry_run, sphere_facts
+from flocsim.ensembles.dry_run import sphere_facts
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.numerical import leading_axes
-from flocsim.ensembles.estimates.statistics import COUNTED, StopRule
-from flocsim.ensembles.kernels import KernelStudy, study_of
-from flocsim.ensembles.kind import Kind, OldResults
+from flocsim.ensembles.estimates.statistics import COUNTED
+from flocsim.ensembles.kind import OldResults
 from flocsim.ensembles.parallel.communicator import StopRequested
-from flocsim.ensembles.preflight import check_study, settling_facts, study_doubts
-from flocsim.ensembles.storage.identity import PHYSICS, identity_of
+from flocsim.ensembles.preflight import settling_facts
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.storage.unfinished import Unfinished, store_of
-from flocsim.ensembles.study import Study, flocs_of
-from flocsim.errors import FlocsimError
+from flocsim.ensembles.study import KernelStudy, Study
 from flocsim.io.groups import run_of
-from flocsim.io.journal import JournalReader
-from flocsim.io.results.checks import check_rows
 from flocsim.io.results.file import failures_of, opened
-from flocsim.io.results.layout import FORMAT, write_results
+from flocsim.io.results.layout import write_results
 from flocsim.io.results.schema import Results, as_words
-from flocsim.process import INTERRUPTION, WITHHELD, stop_requested
+from flocsim.process import INTERRUPTION, stop_requested
+
+KINDS = (Study, KernelStudy)
 
 
 @contextmanager
@@ -94,31 +87,14 @@ def facts(study: Study) -> dict[str, Any]:
     }
 
 
-def verdict(found: Results) -> tuple[int, str]:
-    """0, or the code of an error where not one replicate has come to an outcome, or where more are
-    undecided than may be; and what to say of those that have none."""
-    line = report.undecided_line(found)
-    if not line:
-        return 0, ""
-    counts = found.probabilities
-    if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
-        return FlocsimError.exit_code, line
-    return (WITHHELD if report.too_many_undecided(found) else 0), f"warning: {line}"
-
-
-def so_far(journal: JournalReader, sessions: list[dict]) -> Unfinished:
-    """What a journal has of pairs: their counts and probabilities."""
-    asked = sessions[-1]["asked"]
-
-    check = partial(check_rows, failures=len(FAILURES), flocs=2**31)
-    store, notes, unread = store_of(journal, sessions, kind.ROW, check)
+def so_far(store: RowStore, asked: dict[str, Any]) -> tuple[Results, int, int]:
+    """Make Results of the rows that a store has, without single replicates and pooled tables."""
     table = tables(store, tuple(len(asked[name]) for name in kind.ORDER))
     made = Results(
         types=asked["types"], vertices=asked["vertices"], delta=asked["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
     )  # fmt: skip
-    many = asked["replicates"] * len(store.conditions)
-    return Unfinished(journal.path, FORMAT, made, store.there(), many, notes, sessions, unread)
+    return made, store.there(), asked["replicates"] * len(store.conditions)
 
 
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
@@ -147,13 +123,3 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
         if name not in (*summary.POOLED_NAMES, summary.JOINT)
         and not name.endswith(summary.OF_OUTLINES)
     }  # fmt: skip
-
-
-KIND = Kind(
-    scenes=(*PAIR_SCENES.values(), KernelScene),
-    make=study_of, flocs=flocs_of, identity=identity_of, code=PHYSICS, check=check_study,
-    doubts=lambda study: study_doubts(study.config, study.flocs), facts=facts, old_rows=old_rows,
-    results=results, total=lambda found: int(found.probabilities["n_total"].sum()),
-    verdict=verdict, dry_run=dry_run, so_far=so_far,
-    enough=lambda study, store: StopRule(study.config.stop, store),
-)  # fmt: skip

@@ -249,7 +249,7 @@ def run_chunk(
     ``tell`` takes what is kept of a replicate while it runs, and how far it is.
     """
     rows = np.zeros(chunk.stop - chunk.first, study.row)
-    place = study.places[chunk.condition]
+    condition = study.conditions[chunk.condition]
     notes: list[dict] = []
     count = 0
     until = time.monotonic() + seconds
@@ -261,7 +261,7 @@ def run_chunk(
             tell(Kept(chunk.condition, replicate, name, about, data))
 
         row, note = study.run_task(
-            place, replicate, halted, chunk.left, keep, lambda words: tell(Going(words))
+            condition, replicate, halted, chunk.left, keep, lambda words: tell(Going(words))
         )
         if row is None:
             break

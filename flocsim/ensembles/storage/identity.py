@@ -19,30 +19,20 @@ import attrs
 import numpy as np
 
 from flocsim.compiler.disk_cache import kept
-from flocsim.compiler.fingerprint import fingerprint
-from flocsim.ensembles.config.pair_scene import SETTLING
 from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.preflight import kinds, placed_system, sphere_pairs
-from flocsim.ensembles.study import Study
+from flocsim.ensembles.kind import PHYSICS, StudyKind
 from flocsim.geometry.contact.compounds import outlines_of, point_columns
+from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
-from flocsim.integrators.loop.driver import advance
 
-VARIABLE = {"scene": {"types", "pairs", "delta", "sizes"}, "shapes": {"vertices", "file", "own"}}
+VARIABLE = {
+    "scene": {"types", "pairs", "delta", "sizes", "checkpoint"},
+    "shapes": {"vertices", "file", "own"},
+}
 """Keys that choose rows, but change none."""
 
 PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 """Starts of names that need to agree only where both runs have them."""
-
-PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "run.py",
-    "compiler", "bonds", "hydrodynamics", "forces", "integrators", "geometry/shapes",
-    "geometry/contact", "io/results/schema.py", "io/results/events.py",
-    "ensembles/collision", "ensembles/study.py", "ensembles/kernels.py",
-)  # fmt: skip
-"""The modules, or folders of such at any depth, whose code decides what is in a row. geometry/fit
-makes shapes: what it made is compared itself. tests/ensembles/storage/test_identity.py holds this
-list against all that a replicate imports."""
 
 PACKAGE = Path(__file__).parents[2]
 
@@ -52,22 +42,24 @@ def machine_facts(names: Sequence[str] = PHYSICS) -> dict:
     return {"code": physics_digest(names=names), "arithmetic": arithmetic_digest()}
 
 
-def identity_of(study: Study, machine: dict | None = None) -> dict:
-    """{name: text or number} of all that the rows of a Study follow from.
+def identity_of(study: StudyKind, machine: dict | None = None) -> dict:
+    """Return {name: text or number} of all that the rows of a study follow from.
 
     ``machine``: the machine_facts, where they are known.
     """
-    facts = facts_before(study.config, machine)
-    facts |= type_facts(study) | floc_facts(study) | kernel_facts(study) | study.facts()
+    tables = ("scene", "shapes", "bodies", "fluid", "zone")
+    facts = config_facts(study.config, [each for each in tables if each not in study.scene.without])
+    facts |= machine or machine_facts(study.code)
+    facts |= floc_facts(study.flocs)
+    facts |= {name: comparable(value) for name, value in study.identity_facts().items()}
     return json.loads(json.dumps(facts))
 
 
-def facts_before(config: Config, machine: dict | None = None) -> dict:
-    """What of the identity is known before any floc is made, which may take long."""
-    facts = config_facts(config, ("scene", "shapes", "bodies", "fluid", "zone"))
-    facts |= machine or machine_facts()
-    facts["integrator.check_share"] = config.integrator.check_share
-    return json.loads(json.dumps(facts))
+def comparable(value):
+    """Return a fact as JSON can hold it: a digest of an array, or of a list of shapes."""
+    if isinstance(value, list) and value and isinstance(value[0], Shape):
+        value = np.concatenate([shape_numbers(each) for each in value])
+    return digest(value) if isinstance(value, np.ndarray) else plain(value)
 
 
 def config_facts(config: Config, tables: Sequence[str]) -> dict:
@@ -119,54 +111,17 @@ def plain(value):
     return value if isinstance(value, str | int | float | None) else repr(value)
 
 
-def type_facts(study):
-    """Radii and zone of the collision types, and the numbers that the forces hand to kernels."""
-    config = study.config
-    facts = {f"types.{each.name}": list(each.radii) for each in study.pairings}
-    for name, pair in sphere_pairs(config, study.flocs):
-        pieces = pair.system.pieces
-        numbers = [
-            *pieces.parameters,
-            pieces.surface_reach,
-            *pieces.smoothness,
-            pieces.events,
-            *(pieces.outlines if pieces.outlines[0] > 0.0 else ()),
-            *(pieces.layer if pieces.layer[2] > 0.0 else ()),
-        ]
-        facts[f"numbers.{name}"] = digest(np.array(numbers, float))
-        # A force of the user's own may compute what the zone follows from.
-        facts[f"types.{name}"].append(plain(pair.zone_distance))
-    return facts
-
-
-def floc_facts(study):
-    """A digest of all flocs at each number of vertices, and of what else chooses among them."""
-    facts = {}
-    counts = {n for floc in study.flocs for n in floc.shapes}
-    every = [each for floc in study.flocs for each in (floc, *floc.band.values())]
-    for n in sorted(counts):
-        parts = [np.array([floc.ratio]) for floc in every]
-        shapes = [floc.shapes[n] for floc in every]
-        parts += [np.append(np.ravel(each.vertices), each.radius) for each in shapes]
-        parts += [ring_numbers(each) for each in shapes]
-        if study.floc_pool.by_error:
-            parts.append(np.array([floc.errors[n] for floc in study.flocs]))
-        facts[f"flocs.{n}"] = digest(np.concatenate(parts))
-    if study.floc_pool.own_size:
-        facts["flocs.size"] = digest(np.array([floc.size for floc in every]))
-        weights = np.array([floc.weight for floc in study.flocs])
-        if np.any(weights != 1.0):
-            facts["flocs.weight"] = digest(weights)
-    shapes = study.config.shapes
-    if shapes.own is not None and study.flocs:
-        # Its class computes what is known of others, and how it grows, at the sizes of each type.
-        [floc] = study.flocs
-        [n] = floc.shapes
-        for each in study.pairings:
-            sized = [floc.resized(n, radius, shapes.radius) for radius in each.radii]
-            facts[f"flocs.{n} at the sizes of {each.name}"] = digest(
-                np.concatenate([shape_numbers(one) for one in sized])
-            )
+def floc_facts(flocs):
+    """Return digests of all flocs at each number of vertices, and of what chooses among them."""
+    every = [each for floc in flocs for each in (floc, *floc.band.values())]
+    if not every:
+        return {}
+    facts = {"flocs.any": digest(np.array([(f.ratio, f.size or 0.0, f.weight) for f in every]))}
+    for n in sorted({n for floc in every for n in floc.shapes}):
+        of_n = [each for each in every if n in each.shapes]
+        errors = np.array([each.errors.get(n, 0.0) for each in of_n])
+        numbers = [shape_numbers(each.shapes[n]) for each in of_n]
+        facts[f"flocs.{n}"] = digest(np.concatenate([errors, *numbers]))
     return facts
 
 
@@ -189,29 +144,6 @@ def ring_numbers(shape):
 
 SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 """Angles [rad] at which a shape is placed for the identity."""
-
-
-def kernel_facts(study):
-    """Fingerprints of the compiled code for spheres and for polygons, by every method, of what
-    the types compile that meet alike."""
-    config, facts = study.config, {}
-    meetings = {each.meeting: place for place, each in reversed([*enumerate(study.pairings)])}
-    pairs = [pair for _, pair in sphere_pairs(config, study.flocs)]
-    several = [each for floc in study.flocs for each in floc.shapes.values() if each.is_compound]
-    for pair in (pairs[place] for place in sorted(meetings.values())):
-        wanted = [*kinds(config, pair.shapes), *((each, each) for each in several[:1])]
-        for shapes in wanted:
-            system = placed_system(config, pair.system, shapes)
-            name = system.family
-            if pair.meeting != SETTLING:
-                name += f" in {pair.meeting}"
-            laws = sorted(system.pieces.laws.items())
-            codes = [fingerprint(advance, system.fillings(pair.observer))]
-            codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
-            facts[f"kernels.{name}"] = hashlib.blake2b(
-                "\n".join(codes).encode(), digest_size=12
-            ).hexdigest()
-    return facts
 
 
 @functools.cache
@@ -330,7 +262,7 @@ EXPLAINED = {
     "arithmetic": "this machine rounds sin, exp and similar functions differently (another kind "
     "of processor, C library or numpy): resume where the run was begun, or start over",
     "code": "flocsim's own code has changed",
-    "flocs": "the flocs with N = {} have changed",
+    "flocs": "the flocs with {} vertices have changed",
     "start": "the initial values of {} have changed",
     "numbers": "the parameters of the forces have changed for type {}",
     "kernels": "the compiled code for {} has changed (flocsim, a force or an integrator of your "

@@ -158,7 +158,8 @@ def begin(
     take_journal(start, study)
     refuse_fewer(start, output, study.config.replicates)
     start.session = journal.add(SESSION, "", 0, {
-        "identity": identity, "short": short(identity), "layout": kind.layout(study.row),
+        "kind": study.format, "identity": identity, "short": short(identity),
+        "layout": kind.layout(study.row),
         "date": now(), "command": shlex.join(sys.argv), "cpus": start.cpus_now,
         "rule": start.rule, "asked": study.asked(), "source": source_line(study.source),
     })  # fmt: skip
@@ -302,14 +303,11 @@ def take_record(start: Beginning, study: StudyKind, record: Record, session: dic
     store, title = start.store, title_of(record, study)
 
     def check(rows: np.ndarray) -> None:
-        study.check_rows(rows.__getitem__)
         if record.kind == CHUNK or start.old is None:
             study.check_whole(rows, store.parts.get((place, record.first), ()))
 
     place = store.indices.get(record.condition, -1)
     try:
-        if record.kind == PART:
-            study.check_part(record.about.get("name", ""), record.about, record.data)
         taken = store.take(record, check)
     except ValueError as error:
         raise ValueError(f"{title}: {error}") from error
@@ -343,7 +341,6 @@ def take_results(
             before = [each.id for each in start.journal.records(OLD)]
             start.journal.discard([*before, *start.journal.damaged])
             for condition, first, rows in old.chunks:
-                study.check_rows(rows.__getitem__)
                 start.store.copy(condition, first, rows)
     except UNREADABLE as error:
         if isinstance(error, FlocsimError):

@@ -12,7 +12,7 @@ file: its own facts}}; facts are those of the identity, and "asked", the axes.
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.ensembles.kind import ORDER, Condition, kinds, layout
+from flocsim.ensembles.config import STUDIES, contents_of
+from flocsim.ensembles.kind import ORDER, Condition, layout
 from flocsim.ensembles.storage.identity import differences
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Old, write_file
-from flocsim.io.journal import PART, SESSION, JournalReader, read_journal
+from flocsim.io.groups import UNREADABLE
+from flocsim.io.journal import SESSION, JournalReader, read_journal
 from flocsim.io.json_text import matches, read_json
 from flocsim.io.results.run_group import is_session
 
@@ -67,10 +69,8 @@ class Unfinished:
 
 
 def store_of(
-    journal: JournalReader, sessions: list[dict], row: np.dtype,
-    check: Callable[[Callable[[str], np.ndarray]], object],
-    check_part: Callable[[str, dict, bytes], object] | None = None,
-) -> tuple[RowStore, list[dict], int]:  # fmt: skip
+    journal: JournalReader, sessions: list[dict], row: np.dtype
+) -> tuple[RowStore, list[dict], int]:
     """(what of a journal can be believed, notes on failed replicates, records that are damaged or
     of no run); FileError where there is nothing."""
     axes = sessions[-1]["asked"]
@@ -87,12 +87,10 @@ def store_of(
     conditions = tuple(Condition(*each) for each in product(*(axes[name] for name in ORDER)))
     store, notes = RowStore(journal, conditions, row), []
     for each in journal.records():
-        if each.kind == SESSION or (each.kind == PART and check_part is None):
+        if each.kind == SESSION:
             continue
         try:
-            if each.kind == PART and check_part is not None:
-                check_part(each.about.get("name", ""), each.about, each.data)
-            if store.take(each, lambda rows: check(rows.__getitem__)) is not None:
+            if store.take(each, lambda rows: None) is not None:
                 notes += each.about.get("notes", [])
         except ValueError:
             journal.damaged.append(each.id)
@@ -106,15 +104,18 @@ def read_unfinished(path: str | Path) -> Unfinished:
     with read_journal(Path(path)) as journal:
         sessions = [each.about for each in journal.records(SESSION) if is_session(each.about)]
         asked = sessions[-1].get("asked") if sessions else None
-        if not matches(asked, ASKED):
+        name = sessions[-1].get("kind") if sessions else None
+        if not matches(asked, ASKED) or name not in STUDIES:
             raise FileError(
                 f"{path} is not a journal of an unfinished run, or has only just begun: try again"
             )
-        # Pairs come first, and are all that says nothing more of itself.
-        first, *others = kinds().values()
-        known = [each for each in others if each.asked and matches(asked, each.asked)]
-        found: Unfinished = (known or [first])[0].so_far(journal, sessions)
-        return found
+        kind = STUDIES[name].part("kind").KINDS[0]
+        store, notes, unread = store_of(journal, sessions, kind.row)
+        try:
+            results, done, of = contents_of(name).so_far(store, asked)
+        except UNREADABLE as error:
+            raise FileError(f"{path} cannot be read: {error}") from error
+        return Unfinished(journal.path, name, results, done, of, notes, sessions, unread, kind.noun)
 
 
 def plan_text(plan: Plan) -> str:

@@ -1,6 +1,7 @@
 """What a results file of swarms holds, for the commands; two of them compared."""
 
 import warnings
+from functools import partial
 from typing import Any
 
 import attrs
@@ -18,6 +19,7 @@ from flocsim.ensembles.contents import (
     common,
     in_words,
     labelled_of,
+    later,
     origin,
     starred,
 )
@@ -213,14 +215,18 @@ def mean_differences(
     }  # fmt: skip
 
 
+OF_KIND = partial(later, "ensembles.swarms.kind")
+
 CONTENTS = Contents(
     title="results of a swarm study", read=swarm_file.read_swarm, summary=summary,
     table=swarm_file.table_of, tables=tables,
     figures=figures, drawn={"a swarm study": SWARM_FIGURES},
-    so_far=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
+    running=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
     opened=lambda path, allowed=None: swarm_file.read_swarm(path),
     compare=compare,
     compared={name: words for name, (_, _, words) in swarm_file.COUNTS.items()},
     joined=Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
+    results=OF_KIND("results"), old_rows=OF_KIND("old_rows"), so_far=OF_KIND("so_far"),
+    facts=OF_KIND("facts"), verdict=OF_KIND("verdict"), dry_run=OF_KIND("dry_run"),
     animate=write_swarm_animation, motion=first_swarm,
 )  # fmt: skip

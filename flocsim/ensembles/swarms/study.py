@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -10,20 +10,26 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.compiler.composer import is_on_disk
+from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
-from flocsim.ensembles.kind import Code, Going, Keep, Place, StudyKind
+from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Going, Keep, StudyKind
+from flocsim.ensembles.preflight import names_in
 from flocsim.ensembles.storage.row_store import Parts
 from flocsim.ensembles.swarms import records
 from flocsim.ensembles.swarms.replicate import run_replicate
 from flocsim.ensembles.swarms.scene import SwarmScene
+from flocsim.errors import ConfigError, UsageError
+from flocsim.forces import ContactForce
 from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import ENDS
+from flocsim.io.results.swarm_file import ENDS, FORMAT
+from flocsim.plausibility import doubts_of
+from flocsim.swarms.islands import run_islands
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
-from flocsim.swarms.swarm import Swarm, stops_of
+from flocsim.swarms.swarm import Swarm, check_box, stops_of
 from flocsim.system import System
 
 SPHERE = -1
@@ -39,19 +45,16 @@ BEYOND = 4.0
 """A floor goes on for so many bounding radii beyond the box."""
 
 
+CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
+"""The modules that decide what a swarm does."""
+
+
 @attrs.frozen(eq=False)
 class Drawn:
     """The bodies of a replicate before they are placed: place of the floc, and shape, of each."""
 
     flocs: np.ndarray
     shapes: list[Shape]
-
-
-def flocs_of(config: Config) -> list[Floc]:
-    """The flocs that a config's swarm needs: none for spheres of given sizes."""
-    shapes = shapes_of(config)
-    needed = config.scene.is_measured or max(shapes.vertices) > 1
-    return load_flocs(shapes, config.seed) if needed else []
 
 
 def shapes_of(config: Config) -> ShapesConfig:
@@ -67,20 +70,87 @@ class SwarmStudy(StudyKind):
 
     config: Config
     flocs: list[Floc] = attrs.field(
-        default=attrs.Factory(lambda self: flocs_of(self.config), takes_self=True)
+        default=attrs.Factory(lambda self: self.flocs_of(self.config), takes_self=True)
     )
     pool: FlocPool = attrs.field(init=False)
     choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
     """Places of the measured flocs that bodies are drawn from."""
+    scenes: ClassVar[Sequence[type]] = (SwarmScene,)
+    format: ClassVar[str] = FORMAT
+    code: ClassVar[Sequence[str]] = CODE
     row: ClassVar[np.dtype] = ROW
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
-    check_rows = staticmethod(records.check_ends)
+    in_common: ClassVar[Sequence[str]] = (*ORDER, "times", "bounds", "replicates")
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
         if self.scene.is_measured:
             self.choosable = within_limits(self.scene, self.flocs)
+
+    @staticmethod
+    def flocs_of(config: Config) -> list[Floc]:
+        """Grow or read the flocs that a config's swarm needs: none for spheres of given sizes."""
+        shapes = shapes_of(config)
+        needed = config.scene.is_measured or max(shapes.vertices) > 1
+        return load_flocs(shapes, config.seed) if needed else []
+
+    @staticmethod
+    def check(config: Config) -> None:
+        """ConfigError for a swarm whose bodies have no contact force."""
+        if not any(isinstance(force, ContactForce) for force in config.forces):
+            raise ConfigError(
+                "bodies that meet need a contact force, found none among "
+                f"{', '.join(config.force_names)}: add [forces.contact]"
+            )
+
+    def prepare(self, comm: Any) -> None:
+        """UsageError on rank 0 where the bodies of a replicate find no place, or its box is too
+        small for them: before the first runs for hours. Every rank looks at its share, but for the
+        first replicate, which all have placed by now."""
+        reach, first = self.first.reach, None
+        for replicate in range(comm.rank or comm.size, self.config.replicates, comm.size):
+            try:
+                drawn, box, _ = self.placed(replicate)
+                check_box(drawn.shapes, self.periods(box), reach)
+            except UsageError as error:
+                first = replicate, str(error)
+                break
+        found = comm.gather(first)
+        if found is None:
+            return
+        if faults := sorted(each for each in found if each is not None):
+            replicate, why = faults[0]
+            raise UsageError(f"swarm {replicate} of {self.config.replicates} (from 0): {why}")
+        self.check_code()
+
+    def check_code(self) -> None:
+        """Raise the FlocsimError that the laws of forces would meet when they are compiled."""
+        for law in self.first.system.pieces.laws.values():
+            refuse_interpreter(law)
+        refuse_interpreter(run_islands, self.first.fillings())
+
+    def largest_pair(self) -> System:
+        """A System of the two largest bodies, for what is said of a swarm."""
+        free = [body for body in self.first.bodies if not body.fixed]
+        bodies = sorted(free, key=lambda body: -body.shape.equivalent_radius)[:2]
+        return attrs.evolve(self.first.system, bodies=bodies)
+
+    def doubts(self) -> list[str]:
+        """Return lines on what is implausible."""
+        return doubts_of([self.largest_pair()], names_in(self.config, self.config.forces))
+
+    def identity_facts(self) -> dict[str, Any]:
+        """Return what rows follow from besides config, flocs, code and machine."""
+        pieces = self.first.system.pieces
+        numbers = [*pieces.parameters, pieces.surface_reach, *pieces.smoothness, pieces.events]
+        codes = [fingerprint(run_islands, self.first.fillings())]
+        codes += [f"{law} {fingerprint(each, {})}" for law, each in sorted(pieces.laws.items())]
+        return {
+            "shapes.vertices": list(self.config.shapes.vertices),
+            "numbers.the swarm": np.array(numbers, float),
+            "kernels.swarms": np.array("\n".join(codes)),
+        }
 
     @property
     def vertices(self) -> int:
@@ -110,7 +180,7 @@ class SwarmStudy(StudyKind):
         return records.Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
 
     @property
-    def pieces(self) -> int:
+    def pieces(self) -> int:  # type: ignore[override]
         return len(self.stops)
 
     @property
@@ -125,12 +195,7 @@ class SwarmStudy(StudyKind):
 
     def asked(self) -> dict[str, Any]:
         """What the study consists of, and what its records look like."""
-        return super().asked() | {"swarm": self.form.asked()}
-
-    def fixed(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """The times and size classes as well, and the number of replicates, which are an axis."""
-        form = {name: asked["swarm"][name] for name in ("times", "bounds")}
-        return super().fixed(asked) | form | {"replicates": [asked["replicates"]]}
+        return super().asked() | self.form.asked()
 
     def compile(self, kinds: Iterable[Code]) -> None:
         """Compile all that a swarm needs, or load it, by running two bodies for no time."""
@@ -142,7 +207,7 @@ class SwarmStudy(StudyKind):
         return [] if is_on_disk(self.first.begin(TRIAL_SECONDS).runner.driver) else list(kinds)
 
     def run_task(
-        self, place: Place, replicate: int, halted: Callable[[], bool],
+        self, condition: Condition, replicate: int, halted: Callable[[], bool],
         left: records.Left | None = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
@@ -162,13 +227,10 @@ class SwarmStudy(StudyKind):
             f"{ended['status'].lower()} at {ended['time']:.4g} s, in an island of bodies "
             f"{', '.join(map(str, ended['failed'][:6]))}"
         )
-        return row, self.note(place, replicate, why)
+        return row, self.note(condition, replicate, why)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         return column("finished") == 0
-
-    def check_part(self, name: str, description: dict, data: bytes) -> None:
-        records.check_part(name, records.part_of(description, data), self.form)
 
     def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
         """ValueError where bodies or snapshots of a finished replicate are not there."""

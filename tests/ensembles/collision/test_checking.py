@@ -115,7 +115,7 @@ def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(
         small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 0.0, "tolerance": each}})
         for each in (1e-11, 1e-12)
     )
-    place = all_of_them.places[0]
+    place = 0, *all_of_them.conditions[0][1:]
     for k in range(6):
         row, plain, tighter = (each.run(*place, k) for each in (all_of_them, none, exact))
         assert [plain[name] for name in CHECKS + THIRDS] == [NOT_APPLICABLE] * 6
@@ -134,7 +134,7 @@ def test_a_second_run_is_that_of_the_tighter_tolerance_and_changes_nothing_else(
 
 def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
     study = small_study(tmp_path, POLYGONS | {"integrator": {"check_share": 1.0}})
-    whole, plain_run = study.run(*study.places[0], 0), Draw.run
+    whole, plain_run = study.run(0, *study.conditions[0][1:], 0), Draw.run
 
     def broken(*args, integrator=None, **options):
         if integrator is not None:
@@ -142,7 +142,7 @@ def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
         return plain_run(*args, **options)
 
     monkeypatch.setattr(Draw, "run", broken)
-    row, note = run_safely(study, study.places[0], 0)
+    row, note = run_safely(study, study.conditions[0], 0)
     assert note is None
     assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
     assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])

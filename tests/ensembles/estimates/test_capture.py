@@ -18,7 +18,7 @@ from flocsim.ensembles.estimates.capture import (
     weighted,
     widened,
 )
-from flocsim.ensembles.kernels import study_of
+from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
 from flocsim.ensembles.runner import run
 from flocsim.io.results.kernel_group import ESTIMATES, WHAT

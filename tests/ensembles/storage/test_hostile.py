@@ -5,7 +5,6 @@ import json
 import random
 
 import h5py
-import numpy as np
 import pytest
 
 from flocsim.ensembles.parallel.communicator import Communicator
@@ -102,25 +101,6 @@ def test_a_session_of_another_form_is_refused(reader, tmp_path, change):
         taken(reader, tmp_path, [(*key, about | change, data), *chunks])
 
 
-@pytest.mark.parametrize(
-    ("column", "value"),
-    [("outcome", 8), ("outcome", 255), ("inside", 0), ("inside", 9), ("crossed_zone", 3),
-     ("bond", 0), ("bond", 4), ("failure", 99), ("steps", -1), ("floc_i", -2),
-     ("angle_i", np.nan), ("t_end", np.inf), ("d_c_last", np.nan),
-     ("r_i", 0.0), ("r_j", np.inf), ("D_0", np.nan), ("d_c_over_D_0", 0.5),
-     ("checked_outcome", 8), ("checked_inside", 2), ("checked_bond", 0),
-     ("third_outcome", 8), ("third_outcome", 0), ("third_inside", 2), ("third_bond", 0),
-     ("closer_outcome", 8), ("wider_inside", 2), ("wider_bond", 0)],
-)  # fmt: skip
-def test_rows_that_no_run_has_given_are_computed_again(reader, tmp_path, column, value):
-    session, (*key, about, _), second = reader.parts
-    rows = reader.rows()
-    rows[column][1] = value
-    start, count = taken(reader, tmp_path, [session, (*key, about, rows.tobytes()), second])
-    assert count == 2
-    assert f"replicates/{column} are impossible: computed again" in start.remarks[0]
-
-
 def test_any_shuffled_journal_is_taken_or_refused(reader, tmp_path):
     for number in range(60):
         path = reader.make(random.Random(number), tmp_path)
@@ -148,21 +128,11 @@ def put(name, value):
     return change
 
 
-def row(name, value):
-    """A change of one row."""
-
-    def change(file):
-        file[f"replicates/{name}"][0, 0, 0, 0] = value
-
-    return change
-
-
 CHANGES = (
     [put("identity", text) for text in ("[]", "{", "[" * 10**5, "NaN", 7, "")]
     + [put(name, text) for name in ("failed", "history", "cpus")
        for text in ("{}", "[1]", '[{"a": ' * 50, 1.5)]
     + [put("failed", '[{"type": "I", "vertices": 1, "delta": "x", "replicate": 0, "why": "y"}]')]
-    + [row("outcome", 9), row("failure", 50), row("t_end", np.nan), row("steps", -4)]
     + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")]
 )  # fmt: skip
 

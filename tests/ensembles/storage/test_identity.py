@@ -11,7 +11,7 @@ from flocsim.ensembles.storage.identity import PACKAGE, physics_digest, physics_
 from tests.helpers.tiers import rest_slow
 
 ENTRIES = (
-    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/kernels.py",
+    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/collision/offsets.py",
 )  # fmt: skip
 """From these files a replicate reaches all that it runs."""
 
@@ -24,6 +24,7 @@ NOT_PHYSICS = {
     "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",
     "io/hdf5_child.py": "reads flocs, and these are compared themselves",
+    "ensembles/preflight.py": "what is refused, or looks implausible",
     "ensembles/kind.py": "what is asked of studies, and how rows are stored",
     "io/results/checks.py": "what is believed of files",
     "io/results/run_group.py": "text for people",

@@ -21,8 +21,8 @@ ASKED = {"types": ["I", "III"], "vertices": [1, 8], "delta": [0.0, 1.0], "replic
 def write_journal(path, asked=ASKED):
     """A locked journal: all of type I, of type III replicates 10 to 25 at N = 8, delta = 0."""
     session = {
-        "identity": {}, "short": "k", "layout": layout(), "date": "2020", "command": "x y",
-        "asked": asked,
+        "kind": "flocsim results", "identity": {}, "short": "k", "layout": layout(),
+        "date": "2020", "command": "x y", "asked": asked,
     }  # fmt: skip
     journal = Journal(path)
     journal.add(SESSION, "", 0, session)

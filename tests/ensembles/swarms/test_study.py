@@ -7,7 +7,6 @@ import pytest
 from scipy.stats import kstest, norm
 
 from flocsim.ensembles.runner import run
-from flocsim.ensembles.swarms.kind import check_room
 from flocsim.ensembles.swarms.study import SPHERE, SwarmStudy, lognormal
 from flocsim.errors import ConfigError, UsageError
 from tests.helpers.small_study import write_star_library
@@ -111,10 +110,10 @@ def test_every_replicate_is_placed_before_the_first_runs(tmp_path):
     for size in (1, 3):
         known = [seen for rank in range(size) for seen in [Told(rank, size)]]
         for comm in known[1:]:
-            check_room(found, comm)
+            found.prepare(comm)
         known[0].others = [comm.given for comm in known[1:]]
         with pytest.raises(UsageError, match=f"swarm {faults[0]} of 30"):
-            check_room(found, known[0])
+            found.prepare(known[0])
 
 
 def test_the_first_replicate_is_drawn_once_before_it_is_run(tmp_path, monkeypatch):

@@ -1,6 +1,6 @@
-"""KernelStudy: the replicates of a study of rates, and study_of, the Study of any config.
+"""Offsets at which the pairs of a study of rates approach each other, from uniform numbers.
 
-Points of a study of rates are for (θ_i, θ_j, flocs, offset). The offset comes first, as the first
+Points of such a study are for (θ_i, θ_j, flocs, offset). The offset comes first, as the first
 dimensions of Sobol's sequence are the most even ones.
 
 A settling pair touches exactly where the shadows of the two outlines overlap, as nothing turns them
@@ -9,17 +9,11 @@ they come, and offsets are b = ± b_max √u: as often as the flow brings pairs 
 """
 
 from collections.abc import Sequence
-from typing import Any
 
-import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.draw import point, point_facts
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.config.pair_scene import SETTLING
-from flocsim.ensembles.config.schema import Config
-from flocsim.ensembles.study import Study, flocs_of
 from flocsim.geometry.shapes.shape import Shape
 
 OFFSET, ANGLE_I, ANGLE_J, FLOC_I, FLOC_J = range(5)
@@ -68,31 +62,6 @@ LEAST_OFFSET = 1e-4
 pairs that is, its square, is none."""
 
 
-@attrs.define(eq=False)
-class KernelStudy(Study):
-    """Every replicate of a config whose scene is a KernelScene.
-
-    A replicate is a point of a scrambled Sobol sequence, the same in all conditions: orientations,
-    flocs, and the offset b of j's way from i's centre, which is share · (R_i + R_j).
-    """
-
-    def numbers(self, replicate: int) -> np.ndarray:
-        """The point of a replicate: two orientations, two choices of floc, the offset."""
-        return as_draws(point(self.config.seed, self.scene.scrambles, replicate))
-
-    def facts(self) -> dict[str, Any]:
-        """What rows follow from besides the config: the points themselves."""
-        return point_facts(self.config.seed, self.scene.scrambles)
-
-    def share_of(
-        self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
-    ) -> float:
-        """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
-        angles = np.array(encounter.orientations(numbers))[:, None]
-        offsets = offsets_of(encounter, angles[0], angles[1], np.array(numbers[4:]))
-        return float(offsets[0]) / encounter.outer
-
-
 def bounds_of(
     encounter: Encounter, angles_i: np.ndarray, angles_j: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -117,10 +86,3 @@ def offsets_of(
     offsets = flow_offset(numbers, float(high[0]))
     least = LEAST_OFFSET * float(high[0])
     return np.where(np.abs(offsets) < least, np.copysign(least, offsets), offsets)
-
-
-def study_of(config: Config, flocs: Sequence[Floc] | None = None) -> Study:
-    """Return the Study of a config of binary collisions or of rates; ``flocs`` are grown or read
-    unless given."""
-    made = KernelStudy if config.is_kernel else Study
-    return made(config, flocs=flocs_of(config) if flocs is None else list(flocs))
