@@ -107,7 +107,6 @@ HEAVYWEIGHTS = {
         "io/groups.py",
         "io/hdf5.py",
         "io/hdf5_child.py",
-        "io/results/layout.py",
         "io/trajectory.py",
     ],
     "skimage": ["io/images/*.py"],

@@ -1,50 +1,61 @@
-"""Groups of arrays in HDF5, declared once.
+"""Kinds of files, each declared once as tables; written, read, checked and shown from that.
 
-A Group says what arrays a group has, along which axes, of what type, in what unit, and what they
-mean: how it is written and read, what a file is held against and what a user sees follow from it.
-A file is opened in three steps: its checksum, then its structure (`flocsim.io.hdf5`), then values.
+A `FileFormat` is the name and version of a kind of file and its groups. A `Group` is a table: its
+columns and their axes, each a `Dataset` with type, axes, unit, meaning, and range or codes. To
+declare a kind of file, for example the results of a kind of study:
+
+    COLUMNS = {"speed": ("f8", "m s-1", "mean downward velocity"),
+               "steps": ("i8", "1", "accepted integrator steps")}
+    SCALES = {"replicate": ("i8", "1", "number of the replicate")}
+    FLOCS = Group.of(declared(COLUMNS, ("replicate",)), SCALES)
+    FORMAT = FileFormat("flocsim lone", 1, "results of single flocs", {"flocs": FLOCS})
+
+    FORMAT.write(path, {"flocs": FLOCS.labelled({"replicate": numbers, "speed": v, "steps": n})},
+                 run={"config": text})
+    found = FORMAT.read(path)    # Stored: found.groups["flocs"]["speed"], found.run["config"]
+    found.to_xarray("flocs")     # also to_pandas, and `flocsim export csv`
+
+Files are HDF5 that xarray, MATLAB, R and Julia open: axes are dimension scales, every dataset has
+``units`` and ``long_name``, codes have ``flag_values`` and ``flag_meanings``, and a checksum
+follows the HDF5 data (`flocsim.io.seals`).
 """
 
 import contextlib
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any, BinaryIO
 
 import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.files import Rule, keep, write_file
-from flocsim.io.hdf5 import File, Node, Unfit, open_hdf5
-from flocsim.io.labelled import Column, Labelled
-from flocsim.io.seals import checked_sealed, seal
-
-ATTRIBUTES = {
-    "units", "long_name", "flag_values", "flag_meanings", "CLASS", "NAME", "DIMENSION_LIST",
-    "REFERENCE_LIST",
-}  # fmt: skip
-"""Attributes that a dataset may have."""
+from flocsim.io.files import Rule, keep, unfinished
+from flocsim.io.hdf5 import File, Unfit, open_hdf5
+from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.seals import checked_sealed, seal_file
 
 Schema = Mapping[str, tuple[str, str, str]]
-"""{name: (type, unit, meaning)}."""
+"""{name: (type, unit, meaning)}; types are "f8", "i8", "i4", "u1" and "text"."""
 
 UNREADABLE = (
     OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
     OverflowError, IndexError, EOFError,
 )  # fmt: skip
-"""What h5py raises for what it cannot read."""
+"""What reading a file raises that does not hold what it should."""
 
-LONGEST_WORDS = 80
-"""Letters of what a file says that it is."""
+LONGEST_NAME = 80
+"""Characters of the name of a kind of file."""
 
 
 @attrs.frozen
-class Declared:
-    """A dataset: its type and its axes, each a length or the name of one that is found, its unit,
-    its meaning, and where it holds codes these and their words.
+class Dataset:
+    """One array of a file.
 
-    Axes of one name are of one length.
+    ``axes``: a length or a name each, and axes of one name are of one length. A text has to be
+    printable, and numbers are one of the ``codes`` (codes, their words), or lie from ``low`` to
+    ``high``, and where they are places ``along`` an axis below its length. Without a range any
+    number will do, NaN too.
     """
 
     type: str
@@ -52,325 +63,411 @@ class Declared:
     unit: str = "1"
     text: str = ""
     codes: tuple[Sequence[int], Sequence[str]] | None = None
+    low: float = -np.inf
+    high: float = np.inf
+    along: str | None = None
 
     @property
     def about(self) -> dict[str, Any]:
         """Its attributes."""
-        said: dict[str, Any] = {"units": self.unit, "long_name": self.text}
+        about: dict[str, Any] = {"units": self.unit, "long_name": self.text}
         if self.codes is not None:
-            said["flag_values"] = np.array(self.codes[0], "u1")
-            said["flag_meanings"] = " ".join(self.codes[1])
-        return said
+            about["flag_values"] = np.array(self.codes[0], "u1")
+            about["flag_meanings"] = " ".join(self.codes[1])
+        return about
 
-
-def hold_against(
-    nodes: Mapping[str, Node], groups: Mapping[str, Mapping[str, Declared]],
-    needed: Iterable[str], known: Mapping[str, int] | None = None,
-) -> dict[str, int]:  # fmt: skip
-    """{axis: length} where every group and dataset of a file is as its kind should have it.
-
-    ``groups``: {path: {name: Declared}}, ``needed`` the paths of those that it must have, ``known``
-    the lengths of axes that are always the same. Raises Unfit for a group or dataset that is
-    missing, unknown, or of another type or shape.
-    """
-    lengths = dict(known or {})
-    for path in needed:
-        if path not in nodes or nodes[path].type is not None:
-            raise Unfit(f"there is no group {path}")
-    for path, node in nodes.items():
-        group, _, name = path.rpartition("/")
-        if node.type is None:
-            if path and path not in groups:
-                raise Unfit(f"there is an unknown group {path}")
-            # Coordinates that are no axis, as xarray looks for them.
-            if path and node.attributes.keys() - {"coordinates"}:
-                raise Unfit(f"the group {path} has attributes")
-        elif name not in groups.get(group, {}):
-            raise Unfit(f"there is an unknown dataset {path}")
+    def check(self, path: str, values: np.ndarray, lengths: Mapping[str, int]) -> None:
+        """Raise Unfit for values out of range; ``lengths`` {axis: length} of the file."""
+        if self.type == "text":
+            wrong = any(not word.isprintable() for word in values.ravel())
+        elif self.codes is not None:
+            wrong = not np.isin(values, self.codes[0]).all()
         else:
-            check_column(path, node, groups[group][name], lengths)
-    for group, columns in groups.items():
-        for name in columns:
-            if group in nodes and f"{group}/{name}" not in nodes:
-                raise Unfit(f"{group}/{name} is missing")
-    return lengths
+            most = lengths[self.along] - 1 if self.along else self.high
+            ranged = (self.low, most) != (-np.inf, np.inf)
+            wrong = ranged and not np.all((values >= self.low) & (values <= most))
+        if wrong:
+            raise Unfit(f"{path} has impossible values")
 
-
-def check_column(path, node, column, lengths):
-    if node.type != column.type:
-        raise Unfit(f"{path} holds {node.type}, expected {column.type}")
-    if len(node.shape) != len(column.axes):
-        raise Unfit(f"{path} has {len(node.shape)} dimensions, expected {len(column.axes)}")
-    for axis, length in zip(column.axes, node.shape, strict=True):
-        wanted = axis if isinstance(axis, int) else lengths.setdefault(axis, length)
-        if length != wanted:
-            raise Unfit(f"{path} has {length} values along {axis}, expected {wanted}")
-    for name in node.attributes.keys() - ATTRIBUTES:
-        raise Unfit(f"{path} has an attribute {name} that flocsim does not write")
+    def column(self, values: Any) -> Column:
+        """Return values of this dataset with its axes and attributes."""
+        if self.type == "text":
+            array = np.array([str(word) for word in values], dtype=object)
+        else:
+            array = np.asarray(values, self.type)
+        return Column(tuple(map(str, self.axes)), array, self.about)
 
 
 def declared(
-    schema: Schema, axes: Sequence[int | str], codes: Mapping[str, tuple] | None = None
-) -> dict[str, Declared]:
-    """{name: Declared} of arrays along the same axes; ``codes`` {name: (codes, words)}."""
+    schema: Schema, axes: Sequence[int | str], codes: Mapping[str, tuple] | None = None,
+    low: float = -np.inf, high: float = np.inf, along: Mapping[str, str] | None = None,
+) -> dict[str, Dataset]:  # fmt: skip
+    """Return {name: Dataset} of arrays along the same axes, and of one range.
+
+    ``codes``: {name: (codes, words)} of the arrays that hold codes; ``along``: {name: axis} of
+    those that hold places along an axis.
+    """
+    codes, along = codes or {}, along or {}
     return {
-        name: Declared(kind, tuple(axes), unit, text, (codes or {}).get(name))
+        name: Dataset(kind, tuple(axes), unit, text, codes.get(name), low, high, along.get(name))
         for name, (kind, unit, text) in schema.items()
     }
 
 
 @attrs.frozen(eq=False)
 class Group:
-    """A group: its arrays in order, and ``scales`` {axis: Declared} of the axes that they have.
+    """A table: its columns in order, and ``scales``, the coordinates of their axes.
 
-    ``beside``: coordinates that are no axis themselves.
+    A coordinate that is no axis itself lies along the axis that its Dataset names.
     """
 
-    columns: Mapping[str, Declared]
-    scales: Mapping[str, Declared]
-    beside: Mapping[str, Declared] = attrs.Factory(dict)
+    columns: Mapping[str, Dataset]
+    scales: Mapping[str, Dataset]
 
     @classmethod
     def of(
-        cls, columns: Mapping[str, Declared], scales: Schema,
-        beside: Mapping[str, Declared] | None = None,
+        cls, columns: Mapping[str, Dataset], scales: Schema,
+        beside: Mapping[str, Dataset] | None = None,
     ) -> "Group":  # fmt: skip
-        """A group whose axes are those of its arrays, of some ``scales`` {axis: (type, unit,
-        meaning)}."""
+        """Return a group with those of the ``scales`` that its columns have as axes.
+
+        ``beside``: coordinates that are no axes.
+        """
         used = dict.fromkeys(str(axis) for each in columns.values() for axis in each.axes)
-        axes = {axis: Declared(scales[axis][0], (axis,), *scales[axis][1:]) for axis in used}
-        return cls(columns, axes, beside or {})
+        axes = {axis: Dataset(scales[axis][0], (axis,), *scales[axis][1:]) for axis in used}
+        return cls(columns, axes | dict(beside or {}))
 
     @property
     def index(self) -> list[str]:
-        """The axes that all of its arrays have."""
-        return [axis for axis in self.scales
-                if all(axis in each.axes for each in self.columns.values())]  # fmt: skip
+        """The axes that all columns have."""
+        return [name for name, scale in self.scales.items() if scale.axes == (name,)
+                and all(name in each.axes for each in self.columns.values())]  # fmt: skip
 
     @property
-    def arrays(self) -> dict[str, Declared]:
-        """All that it holds."""
-        return {**self.scales, **self.beside, **self.columns}
+    def arrays(self) -> dict[str, Dataset]:
+        """All coordinates and columns."""
+        return {**self.scales, **self.columns}
 
     def labelled(self, values: Mapping[str, Any]) -> Labelled:
-        """Values of all that it holds, by name, as Labelled."""
+        """Return {name: values} of all coordinates and columns as Labelled."""
+        scales, columns = (
+            {name: each.column(values[name]) for name, each in part.items()}
+            for part in (self.scales, self.columns)
+        )
+        return Labelled(scales, columns)
 
-        def columns(declared):
-            return {name: column_of(each, values[name]) for name, each in declared.items()}
-
-        return Labelled(columns({**self.scales, **self.beside}), columns(self.columns))
-
-    def read(self, file: File, path: str) -> dict[str, np.ndarray]:
-        """{name: values} of all that a group of a file holds, which was held against this one."""
-        return {name: file.read(f"{path}/{name}") for name in self.arrays}
+    def read(self, file: File, path: str, lengths: Mapping[str, int]) -> dict[str, np.ndarray]:
+        """Return {name: values} of all coordinates and columns of a group of an open file."""
+        values = {name: file.read(f"{path}/{name}") for name in self.arrays}
+        for name, each in self.arrays.items():
+            each.check(f"{path}/{name}", values[name], lengths)
+        return values
 
 
-def column_of(declared: Declared, values: Any) -> Column:
-    """Values with what is said of them."""
-    words = declared.type == "text"
-    found = (
-        np.array([str(word) for word in values], dtype=object)
-        if words
-        else (np.asarray(values, declared.type))
-    )
-    return Column(tuple(map(str, declared.axes)), found, declared.about)
+@attrs.frozen(eq=False)
+class Stored(Tables):
+    """What a file holds: ``groups`` {group: {name: values}}, coordinates among them; ``run``, the
+    scalars of the group ``run``; the ``attributes`` of the file."""
+
+    declared: Mapping[str, Group]
+    groups: dict[str, dict[str, np.ndarray]]
+    run: dict[str, Any]
+    attributes: dict[str, Any]
+
+    @property
+    def format(self) -> str:
+        """The kind of file."""
+        return str(self.attributes.get("format", ""))
+
+    @property
+    def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
+        """{group: the axes that all of its columns have}."""
+        return {name: self.declared[name].index for name in self.groups}
+
+    def labelled(self, group: str) -> Labelled:
+        """Return a group's arrays with their axes; UsageError for an unknown one."""
+        name = self.known(group)
+        return self.declared[name].labelled(self.groups[name])
+
+
+@attrs.frozen(eq=False)
+class FileFormat:
+    """A kind of file.
+
+    Parameters
+    ----------
+    name : str
+        What its attribute ``format`` (or the one that ``attribute`` names) says.
+    version : int
+        Schema version that is written, and the latest that is read.
+    title : str
+        What a file holds, for messages: "results of a swarm".
+    groups : {str: Group}
+        Its tables, by the paths of their groups.
+    optional : collection of str
+        Groups that a file may lack.
+    lengths : {str: int}
+        Lengths of axes that are the same in every file.
+    oldest : int, optional
+        Earliest version that is read; ``version`` by default.
+    attribute : str
+        The attribute of the file that has the name.
+    remedy : str
+        What a user can do about a file that cannot be read.
+    """
+
+    name: str
+    version: int
+    title: str
+    groups: Mapping[str, Group]
+    optional: Collection[str] = ()
+    lengths: Mapping[str, int] = attrs.Factory(dict)
+    oldest: int | None = None
+    attribute: str = "format"
+    remedy: str = "run the study again"
+
+    @property
+    def indices(self) -> dict[str, list[str]]:
+        """{group: the axes that all of its columns have}."""
+        return {name: group.index for name, group in self.groups.items()}
+
+    def write(
+        self, path: str | os.PathLike, groups: Mapping[str, Labelled],
+        run: Mapping[str, Any] | None = None, attributes: Mapping[str, Any] | None = None,
+        rule: Rule = keep, fill: Mapping[str, Callable[[Any], None]] | None = None,
+    ) -> None:  # fmt: skip
+        """Write a file with its checksum, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+        groups : {str: Labelled}
+            The arrays of each group.
+        run : {str: str, int or float}, optional
+            The scalars of the group ``run``.
+        attributes : {str: str or number}, optional
+            Further attributes of the file.
+        rule : Rule
+            What becomes of a file that exists (`flocsim.io.files`).
+        fill : {str: function}, optional
+            Functions that write the columns of some groups, given the open group of h5py, a part
+            at a time so that memory stays flat. Only types and shapes of their arrays are used.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        """
+        with unfinished(path, rule) as (_, file):
+            # HDF5 can crash where a write fails, as on a full disk: the error is raised afterwards.
+            steady = Unfailing(file)
+            try:
+                self.write_data(steady, groups, run, attributes, fill)
+            except Exception:
+                if steady.error is None:
+                    raise
+            if steady.error is not None:
+                raise steady.error
+            seal_file(file)
+
+    def write_data(
+        self, target: BinaryIO, groups: Mapping[str, Labelled],
+        run: Mapping[str, Any] | None = None, attributes: Mapping[str, Any] | None = None,
+        fill: Mapping[str, Callable[[Any], None]] | None = None,
+    ) -> None:  # fmt: skip
+        """Write the HDF5 data of a file into an open one, without a checksum."""
+        import h5py
+
+        fill = fill or {}
+        with h5py.File(target, "w") as file:
+            file.attrs.update({self.attribute: self.name, "schema_version": self.version})
+            file.attrs.update(attributes or {})
+            for name, labelled in groups.items():
+                write_labelled(file.require_group(name or "/"), labelled, empty=name in fill)
+            for name, write_columns in fill.items():
+                write_columns(file[name])
+            # Last, so that its length moves no byte of the groups before it.
+            for name, value in (run or {}).items():
+                # A bool would become an HDF5 enumeration, which few readers know.
+                file[f"run/{name}"] = int(value) if isinstance(value, bool) else value
+
+    @contextlib.contextmanager
+    def opened(self, path: str | os.PathLike) -> Iterator[File]:
+        """Open a file, once its checksum, format and version were found right.
+
+        Raises FileError for an absent or damaged file, and for one of another kind or version. So
+        do errors of the block that say that the file does not hold what it should (UNREADABLE).
+        """
+        with checked_sealed(path) as data:
+            try:
+                file = open_hdf5(path, data)
+                self.check_version(path, file)
+                yield file
+            except FileError:
+                raise
+            except UNREADABLE as error:
+                why = " ".join(str(error).split())
+                raise FileError(
+                    f"{path} has no readable {self.title}: {why}; {self.remedy}"
+                ) from error
+
+    def check_version(self, path: object, file: File) -> None:
+        """Raise FileError unless an open file is of this format and of a version that is read.
+
+        Versions below ``oldest`` were never released, so there is nothing to migrate them by: who
+        raises a version adds what makes a file of before one of now.
+        """
+        if text_of(file, self.attribute) != self.name:
+            other = text_of(file, "format") or text_of(file, "kind") or "file of another kind"
+            raise FileError(f"{path} holds a {other}: name a file with {self.title}")
+        found, oldest = file.attributes.get("schema_version"), self.oldest or self.version
+        if not isinstance(found, int) or found < 1:
+            raise Unfit("it does not record a schema version")
+        if found < oldest:
+            raise FileError(
+                f"{path} has schema version {found}, written by a flocsim before 0.3 that was "
+                f"never released: {self.remedy}"
+            )
+        if found > self.version:
+            raise FileError(
+                f"{path} has schema version {found}, and this flocsim reads up to {self.version}: "
+                "read it with the version that wrote it"
+            )
+
+    def check(self, file: File) -> dict[str, int]:
+        """Return {axis: length} of an open file whose groups and datasets are those declared.
+
+        Raises Unfit for a dataset that is missing, unknown, or of another type or shape.
+        """
+        lengths = dict(self.lengths)
+        wanted = {
+            f"{name}/{column}".lstrip("/"): each for name, group in self.groups.items()
+            if name in file or name not in self.optional for column, each in group.arrays.items()
+        }  # fmt: skip
+        datasets = {path for path, node in file.items() if node.type is not None}
+        scalars = {path for path in datasets if path.startswith("run/") and not file[path].shape}
+        for path in sorted(wanted.keys() - datasets):
+            raise Unfit(f"{path} is missing")
+        for path in sorted(datasets - scalars - wanted.keys()):
+            raise Unfit(f"there is an unknown dataset {path}")
+        for path, each in wanted.items():
+            node = file[path]
+            if node.type != each.type or len(node.shape) != len(each.axes):
+                raise Unfit(
+                    f"{path} holds {node.type} of {len(node.shape)} dimensions, expected "
+                    f"{each.type} of {len(each.axes)}"
+                )
+            for axis, length in zip(each.axes, node.shape, strict=True):
+                wide = axis if isinstance(axis, int) else lengths.setdefault(axis, length)
+                if length != wide:
+                    raise Unfit(f"{path} has {length} values along {axis}, expected {wide}")
+        return lengths
+
+    def contents(self, file: File, without: Collection[str] = ()) -> Stored:
+        """Return what an open file holds, checked; ``without``: groups that are not read."""
+        lengths = self.check(file)
+        groups = {
+            name: group.read(file, name, lengths) for name, group in self.groups.items()
+            if name in file and name not in without
+        }  # fmt: skip
+        first: dict[str, np.ndarray] = {}
+        for name, values in groups.items():
+            for axis in self.groups[name].scales:
+                # Coordinates may be unknown: NaN is NaN.
+                words = values[axis].dtype == object
+                if not np.array_equal(
+                    first.setdefault(axis, values[axis]), values[axis], equal_nan=not words
+                ):
+                    raise Unfit(f"{name}/{axis} is not that of the other groups")
+        return Stored(self.groups, groups, run_of(file), file.attributes)
+
+    def read(self, path: str | os.PathLike) -> Stored:
+        """Return what a file holds, checked; FileError where it cannot be read."""
+        with self.opened(path) as file:
+            return self.contents(file)
 
 
 def run_of(file: File) -> dict[str, str | int | float]:
-    """The scalars of the group ``run`` of an open file."""
-    return {name: scalar_of(file, f"run/{name}") for name in file.names("run")}
+    """Return the scalars of the group ``run`` of an open file."""
+    return {name: file.read(f"run/{name}").item() for name in file.names("run")}
 
 
-def scalar_of(file: File, path: str) -> str | int | float:
-    """The value of a dataset of one."""
-    value: str | int | float = file.read(path).item()
-    return value
+def write_labelled(place: Any, labelled: Labelled, empty: bool = False) -> None:
+    """Write arrays into an open group of h5py, their axes as dimension scales.
 
-
-def scalars_in(nodes: Mapping[str, Node], group: str) -> dict[str, Declared]:
-    """What a group of any scalars holds, to hold it against."""
-    return {
-        path.removeprefix(f"{group}/"): Declared(node.type)
-        for path, node in nodes.items()
-        if path.startswith(f"{group}/") and node.type in ("text", "i8", "f8")
-    }
-
-
-def write_labelled(
-    place: Any, labelled: Labelled, create: Callable[[Any, str, np.ndarray], Any] | None = None,
-    created: Sequence[str] = (),
-) -> list[Any]:  # fmt: skip
-    """Write arrays into an open group, their axes as dimension scales; the datasets in order.
-
-    A coordinate that is no axis itself is an array that the attribute of the group names.
-    ``create(group, name, values)`` makes the datasets of the names in ``created``.
+    A coordinate that is no axis itself is an array that the attribute ``coordinates`` of the group
+    names, where xarray looks for it. ``empty``: the columns are to be filled later.
     """
     import h5py
 
-    inner = {name: each for name, each in labelled.axes.items() if each.axes != (name,)}
-    scales = {name: each for name, each in labelled.axes.items() if name not in inner}
-    if inner:
-        place.attrs["coordinates"] = " ".join(inner)
-    datasets: dict[str, Any] = {}
-    for name, column in (scales | inner | labelled.columns).items():
-        if create is not None and name in created:
-            dataset = create(place, name, column.values)
+    scales = {name: each for name, each in labelled.axes.items() if each.axes == (name,)}
+    beside = {name: each for name, each in labelled.axes.items() if name not in scales}
+    if beside:
+        place.attrs["coordinates"] = " ".join(beside)
+    for name, column in (scales | beside | labelled.columns).items():
+        values = column.values
+        if empty and name in labelled.columns:
+            dataset = place.create_dataset(name, values.shape, values.dtype)
+        elif values.dtype.kind in "OU":
+            dataset = place.create_dataset(name, data=values.tolist(), dtype=h5py.string_dtype())
         else:
-            words = column.values.dtype.kind in "OU"
-            values = column.values.tolist() if words else column.values
-            kind = h5py.string_dtype() if words else None
-            dataset = place.create_dataset(name, data=values, dtype=kind)
-        datasets[name] = dataset
+            dataset = place.create_dataset(name, data=values)
+        dataset.attrs.update(column.about)
         if name in scales:
             dataset.make_scale(name)
-        dataset.attrs.update(column.about)
+            continue
         for number, axis in enumerate(column.axes):
-            if name not in scales and axis in scales:
-                h5py.h5ds.attach_scale(dataset.id, datasets[axis].id, number)
-    return list(datasets.values())
+            if axis in scales:
+                dataset.dims[number].attach_scale(place[axis])
 
 
-def write_groups(
-    path: str | os.PathLike, attributes: Mapping[str, Any], groups: Mapping[str, Labelled],
-    scalars: Mapping[str, Any] | None = None, rule: Rule = keep,
-) -> None:  # fmt: skip
-    """Write a file of groups, sealed, whole or not at all; FileError if that is impossible.
+class Unfailing(io.FileIO):
+    """An open file as HDF5 sees it: no write fails.
 
-    ``scalars``, optional: those of the group ``run``; ``rule`` says what becomes of a file that is
-    there.
+    The first error is remembered in ``error``, and nothing is written after it.
     """
-    import h5py
 
-    image = io.BytesIO()
-    with h5py.File(image, "w") as file:
-        file.attrs.update(attributes)
-        for name, labelled in groups.items():
-            write_labelled(file.require_group(name), labelled)
-        if scalars is not None:
-            run = file.create_group("run")
-            for name, value in scalars.items():
-                run[name] = value
-    write_file(path, seal(image.getvalue()), rule)
+    def __init__(self, file: BinaryIO) -> None:
+        super().__init__(file.fileno(), "r+", closefd=False)
+        self.error: OSError | None = None
 
-
-def check_format(
-    path: object, file: File, name: str, version: int, text: str | None = None
-) -> None:
-    """ValueError unless an open file is of this format, and has the attribute ``text``; FileError
-    for another version."""
-    for attribute in ("format", text or "format"):
-        if not isinstance(file.attributes.get(attribute), str):
-            raise Unfit(f"its attribute {attribute} is missing, or is of another type")
-    if file.attributes["format"] != name:
-        raise ValueError(f"its format is not {name}")
-    check_version(path, file, version)
-
-
-def check_version(
-    path: object, file: File, first: int, last: int | None = None,
-    remedy: str = "run the study again",
-) -> int:  # fmt: skip
-    """The schema version of an open file; FileError unless it is one of ``first`` to ``last``.
-
-    Versions below ``first`` were never released, so there is nothing to migrate them by: whoever
-    raises a version puts here what makes a file of before one of now.
-    """
-    version = file.attributes.get("schema_version")
-    if not isinstance(version, int) or version < 1:
-        raise Unfit("it does not record a schema version")
-    if version < first:
-        raise FileError(
-            f"{path} has schema version {version}, written by a flocsim before 0.3 that was never "
-            f"released: {remedy}"
-        )
-    if version > (last or first):
-        raise FileError(
-            f"{path} has schema version {version}, and this flocsim reads up to {last or first}: "
-            "read it with the version that wrote it"
-        )
-    return version
-
-
-@contextlib.contextmanager
-def opened_file(path: str | os.PathLike, complaint: Callable[[str], str]) -> Iterator[File]:
-    """An open file, once checksum and structure were found right.
-
-    FileError with ``complaint(reason)`` where it, or what is done with it, fails on what it holds,
-    and where it was written to meanwhile.
-    """
-    before = stamp(path)
-    with checked_sealed(path) as (data, _):
+    def write(self, data: Any) -> int:
+        """Write all of the data, or none after an error."""
+        left = memoryview(data).cast("B")
         try:
-            yield open_hdf5(path, data)
-        except FileError:
-            raise
-        except UNREADABLE as error:
-            raise FileError(complaint(" ".join(str(error).split()))) from error
-        if stamp(data.fileno()) != before:
-            raise FileError(f"{path} was changed by another program while it was read: try again")
+            while self.error is None and len(left):
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.error = error
+        return len(data)
 
-
-def stamp(file: str | os.PathLike | int) -> tuple | None:
-    """What tells that a file is another one, or was written to; None where there is none."""
-    try:
-        about = os.stat(file)
-    except (OSError, ValueError):
-        return None
-    return about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length of the file, unless an error came before."""
+        try:
+            if self.error is None:
+                return super().truncate(size)
+        except OSError as error:
+            self.error = error
+        return size or 0
 
 
 def text_of(file: File, name: str) -> str:
-    """An attribute of an open file that is a text; "" where there is none, or none that flocsim
-    writes there, which messages show."""
+    """Return a short printable attribute of an open file; "" where it has none."""
     found = file.attributes.get(name)
-    if not isinstance(found, str) or not found.isprintable() or len(found) > LONGEST_WORDS:
+    if not isinstance(found, str) or not found.isprintable() or len(found) > LONGEST_NAME:
         return ""
     return found
 
 
 def kind_of(path: str | os.PathLike) -> str:
-    """What a file says that it is, its `kind` or `format`; "" where that cannot be read: who then
-    reads it as one of these says what is wrong.
+    """Return the kind of a file, its attribute ``kind`` or ``format``.
 
-    One look for all kinds, since each look goes through the whole file for its checksum. FileError
-    where that is wrong, or where there is no such file.
+    "" where HDF5 cannot read it: the reader that is tried then says what is wrong. FileError for
+    an absent file or a wrong checksum.
     """
-    with checked_sealed(path) as (data, _):
+    with checked_sealed(path) as data:
         try:
-            file = open_hdf5(path, data, root_only=True)
+            file = open_hdf5(path, data)
         except UNREADABLE:
             return ""
         return text_of(file, "kind") or text_of(file, "format")
-
-
-def checked_arrays(
-    group: str, arrays: Mapping[str, Any], declared: Mapping[str, Declared],
-    lengths: Mapping[str, int],
-) -> dict[str, np.ndarray]:  # fmt: skip
-    """A group's arrays in the order and of the types declared; UsageError for an array that is
-    missing, unknown, misshapen or would lose its values."""
-    if set(arrays) != set(declared):
-        strange = ", ".join(sorted(set(arrays) ^ set(declared)))
-        raise UsageError(f"{group} must hold exactly the schema's arrays; differing: {strange}")
-    found = {
-        name: exact(arrays[name], each.type, f"{group}/{name}") for name, each in declared.items()
-    }
-    for name, array in found.items():
-        shape = tuple(lengths[str(axis)] for axis in declared[name].axes)
-        if array.shape != shape:
-            raise UsageError(f"{group}/{name} has shape {array.shape}, expected {shape}")
-    return found
-
-
-def exact(values, dtype, name):
-    """``values`` as an array of ``dtype``; UsageError if a value would change."""
-    try:
-        given = np.asarray(values)
-        with np.errstate(invalid="ignore"):
-            converted = given.astype(dtype)
-        same = np.array_equal(given, converted, equal_nan=converted.dtype.kind == "f")
-    except (TypeError, ValueError, OverflowError) as error:
-        raise UsageError(f"{name} must hold numbers of type {dtype}: {error}") from error
-    if not same:
-        raise UsageError(f"{name} holds values that do not fit the type {dtype}")
-    return converted

@@ -92,14 +92,14 @@ class File(dict[str, Node]):
         return self.node(path)[at]
 
 
-def open_hdf5(path: object, data: BinaryIO, root_only: bool = False) -> File:
+def open_hdf5(path: object, data: BinaryIO) -> File:
     """Return the File of an open file whose checksum was found right.
 
-    ``path``: its name in messages; ``root_only``: without what is in it. Raises Unfit for all that
-    flocsim does not write, and FileError for a file that the HDF5 library fails on.
+    ``path``: its name in messages. Raises Unfit for all that flocsim does not write, and FileError
+    for a file that the HDF5 library fails on.
     """
     describe = describe_forked if can_fork() else describe_spawned
-    said, status = describe(data, root_only)
+    said, status = describe(data)
     # The other process may have moved the place in the file that both have, which a buffer does not
     # notice unless it is sought from the end.
     seconds = hdf5_child.cpu_seconds(data.seek(0, os.SEEK_END))
@@ -134,7 +134,7 @@ def can_fork() -> bool:
     )
 
 
-def describe_forked(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:
+def describe_forked(data: BinaryIO) -> tuple[bytes, int]:
     """(what a forked process writes, its status: −n where signal n ended it)."""
     import h5py  # noqa: F401 (so that the process has it)
 
@@ -146,7 +146,7 @@ def describe_forked(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
-        run_forked(data.fileno(), writing, root_only, mask)
+        run_forked(data.fileno(), writing, mask)
     os.close(writing)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     with open(reading, "rb") as pipe:
@@ -160,7 +160,7 @@ def describe_forked(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:
     return said, os.waitstatus_to_exitcode(status)
 
 
-def run_forked(file: int, writing: int, root_only: bool, mask: Any) -> None:
+def run_forked(file: int, writing: int, mask: Any) -> None:
     """Describe the file; never returns. All else that this process has open belongs to another."""
     try:
         signal.set_wakeup_fd(-1)
@@ -174,18 +174,18 @@ def run_forked(file: int, writing: int, root_only: bool, mask: Any) -> None:
             os.dup2(each, place)
         for number in map(int, os.listdir("/proc/self/fd")):
             os.closerange(max(number, 3), number + 1)
-        hdf5_child.main(root_only)
+        hdf5_child.main()
     finally:
         os._exit(2)
 
 
-def describe_spawned(data: BinaryIO, root_only: bool) -> tuple[bytes, int]:
+def describe_spawned(data: BinaryIO) -> tuple[bytes, int]:
     """(what a new process writes, its exit code: −n where signal n ended it)."""
     variables = {
         name: value for name, value in os.environ.items() if not name.startswith(MPI_VARIABLES)
     } | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), BLAS_THREADS: "1"}  # fmt: skip
     done = subprocess.run(
-        [sys.executable, "-P", hdf5_child.__file__, *(["root"] if root_only else [])],
+        [sys.executable, "-P", hdf5_child.__file__],
         stdin=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=variables,
         start_new_session=True, check=False,
     )  # fmt: skip

@@ -39,13 +39,13 @@ class Refused(ValueError):
     """A file holds what flocsim does not write; a line without the file's name."""
 
 
-def main(root_only: bool) -> None:
+def main() -> None:
     """Write the description of the file; ends the process."""
     try:
         import h5py
 
         set_limits()
-        found: dict[str, Any] = {"nodes": described(h5py, root_only)}
+        found: dict[str, Any] = {"nodes": described(h5py)}
         said = json.dumps(found, default=plain, ensure_ascii=False).encode()
     except MemoryError:
         said = json.dumps({"refused": "it takes more than 768 MiB of memory"}).encode()
@@ -90,7 +90,7 @@ def limit(name: str, most: int) -> None:
     resource.setrlimit(which, (most if least < 0 else min(most, least), least))
 
 
-def described(h5py: Any, root_only: bool) -> dict[str, tuple]:
+def described(h5py: Any) -> dict[str, tuple]:
     """Return {path: (type, shape, offset of its values, attributes, text)} of all groups, of type
     None, and datasets; "" is the root."""
     # Not by its name, under which another file may lie by now.
@@ -100,8 +100,7 @@ def described(h5py: Any, root_only: bool) -> dict[str, tuple]:
             limit("NOFILE", 0)  # from here on nothing else can be opened
         root = h5py.h5o.open(file.id, b"/")
         nodes = {"": (None, (), None, attributes(h5py, root), None)}
-        if not root_only:
-            walk(h5py, root, "", nodes, [os.fstat(0).st_size])
+        walk(h5py, root, "", nodes, [os.fstat(0).st_size])
     return nodes
 
 
@@ -181,4 +180,4 @@ def plain(value: Any) -> Any:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] == ["root"])
+    main()

@@ -16,8 +16,6 @@ the same from run to run.
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from itertools import product
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,23 +23,13 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
 from flocsim.geometry.shapes.cores import Part, PointTable, is_compound, parts_in, table_of
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import (
-    Declared,
-    check_version,
-    column_of,
-    declared,
-    hold_against,
-    opened_file,
-    text_of,
-    write_groups,
-)
-from flocsim.io.hdf5 import File, Node
+from flocsim.io.groups import Dataset, FileFormat, Group, Stored, declared
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.results.schema import BAND_ENDS
 
@@ -54,14 +42,20 @@ NAME_OF_SHIPPED = "synthetic"
 SHIPPED = Path(__file__).with_name("synthetic.h5")
 """Its place; tests/helpers/shipped_library.py made it."""
 
-KIND = "flocsim shape library"
-SCHEMA_VERSION, COMPOUND_VERSION = 1, 2
-"""Of libraries of polygons, and of those with holes or parts."""
+POLYGONS, COMPOUNDS = 1, 2
+"""Schema versions of libraries of polygons, and of those with holes or parts."""
 
-MOST_VERTICES = 10_000
+LIBRARY = FileFormat(
+    "flocsim shape library", COMPOUNDS, "shape library", {}, optional=("measures", "population"),
+    oldest=POLYGONS, attribute="kind", remedy="make it again with flocsim fit",
+)  # fmt: skip
+"""Its groups are those of `groups_of`."""
+
 LARGEST = 1.0
 """Metres beyond which nothing of a floc lies."""
 MOST_PIXELS = 1e12
+LEAST = 5e-324
+"""The least number above 0."""
 
 FLOC_COLUMNS = declared(
     {
@@ -73,9 +67,11 @@ FLOC_COLUMNS = declared(
         "equivalent_radius": ("f8", "px", "radius of the circle of equal area"),
         "spheroradius": ("f8", "px", "spheroradius asked for"),
     },
-    ("floc",),
+    ("floc",), low=LEAST, high=MOST_PIXELS,
+)  # fmt: skip
+FLOC_COLUMNS["centroid"] = attrs.evolve(
+    FLOC_COLUMNS["centroid"], axes=("floc", 2), low=-MOST_PIXELS
 )
-FLOC_COLUMNS["centroid"] = attrs.evolve(FLOC_COLUMNS["centroid"], axes=("floc", 2))
 
 FIT_COLUMNS = {
     "vertices": ("f8", "m", "vertices around the floc's centroid, x right and y up"),
@@ -105,30 +101,39 @@ UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
 
 POPULATION_COLUMNS = declared(
     {
-        "weight": (
-            "f8",
-            "1",
-            "number of flocs that it represents, of which the filters kept only this one",
-        ),
+        "weight": ("f8", "1", "number of flocs that it represents, of which filters kept only it"),
         "radius_low": ("f8", "px", "equivalent radius as it would have been cut closer"),
         "radius_high": ("f8", "px", "equivalent radius as it would have been cut wider"),
     },
-    ("floc",),
-)
+    ("floc",), low=LEAST, high=MOST_PIXELS,
+)  # fmt: skip
 """What the picture leaves open."""
 
 ATTRIBUTES = {
     "id": "floc_id", "part": "points.part", "ring": "points.ring",
     "point_radius": "points.radius",
 }  # fmt: skip
-"""What a column holds of a ShapeEntry or a StoredFit, where that has another name."""
+"""Column → attribute of a ShapeEntry or a StoredFit, where that has another name."""
 
 
-def fits_at(count: int, compound: bool) -> dict[str, Declared]:
-    """The columns of fits with so many vertices; ``compound``: of flocs with holes or parts."""
-    columns = declared(FIT_COLUMNS, ("floc",))
-    columns["vertices"] = attrs.evolve(columns["vertices"], axes=("floc", count, 2))
-    return columns | (declared(POINT_COLUMNS, ("floc", count)) if compound else {})
+def groups_of(kinds: Iterable[str], counts: Sequence[int], compound: bool) -> dict[str, Group]:
+    """Return the groups of a library of fits at these numbers of vertices.
+
+    ``kinds``: "fits", and the ends of bands where these were fitted; ``compound``: of flocs with
+    holes or parts.
+    """
+    groups = {"flocs": Group(FLOC_COLUMNS, {}), "measures": Group(MEASURE_COLUMNS, {}),
+              "population": Group(POPULATION_COLUMNS, {})}  # fmt: skip
+    for count in counts:
+        columns = declared(FIT_COLUMNS, ("floc",), low=0.0, high=LARGEST)
+        columns["vertices"] = attrs.evolve(
+            columns["vertices"], axes=("floc", count, 2), low=-LARGEST
+        )
+        columns["relative_error"] = attrs.evolve(columns["relative_error"], high=np.inf)
+        if compound:
+            columns |= declared(POINT_COLUMNS, ("floc", count), low=0)
+        groups |= {f"{kind}/{count}": Group(columns, {}) for kind in kinds}
+    return groups
 
 
 @attrs.frozen(eq=False)
@@ -158,8 +163,12 @@ class StoredFit:
         return table_of((Part((self.vertices,), self.radius),))
 
 
-def own_radius(entry):
-    return entry.equivalent_radius
+def own_radius() -> Any:
+    """Return the default of an end of a floc's band: its own radius."""
+    return attrs.field(
+        kw_only=True,
+        default=attrs.Factory(lambda entry: entry.equivalent_radius, takes_self=True),
+    )
 
 
 @attrs.frozen(eq=False)
@@ -182,12 +191,8 @@ class ShapeEntry:
     fits: dict[int, StoredFit]
     measures: ShapeMeasures | None = None
     weight: float = 1.0
-    radius_low: float = attrs.field(
-        kw_only=True, default=attrs.Factory(own_radius, takes_self=True)
-    )
-    radius_high: float = attrs.field(
-        kw_only=True, default=attrs.Factory(own_radius, takes_self=True)
-    )
+    radius_low: float = own_radius()
+    radius_high: float = own_radius()
     closer: dict[int, StoredFit] = attrs.field(kw_only=True, factory=dict)
     wider: dict[int, StoredFit] = attrs.field(kw_only=True, factory=dict)
 
@@ -200,31 +205,6 @@ class ShapeEntry:
     def is_banded(self) -> bool:
         """Whether the ends of its band were fitted."""
         return bool(self.closer and self.wider)
-
-
-def measures_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
-    """The ShapeMeasures of all flocs, None for those without; ValueError for what cannot be."""
-    table = np.stack(list(columns.values()))
-    known = np.isfinite(table) & (table > 0.0)
-    if not np.all(known.all(axis=0) | np.isnan(table).all(axis=0)):
-        raise ValueError("measures has values that a floc cannot have")
-    rows = table.T.tolist()
-    return {"measures": [ShapeMeasures(*row) if row[0] == row[0] else None for row in rows]}
-
-
-def population_in(columns: dict[str, np.ndarray]) -> dict[str, list]:
-    """What the picture leaves open of all flocs; ValueError for what cannot be."""
-    for name, values in columns.items():
-        if not np.all((values > 0.0) & (values <= MOST_PIXELS)):
-            raise ValueError(f"population/{name} has values that a floc cannot have")
-    return {name: values.tolist() for name, values in columns.items()}
-
-
-OPTIONAL = {
-    "measures": (MEASURE_COLUMNS, measures_in), "population": (POPULATION_COLUMNS, population_in)
-}  # fmt: skip
-"""Groups that a library may lack: their columns, and the attributes of entries that these give,
-once they were checked."""
 
 
 def make_entry(
@@ -304,165 +284,100 @@ def write_library(
         )
 
     compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
-    groups = {"flocs": labelled(FLOC_COLUMNS, entries)}
     kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
-    for kind, count in product(kinds, sorted(entries[0].fits)):
-        fits = [getattr(entry, kind)[count] for entry in entries]
-        groups[f"{kind}/{count}"] = labelled(fits_at(count, compound), fits)
-    if any(entry.measures is not None for entry in entries):
-        groups["measures"] = labelled_measures(entries)
-    if any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
-        groups["population"] = labelled(POPULATION_COLUMNS, entries)
-    version = COMPOUND_VERSION if compound else SCHEMA_VERSION
-    attributes = {"kind": KIND, "schema_version": version, **(settings or {})}
-    write_groups(path, attributes, groups, rule=rule)
+    declared_as = groups_of(kinds, sorted(entries[0].fits), compound)
+    # Of a library of nothing but outlines these say nothing.
+    if not any(entry.measures is not None for entry in entries):
+        del declared_as["measures"]
+    if not any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
+        del declared_as["population"]
+    groups = {}
+    for name, group in declared_as.items():
+        kind, _, count = name.partition("/")
+        owners: list[Any] = entries
+        if count:
+            owners = [getattr(entry, kind)[int(count)] for entry in entries]
+        elif name == "measures":
+            owners = [entry.measures or UNMEASURED for entry in entries]
+        groups[name] = labelled(group.columns, owners)
+    version = COMPOUNDS if compound else POLYGONS
+    attrs.evolve(LIBRARY, version=version).write(path, groups, attributes=settings, rule=rule)
 
 
-def labelled(columns, owners):
-    """What columns hold of some owners."""
+def labelled(columns: Mapping[str, Dataset], owners: Sequence[Any]) -> Labelled:
+    """Return columns of attributes of some owners: flocs, fits or measures."""
     found = {}
     for name, each in columns.items():
         value = attrgetter(ATTRIBUTES.get(name, name))
-        found[name] = column_of(each, [value(owner) for owner in owners])
+        found[name] = each.column([value(owner) for owner in owners])
     return Labelled({}, found)
-
-
-def labelled_measures(entries):
-    """The measures of all flocs, NaN for one without."""
-    return labelled(MEASURE_COLUMNS, [entry.measures or UNMEASURED for entry in entries])
 
 
 def labelled_flocs(entries: Sequence[ShapeEntry]) -> Labelled:
     """Return all that is known of each floc but its fits, with the axes ``floc`` and ``2``."""
     columns = labelled(FLOC_COLUMNS | POPULATION_COLUMNS, entries).columns
     axes = {"floc": columns.pop("id"), "2": Column(("2",), np.array(["x", "y"], object))}
-    return Labelled(axes, columns | labelled_measures(entries).columns)
+    measures = labelled(MEASURE_COLUMNS, [entry.measures or UNMEASURED for entry in entries])
+    return Labelled(axes, columns | measures.columns)
 
 
-def reach_of(entry):
-    """The largest coordinate or radius of a floc's fits [m]."""
+def reach_of(entry: ShapeEntry) -> float:
+    """Return the largest coordinate or radius of a floc's fits [m]."""
     return max(
         max(np.abs(fit.vertices).max(), fit.points.radius.max()) for fit in entry.fits.values()
     )
 
 
 def read_settings(path: str | os.PathLike) -> dict[str, Any]:
-    """{name: value} of what the fits of a shape library were made with."""
-    with opened(path) as file:
-        named = file.attributes.items()
-        return {name: value for name, value in named if name not in ("kind", "schema_version")}
+    """Return {name: value} of what the fits of a shape library were made with."""
+    with LIBRARY.opened(path) as file:
+        apart = (LIBRARY.attribute, "schema_version")
+        return {name: value for name, value in file.attributes.items() if name not in apart}
 
 
 def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
-    """The flocs of a shape library, in the order of writing.
+    """Return the flocs of a shape library, in the order of writing.
 
     Raises FileError for a file that is missing, damaged, of another kind or another version, or
     that has impossible values.
     """
-    with opened(path) as file:
-        if text_of(file, "kind") != KIND:
-            raise FileError(f"{path} is not a shape library: name a file written by flocsim fit")
-        remedy = "make it again with flocsim fit"
-        version = check_version(path, file, SCHEMA_VERSION, COMPOUND_VERSION, remedy)
-        check_structure(file, version == COMPOUND_VERSION)
-        return _entries(file)
+    with LIBRARY.opened(path) as file:
+        kinds = [kind for kind in ("fits", *BAND_ENDS) if kind in file]
+        counts = sorted(map(int, file.names("fits")))
+        compound = file.attributes["schema_version"] == COMPOUNDS
+        groups = groups_of(kinds, counts, compound)
+        stored = attrs.evolve(LIBRARY, groups=groups).contents(file)
+        return entries_in(stored, kinds, counts)
 
 
-def opened(path: str | os.PathLike) -> AbstractContextManager[File]:
-    """An open file, once checksum and structure were found right."""
-    return opened_file(
-        path,
-        lambda reason: (
-            f"{path} is not a complete shape library ({reason}): make it again with flocsim fit"
-        ),
-    )
-
-
-def check_structure(nodes: Mapping[str, Node], compound: bool = False) -> None:
-    """ValueError unless the groups and datasets of a file are those of a shape library."""
-    banded = "closer" in nodes or "wider" in nodes
-    kinds = ("fits", *(BAND_ENDS if banded else ()))
-    groups: dict[str, Mapping[str, Declared]] = {"flocs": FLOC_COLUMNS} | {k: {} for k in kinds}
-    counts: dict[str, set[str]] = {kind: set() for kind in kinds}
-    for path in nodes:
-        group, _, count = path.rpartition("/")
-        if group in kinds:
-            if not (count.isdecimal() and count.isascii() and 0 < int(count) <= MOST_VERTICES):
-                raise ValueError(f"{path} is not a number of vertices up to {MOST_VERTICES}")
-            groups[path] = fits_at(int(count), compound)
-            counts[group].add(count)
-    optional = {name: columns for name, (columns, _) in OPTIONAL.items()}
-    lengths = hold_against(nodes, groups | optional, groups)
-    if lengths["floc"] < 1 or not counts["fits"]:
-        raise ValueError("there are no flocs")
-    if any(each != counts["fits"] for each in counts.values()):
-        raise ValueError("the ends of its bands have different numbers of vertices from its fits")
-    for name, value in nodes[""].attributes.items():
-        if not isinstance(value, str | bool | int | float):
-            raise ValueError(f"its attribute {name} is neither text nor a number")
-
-
-def _entries(file):
-    """The ShapeEntries of an open library; ValueError for values that cannot be."""
-    flocs = {}
-    for name, declared_as in FLOC_COLUMNS.items():
-        values = file.read(f"flocs/{name}")
-        if declared_as.type != "text":
-            least = -MOST_PIXELS if name == "centroid" else 0.0
-            most = LARGEST if name == "pixel_size" else MOST_PIXELS
-            inside = (values >= least) & (values <= most) & (values != 0 if least == 0.0 else True)
-            if not inside.all():
-                raise ValueError(f"flocs/{name} has values that a floc cannot have")
-        flocs[ATTRIBUTES.get(name, name)] = values.tolist()
+def entries_in(stored: Stored, kinds: Sequence[str], counts: Sequence[int]) -> list[ShapeEntry]:
+    """Return the ShapeEntries of what a library holds."""
+    columns = stored.groups["flocs"] | stored.groups.get("population", {})
+    flocs = {ATTRIBUTES.get(name, name): values.tolist() for name, values in columns.items()}
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
-    if len(set(flocs["floc_id"])) < len(flocs["floc_id"]):
-        raise ValueError("two flocs have the same id")
-    for name, (columns, read) in OPTIONAL.items():
-        if name in file:
-            flocs |= read({each: file.read(f"{name}/{each}") for each in columns})
-    for kind in ("fits", *BAND_ENDS):
-        if kind in file:
-            counts = sorted(map(int, file.names(kind)))
-            fits = {n: _fits(n, file, f"{kind}/{n}") for n in counts}
-            flocs[kind] = [
-                dict(zip(fits, each, strict=True)) for each in zip(*fits.values(), strict=True)
-            ]
+    if "measures" in stored.groups:
+        rows = np.stack(list(stored.groups["measures"].values()), axis=1)
+        flocs["measures"] = [
+            None if np.isnan(row).any() else ShapeMeasures(*row.tolist()) for row in rows
+        ]
+    for kind in kinds:
+        fits = [fits_in(stored.groups[f"{kind}/{count}"]) for count in counts]
+        flocs[kind] = [dict(zip(counts, own, strict=True)) for own in zip(*fits, strict=True)]
     return [
         ShapeEntry(**dict(zip(flocs, row, strict=True)))
         for row in zip(*flocs.values(), strict=True)
     ]
 
 
-def _fits(count, file, group):
-    """The StoredFits of all flocs at N = ``count``, in a group."""
-    vertices, radius, error = (file.read(f"{group}/{name}") for name in FIT_COLUMNS)
-    for name, values, most in (
-        ("vertices", np.abs(vertices), LARGEST),
-        ("radius", radius, LARGEST),
-        ("relative_error", error, np.inf),
-    ):
-        if not (np.isfinite(values).all() and np.all(values >= 0.0) and np.all(values <= most)):
-            raise ValueError(f"{group}/{name} has values that a floc cannot have")
-    if count == 1 and not np.all(radius > 0.0):
-        raise ValueError("fits/1/radius holds circles without a size")
-    tables = _tables(file, group, vertices, radius)
-    columns = vertices, radius.tolist(), error.tolist(), tables
-    return [StoredFit(*each) for each in zip(*columns, strict=True)]
-
-
-def _tables(file, group, vertices, radius):
-    """The PointTables of all flocs in a group; None for those of one ring."""
-    if f"{group}/part" not in file:
-        return [None] * len(vertices)
-    columns = {
-        ATTRIBUTES[name].removeprefix("points."): file.read(f"{group}/{name}")
-        for name in POINT_COLUMNS
-    }
-    wide = columns["radius"]
-    if not np.all((wide > 0.0) & (wide <= LARGEST)) or np.any(wide.min(axis=1) != radius):
-        raise ValueError(f"{group}/point_radius has values that are not radii")
-    tables = []
-    for row, place in enumerate(vertices):
-        table = PointTable(place, **{name: values[row] for name, values in columns.items()})
-        tables.append(table if is_compound(parts_in(table)) else None)
-    return tables
+def fits_in(columns: Mapping[str, np.ndarray]) -> list[StoredFit]:
+    """Return the StoredFits of all flocs at one number of vertices."""
+    fits = []
+    for row, vertices in enumerate(columns["vertices"]):
+        table = None
+        if "part" in columns:
+            table = PointTable(vertices, *(columns[name][row] for name in POINT_COLUMNS))
+        if table is not None and not is_compound(parts_in(table)):
+            table = None
+        radius, error = float(columns["radius"][row]), float(columns["relative_error"][row])
+        fits.append(StoredFit(vertices, radius, error, table))
+    return fits

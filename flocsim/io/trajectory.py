@@ -18,23 +18,52 @@ from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep, write_file
-from flocsim.io.groups import check_version, opened_file, text_of, write_labelled
-from flocsim.io.labelled import Column, Labelled, Tables, about_of
-from flocsim.io.seals import seal
+from flocsim.io.groups import FileFormat, Group, declared
+from flocsim.io.hdf5 import File
+from flocsim.io.labelled import Column, Labelled, Tables
 
-KIND = "flocsim trajectory"
-SCHEMA_VERSION = 2
+TRAJECTORY = FileFormat(
+    "flocsim trajectory", 2, "trajectory", {}, attribute="kind", remedy="write it again"
+)
+"""Its arrays are those of `motion_group`, without a group; ``VTKHDF`` is for ParaView."""
+KIND = TRAJECTORY.name
 
 COMPONENTS = ("x", "y", "angle")
 """Of a place and of its rate."""
 
-DATASETS = {
-    "time": ("s", "time since the start"),
-    "position": ("m, m, rad", "x, y and angle of each body (time, body, 3)"),
-    "velocity": ("m/s, m/s, rad/s", "velocity and spin of each body (time, body, 3)"),
-    "centre_distance": ("m", "distance of the two centroids"),
+SCALES = {
+    "time": ("f8", "s", "time since the start"),
+    "body": ("i8", "1", "number of the body"),
+    "component": ("text", "1", "of a place, and of its rate"),
+    "axis": ("text", "1", "of a point"),
 }
-"""Units and meaning of the arrays of a trajectory file."""
+DATASETS = {
+    "position": ("f8", "m, m, rad", "x, y and angle of each body (time, body, 3)"),
+    "velocity": ("f8", "m/s, m/s, rad/s", "velocity and spin of each body (time, body, 3)"),
+}
+DISTANCE = {"centre_distance": ("f8", "m", "distance of the two centroids")}
+POINTS = {
+    "part": ("i8", "1", "part of the body that a core point belongs to"),
+    "ring": ("i8", "1", "ring of the part: 0 its outline, from 1 its holes"),
+    "point_radius": ("f8", "m", "radius of the disk that sweeps the part"),
+}
+"""Columns of the core points of a body with holes or several parts."""
+
+
+def motion_group(compounds: Sequence[bool]) -> Group:
+    """Return the table of a motion; ``compounds``: which bodies have holes or several parts."""
+    columns = declared(DATASETS, ("time", "body", "component"))
+    scales = dict(SCALES)
+    if len(compounds) == 2:
+        columns |= declared(DISTANCE, ("time",))
+    for body, compound in enumerate(compounds):
+        vertex = f"vertex_{body}"
+        scales[vertex] = ("i8", "1", f"core point of body {body}")
+        points = {f"vertices_{body}": ("f8", "m", f"core points of body {body}")}
+        columns |= declared(points, (vertex, "axis"))
+        if compound:
+            columns |= declared({f"{n}_{body}": about for n, about in POINTS.items()}, (vertex,))
+    return Group.of(columns, scales)
 
 
 def centre_distance(position: np.ndarray) -> np.ndarray:
@@ -59,43 +88,24 @@ def write_trajectory(
     outlines for ParaView in the group ``VTKHDF``; ``rule`` says what becomes of a file that is
     there. Raises FileError if it cannot be written.
     """
-    import h5py
-
-    count = len(shapes)
-    scales: dict[str, Any] = {
-        "time": times,
-        "body": np.arange(count),
-        "component": np.array(COMPONENTS, object),
-        "axis": np.array(COMPONENTS[:2], object),
-    } | {f"vertex_{body}": np.arange(len(each.vertices)) for body, each in enumerate(shapes)}
-    arrays = {"position": position, "velocity": velocity}
-    if count == 2:
-        arrays["centre_distance"] = centre_distance(position)
-    axes = ("time", "body", "component")
-    columns = {
-        name: Column(axes[: array.ndim], array, about_of(DATASETS[name]))
-        for name, array in arrays.items()
-    }
+    values: dict[str, Any] = {
+        "time": times, "body": np.arange(len(shapes)), "component": COMPONENTS,
+        "axis": COMPONENTS[:2], "position": position, "velocity": velocity,
+    }  # fmt: skip
+    if len(shapes) == 2:
+        values["centre_distance"] = centre_distance(position)
     for body, shape in enumerate(shapes):
-        of_points, about = (f"vertex_{body}", "axis"), {"units": "m", "radius": shape.radius}
-        columns[f"vertices_{body}"] = Column(of_points, np.array(shape.vertices), about)
-        if shape.is_compound:
-            table = table_of(shape.parts)
-            for name, values, unit in (
-                ("part", table.part, "1"), ("ring", table.ring, "1"),
-                ("point_radius", table.radius, "m"),
-            ):  # fmt: skip
-                columns[f"{name}_{body}"] = Column(of_points[:1], values, {"units": unit})
-    said = {name: DATASETS.get(name, ("1", name.replace("_", " of body "))) for name in scales}
-    coordinates = {
-        name: Column((name,), each, about_of(said[name])) for name, each in scales.items()
-    }
-    buffer = io.BytesIO()
-    with h5py.File(buffer, "w") as file:
-        file.attrs.update({"kind": KIND, "schema_version": SCHEMA_VERSION, **facts})
-        write_labelled(file, Labelled(coordinates, columns))
-        add_vtkhdf(file, times, position, shapes)
-    write_file(path, seal(buffer.getvalue()), rule)
+        table = table_of(shape.parts)
+        values |= {f"vertex_{body}": np.arange(len(shape.vertices)),
+                   f"vertices_{body}": shape.vertices, f"part_{body}": table.part,
+                   f"ring_{body}": table.ring, f"point_radius_{body}": table.radius}  # fmt: skip
+    motion = motion_group([shape.is_compound for shape in shapes]).labelled(values)
+    for body, shape in enumerate(shapes):
+        motion.columns[f"vertices_{body}"].about["radius"] = shape.radius
+    TRAJECTORY.write(
+        path, {"": motion, "VTKHDF": Labelled({}, {})}, attributes=facts, rule=rule,
+        fill={"VTKHDF": lambda group: write_outlines(group, times, position, shapes)},
+    )  # fmt: skip
 
 
 MOST_FRAMES = 400
@@ -225,8 +235,10 @@ KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
 
 
-def add_vtkhdf(file: Any, times: np.ndarray, position: np.ndarray, shapes: Sequence[Shape]) -> None:
-    """Write the group into an open h5py file: ``times`` (k,) [s], ``position`` (k, n, 3).
+def write_outlines(
+    group: Any, times: np.ndarray, position: np.ndarray, shapes: Sequence[Shape]
+) -> None:
+    """Fill the open group VTKHDF of a file: ``times`` (k,) [s], ``position`` (k, n, 3).
 
     A polygon for every ring: its cell data are ``body``, the number, and ``hole``, 1 for the rings
     of holes. Points are in m.
@@ -241,7 +253,6 @@ def add_vtkhdf(file: Any, times: np.ndarray, position: np.ndarray, shapes: Seque
     owners = [n for n, each in enumerate(rings) for _ in each]
     holes = [int(place > 0 and is_hole(ring)) for each in rings for place, ring in enumerate(each)]
 
-    group = file.create_group("VTKHDF")
     group.attrs["Version"] = np.array([2, 0], "i8")
     group.attrs["Type"] = np.bytes_("PolyData")
     group["NumberOfPoints"] = np.array([count], "i8")
@@ -279,7 +290,7 @@ def write_vtkhdf(
 
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
-        add_vtkhdf(file, times, position, shapes)
+        write_outlines(file.create_group("VTKHDF"), times, position, shapes)
     write_file(path, buffer.getvalue(), rule)
 
 
@@ -320,37 +331,26 @@ class StoredTrajectory(Tables):
 
 
 def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
-    """The motion in a trajectory file; FileError where it is damaged, or of another kind."""
-    with opened_file(
-        path, lambda reason: f"{path} has no readable trajectory: {reason}; write it again"
-    ) as file:
-        if text_of(file, "kind") != KIND:
-            raise ValueError(f"it is not a {KIND}")
-        check_version(path, file, SCHEMA_VERSION, remedy="write it again")
-        return stored_trajectory(file)
+    """Return the motion in a trajectory file; FileError where it is damaged, or of another kind."""
+    with TRAJECTORY.opened(path) as file:
+        time, position, velocity = (file.read(name) for name in ("time", "position", "velocity"))
+        bodies = len(file.read("body"))
+        for array in (position, velocity):
+            if array.shape != (len(time), bodies, 3) or not np.isfinite(array).all():
+                raise ValueError("its arrays do not match its times and bodies, or have no numbers")
+        facts = {
+            name: value for name, value in file.attributes.items()
+            if name not in (TRAJECTORY.attribute, "schema_version")
+        }  # fmt: skip
+        shapes = tuple(stored_shape(file, body) for body in range(bodies))
+        return StoredTrajectory(time, position, velocity, shapes, facts)
 
 
-def stored_trajectory(file):
-    """The StoredTrajectory of an open file; ValueError where it is none."""
-    named = file.attributes.items()
-    facts = {name: value for name, value in named if name not in ("kind", "schema_version")}
-    time, *arrays = (file.read(name) for name in ("time", "position", "velocity"))
-    bodies = len(file.read("body"))
-    if time.ndim != 1 or not len(time) or not bodies:
-        raise ValueError("it has no times or no bodies")
-    for array in (time, *arrays):
-        shape = (len(time), bodies, 3) if array.ndim > 1 else (len(time),)
-        if array.shape != shape or not np.isfinite(array).all():
-            raise ValueError("its arrays do not match its times and bodies, or are not numbers")
-    shapes = []
-    for body in range(bodies):
-        points = file.read(f"vertices_{body}")
-        radius = float(file.node(f"vertices_{body}").attributes["radius"])
-        if f"part_{body}" in file:
-            columns = [file.read(f"{name}_{body}") for name in ("part", "ring", "point_radius")]
-            if any(column.shape != (len(points),) for column in columns):
-                raise ValueError("the columns of its core points do not match the points")
-            shapes.append(shape_of_parts(parts_in(PointTable(points, *columns))))
-        else:
-            shapes.append(SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius))
-    return StoredTrajectory(time, *arrays, tuple(shapes), facts)
+def stored_shape(file: File, body: int) -> Shape:
+    """Return the shape of one body of an open file; ValueError where it is none."""
+    points = file.read(f"vertices_{body}")
+    radius = float(file.node(f"vertices_{body}").attributes["radius"])
+    if f"part_{body}" in file:
+        columns = (file.read(f"{name}_{body}") for name in POINTS)
+        return shape_of_parts(parts_in(PointTable(points, *columns)))
+    return SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius)

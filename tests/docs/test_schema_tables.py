@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.ensembles.config.schema import FORCES, TABLES, keys_of
 from flocsim.errors import UsageError
-from flocsim.io.results.layout import SCHEMA_VERSION
+from flocsim.io.results.file import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES
 from tests.helpers.small_study import ROOT
 

@@ -48,8 +48,7 @@ def paper_results(change=None):
 
 def blank_replicates(shape):
     """The table of replicates without what happened."""
-    from flocsim.io.results.checks import FURTHER_RUNS
-    from flocsim.io.results.schema import REPLICATES
+    from flocsim.io.results.schema import FURTHER_RUNS, REPLICATES
 
     blank = {name: np.zeros(shape, dtype=kind) for name, (kind, _, _) in REPLICATES.items()}
     further = tuple(f"{run}_" for run in FURTHER_RUNS)

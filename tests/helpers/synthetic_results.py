@@ -104,4 +104,7 @@ def made(types, vertices, delta, count, seed):
         replicates[f"aspect_ratio_{body}"] = 1.0 + rank
         replicates[f"circularity_{body}"] = 0.9 - 0.5 * rank**2
         replicates[f"solidity_{body}"] = 0.8 + 0.1 * np.cos(3 * rank)
-    return replicates, tabulate(outcome, inside, bond, **again)
+    typed = {
+        name: np.asarray(replicates[name]).astype(kind) for name, (kind, _, _) in REPLICATES.items()
+    }
+    return typed, tabulate(outcome, inside, bond, **again)

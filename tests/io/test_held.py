@@ -95,16 +95,16 @@ def test_a_command_reads_one_file(two, name, monkeypatch, capsys):
     one = outcome()
     shutil.copyfile(other, path)
     another = outcome()
-    looks, check = [], seals.check_seal
+    looks, checked = [], seals.seal_of
 
-    def replaced(place, file):
-        looks.append(place)
+    def replaced(file, size):
+        looks.append(file)
         if len(looks) == look:
             shutil.copyfile(other, "new.h5")
             os.replace("new.h5", path)
-        return check(place, file)
+        return checked(file, size)
 
-    monkeypatch.setattr(seals, "check_seal", replaced)
+    monkeypatch.setattr(seals, "seal_of", replaced)
     for look in (1, 2, 3):
         shutil.copyfile("kept.h5", path)
         looks.clear()

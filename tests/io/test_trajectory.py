@@ -11,7 +11,7 @@ from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.groups import kind_of
 from flocsim.io.seals import seal
-from flocsim.io.trajectory import DATASETS, KIND, read_trajectory, write_trajectory
+from flocsim.io.trajectory import DATASETS, DISTANCE, KIND, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
 from tests.helpers.sealed import read_sealed
 
@@ -38,7 +38,7 @@ def test_arrays_come_back_with_units(tmp_path):
             np.testing.assert_array_equal(file[name][()], array)
         gaps = position[:, 1, :2] - position[:, 0, :2]
         np.testing.assert_allclose(file["centre_distance"][()] ** 2, (gaps**2).sum(axis=1))
-        for name, (units, text) in DATASETS.items():
+        for name, (_, units, text) in (DATASETS | DISTANCE).items():
             assert (file[name].attrs["units"], file[name].attrs["long_name"]) == (units, text)
 
 

@@ -28,11 +28,11 @@ import flocsim.arrays as at
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
 from flocsim.integrators.base import Integrator, Status
-from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.schema import (
     AGGREGATED,
     BLANKS,
     FAILED,
+    FURTHER_RUNS,
     NOT_APPLICABLE,
     OUTCOMES,
     REPLICATES,

@@ -33,7 +33,6 @@ from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io import confidence
 from flocsim.io.confidence import scrambled_difference, wilson
 from flocsim.io.results import schema
-from flocsim.io.results.checks import FURTHER_RUNS
 from flocsim.io.results.events import (
     HELD,
     MISSED,
@@ -44,7 +43,7 @@ from flocsim.io.results.events import (
     events_of,
     kinds_of,
 )
-from flocsim.io.results.schema import AXES, NOT_APPLICABLE
+from flocsim.io.results.schema import AXES, FURTHER_RUNS, NOT_APPLICABLE
 
 CODES = ("outcome", "inside", "bond")
 """The columns of first runs that are counted."""

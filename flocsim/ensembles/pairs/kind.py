@@ -23,8 +23,7 @@ from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import KernelStudy, Study
 from flocsim.io.groups import run_of
-from flocsim.io.results.file import failures_of, opened
-from flocsim.io.results.layout import write_results
+from flocsim.io.results.file import failures_of, opened, write_results
 from flocsim.io.results.schema import Results, as_words
 from flocsim.process import INTERRUPTION, stop_requested
 

@@ -30,9 +30,8 @@ from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import data_rule
 from flocsim.io.plots.results import FIGURES, OF_ROWS
 from flocsim.io.plots.style import Figure, add_foot, save
-from flocsim.io.results.file import first_of_each, read_results, read_row
+from flocsim.io.results.file import FORMAT, first_of_each, read_results, read_row
 from flocsim.io.results.kernel_group import KERNEL_GROUP
-from flocsim.io.results.layout import FORMAT
 from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
 from flocsim.io.seals import held

@@ -46,7 +46,7 @@ from flocsim.integrators import Overdamped
 from flocsim.io.confidence import wilson
 from flocsim.io.results import schema
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.layout import image_of
+from flocsim.io.results.file import size_of
 from flocsim.system import System
 
 MOST = 900
@@ -285,7 +285,7 @@ def file_size(study: Study, count: int) -> float:
     shape = study.shape[:3]
     none = (np.zeros((*shape, 0), "u1"),) * len(COUNTED)
     sums = summary.sums_of(lambda *_: none, math.prod(shape), 0, 0, study.scrambles)
-    tables = len(image_of(summary.results_of(study, 0, sums, {}), {}).getbuffer())
+    tables = size_of(summary.results_of(study, 0, sums, {}))
     run = RUN_BYTES + len(config.text) + FLOC_BYTES * len(study.flocs)
     return float(tables + run + count * (math.prod(shape) * ROW.itemsize + 8))
 

@@ -1,110 +1,142 @@
-"""The results file of an ensemble: HDF5 that xarray, MATLAB, R and Julia can open.
+"""The results file of pairs and rates (`schema.RESULTS`): writing it, and reading it in parts.
 
-Every group of `schema.GROUPS`, and ``kernel`` (`kernel_group`), holds its own coordinates as
-dimension scales, and every dataset a ``units`` and a ``long_name``; codes carry ``flag_values`` and
-``flag_meanings``. ``flocs`` has the names of the flocs that ``replicates/floc_i`` and ``floc_j``
-number, ``run`` scalars: config text, versions, machine, wall times. All that may differ between two
-runs of one config is in ``run``, so the rest can be compared byte for byte. The file ends in
-a checksum behind the HDF5 data (see `flocsim.io.seals`), is checked before HDF5 parses it, and is
-written by `flocsim.io.results.layout`.
+Its table of replicates may be larger than the memory: rank 0 writes it a part at a time, and a
+reader takes all of it, a summary, or single rows.
 """
 
 import contextlib
+import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.errors import FileError
-from flocsim.io.groups import check_version, opened_file, run_of, text_of
-from flocsim.io.hdf5 import File
-from flocsim.io.results import checks, schema
-from flocsim.io.results.kernel_group import read_kernel
-from flocsim.io.results.layout import FORMAT, SCHEMA_VERSION
-from flocsim.io.results.schema import GROUPS, OUTCOMES, REPLICATES, Results
+from flocsim.io.files import Rule, keep
+from flocsim.io.groups import File
+from flocsim.io.labelled import Labelled
+from flocsim.io.results.kernel_group import kernel_in
+from flocsim.io.results.schema import (
+    FLOCS,
+    GROUPS,
+    OUTCOMES,
+    REPLICATES,
+    RESULTS,
+    ROWS,
+    Results,
+    check_rows,
+)
+
+FORMAT, SCHEMA_VERSION = RESULTS.name, RESULTS.version
+
+MOST_VALUES = 32_768
+"""Rows that are written at a time, 4.6 MB."""
+
+Part = Callable[[Sequence[slice]], Any]
+"""Gives the rows of a part of the table (type, vertices, delta, replicate), an array by column."""
 
 
-def results_of(file: File, replicates: bool = True) -> Results:
-    """The Results in an open file; ``replicates``: whether their table is read as well."""
-    tables = [name for name in GROUPS if name in file and (replicates or name != "replicates")]
-    found = {name: GROUPS[name].read(file, name) for name in tables}
-    table = found["probabilities"]
-    made: Any = {
-        name: {column: each[column] for column in GROUPS[name].columns}
-        for name, each in found.items()
-    }
-    run = run_of(file)
-    return Results(
-        types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
-        failures=failures_of(file), flocs=file.read("flocs/floc") if "flocs" in file else (),
-        count=file.node("replicates/replicate").shape[0],
-        radii={name: table[name] for name in schema.SIZES},
-        kernel=read_kernel(file, str(run.get("identity", ""))),
-        **{"replicates": None, **made},
-    )  # fmt: skip
+def write_results(
+    path: str | os.PathLike, results: Results, rule: Rule = keep, part: Part | None = None
+) -> None:
+    """Write results, whole or not at all; FileError if that is impossible.
+
+    ``part`` gives rows where they are not in the results. ``rule`` says what becomes of a file that
+    exists.
+    """
+
+    def fill(group: Any) -> None:
+        for where in parts_of((*results.shape, results.count), MOST_VALUES):
+            rows = part(where)  # type: ignore[misc]
+            for name in REPLICATES:
+                group[name][tuple(where)] = rows[name]
+
+    fills = {"replicates": fill} if part is not None else {}
+    RESULTS.write(path, groups_of(results), results.run, rule=rule, fill=fills)
 
 
-def failures_of(file: File) -> list[str]:
-    """The words for the codes of failures."""
-    words: str = file.node("replicates/failure").attributes["flag_meanings"]
-    return words.split()
+def groups_of(results: Results) -> dict[str, Labelled]:
+    """Return the groups of a results file, replicates last."""
+    names = ("probabilities", "pooled", "differences", "numerics", "outlines")
+    groups = {name: results.labelled(name) for name in names if getattr(results, name)}
+    if results.kernel is not None:
+        groups["kernel"] = results.kernel.labelled()
+    if results.flocs:
+        groups["flocs"] = FLOCS.labelled({"floc": results.flocs})
+    return groups | {"replicates": results.labelled("replicates")}
 
 
-BLOCK = 262_144
-"""Replicates of a condition that are read together."""
+def size_of(results: Results) -> int:
+    """Return the size [bytes] of a results file without its group ``run``."""
+    image = io.BytesIO()
+    RESULTS.write_data(image, groups_of(results))
+    return len(image.getbuffer())
+
+
+def parts_of(shape: Sequence[int], most: int) -> Iterator[list[slice]]:
+    """Cut an array into parts of at most so many values, in order."""
+    inner = int(np.prod(shape[1:]))
+    step = 1 if len(shape) > 1 and inner > most else max(most // max(inner, 1), 1)
+    for first in range(0, shape[0], step):
+        own = slice(first, min(first + step, shape[0]))
+        rest = parts_of(shape[1:], most) if inner > most else [[slice(0, n) for n in shape[1:]]]
+        for each in rest:
+            yield [own, *each]
 
 
 def read_results(path: str | os.PathLike, replicates: bool = True) -> Results:
-    """The Results in a file; FileError if it is absent, damaged, of another kind or version.
+    """Return the Results in a file; FileError if it is absent, damaged, of another kind or version.
 
-    With ``replicates=False`` the table of replicates, which may be larger than the memory, stays
-    on the disk.
+    Without ``replicates`` their table, which may be larger than the memory, stays on the disk.
     """
     with opened(path) as file:
         return results_in(file, replicates)
 
 
-def read_overview(path: str | os.PathLike) -> "Overview":
-    """The Results in a file without its table of replicates, but with the Totals of that table.
+def results_in(file: File, replicates: bool = True) -> Results:
+    """Return the Results in an open file."""
+    stored = RESULTS.contents(file, without=() if replicates else ("replicates",))
+    table, run = stored.groups["probabilities"], stored.run
+    failures = failures_of(file)
+    tables: dict[str, Any] = {"replicates": None} | {
+        name: {column: stored.groups[name][column] for column in group.columns}
+        for name, group in GROUPS.items() if name in stored.groups
+    }  # fmt: skip
+    if replicates:
+        check_rows(tables["replicates"].__getitem__, len(failures))
+    kernel = stored.groups.get("kernel")
+    return Results(
+        types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
+        failures=failures, flocs=stored.groups.get("flocs", {"floc": ()})["floc"],
+        count=file.node("replicates/replicate").shape[0],
+        radii={name: table[name] for name in ("r_i", "r_j")},
+        kernel=None if kernel is None else kernel_in(kernel, str(run.get("identity", ""))),
+        **tables,
+    )  # fmt: skip
 
-    For files larger than the memory; FileError as `read_results`.
-    """
-    with opened(path) as file:
-        results = results_in(file, replicates=False)
-        totals = totals_in(file, len(results.failures))
-        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
-        return Overview(**known, totals=totals)
+
+def failures_of(file: File) -> list[str]:
+    """Return the words for the codes of failures."""
+    words: str = file.node("replicates/failure").attributes["flag_meanings"]
+    return words.split()
 
 
 def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -> Results:
-    """The Results in a file with their table of replicates, unless that has more than ``most``
-    rows."""
+    """Return results with their table of replicates, unless that has more than ``most`` rows."""
     rows = int(np.prod(results.shape)) * results.count
     if results.replicates is not None or rows > most:
         return results
     return attrs.evolve(results, replicates=read_results(path).replicates)
 
 
-def results_in(file, replicates):
-    """The Results in an open file."""
-    results = results_of(file, replicates)
-    checks.check_tables(results)
-    if results.replicates is not None:
-        column = results.replicates.__getitem__
-        checks.check_rows(column, len(results.failures), len(results.flocs))
-    return results
-
-
 def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:
-    """{column: value} of one replicate, at (type, vertices, delta, replicate); FileError as
-    `read_results`, and for values that no run can have given."""
+    """Return {column: value} of one replicate, at (type, vertices, delta, replicate)."""
     with opened(path) as file:
         at = (*place[:-1], slice(place[-1], place[-1] + 1))
-        found = {name: file.read(f"replicates/{name}", at)[0] for name in REPLICATES}
-        checks.check_rows(lambda name: np.asarray(found[name]), len(failures_of(file)), 0)
-        return found
+        row = {name: file.read(f"replicates/{name}", at)[0] for name in REPLICATES}
+        check_rows(lambda name: np.asarray(row[name]), len(failures_of(file)))
+        return row
 
 
 SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
@@ -131,71 +163,62 @@ class Overview(Results):
     totals: Totals = attrs.field(kw_only=True)
 
 
-def totals_in(file, reasons):
-    """The Totals of the replicates of an open file with so many reasons of failure."""
-    found = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
-    for part in parts_of(file.node("replicates/outcome").shape):
-        columns = {name: file.read(f"replicates/{name}", part) for name in checks.CODED}
-        checks.check_codes(columns, reasons)
-        outcome, failure, steps, rejected = columns.values()
-        found.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
-        found.failures += np.bincount(failure, minlength=reasons)
-        found.count += outcome.size
-        found.steps += int(steps.sum())
-        found.most_steps = max(found.most_steps, int(steps.max(initial=0)))
-        found.rejected += int(rejected.sum())
+def read_overview(path: str | os.PathLike) -> Overview:
+    """Return the Results in a file without its table of replicates, but with its Totals.
+
+    For files larger than the memory; FileError as `read_results`.
+    """
+    with opened(path) as file:
+        results = results_in(file, replicates=False)
+        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
+        return Overview(**known, totals=totals_in(file, results))
+
+
+def totals_in(file: File, results: Results) -> Totals:
+    """Return the Totals of the replicates of an open file, a condition at a time."""
+    reasons = len(results.failures)
+    totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
+    names = ("outcome", "failure", "steps", "rejected")
+    for place in np.ndindex(*results.shape):
+        at = (*place, slice(None))
+        columns = [file.read(f"replicates/{name}", at) for name in names]
+        for name, column in zip(names, columns, strict=True):
+            ROWS[name].check(f"replicates/{name}", column, {})
+        outcome, failure, steps, rejected = columns
+        totals.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
+        totals.failures += np.bincount(failure, minlength=reasons)
+        totals.count += outcome.size
+        totals.steps += int(steps.sum())
+        totals.most_steps = max(totals.most_steps, int(steps.max(initial=0)))
+        totals.rejected += int(rejected.sum())
         for name in SPANNED:
-            values = file.read(f"replicates/{name}", part)
-            known = np.append(values[np.isfinite(values)], found.spans.get(name, ()))
+            values = file.read(f"replicates/{name}", at)
+            known = np.append(values[np.isfinite(values)], totals.spans.get(name, ()))
             if known.size:
-                found.spans[name] = float(known.min()), float(known.max())
-    return found
+                totals.spans[name] = float(known.min()), float(known.max())
+    return totals
 
 
 def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
-    """{outcome: place (type, vertices, delta, replicate)} of its first replicate, where it has one.
+    """Return {outcome: place (type, vertices, delta, replicate)} of its first replicate, if any.
 
     Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
     """
     with opened(path) as file:
-        outcome, vertices = file.node("replicates/outcome"), file.read("replicates/vertices")
-        order = np.argsort(-vertices, kind="stable")
+        order = np.argsort(-file.read("replicates/vertices"), kind="stable").tolist()
+        types, _, deltas, _ = file.node("replicates/outcome").shape
         found: dict[str, tuple[int, int, int, int]] = {}
-        types, _, deltas, count = outcome.shape
         for v, t, d in ((v, t, d) for v in order for t in range(types) for d in range(deltas)):
-            for first in range(0, count, BLOCK):
-                part = t, v, d, slice(first, first + BLOCK)
-                codes = file.read("replicates/outcome", part)
-                for code, row in zip(*np.unique(codes, return_index=True), strict=True):
-                    if code < len(OUTCOMES):
-                        found.setdefault(OUTCOMES[code], (t, int(v), d, first + int(row)))
+            codes = file.read("replicates/outcome", (t, v, d, slice(None)))
+            for code, row in zip(*np.unique(codes, return_index=True), strict=True):
+                if code < len(OUTCOMES):
+                    found.setdefault(OUTCOMES[code], (t, v, d, int(row)))
         return found
-
-
-def parts_of(shape):
-    """Places of an array's values, some of one condition at a time; () of a single value."""
-    if not shape:
-        yield ()
-        return
-    *outer, count = shape
-    for place in np.ndindex(*outer):
-        for first in range(0, count, BLOCK):
-            yield (*place, slice(first, first + BLOCK))
 
 
 @contextlib.contextmanager
 def opened(path: str | os.PathLike) -> Iterator[File]:
-    """An open file of this schema, once checksum and structure were found right."""
-    with opened_file(
-        path, lambda reason: f"{path} has no readable results: {reason}; run it again"
-    ) as file:
-        if text_of(file, "format") != FORMAT:
-            what = text_of(file, "format") or text_of(file, "kind")
-            found = f", it holds a {what}" if what else ""
-            raise FileError(
-                f"{path} is not a results file{found}: name one written by flocsim ensemble"
-            )
-        check_version(path, file, SCHEMA_VERSION)
-        checks.check_structure(file)
-        checks.check_coordinates(file)
+    """Open a results file, once checksum and structure were found right."""
+    with RESULTS.opened(path) as file:
+        RESULTS.check(file)
         yield file

@@ -1,14 +1,14 @@
 """Group `kernel` of a results file: rates of encounters by mechanism, N and two size classes."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.io.groups import Group, checked_arrays, declared
-from flocsim.io.hdf5 import File
+from flocsim.io.groups import Group, declared
 from flocsim.io.labelled import Labelled
 
 AXES = ("mechanism", "vertices", "i", "j")
@@ -75,8 +75,6 @@ SCALES = {
 }
 RADIUS = {"r_eq": ("f8", "m", "equivalent radius of the size class; of measured flocs the median")}
 KERNEL_GROUP = Group.of(declared(KERNEL, AXES), SCALES, declared(RADIUS, ("i",)))
-SMALLEST = -1e-9
-"""Rounding below 0."""
 
 
 @attrs.frozen(eq=False)
@@ -98,14 +96,8 @@ class Kernel:
     water: bool = False
     fractal: tuple[float, float, float] | None = None
 
-    def __attrs_post_init__(self):
-        values = self.mechanisms, self.vertices, self.labels, self.labels
-        lengths = dict(zip(AXES, map(len, values), strict=True))
-        arrays = checked_arrays("kernel", self.arrays, KERNEL_GROUP.columns, lengths)
-        object.__setattr__(self, "arrays", arrays)
-
     def labelled(self) -> Labelled:
-        """The arrays with their axes."""
+        """Return the arrays with their axes."""
         return KERNEL_GROUP.labelled({
             "mechanism": self.mechanisms, "vertices": self.vertices, "i": self.labels,
             "j": self.labels, "r_eq": self.radii, **self.arrays,
@@ -114,45 +106,34 @@ class Kernel:
     def place_of(
         self, mechanism: str | None = None, vertices: int | None = None
     ) -> tuple[int, int]:
-        """Places of a mechanism and of N, by default the first and the last one."""
-        mechanism = self.mechanisms[0] if mechanism is None else mechanism
-        vertices = int(self.vertices[-1]) if vertices is None else vertices
-        for what, value, known in (
-            ("mechanism", mechanism, list(self.mechanisms)),
-            ("vertices", vertices, [int(each) for each in self.vertices]),
-        ):
+        """Return the places of a mechanism and of N, by default the first and the last one."""
+
+        def place(name: str, value: Any, known: Sequence) -> int:
             if value not in known:
-                raise UsageError(
-                    f"{what} must be one of {', '.join(map(str, known))}, found {value}"
-                )
-        return self.mechanisms.index(mechanism), self.vertices.tolist().index(vertices)
+                words = ", ".join(map(str, known))
+                raise UsageError(f"{name} must be one of {words}, found {value}")
+            return known.index(value)
+
+        counts = self.vertices.tolist()
+        return (
+            place("mechanism", self.mechanisms[0] if mechanism is None else mechanism,
+                  self.mechanisms),
+            place("vertices", counts[-1] if vertices is None else vertices, counts),
+        )  # fmt: skip
 
 
-def read_kernel(file: File, identity: str) -> Kernel | None:
-    """The group of an open file, None where it has none; ValueError for values that cannot be.
-
-    ``identity``: the text of what its rows follow from.
-    """
-    if "kernel" not in file:
-        return None
-    found = KERNEL_GROUP.read(file, "kernel")
-    if found["i"].tolist() != found["j"].tolist():
-        raise ValueError("kernel/i and kernel/j name other classes")
-    arrays = {name: found[name] for name in KERNEL}
-    check_kernel(arrays)
+def kernel_in(values: Mapping[str, Any], identity: str) -> Kernel:
+    """Return the Kernel of what the group of a file holds; ``identity``: the text of what its rows
+    follow from."""
     return Kernel(
-        tuple(found["mechanism"]),
-        found["vertices"],
-        tuple(found["i"]),
-        found["r_eq"],
-        arrays,
-        '"PairResistance"' in identity,
+        tuple(values["mechanism"]), values["vertices"], tuple(values["i"]), values["r_eq"],
+        {name: values[name] for name in KERNEL}, '"PairResistance"' in identity,
         fractal_in(identity),
-    )
+    )  # fmt: skip
 
 
 def fractal_in(identity: str) -> tuple[float, float, float] | None:
-    """(D_p, n_f, density of the solid) of a FractalDensity in what rows follow from."""
+    """Return (D_p, n_f, density of the solid) of a FractalDensity in what rows follow from."""
     found = re.search(
         r"FractalDensity\(law='fractal', primary=([^,]+), dimension=([^,]+), solid=([^)]+)\)",
         identity,
@@ -161,11 +142,3 @@ def fractal_in(identity: str) -> tuple[float, float, float] | None:
         return None
     primary, dimension, solid = map(float, found.groups())
     return primary, dimension, solid
-
-
-def check_kernel(arrays: Mapping[str, np.ndarray]) -> None:
-    """ValueError for values that no study can have given."""
-    for name, values in arrays.items():
-        least = -np.inf if "_change_" in name else SMALLEST
-        if np.any(values < least) or np.any(np.isinf(values)):
-            raise ValueError(f"there are impossible values in kernel/{name}")

@@ -1,18 +1,17 @@
-"""What a results file holds: outcome codes, the table of its arrays, and the checked container.
+"""What a results file of pairs holds: outcome codes, its tables, and the Results in memory.
 
-The file itself is read by `flocsim.io.results.file` and written by `flocsim.io.results.layout`.
+The file itself is read and written by `flocsim.io.results.file`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
-from flocsim.io.groups import Declared, Group, checked_arrays, declared, exact
+from flocsim.io.groups import Dataset, FileFormat, Group, Unfit, declared
 from flocsim.io.labelled import Labelled
-from flocsim.io.results.kernel_group import Kernel
+from flocsim.io.results.kernel_group import KERNEL_GROUP, Kernel
 
 OUTCOMES = ("A", "B", "C", "D", "missed", "undecided", "failed", "held")
 """Code of an outcome = its place here. A, C: aggregated; B, D: departed; A, B: inside the zone;
@@ -38,6 +37,8 @@ SHAPE_COLUMNS = tuple(f"{name}_{body}" for name in SHAPE_MEASURES for body in "i
 
 BAND_ENDS = ("closer", "wider")
 """How another eye might have cut the outlines of flocs: the two ends of their bands."""
+FURTHER_RUNS = ("checked", "third", *BAND_ENDS)
+"""What begins the names of columns of a replicate's further runs."""
 
 REPLICATES = {  # name: (dtype, units, long name)
     "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
@@ -227,57 +228,80 @@ def last_axis(name: str) -> tuple[str, ...]:
     return tuple(axis for axis in LAST_AXES if axis in name)
 
 
-def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Declared]:
+def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Dataset]:
     """Arrays with a value, or one for each word of a last axis, for every condition."""
     return {
-        name: Declared(kind, (*AXES, *last_axis(name)), unit, text)
+        name: Dataset(kind, (*AXES, *last_axis(name)), unit, text)
         for name, (kind, unit, text) in schema.items()
     }
 
 
 SIZES = declared(RADII, AXES[:1])
+ROWS = declared(REPLICATES, (*AXES, "replicate"), FLAGS)
+for name in ("steps", "rejected", "failure"):
+    ROWS[name] = attrs.evolve(ROWS[name], low=0)
+for name in ("floc_i", "floc_j"):
+    ROWS[name] = attrs.evolve(ROWS[name], low=-1)
 GROUPS = {
     "probabilities": Group.of(of_conditions(TABLE), COORDINATES, SIZES),
     "numerics": Group.of(of_conditions(NUMERICS), COORDINATES),
     "outlines": Group.of(of_conditions(OUTLINES), COORDINATES),
     "pooled": Group.of(declared(POOLED, AXES[:2]), COORDINATES, SIZES),
     "differences": Group.of(declared(DIFFERENCES, ("against", "event", *AXES)), COORDINATES),
-    "replicates": Group.of(declared(REPLICATES, (*AXES, "replicate"), FLAGS), COORDINATES),
+    "replicates": Group.of(ROWS, COORDINATES),
 }  # fmt: skip
 """Groups of a results file; the failure codes of the replicates have words of their own in each."""
 FLOCS = Group({}, declared({"floc": COORDINATES["floc"]}, ("floc",)))
-"""The group of the flocs' names."""
+"""The group of the flocs' names, which ``floc_i`` and ``floc_j`` of replicates count."""
 WORDS = LAST_AXES | {"against": AXES, "event": EVENTS}
 """Axes whose words are the same in every file."""
+
+RESULTS = FileFormat(
+    "flocsim results", 7, "results", GROUPS | {"kernel": KERNEL_GROUP, "flocs": FLOCS},
+    optional=("pooled", "differences", "numerics", "outlines", "flocs", "kernel"),
+    lengths={axis: len(words) for axis, words in WORDS.items()}, remedy="run it again",
+)  # fmt: skip
+"""The results file of pairs and of rates.
+
+All that may differ between two runs of one config is in the group ``run``.
+"""
+
+
+def check_rows(column: Callable[[str], np.ndarray], failures: int) -> None:
+    """Raise ValueError for rows with codes that have no word, or with negative counts.
+
+    ``column(name)`` gives the values of a column; ``failures``: how many reasons of failure there
+    are.
+    """
+    for name, each in ROWS.items():
+        each.check(f"replicates/{name}", column(name), {})
+    if np.any(column("failure") >= failures):
+        raise Unfit("replicates/failure has impossible values")
 
 
 def blank(
     schema: Mapping[str, tuple[str, str, str]], shape: tuple[int, ...]
 ) -> dict[str, np.ndarray]:
-    """Tables of a results file without any number in them."""
-    tails = {name: [len(LAST_AXES[axis]) for axis in last_axis(name)] for name in schema}
-    return {name: np.zeros((*shape, *tails[name]), about[0]) for name, about in schema.items()}
-
-
-def as_names(names: Iterable) -> tuple[str, ...]:
-    return tuple(str(name) for name in names)
+    """Return tables of a results file without any number in them."""
+    return {
+        name: np.zeros((*shape, *(len(LAST_AXES[axis]) for axis in last_axis(name))), kind)
+        for name, (kind, _, _) in schema.items()
+    }
 
 
 def as_words(words: Iterable) -> tuple[str, ...]:
+    """Return words without blanks, as flag_meanings needs them."""
     return tuple("_".join(str(word).split()) for word in words)
 
 
-def as_vertices(counts: Iterable) -> np.ndarray:
-    return exact(counts, "i8", "vertices")
-
-
-def as_shares(shares: Iterable) -> np.ndarray:
-    return exact(shares, "f8", "delta")
+def as_names(names: Iterable) -> tuple[str, ...]:
+    """Return names as plain strings."""
+    return tuple(map(str, names))
 
 
 @attrs.frozen(eq=False)
 class Results:
-    """All that one ensemble found, checked for names, shapes and exact conversion.
+    """All results of one study of pairs or rates.
 
     ``types`` names; ``vertices`` N [-]; ``delta`` shares of delta_max [-]; ``replicates`` the
     arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where they were left
@@ -286,16 +310,14 @@ class Results:
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
     the arrays of `POOLED`, (type, vertices), and ``differences`` those of `DIFFERENCES`, (against,
-    event, type, vertices, delta), ``numerics`` and ``outlines``
-    those of `NUMERICS` and `OUTLINES`, or nothing; ``radii``
-    {r_i, r_j: (type,)} [m] those of `RADII`,
-    NaN where they are not known; ``kernel`` the rates of a kernel study, None in others.
-    Raises UsageError for an array that is missing, unknown, misshapen or would lose its values.
+    event, type, vertices, delta), ``numerics`` and ``outlines`` those of `NUMERICS` and
+    `OUTLINES`, or nothing; ``radii`` {r_i, r_j: (type,)} [m] those of `RADII`, NaN where they are
+    not known; ``kernel`` the rates of a kernel study, None in others.
     """
 
     types: tuple[str, ...] = attrs.field(converter=as_names)
-    vertices: np.ndarray = attrs.field(converter=as_vertices)
-    delta: np.ndarray = attrs.field(converter=as_shares)
+    vertices: np.ndarray = attrs.field(converter=np.asarray)
+    delta: np.ndarray = attrs.field(converter=np.asarray)
     replicates: dict[str, np.ndarray] | None
     probabilities: dict[str, np.ndarray]
     run: dict[str, str | int | float] = attrs.field(factory=dict)
@@ -316,35 +338,25 @@ class Results:
 
     def __attrs_post_init__(self):
         if self.replicates is not None:
-            [*_, count] = np.shape(self.replicates.get("outcome", ())) or [0]
-            object.__setattr__(self, "count", count)
-        lengths = {axis: len(values) for axis, values in self.axes.items()}
-        columns = {"radii": SIZES} | {name: group.columns for name, group in GROUPS.items()}
-        for name, each in columns.items():
-            arrays = getattr(self, name)
-            if arrays or (arrays is not None and name in ("probabilities", "radii", "replicates")):
-                object.__setattr__(self, name, checked_arrays(name, arrays, each, lengths))
-        if self.replicates and np.any(self.replicates["failure"] >= len(self.failures)):
-            raise UsageError("replicates/failure holds a code without a word in failures")
+            object.__setattr__(self, "count", np.shape(self.replicates["outcome"])[-1])
 
     def labelled(self, group: str, arrays: Mapping[str, np.ndarray] | None = None) -> Labelled:
-        """A group with its axes; ``arrays``: those of the group, where they are not at hand.
+        """Return a group with its axes; ``arrays``: those of the group, where they are not here.
 
-        Replicates that were left on the disk are zeros.
+        Replicates that were left on the disk are zeros that take no memory.
         """
         declared = GROUPS[group]
-        found = getattr(self, group) if arrays is None else arrays
+        values = getattr(self, group) if arrays is None else arrays
         if group == "replicates":
             codes = tuple(range(len(self.failures))), self.failures
-            columns = dict(declared.columns)
-            columns["failure"] = attrs.evolve(columns["failure"], codes=codes)
+            columns = ROWS | {"failure": attrs.evolve(ROWS["failure"], codes=codes)}
             declared = attrs.evolve(declared, columns=columns)
             shape = (*self.shape, self.count)
-            found = found or {
+            values = values or {
                 name: np.broadcast_to(np.zeros((), each.type), shape)
                 for name, each in columns.items()
             }
-        return declared.labelled({**self.axes, **self.radii, **found})
+        return declared.labelled({**self.axes, **self.radii, **values})
 
     @property
     def axes(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ there is so far. Here its tables are made of rows, too, and told.
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,10 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Group, check_format, declared, hold_against, opened_file, write_groups
+from flocsim.io.groups import FileFormat, Group, declared
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
-
-FORMAT = "flocsim strength"
-SCHEMA_VERSION = 2
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
 """Words of the codes of ``status``: between two rates; at the lowest rate already; at none; a run
@@ -69,12 +66,15 @@ SCALES = COORDINATES | {
 CODES = {"bond": FLAGS["bond"], "status": (range(len(STATUS)), STATUS)}
 
 GROUPS = {
-    "doublets": Group.of(declared(DOUBLETS, ("doublet",), CODES), SCALES),
+    "doublets": Group.of(
+        declared(DOUBLETS, ("doublet",), CODES, along={name: name for name in AXES}), SCALES
+    ),
     "conditions": Group.of(declared(COUNTS, AXES) | declared(RATE, (*AXES, "quantile")), SCALES),
 }
-
-
-INDICES = {name: group.index for name, group in GROUPS.items()}
+STRENGTHS = FileFormat(
+    "flocsim strength", 2, "strengths of bonds", GROUPS, lengths={"quantile": len(QUANTILES)},
+    remedy="test the bonds again",
+)  # fmt: skip
 
 
 @attrs.frozen(eq=False)
@@ -84,8 +84,8 @@ class Strengths(Tables):
     about: dict[str, Any]
     doublets: Labelled
     conditions: Labelled
-    indices = INDICES
-    format = FORMAT
+    indices = STRENGTHS.indices
+    format = STRENGTHS.name
 
     @property
     def complete(self) -> bool:
@@ -125,40 +125,17 @@ def labelled_conditions(axes: tuple, columns: dict[str, np.ndarray]) -> Labelled
 
 def write_strengths(path: str | Path, found: Strengths, rule: Rule = keep) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
-    about = json.dumps(found.about)
-    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "about": about}
     groups = {"doublets": found.doublets, "conditions": found.conditions}
-    write_groups(path, attributes, groups, rule=rule)
+    STRENGTHS.write(path, groups, attributes={"about": json.dumps(found.about)}, rule=rule)
 
 
 def read_strengths(path: str | os.PathLike) -> Strengths:
-    """The Strengths of a file; FileError for one that is absent, damaged, or of another kind."""
-    with opened_file(
-        path, lambda reason: f"{path} has no readable strengths of bonds: {reason}"
-    ) as file:
-        check_format(path, file, FORMAT, SCHEMA_VERSION, "about")
-        known = read_json(file.attributes["about"], {})
-        if not isinstance(known, dict):
-            raise ValueError("its attribute about is not a table")
-        wanted = {name: group.arrays for name, group in GROUPS.items()}
-        hold_against(file, wanted, wanted, {"quantile": len(QUANTILES)})
-        doublets, conditions = (group.read(file, name) for name, group in GROUPS.items())
-        for axis in AXES:
-            if np.any((doublets[axis] < 0) | (doublets[axis] >= len(conditions[axis]))):
-                raise ValueError(f"a doublet has a {axis} that the file does not have")
-        check_opened(doublets.__getitem__)
-        return Strengths(
-            known, GROUPS["doublets"].labelled(doublets),
-            GROUPS["conditions"].labelled(conditions | {"quantile": QUANTILES}),
-        )  # fmt: skip
-
-
-def check_opened(column: Callable[[str], np.ndarray]) -> None:
-    """ValueError for doublets that no run can have come to; ``column(name)`` of ROW."""
-    if np.any(column("status") >= len(STATUS)):
-        raise ValueError("a doublet has an unknown status")
-    if not np.isin(column("bond"), FLAGS["bond"][0]).all() or np.any(column("runs") < 0):
-        raise ValueError("a doublet has an unknown bond")
+    """Return the Strengths of a file; FileError for one that is absent, damaged, or of another
+    kind."""
+    with STRENGTHS.opened(path) as file:
+        stored = STRENGTHS.contents(file)
+        about = read_json(stored.attributes["about"], {})
+        return Strengths(about, stored.labelled("doublets"), stored.labelled("conditions"))
 
 
 def quantiles_of(opens: np.ndarray, holding: int) -> np.ndarray:

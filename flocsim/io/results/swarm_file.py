@@ -20,21 +20,9 @@ import numpy as np
 
 from flocsim.geometry.shapes.cores import PointTable, parts_in
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import (
-    Group,
-    check_format,
-    declared,
-    hold_against,
-    opened_file,
-    run_of,
-    scalars_in,
-    write_groups,
-)
+from flocsim.io.groups import FileFormat, Group, declared
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.terminal import aligned
-
-FORMAT = "flocsim swarm"
-SCHEMA_VERSION = 6
 
 WALL = -2
 """In `bodies/floc`: a wall."""
@@ -162,6 +150,14 @@ SCALES = {
 }
 COMPONENTS, AXES = ("x", "y", "angle"), ("x", "y")
 
+PLACES = {
+    "bond_replicate": "replicate", "bond_time": "time", "bond_later": "body",
+    "bond_earlier": "body", "cluster_replicate": "replicate", "cluster_time": "time",
+    "cluster_number": "body", "event_replicate": "replicate", "event_time": "time",
+    "first_point": "point",
+}  # fmt: skip
+"""Columns that hold places along an axis."""
+
 GROUPS = {
     "counts": Group.of(
         declared(COUNTS, MOMENTS)
@@ -170,20 +166,21 @@ GROUPS = {
     ),
     "snapshots": Group.of(
         declared(SNAPSHOTS, (*MOMENTS, "body", "component"))
-        | declared(CLUSTER, (*MOMENTS, "body")), SCALES,
+        | declared(CLUSTER, (*MOMENTS, "body"), low=GONE, along={"cluster": "body"}), SCALES,
     ),
     "bodies": Group.of(
-        declared(BODIES, ("replicate", "body")) | declared(POINTS, ("replicate", "point", "axis"))
-        | declared(RINGS, ("replicate", "point")) | declared(BOX, ("replicate", "axis")), SCALES,
+        declared(BODIES, ("replicate", "body"), low=WALL, along=PLACES)
+        | declared(POINTS, ("replicate", "point", "axis"))
+        | declared(RINGS, ("replicate", "point"), low=0)
+        | declared(BOX, ("replicate", "axis"), low=0), SCALES,
     ),
-    "bonds": Group.of(declared(BONDS, ("bond",)), SCALES),
-    "clusters": Group.of(declared(CLUSTERS, ("row",)), SCALES),
-    "events": Group.of(declared(EVENTS, ("event",)), SCALES),
-    "ends": Group.of(declared(ENDS, ("replicate",)), SCALES),
+    "bonds": Group.of(declared(BONDS, ("bond",), low=0, along=PLACES), SCALES),
+    "clusters": Group.of(declared(CLUSTERS, ("row",), along=PLACES), SCALES),
+    "events": Group.of(declared(EVENTS, ("event",), low=0, along=PLACES), SCALES),
+    "ends": Group.of(declared(ENDS, ("replicate",), low=0), SCALES),
 }  # fmt: skip
-
-
-INDICES = {name: group.index for name, group in GROUPS.items()}
+SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS)
+FORMAT = SWARMS.name
 
 
 @attrs.frozen(eq=False)
@@ -194,7 +191,7 @@ class SwarmResults(Tables):
     scales: dict[str, np.ndarray]
     groups: dict[str, dict[str, np.ndarray]]
     run: dict[str, Any]
-    indices = INDICES
+    indices = SWARMS.indices
     exported = ("counts", "clusters", "events")
     format = FORMAT
 
@@ -218,29 +215,23 @@ def mean(values: np.ndarray) -> np.ndarray:
 def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
     groups = {name: results.labelled(name) for name in GROUPS}
-    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION}
-    write_groups(path, attributes, groups, results.run, rule)
+    SWARMS.write(path, groups, results.run, rule=rule)
 
 
 def read_swarm(path: str | os.PathLike) -> SwarmResults:
-    """The SwarmResults in a file; FileError for one that is absent, damaged, of another kind or
-    version."""
-    with opened_file(path, lambda why: f"{path} has no readable results of a swarm: {why}") as file:
-        check_format(path, file, FORMAT, SCHEMA_VERSION)
-        wanted = {name: group.arrays for name, group in GROUPS.items()}
-        wanted["run"] = scalars_in(file, "run")
-        hold_against(file, wanted, wanted)
-        scales: dict[str, np.ndarray] = {}
-        groups: dict[str, dict[str, np.ndarray]] = {}
-        for name, group in GROUPS.items():
-            found = group.read(file, name)
-            groups[name] = {column: found[column] for column in group.columns}
-            for axis in group.scales:
-                if not np.array_equal(scales.setdefault(axis, found[axis]), found[axis]):
-                    raise ValueError(f"{name}/{axis} is not that of the other groups")
-        run = run_of(file)
-        check_swarm(scales, groups)
-        return SwarmResults(scales, groups, run)
+    """Return the SwarmResults in a file; FileError for one that is absent, damaged, of another
+    kind or version."""
+    with SWARMS.opened(path) as file:
+        stored = SWARMS.contents(file)
+        bodies = stored.groups["bodies"]
+        for replicate, body in np.ndindex(*bodies["first_point"].shape):
+            parts_in(points_of(bodies, replicate, body))
+    scales: dict[str, np.ndarray] = {}
+    groups: dict[str, dict[str, np.ndarray]] = {}
+    for name, group in GROUPS.items():
+        scales |= {axis: stored.groups[name][axis] for axis in group.scales}
+        groups[name] = {column: stored.groups[name][column] for column in group.columns}
+    return SwarmResults(scales, groups, stored.run)
 
 
 def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
@@ -293,43 +284,6 @@ def points_of(bodies: Mapping[str, np.ndarray], replicate: int, body: int) -> Po
     first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
     rows = slice(first, first + count)
     return PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
-
-
-def check_swarm(scales: Mapping[str, np.ndarray], groups: Mapping[str, Any]) -> None:
-    """ValueError for what no swarm can have been."""
-    bodies = groups["bodies"]
-    first, count = bodies["first_point"], bodies["point_count"]
-    total = bodies["points"].shape[1]
-    if np.any(first < 0) or np.any(count < 1) or np.any(first > total - count):
-        raise ValueError("its bodies have core points that are not there")
-    for name in ("r_eq", "spheroradius"):
-        if not np.all((bodies[name] > 0.0) & np.isfinite(bodies[name])):
-            raise ValueError(f"bodies/{name} has values that are not radii")
-    for replicate, body in np.ndindex(*first.shape):
-        table = points_of(bodies, replicate, body)
-        if not np.all((table.radius > 0.0) & np.isfinite(table.radius)):
-            raise ValueError("bodies/point_radius has values that are not radii")
-        parts_in(table)
-    if not np.all((bodies["box"] > 0.0) & np.isfinite(bodies["box"])):
-        raise ValueError("its box has no size")
-    if not np.all(np.diff(scales["time"]) > 0.0) or not np.all(np.isfinite(scales["time"])):
-        raise ValueError("its times do not increase")
-    replicates, times, many = groups["snapshots"]["cluster"].shape
-    check_rows("bonds", groups["bonds"], (replicates, times, many, many, KIND_COUNT))
-    check_rows("clusters", groups["clusters"], (replicates, times, many, many + 1))
-    sizes = (many + 1,) * (len(EVENTS) - 2)
-    check_rows("events", groups["events"], (replicates, times, *sizes))
-    labels = groups["snapshots"]["cluster"]
-    if np.any(labels < GONE) or np.any(labels >= max(labels.shape[-1], 1)):
-        raise ValueError("snapshots/cluster has values that are not clusters")
-
-
-def check_rows(group: str, columns: Mapping[str, np.ndarray], limits: tuple[int, ...]) -> None:
-    """ValueError where one of the first columns of a group does not count from 0 to below its
-    limit."""
-    for (name, values), limit in zip(columns.items(), limits, strict=False):
-        if np.any(values < 0) or np.any(values >= limit):
-            raise ValueError(f"{group}/{name} has impossible values")
 
 
 def table_of(results: SwarmResults) -> str:

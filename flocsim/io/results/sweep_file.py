@@ -15,22 +15,13 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import (
-    Declared,
-    Group,
-    check_format,
-    hold_against,
-    opened_file,
-    scalar_of,
-    write_groups,
-)
-from flocsim.io.hdf5 import Node
+from flocsim.io.groups import Dataset, FileFormat, Group
+from flocsim.io.hdf5 import File
 from flocsim.io.json_text import matches, read_json
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.results.run_group import SOURCE
 
-FORMAT = "flocsim sweep"
-SCHEMA_VERSION = 1
+SWEEP = FileFormat("flocsim sweep", 1, "sweep", {}, remedy="join it again with --resume")
+"""Its groups are those of the studies that are joined, along the swept keys as well."""
 
 
 @attrs.frozen(eq=False)
@@ -80,58 +71,52 @@ class SweepResults(Tables):
 def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
     about = {name: {"key": each.key, "unit": each.unit} for name, each in results.swept.items()}
-    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION, "swept": json.dumps(about)}
-    write_groups(
-        results.path, attributes, results.groups, {"plan": results.plan} | results.run, rule
-    )
+    run = {"plan": results.plan} | results.run
+    SWEEP.write(results.path, results.groups, run, {"swept": json.dumps(about)}, rule)
 
 
 def read_sweep(
     path: str | os.PathLike, known: Sequence[tuple[Mapping[str, Group], Mapping[str, int]]]
 ) -> SweepResults:
-    """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
-    or version. ``known``: (groups of results, how many places their last axes have) of all kinds
-    of studies that are joined."""
-    with opened_file(
-        path,
-        lambda reason: f"{path} has no readable sweep: {reason}; join it again with --resume",
-    ) as file:
-        check_format(path, file, FORMAT, SCHEMA_VERSION, "swept")
+    """Return the SweepResults in a joined file; FileError for one that is absent, damaged, of
+    another kind or version.
+
+    ``known``: (groups of results, how many places their last axes have) of all kinds of studies
+    that are joined.
+    """
+    with SWEEP.opened(path) as file:
         about = read_json(file.attributes["swept"], {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept does not name any keys")
         joined, lengths = next((each for each in known if each[0].keys() <= file.keys()), ({}, {}))
         if not joined:
             raise ValueError("it has no group of a sweep")
-        declared = {name: joined_group(each, name, about, file) for name, each in joined.items()}
-        wanted = {name: group.arrays for name, group in declared.items()}
-        source = {name: Declared("text") for name in SOURCE if f"run/{name}" in file}
-        run = {"run": {"plan": Declared("text")} | source}
-        hold_against(file, wanted | run, list(joined), lengths)
-        groups = {name: group.labelled(group.read(file, name)) for name, group in declared.items()}
-        first = next(iter(groups.values())).axes
+        groups = {name: joined_group(each, name, about, file) for name, each in joined.items()}
+        stored = attrs.evolve(SWEEP, groups=groups, lengths=lengths).contents(file)
+        first = next(iter(stored.groups.values()))
         swept = {
-            name: Swept(each["key"], first[name].values.tolist(), each["unit"])
+            name: Swept(each["key"], first[name].tolist(), each["unit"])
             for name, each in about.items()
         }
-        plan = scalar_of(file, "run/plan") if "run" in file else ""
-        about_all = {name: scalar_of(file, f"run/{name}") for name in source}
-        return SweepResults(Path(path), swept, groups, str(plan), about_all)
+        run = dict(stored.run)
+        plan = str(run.pop("plan", ""))
+        return SweepResults(
+            Path(path), swept, {name: stored.labelled(name) for name in groups}, plan, run
+        )
 
 
-def joined_group(
-    one: Group, name: str, about: Mapping[str, dict], nodes: Mapping[str, Node]
-) -> Group:
-    """A group of results along the swept keys, {dimension: {key, unit}}, as well."""
+def joined_group(one: Group, name: str, about: Mapping[str, dict], file: File) -> Group:
+    """Return a group of results along the swept keys, {dimension: {key, unit}}, as well."""
 
-    def along(declared):
+    def along(declared: Mapping[str, Dataset]) -> dict[str, Dataset]:
         return {
             name: attrs.evolve(each, axes=(*about, *each.axes)) for name, each in declared.items()
         }
 
-    swept = {}
-    for axis, each in about.items():
-        node = nodes.get(f"{name}/{axis}")
-        kind = "text" if node is not None and node.type == "text" else "f8"
-        swept[axis] = Declared(kind, (axis,), each["unit"], each["key"])
-    return Group(along(one.columns), swept | dict(one.scales), along(one.beside))
+    swept = {
+        axis: Dataset(file.node(f"{name}/{axis}").type or "f8", (axis,), each["unit"], each["key"])
+        for axis, each in about.items()
+    }
+    axes = {name: each for name, each in one.scales.items() if each.axes == (name,)}
+    beside = {name: each for name, each in one.scales.items() if name not in axes}
+    return Group(along(one.columns), swept | axes | along(beside))

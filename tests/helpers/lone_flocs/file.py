@@ -7,19 +7,9 @@ import attrs
 import numpy as np
 
 from flocsim.io.files import Rule
-from flocsim.io.groups import (
-    Group,
-    check_format,
-    declared,
-    hold_against,
-    opened_file,
-    run_of,
-    scalars_in,
-    write_groups,
-)
+from flocsim.io.groups import FileFormat, Group, declared
 from flocsim.io.labelled import Labelled, Tables
 
-FORMAT, SCHEMA_VERSION = "flocsim lone", 1
 COLUMNS = {
     "speed": ("f8", "m s-1", "mean downward velocity"),
     "drift": ("f8", "m", "how far it has moved away from the wall"),
@@ -31,7 +21,8 @@ SCALES = {
     "replicate": ("i8", "1", "number of the replicate"),
 }
 GROUP = Group.of(declared(COLUMNS, ("vertices", "replicate")), SCALES)
-INDICES = {"flocs": GROUP.index}
+LONE = FileFormat("flocsim lone", 1, "results of single flocs", {"flocs": GROUP})
+FORMAT = LONE.name
 ROW = np.dtype([(name, kind) for name, (kind, _, _) in COLUMNS.items()])
 
 
@@ -42,7 +33,7 @@ class LoneResults(Tables):
     vertices: np.ndarray
     columns: dict[str, np.ndarray]
     run: dict[str, Any]
-    indices = INDICES
+    indices = LONE.indices
     format = FORMAT
 
     @property
@@ -59,17 +50,11 @@ class LoneResults(Tables):
 
 def write_lone(path: Any, results: LoneResults, rule: Rule) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
-    attributes = {"format": FORMAT, "schema_version": SCHEMA_VERSION}
-    write_groups(path, attributes, {"flocs": results.labelled()}, results.run, rule)
+    LONE.write(path, {"flocs": results.labelled()}, results.run, rule=rule)
 
 
 def read_lone(path: str | os.PathLike) -> LoneResults:
     """The LoneResults of a file; FileError for one that is absent, damaged, or of another kind."""
-    complaint = f"{path} holds no readable results of single flocs: "
-    with opened_file(path, lambda why: complaint + why) as file:
-        check_format(path, file, FORMAT, SCHEMA_VERSION)
-        wanted = {"flocs": GROUP.arrays, "run": scalars_in(file, "run")}
-        hold_against(file, wanted, wanted)
-        found = GROUP.read(file, "flocs")
-        run = run_of(file)
-        return LoneResults(found["vertices"], {name: found[name] for name in COLUMNS}, run)
+    found = LONE.read(path)
+    flocs = found.groups["flocs"]
+    return LoneResults(flocs["vertices"], {name: flocs[name] for name in COLUMNS}, found.run)

@@ -53,7 +53,7 @@ def test_parts_that_cannot_be_are_refused(tmp_path):
 
 
 def test_bonds_of_bodies_that_are_not_there_are_refused(tmp_path):
-    for name in ("bond_later", "bond_time", "bond_kind"):
+    for name in ("bond_later", "bond_time"):
         results = make_swarm_results()
         results.groups["bonds"][name] = np.array([0, 9], "i4")
         write_swarm(tmp_path / f"{name}.h5", results)

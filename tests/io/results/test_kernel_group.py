@@ -8,7 +8,7 @@ import pytest
 
 from flocsim.body import FractalDensity
 from flocsim.errors import UsageError
-from flocsim.io.results.kernel_group import Kernel, check_kernel, fractal_in
+from flocsim.io.results.kernel_group import fractal_in
 from flocsim.io.results.kernel_tables import (
     curvilinear_factor,
     efficiency_for,
@@ -29,24 +29,6 @@ def test_it_opens_as_a_dataset():
     pytest.importorskip("xarray")
     data = some_kernel().labelled().to_xarray()
     assert float(data.alpha.sel(mechanism="shear", vertices=32, i="5um", j="5um")) > 0.0
-
-
-def test_arrays_that_are_missing_or_misshapen_are_refused():
-    kernel = some_kernel()
-    with pytest.raises(UsageError, match="differing: alpha"):
-        Kernel(kernel.mechanisms, kernel.vertices, kernel.labels, kernel.radii,
-               {k: v for k, v in kernel.arrays.items() if k != "alpha"})  # fmt: skip
-    with pytest.raises(UsageError, match="kernel/alpha has shape"):
-        Kernel(kernel.mechanisms, kernel.vertices, kernel.labels, kernel.radii,
-               kernel.arrays | {"alpha": np.zeros(3)})  # fmt: skip
-
-
-@pytest.mark.parametrize("wrong", [-1.0, np.inf])
-def test_impossible_values_are_refused(wrong):
-    arrays = some_kernel().arrays
-    arrays["beta3"][0, 0, 0, 0] = wrong
-    with pytest.raises(ValueError, match="kernel/beta3"):
-        check_kernel(arrays)
 
 
 def test_a_matrix_names_what_it_multiplies():
