@@ -25,7 +25,6 @@ from flocsim.io.results.schema import (
     RESULTS,
     ROWS,
     Results,
-    check_rows,
 )
 
 FORMAT, SCHEMA_VERSION = RESULTS.name, RESULTS.version
@@ -103,8 +102,8 @@ def results_in(file: File, replicates: bool = True) -> Results:
         name: {column: stored.groups[name][column] for column in group.columns}
         for name, group in GROUPS.items() if name in stored.groups
     }  # fmt: skip
-    if replicates:
-        check_rows(tables["replicates"].__getitem__, len(failures))
+    if replicates and np.any(tables["replicates"]["failure"] >= len(failures)):
+        raise ValueError("replicates/failure has codes without a word")
     kernel = stored.groups.get("kernel")
     return Results(
         types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
@@ -135,7 +134,8 @@ def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[
     with opened(path) as file:
         at = (*place[:-1], slice(place[-1], place[-1] + 1))
         row = {name: file.read(f"replicates/{name}", at)[0] for name in REPLICATES}
-        check_rows(lambda name: np.asarray(row[name]), len(failures_of(file)))
+        for name, value in row.items():
+            ROWS[name].check(f"replicates/{name}", value, {})
         return row
 
 

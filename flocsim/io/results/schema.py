@@ -3,13 +3,13 @@
 The file itself is read and written by `flocsim.io.results.file`.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.io.groups import Dataset, FileFormat, Group, Unfit, declared
+from flocsim.io.groups import Dataset, FileFormat, Group, declared
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import KERNEL_GROUP, Kernel
 
@@ -265,18 +265,6 @@ RESULTS = FileFormat(
 
 All that may differ between two runs of one config is in the group ``run``.
 """
-
-
-def check_rows(column: Callable[[str], np.ndarray], failures: int) -> None:
-    """Raise ValueError for rows with codes that have no word, or with negative counts.
-
-    ``column(name)`` gives the values of a column; ``failures``: how many reasons of failure there
-    are.
-    """
-    for name, each in ROWS.items():
-        each.check(f"replicates/{name}", column(name), {})
-    if np.any(column("failure") >= failures):
-        raise Unfit("replicates/failure has impossible values")
 
 
 def blank(
