@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flocsim.ensembles.pairs.comparison import Comparison
     from flocsim.ensembles.pairs.opened import StudyResults
     from flocsim.ensembles.script_study import Study
-    from flocsim.ensembles.swarms.contents import SwarmComparison
+    from flocsim.ensembles.swarms.results import SwarmComparison
     from flocsim.ensembles.sweep import sweep
     from flocsim.forces.base import Force
     from flocsim.geometry.shapes.shape import Shape, Sphere
@@ -44,7 +44,7 @@ HOMES = {
     "State": "trajectories.trajectory",
     "Status": "integrators.base",
     "Swarm": "swarms.swarm",
-    "SwarmComparison": "ensembles.swarms.contents",
+    "SwarmComparison": "ensembles.swarms.results",
     "SwarmResults": "io.results.swarm_file",
     "SwarmTrajectory": "swarms.swarm",
     "Study": "ensembles.script_study",

@@ -183,8 +183,8 @@ class StudyKind:
     def check(config: Config) -> None:
         """Raise the FlocsimError that a config's study would meet."""
 
-    def prepare(self, comm: Any) -> None:
-        """Raise the same for what takes all ranks of a communicator to look at."""
+    def prepare(self) -> None:
+        """Raise the same for what takes the study itself to look at."""
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible in the study."""
@@ -299,7 +299,7 @@ class OldResults:
 @cache
 def kinds() -> dict[type, type[StudyKind]]:
     """Class of [scene] → its kind of study; rates are pairs with other draws and conditions."""
-    found = [each for folder in STUDIES.values() for each in folder.part("kind").KINDS]
+    found = [each for folder in STUDIES.values() for each in folder.part("study").KINDS]
     return {scene: each for each in found for scene in each.scenes}
 
 

@@ -160,7 +160,7 @@ def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict
             raise UsageError(unlike[0] + more)
     cpus = distinct([kind for _, kind in answers or []])
     with sharing_errors(comm):
-        study.prepare(comm)
+        study.prepare()
     return study, leader.identity, cpus
 
 

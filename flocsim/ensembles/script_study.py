@@ -22,7 +22,7 @@ from flocsim.ensembles.config.toml_text import parse, read_text_file, toml_text,
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
+from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
@@ -226,7 +226,7 @@ class Study:
     def check(self) -> None:
         """Raise now what would keep the study from running: zone, sizes, forces, library."""
         kind_of(self.config).check(self.config)
-        study_of(self.config).prepare(Communicator())
+        study_of(self.config).prepare()
 
     def replicate(
         self, replicate: int = 0, type: str | None = None, vertices: int | None = None,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flocsim.commands import add_command
-from flocsim.ensembles.pairs import contents
+from flocsim.ensembles.pairs import results as contents
 from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots.results import FIGURES

@@ -12,7 +12,7 @@ import pytest
 
 import flocsim
 from flocsim.commands import add_command
-from flocsim.ensembles.pairs import contents
+from flocsim.ensembles.pairs import results as contents
 from flocsim.ensembles.report import efficiency_rows
 from flocsim.ensembles.script_study import Study
 from flocsim.errors import FileError, UsageError

@@ -11,7 +11,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.pairs import contents
+from flocsim.ensembles.pairs import results as contents
 from flocsim.errors import ConfigError, UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import OWN, write_own

@@ -7,7 +7,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.draw import columns_of
-from flocsim.ensembles.pairs import contents
+from flocsim.ensembles.pairs import results as contents
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study

@@ -4,7 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles.pairs.contents import told
+from flocsim.ensembles.pairs.results import told
 from flocsim.ensembles.report import verdict
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
 from flocsim.process import WITHHELD

@@ -157,7 +157,7 @@ class SwarmJournalReader:
         """Take what it has, and make results of it where all is there."""
         from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
         from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.ensembles.swarms.kind import results
+        from flocsim.ensembles.swarms.results import results
         from flocsim.io.journal import Journal
         from flocsim.io.results.swarm_file import table_of
 
@@ -172,7 +172,7 @@ class SwarmJournalReader:
             assert all(remark.isprintable() for remark in start.remarks), start.remarks
             for parts in store.parts.values():
                 left = self.study.left_of(parts)
-                assert left is None or np.isfinite(left.state["motion"]).all()
+                assert left is None or np.isfinite(left["motion"]).all()
             if store.intervals(0) == [(0, 2)]:
                 table_of(results(self.study, start, 2, {}, None, True))
             if start.remarks:

@@ -9,7 +9,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.flocs import read_flocs
-from flocsim.ensembles.pairs import contents
+from flocsim.ensembles.pairs import results as contents
 from flocsim.errors import FileError
 from flocsim.io import seals
 from flocsim.io.results.file import read_results

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, Swarm
-from flocsim.ensembles.swarms.replicate import summary_of
+from flocsim.ensembles.swarms.study import summary_of
 from flocsim.forces import Contact
 from flocsim.swarms.together.clusters import Clusters
 

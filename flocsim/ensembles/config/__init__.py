@@ -13,8 +13,8 @@ dimensions and every message stayed ours and its exceptions had to be turned bac
 
 All that a kind of study is lies in its folder, whose modules are loaded by name, when something of
 the kind is there: `scene` has the class of its [scene] as SCENE, where that has a `kind` of its
-own; `kind` what runs it as KINDS, classes of
-`flocsim.ensembles.kind.StudyKind`; `contents` what its files hold as
+own; `study` what runs it as KINDS, classes of
+`flocsim.ensembles.kind.StudyKind`; `results` what its files hold as
 CONTENTS, a `flocsim.ensembles.contents.Contents`.
 """
 
@@ -29,7 +29,7 @@ class Folder(NamedTuple):
     scene: str = ""
 
     def part(self, module: str) -> Any:
-        """One of its modules."""
+        """Return one of its modules."""
         return importlib.import_module(f"flocsim.ensembles.{self.name}.{module}")
 
 
@@ -39,7 +39,7 @@ STUDIES = {
 }
 """What a results file says that it is → the Folder of the kind."""
 
-FILES = {name: f"ensembles.{folder.name}.contents" for name, folder in STUDIES.items()} | {
+FILES = {name: f"ensembles.{folder.name}.results" for name, folder in STUDIES.items()} | {
     "flocsim strength": "ensembles.strength.contents",
     "flocsim sweep": "ensembles.sweep",
     "flocsim trajectory": "commands.trajectory:TRAJECTORY",

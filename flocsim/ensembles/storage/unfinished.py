@@ -109,7 +109,7 @@ def read_unfinished(path: str | Path) -> Unfinished:
             raise FileError(
                 f"{path} is not a journal of an unfinished run, or has only just begun: try again"
             )
-        kind = STUDIES[name].part("kind").KINDS[0]
+        kind = STUDIES[name].part("study").KINDS[0]
         store, notes, unread = store_of(journal, sessions, kind.row)
         try:
             results, done, of = contents_of(name).so_far(store, asked)

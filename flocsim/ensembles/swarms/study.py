@@ -1,7 +1,13 @@
-"""A study of swarms: the bodies of any replicate, by its number."""
+"""A study of swarms: the bodies of any replicate by its number, and how a replicate runs.
+
+While a replicate runs, parts of it are saved: its bodies, every snapshot, and now and then the
+state from which it resumes. A part is arrays by name, those of a snapshot named like the columns
+of the results file that they become.
+"""
 
 import functools
 import math
+import time
 from collections.abc import Callable, Container, Iterable, Sequence
 from typing import Any, ClassVar
 
@@ -16,42 +22,51 @@ from flocsim.ensembles.collision.pairings import drawing_weights, quantile, with
 from flocsim.ensembles.config.schema import Config, ShapesConfig
 from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Going, Keep, StudyKind
 from flocsim.ensembles.preflight import names_in
-from flocsim.ensembles.storage.row_store import Parts
-from flocsim.ensembles.swarms import records
-from flocsim.ensembles.swarms.replicate import run_replicate
+from flocsim.ensembles.swarms.results import (
+    BODIES,
+    STATE,
+    Arrays,
+    decoded,
+    encoded,
+    has,
+    moment_name,
+)
 from flocsim.ensembles.swarms.scene import SwarmScene
 from flocsim.errors import ConfigError, UsageError
+from flocsim.explain import force_lines, scale_lines
 from flocsim.forces import ContactForce
 from flocsim.forces.settling import terminal_motion
+from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import ENDS, FORMAT
-from flocsim.plausibility import doubts_of
+from flocsim.io.results.swarm_file import ENDS, FORMAT, GONE, WALL
+from flocsim.io.terminal import duration
+from flocsim.plausibility import doubts_of, settled
+from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
-from flocsim.swarms.swarm import Swarm, check_box, stops_of
+from flocsim.swarms.progress import Progress
+from flocsim.swarms.swarm import Swarm, stops_of
+from flocsim.swarms.together.bonds import Bonds
+from flocsim.swarms.together.clusters import Clusters, Gauge
 from flocsim.system import System
 
 SPHERE = -1
-"""Place among the flocs of a body that is a sphere."""
-
-ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in ENDS.items()])
-"""A finished replicate: how it ended."""
+"""Index among the flocs of a body that is a sphere."""
 
 TRIAL_SECONDS = 1e-6
-"""For so long the first bodies are run before a study begins [s]."""
+"""For so long two bodies are run before a study begins, to compile [s]."""
 
 BEYOND = 4.0
 """A floor goes on for so many bounding radii beyond the box."""
 
-
-CODE = (*PHYSICS, "swarms", "ensembles/swarms/study.py", "ensembles/swarms/replicate.py")
-"""The modules that decide what a swarm does."""
+MOST_NAMED = 6
+"""Bodies of an island that failed which are named."""
 
 
 @attrs.frozen(eq=False)
 class Drawn:
-    """The bodies of a replicate before they are placed: place of the floc, and shape, of each."""
+    """The bodies of a replicate before they are placed: index of the floc, and shape, of each."""
 
     flocs: np.ndarray
     shapes: list[Shape]
@@ -65,23 +80,23 @@ def shapes_of(config: Config) -> ShapesConfig:
 
 @attrs.define(eq=False)
 class SwarmStudy(StudyKind):
-    """Every replicate of a config whose scene is a swarm. All that is random follows from (seed,
-    replicate). ``flocs`` are grown or read unless given."""
+    """Every replicate of a config whose scene is a swarm; ``flocs`` are grown or read unless
+    given."""
 
     config: Config
     flocs: list[Floc] = attrs.field(
         default=attrs.Factory(lambda self: self.flocs_of(self.config), takes_self=True)
     )
-    pool: FlocPool = attrs.field(init=False)
-    choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
-    """Places of the measured flocs that bodies are drawn from."""
     scenes: ClassVar[Sequence[type]] = (SwarmScene,)
     format: ClassVar[str] = FORMAT
-    code: ClassVar[Sequence[str]] = CODE
-    row: ClassVar[np.dtype] = ROW
+    code: ClassVar[Sequence[str]] = (*PHYSICS, "swarms", "ensembles/swarms/study.py")
+    row: ClassVar[np.dtype] = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
     in_common: ClassVar[Sequence[str]] = (*ORDER, "times", "bounds", "replicates")
+    pool: FlocPool = attrs.field(init=False)
+    choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
+    """Indices of the measured flocs that bodies are drawn from."""
 
     def __attrs_post_init__(self):
         self.pool = pool_of(shapes_of(self.config), self.flocs)
@@ -97,48 +112,28 @@ class SwarmStudy(StudyKind):
 
     @staticmethod
     def check(config: Config) -> None:
-        """ConfigError for a swarm whose bodies have no contact force."""
+        """Raise ConfigError for a swarm whose bodies have no contact force."""
         if not any(isinstance(force, ContactForce) for force in config.forces):
             raise ConfigError(
                 "bodies that meet need a contact force, found none among "
                 f"{', '.join(config.force_names)}: add [forces.contact]"
             )
 
-    def prepare(self, comm: Any) -> None:
-        """UsageError on rank 0 where the bodies of a replicate find no place, or its box is too
-        small for them: before the first runs for hours. Every rank looks at its share, but for the
-        first replicate, which all have placed by now."""
-        reach, first = self.first.reach, None
-        for replicate in range(comm.rank or comm.size, self.config.replicates, comm.size):
-            try:
-                drawn, box, _ = self.placed(replicate)
-                check_box(drawn.shapes, self.periods(box), reach)
-            except UsageError as error:
-                first = replicate, str(error)
-                break
-        found = comm.gather(first)
-        if found is None:
-            return
-        if faults := sorted(each for each in found if each is not None):
-            replicate, why = faults[0]
-            raise UsageError(f"swarm {replicate} of {self.config.replicates} (from 0): {why}")
-        self.check_code()
-
-    def check_code(self) -> None:
-        """Raise the FlocsimError that the laws of forces would meet when they are compiled."""
+    def prepare(self) -> None:
+        """Raise the FlocsimError that the first swarm, or the laws of its forces, would meet."""
         for law in self.first.system.pieces.laws.values():
             refuse_interpreter(law)
         refuse_interpreter(run_islands, self.first.fillings())
 
-    def largest_pair(self) -> System:
-        """A System of the two largest bodies, for what is said of a swarm."""
-        free = [body for body in self.first.bodies if not body.fixed]
-        bodies = sorted(free, key=lambda body: -body.shape.equivalent_radius)[:2]
-        return attrs.evolve(self.first.system, bodies=bodies)
-
     def doubts(self) -> list[str]:
         """Return lines on what is implausible."""
         return doubts_of([self.largest_pair()], names_in(self.config, self.config.forces))
+
+    def largest_pair(self) -> System:
+        """Return a System of the two largest bodies, for what is said of a swarm."""
+        free = [body for body in self.first.bodies if not body.fixed]
+        bodies = sorted(free, key=lambda body: -body.shape.equivalent_radius)[:2]
+        return attrs.evolve(self.first.system, bodies=bodies)
 
     def identity_facts(self) -> dict[str, Any]:
         """Return what rows follow from besides config, flocs, code and machine."""
@@ -162,23 +157,6 @@ class SwarmStudy(StudyKind):
         """Times of the snapshots [s], the start first."""
         return [0.0, *stops_of(self.scene.duration, self.scene.interval, None)]
 
-    @functools.cached_property
-    def beginning(self) -> tuple[Swarm, Drawn, tuple[float, float]]:
-        """The first replicate as `swarm` gives it: from it follows what the study is, by which it
-        is checked, and it is run as it is here, since resizing its flocs takes seconds."""
-        return self.make_swarm(0)
-
-    @property
-    def first(self) -> Swarm:
-        """The swarm of the first replicate at its start."""
-        return self.beginning[0]
-
-    @property
-    def form(self) -> records.Form:
-        """What its records look like."""
-        scene = self.scene
-        return records.Form(len(self.first.bodies), scene.bounds, tuple(self.stops), scene.periodic)
-
     @property
     def pieces(self) -> int:  # type: ignore[override]
         return len(self.stops)
@@ -194,8 +172,12 @@ class SwarmStudy(StudyKind):
         return f"{self.config.replicates} swarms of {number} bodies, {duration:g} s"
 
     def asked(self) -> dict[str, Any]:
-        """What the study consists of, and what its records look like."""
-        return super().asked() | self.form.asked()
+        """Return what the study consists of, and what its snapshots are like."""
+        scene = self.scene
+        return super().asked() | {
+            "times": list(map(float, self.stops)), "bounds": list(map(float, scene.bounds)),
+            "periodic": scene.periodic,
+        }  # fmt: skip
 
     def compile(self, kinds: Iterable[Code]) -> None:
         """Compile all that a swarm needs, or load it, by running two bodies for no time."""
@@ -203,53 +185,86 @@ class SwarmStudy(StudyKind):
             run_briefly(self.first)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
-        """All where the engine is not on the disk: a swarm has but one."""
+        """Return all where the engine is not on the disk: a swarm has but one."""
         return [] if is_on_disk(self.first.begin(TRIAL_SECONDS).runner.driver) else list(kinds)
 
-    def run_task(
-        self, condition: Condition, replicate: int, halted: Callable[[], bool],
-        left: records.Left | None = None,
-        keep: Keep | None = None, going: Going | None = None,
-    ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """One replicate from where it was left; its bodies and snapshots are kept as they come."""
-        kept = keep or (lambda name, description, data: None)
-        ended = run_replicate(
-            self, replicate, lambda part: kept(*part.described()), left, halted, going
-        )
-        if ended is None:
-            return None, None
-        finished = ended["status"] == Status.FINISHED.name
-        row = {name: ended.get(name, 0) for name in ROW.fields or ()}
-        row |= {"finished": finished, "end_time": ended["time"]}
-        if finished:
-            return row, None
-        why = (
-            f"{ended['status'].lower()} at {ended['time']:.4g} s, in an island of bodies "
-            f"{', '.join(map(str, ended['failed'][:6]))}"
-        )
-        return row, self.note(condition, replicate, why)
-
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
+        """Return flags of the swarms that ended early."""
         return column("finished") == 0
 
     def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
-        """ValueError where bodies or snapshots of a finished replicate are not there."""
-        if len(rows) > 1 or not records.has(parts, self.pieces if rows["finished"][0] else 0):
+        """Raise ValueError where bodies or snapshots of a finished replicate are not there."""
+        if len(rows) > 1 or not has(parts, self.pieces if rows["finished"][0] else 0):
             raise ValueError("some of its snapshots are missing")
 
     def counts_part(self, name: str) -> bool:
-        return name.startswith(records.MOMENT)
+        """Return True for a snapshot."""
+        return name.startswith("moment")
 
-    def left_of(self, parts: Parts) -> records.Left | None:
-        return records.left_of(parts)
+    def left_of(self, parts: Any) -> dict[str, np.ndarray] | None:
+        """Return the state from which a replicate resumes; None where it begins anew."""
+        state = decoded(parts.read(STATE)[1]) if STATE in parts else None
+        return state if state is not None and has(parts, int(state["moments"])) else None
 
-    def generator(self, replicate: int) -> np.random.Generator:
-        """The random numbers of a replicate."""
+    # The bodies of a replicate.
+
+    @functools.cached_property
+    def beginning(self) -> tuple[Swarm, Drawn, tuple[float, float]]:
+        """The first replicate as `swarm` gives it, by which the study is known and checked; it is
+        run as it is here, since resizing its flocs takes seconds."""
+        return self.make_swarm(0)
+
+    @property
+    def first(self) -> Swarm:
+        """The swarm of the first replicate at its start."""
+        return self.beginning[0]
+
+    def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
+        """Return (the Swarm of a replicate at its start, its bodies before, its box [m]).
+
+        UsageError where bodies find no place, or the box is too small for them.
+        """
+        return self.beginning if replicate == 0 else self.make_swarm(replicate)
+
+    def make_swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
+        """Draw a replicate, place its bodies, and let them settle at their own speeds."""
+        drawn, box, rng = self.drawn(replicate)
+        scene, forces, fluid = self.scene, self.config.forces, self.config.fluid
+        places = place_at_random(drawn.shapes, box, rng, scene.repeats, scene.gap)
+        bodies, walls = self.bodies(drawn, box, places.tolist())
+        known = System(bodies, forces, self.config.integrator.method, fluid)
+        period = np.where(scene.repeats, box, math.inf).tolist()
+        swarm = Swarm(
+            [*(settling(known, body) for body in bodies), *walls], forces,
+            self.config.integrator.method, fluid, box=(period[0], period[1]),
+            all_pairs=scene.all_pairs, seed=(self.config.seed, replicate),
+        )  # fmt: skip
+        return swarm, drawn, box
+
+    def bodies(
+        self, drawn: Drawn, box: tuple[float, float], places: Sequence[Sequence[float]]
+    ) -> tuple[list[Body], list[Body]]:
+        """Return (the bodies of a replicate at these places, the walls of its box)."""
+        bodies = [
+            Body(shape, (x, y), angle, **self.config.body_options(shape))
+            for shape, (x, y, angle) in zip(drawn.shapes, places, strict=True)
+        ]
+        beyond = BEYOND * max(shape.bounding_radius for shape in drawn.shapes)
+        return bodies, [floor(box[0], 0.0, beyond=beyond)] if self.scene.floor else []
+
+    def drawn(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.random.Generator]:
+        """Return (the bodies of a replicate, its box [m], the random numbers that place them)."""
         stream = np.random.SeedSequence(self.config.seed, spawn_key=(replicate,))
-        return np.random.Generator(np.random.Philox(stream))
+        rng, scene = np.random.Generator(np.random.Philox(stream)), self.scene
+        drawn, box = self.draw(rng), scene.box
+        if box is None:
+            covered = sum(shape.area for shape in drawn.shapes) / scene.area_fraction
+            width = math.sqrt(covered / scene.aspect)
+            box = width, covered / width
+        return drawn, box, rng
 
     def draw(self, rng: np.random.Generator) -> Drawn:
-        """The bodies of a replicate, by its random numbers."""
+        """Return the bodies of a replicate, by its random numbers."""
         numbers = rng.random((self.scene.number, 2))
         if self.scene.is_measured:
             places = self.choosable
@@ -258,8 +273,10 @@ class SwarmStudy(StudyKind):
             radii = [self.flocs[each].measured_size for each in flocs]
         else:
             radii = lognormal(self.scene, numbers[:, 0]).tolist()
-            flocs = [self.floc_for(radius, u) for radius, u in zip(radii, numbers[:, 1].tolist(),
-                                                                   strict=True)]  # fmt: skip
+            flocs = [
+                self.floc_for(radius, u)
+                for radius, u in zip(radii, numbers[:, 1].tolist(), strict=True)
+            ]
         shapes = [
             self.pool.shape(floc, self.vertices, radius)
             for floc, radius in zip(flocs, radii, strict=True)
@@ -269,65 +286,186 @@ class SwarmStudy(StudyKind):
         return Drawn(np.array(names, dtype=np.int32), shapes)
 
     def floc_for(self, radius: float, number: float) -> int:
-        """Place of a floc of the pool nearest in r_eq/r to a body of that radius [m]."""
+        """Return the index of a floc of the pool nearest in r_eq/r to a body of that radius [m]."""
         if not self.flocs:
             return SPHERE
         ratios = [floc.ratio for floc in self.flocs]
         near = nearest_in_ratio(ratios, radius / self.config.shapes.radius, self.pool.pool)
         return near[int(number * len(near))]
 
-    def placed(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.ndarray]:
-        """(the bodies of a replicate, its box [m], their places (n, 3)).
+    # How a replicate runs.
 
-        UsageError where bodies find no place.
+    def run_task(
+        self, condition: Condition, replicate: int, halted: Callable[[], bool],
+        left: dict[str, np.ndarray] | None = None, keep: Keep | None = None,
+        going: Going | None = None,
+    ) -> tuple[dict | None, dict | None]:  # fmt: skip
+        """Run a replicate from its start, or from the state that is ``left`` of it, to its end.
+
+        ``keep`` takes its parts as they come. ``halted()``, looked at between windows and now and
+        then within long ones, makes it leave off, its state kept.
         """
-        rng, scene = self.generator(replicate), self.scene
-        drawn, area = self.draw(rng), scene.box
-        if area is None:
-            covered = sum(shape.area for shape in drawn.shapes) / scene.area_fraction
-            width = math.sqrt(covered / scene.aspect)
-            area = width, covered / width
-        return drawn, area, place_at_random(drawn.shapes, area, rng, scene.repeats, scene.gap)
 
-    def periods(self, area: tuple[float, float]) -> tuple[float, float]:
-        """Width and height of a box [m], inf along axes along which it does not repeat itself."""
-        width, height = np.where(self.scene.repeats, area, math.inf).tolist()
-        return width, height
+        def save(name: str, arrays: Arrays) -> None:
+            if keep is not None:
+                keep(name, {}, encoded(arrays))
 
-    def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
-        """(the Swarm of a replicate at its start, its bodies before, its box [m]).
+        def look(tried: int) -> bool:
+            if going is not None:
+                going(f"swarm {replicate} at {progress.time:.4g} s, {tried} steps on")
+            return halted()
 
-        UsageError where bodies find no place, or the box is too small for them.
-        """
-        return self.beginning if replicate == 0 else self.make_swarm(replicate)
+        scene, stops = self.scene, self.stops
+        try:
+            swarm, drawn, box = self.swarm(replicate)
+        except UsageError as error:  # its bodies find no place in the box
+            drawn, box, _ = self.drawn(replicate)
+            bodies, walls = self.bodies(drawn, box, [(0.0, 0.0, 0.0)] * len(drawn.shapes))
+            save(BODIES, bodies_part([*bodies, *walls], drawn.flocs, box))
+            return dict.fromkeys(ENDS, 0), self.note(condition, replicate, str(error))
+        gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
+        swarm.check_overlaps(gauge)
+        leaving = None
+        if scene.leaving != KEEP:
+            key = self.config.seed, replicate
+            leaving = Leaving(scene.leaving, box, scene.repeats, scene.floor, key, swarm.gauge())
+        progress = swarm.begin(
+            scene.duration, max_steps=self.config.integrator.max_steps, leaving=leaving
+        )
+        if left is None or not fits(left, swarm):
+            save(BODIES, bodies_part(swarm.bodies, drawn.flocs, box))
+            seen = progress.swarm.motion.copy()
+            bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
+            save(moment_name(0), moment_part(scene, swarm, gauge, progress, bonds))
+            moments = 1
+        else:
+            progress.restore(left)
+            moments, seen = int(left["moments"]), left["seen"]
 
-    def make_swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
-        """Draw a replicate, place its bodies, and let them settle at their own speeds."""
-        drawn, (width, height), places = self.placed(replicate)
-        bodies = [
-            Body(shape, (x, y), angle, **self.config.body_options(shape))
-            for shape, (x, y, angle) in zip(drawn.shapes, places.tolist(), strict=True)
-        ]
-        forces, fluid = self.config.forces, self.config.fluid
-        known = System(bodies, forces, self.config.integrator.method, fluid)
-        bodies = [settling(known, body) for body in bodies]
-        if self.scene.floor:
-            beyond = BEYOND * max(shape.bounding_radius for shape in drawn.shapes)
-            bodies.append(floor(width, 0.0, beyond=beyond))
-        swarm = Swarm(
-            bodies, forces, self.config.integrator.method, fluid,
-            box=self.periods((width, height)), all_pairs=self.scene.all_pairs,
-            seed=(self.config.seed, replicate),
-        )  # fmt: skip
-        return swarm, drawn, (width, height)
+        def save_state(moments: int) -> None:
+            """Save what the rest follows from; ``seen``: the motion at the last snapshot."""
+            save(STATE, progress.state() | {"seen": seen, "moments": np.array(moments)})
 
-    def leaving(self, replicate: int, swarm: Swarm, box: tuple[float, float]) -> Leaving | None:
-        """What becomes of bodies of a replicate that leave its box [m]; None: they go on."""
-        scene = self.scene
-        if scene.leaving == KEEP:
-            return None
-        key = self.config.seed, replicate
-        return Leaving(scene.leaving, box, scene.repeats, scene.floor, key, swarm.gauge())
+        saved_at, status = time.monotonic(), Status.FINISHED
+        for place in range(moments, len(stops)):
+            while (status := progress.advance(stops[place], look)) in (
+                Status.PAUSED,
+                Status.STOPPED,
+            ):
+                stopped = status == Status.STOPPED or look(0)
+                if stopped or time.monotonic() - saved_at > scene.checkpoint:
+                    save_state(place)
+                    saved_at = time.monotonic()
+                if stopped:
+                    return None, None
+            if status != Status.FINISHED:
+                break
+            motion = progress.swarm.motion.copy()
+            near = gauge.neighbours(motion[:, :3])
+            bonds = bond_gauge.bonds(stops[place], motion, near, (stops[place - 1], seen))
+            save(moment_name(place), moment_part(scene, swarm, gauge, progress, bonds))
+            seen = motion
+            if place + 1 < len(stops) and halted():
+                save_state(place + 1)
+                return None, None
+        row = {name: getattr(progress.effort, name, 0) for name in ENDS}
+        row |= {"finished": status == Status.FINISHED, "end_time": progress.time}
+        if row["finished"]:
+            return row, None
+        failed = [] if progress.failed is None else progress.failed.tolist()[:MOST_NAMED]
+        why = f"{status.name.lower()} at {progress.time:.4g} s, in an island of bodies "
+        return row, self.note(condition, replicate, why + ", ".join(map(str, failed)))
+
+
+def fits(state: Arrays, swarm: Swarm) -> bool:
+    """Return True if the contacts of a state are between core points that the bodies of a swarm
+    have: the kernels trust them."""
+    first = np.cumsum([0, *(len(body.shape.vertices) for body in swarm.bodies)])
+    owner = np.repeat(np.arange(len(swarm.bodies)), np.diff(first))
+    links = state["links"]
+    points = links[:, [AT_VERTEX, AT_EDGE]]
+    if np.any(points < 0) or np.any(points >= first[-1]):
+        return False
+    bodies = np.sort(links[:, [LATER_BODY, EARLIER_BODY]], axis=1)
+    return bool(np.all(np.sort(owner[points], axis=1) == bodies))
+
+
+def bodies_part(bodies: Sequence[Body], flocs: np.ndarray, box: tuple[float, float]) -> Arrays:
+    """Return what is the same at all times: the bodies, a wall the last of them, and the box."""
+    shapes = [body.shape for body in bodies]
+    tables = [table_of(shape.parts) for shape in shapes]
+    walls = len(shapes) - len(flocs)
+    counts = np.array([len(each.place) for each in tables])
+    return {
+        "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
+        "spheroradius": np.array([shape.radius for shape in shapes]),
+        "mass": np.array([body.mass for body in bodies]),
+        "floc": np.append(flocs, np.full(walls, WALL)).astype(np.int32),
+        "first_point": np.cumsum(counts) - counts,
+        "point_count": counts,
+        "points": np.concatenate([each.place for each in tables]),
+        "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
+        "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
+        "point_radius": np.concatenate([each.radius for each in tables]),
+        "box": np.array(box),
+    }
+
+
+def moment_part(
+    scene: SwarmScene, swarm: Swarm, gauge: Gauge, progress: Progress, bonds: Bonds
+) -> Arrays:
+    """Return a snapshot, with its clusters and bonds."""
+    _, motion, error = progress.seen()
+    # What is gone lies so far outside that it is nobody's neighbour.
+    position, velocity = progress.swarm.motion[:, :3], progress.swarm.motion[:, 3:]
+    near = gauge.neighbours(position, scene.link)
+    found = Clusters.of(swarm.bodies, position, velocity, near, ~progress.gone)
+    facts = {"error": error, "median_error": progress.median_error} | summary_of(found)
+    facts |= {"removed": int(progress.gone.sum()), "reentered": int(progress.returns.sum())}
+    facts |= {f"bonds_{kind}": count for kind, count in bonds.counts.items()}
+    label = np.where(progress.gone, GONE, found.label).astype(np.int32)
+    motion = np.where(progress.gone[:, None], np.nan, motion)
+    pairs = np.column_stack([bonds.pairs, bonds.kind]).astype(np.int32)
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    later, earlier = found.label[bonds.pairs].T
+    inside = later[(later == earlier) & (later >= 0)]
+    clusters = {
+        "mass": found.mass, "gyration": found.gyration, "hydrodynamic": found.hydrodynamic,
+        "speed": -found.velocity[:, 1], "porosity": found.porosity,
+        "bonds": np.bincount(inside, minlength=len(found)), "number": np.arange(len(found)),
+        "bodies": np.bincount(label[label >= 0], minlength=len(found)),
+    }  # fmt: skip
+    bounds = np.array([0.0, *scene.bounds, np.inf])
+    return (
+        {name: np.array(float(value)) for name, value in facts.items()}
+        | {"n_class": found.counts(bounds).astype(float)}
+        | {"position": motion[:, :3], "velocity": motion[:, 3:], "cluster": label}
+        | dict(zip(("bond_later", "bond_earlier", "bond_kind"), pairs.T, strict=True))
+        | {f"cluster_{name}": values for name, values in clusters.items()}
+    )
+
+
+def summary_of(clusters: Clusters) -> dict[str, float]:
+    """Return numbers on all clusters: of a body's cluster in the mean over mass, but for the first
+    three; over the mass of those that have the quantity."""
+    if not len(clusters):
+        return {"clusters": 0, "largest": 0, "percolating": 0}
+    share = clusters.mass / clusters.mass.sum()
+
+    def mean(values: np.ndarray) -> float:
+        known = np.isfinite(values)
+        return float(share[known] @ values[known] / share[known].sum()) if known.any() else math.nan
+
+    return {
+        "clusters": len(clusters),
+        "largest": int(clusters.size.max()),
+        "percolating": int(clusters.percolates.sum()),
+        "mean_size": clusters.mean_size,
+        "gyration": mean(clusters.gyration),
+        "porosity": mean(clusters.porosity),
+        "fractal_dimension": clusters.fractal_dimension(),
+        "settling": float(-share @ clusters.velocity[:, 1]),
+    }
 
 
 def settling(system: System, body: Body) -> Body:
@@ -370,3 +508,51 @@ def run_briefly(swarm: Swarm) -> None:
     progress = few.begin(TRIAL_SECONDS)
     while progress.advance(TRIAL_SECONDS) == Status.PAUSED:
         pass
+
+
+BODY_BYTES = 8 * 6 + 4
+"""Bytes of a body in a snapshot."""
+
+
+def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
+    """All that is known of a study before it is run."""
+    study = SwarmStudy(config)
+    study.prepare()
+    scene = study.scene
+    swarm, drawn, (width, height) = study.swarm(0)
+    radii = 1e6 * np.array([shape.equivalent_radius for shape in drawn.shapes])
+    area = sum(shape.area for shape in drawn.shapes)
+    method, moments = config.integrator.method, len(study.stops)
+    pair = study.largest_pair()
+    largest = settled(pair, pair.bodies[0])
+    repeats = {"xy": "along x and y", "x": "along x", "none": "along no axis"}[scene.periodic]
+    size = config.replicates * moments * len(swarm.bodies) * BODY_BYTES
+    speed = ""
+    if largest is not None:
+        speed = (
+            f", {1e3 * largest.speed:.4g} mm/s alone for the largest, of Re = "
+            f"{largest.reynolds:.2g}, St = {largest.stokes:.2g}"
+        )
+    sizes = "measured" if scene.is_measured else f"lognormal, ln r_eq of sd {scene.spread:g}"
+    lines = [
+        f"{config.replicates} swarms of {scene.number} bodies, N = {study.vertices}, seed "
+        f"{config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
+        f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, "
+        f"median {np.median(radii):.4g} ({sizes})",
+        f"  box {1e6 * width:.5g} x {1e6 * height:.5g} um, periodic {repeats}"
+        f"{', with a floor' if scene.floor else ''}; bodies cover {area / (width * height):.4f}",
+        f"  {scene.duration:g} s{speed}",
+        f"  {moments} snapshots, one every {scene.interval:g} s; a state to resume from every "
+        f"{duration(scene.checkpoint)}; results file about {size / 1e6:.3g} MB",
+        *([f"  {words}"] if (words := config.fluid.words) else []),
+        f"  integrator: {config.integrator.label}, tolerance {method.tolerance:g} m",
+        "forces:",
+        *(f"  {line}" for line in force_lines(pair)),
+        "stiffness, of the two largest:",
+        *(f"  {line}" for line in scale_lines(pair)),
+        "nothing was run (--dry-run)",
+    ]
+    return "\n".join(lines)
+
+
+KINDS = (SwarmStudy,)

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from flocsim.ensembles import cli
-from flocsim.ensembles.pairs import kind as pairs
+from flocsim.ensembles.pairs import study as pairs
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME

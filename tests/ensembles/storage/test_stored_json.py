@@ -9,7 +9,7 @@ import pytest
 
 from flocsim.compiler.processor import cpu_kind
 from flocsim.ensembles import runner
-from flocsim.ensembles.pairs import kind as pairs
+from flocsim.ensembles.pairs import study as pairs
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME

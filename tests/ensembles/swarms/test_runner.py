@@ -14,11 +14,11 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.swarms.records import Left, Part, check_part, part_of
-from flocsim.ensembles.swarms.replicate import run_replicate
+from flocsim.ensembles.swarms.results import decoded
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError, UsageError
 from flocsim.io import terminal
+from flocsim.io.results import swarm_file
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
 from tests.helpers.journals import records_in
@@ -87,13 +87,19 @@ def test_what_is_written_agrees_with_itself(finished):
 
 
 def run_parts(config, halts=(), left=None, replicate=0):
-    """(Parts that a replicate keeps, how it ended); it is asked to halt at some looks."""
+    """([(name, data)] of the parts that a replicate saves, its row); it is asked to halt at some
+    looks."""
     parts, looks, study = [], iter(range(10**9)), SwarmStudy(config)
-    ended = run_replicate(study, replicate, parts.append, left, lambda: next(looks) in halts)
-    for part in parts:
-        # What is written is taken when it is read.
-        check_part(part.name, part_of_encoded(part), study.form)
-    return parts, ended
+    row, _ = study.run_task(
+        study.conditions[0], replicate, lambda: next(looks) in halts, left,
+        lambda name, about, data: parts.append((name, data)),
+    )  # fmt: skip
+    return parts, row
+
+
+def moments_in(parts):
+    """The data of snapshots."""
+    return [data for name, data in parts if name.startswith("moment")]
 
 
 def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
@@ -101,12 +107,9 @@ def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
     whole, ended = run_parts(config)
     assert ended
     first, halted = run_parts(config, halts={5})
-    assert halted is None and first[-1].of == "state"
-    state = part_of_encoded(first[-1])
-    rest, again = run_parts(config, left=Left(state.facts["moments"], state.arrays))
-    motions = [[part.arrays["motion"] for part in parts if part.of == "moment"]
-               for parts in (whole, [*first, *rest])]  # fmt: skip
-    assert np.array(motions[0]).tobytes() == np.array(motions[1]).tobytes()
+    assert halted is None and first[-1][0] == "state"
+    rest, again = run_parts(config, left=decoded(first[-1][1]))
+    assert moments_in(whole) == moments_in([*first, *rest])
     assert ended == again
 
 
@@ -121,13 +124,9 @@ def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_p
         if ended:
             break
         times += 1
-        state = part_of_encoded(found[-1])
-        left = Left(state.facts["moments"], state.arrays)
+        left = decoded(found[-1][1])
     assert times > 1
-    moments = [
-        [each.described() for each in some if each.of == "moment"] for some in (whole, parts)
-    ]  # fmt: skip
-    assert moments[0] == moments[1]
+    assert moments_in(whole) == moments_in(parts)
 
 
 def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys):
@@ -136,7 +135,7 @@ def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys)
     monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
     study = SwarmStudy(swarm_config(tmp_path))
     told = []
-    run_replicate(study, 0, lambda part: None, going=told.append)
+    study.run_task(study.conditions[0], 0, lambda: False, going=told.append)
     found = [re.fullmatch(r"swarm 0 at ([\d.e-]+) s, (\d+) steps on", each) for each in told]
     assert all(found)
     times = [float(each[1]) for each in found]
@@ -158,50 +157,19 @@ def test_what_leaves_is_told_and_resumed(tmp_path, leaving):
     config = swarm_config(tmp_path, {"scene": {"periodic": "x", "leaving": leaving}})
     whole, ended = run_parts(config)
     assert ended
-    moments = [part for part in whole if part.of == "moment"]
-    facts = moments[-1].facts
-    gone = int(np.sum(moments[-1].arrays["cluster"] == -2))
+    moments = list(map(decoded, moments_in(whole)))
+    last, gone = moments[-1], int(np.sum(moments[-1]["cluster"] == -2))
     if leaving == "remove":
-        assert facts["removed"] == gone > 0 and facts["reentered"] == 0
-        assert facts["clusters"] <= 12 - gone
+        assert last["removed"] == gone > 0 and last["reentered"] == 0
+        assert last["clusters"] <= 12 - gone
     else:
-        assert facts["reentered"] > 0 and facts["removed"] == gone == 0
-        highest = max(part.arrays["motion"][:, 1].max() for part in moments[1:])
-        assert highest > moments[0].arrays["motion"][:, 1].max()
+        assert last["reentered"] > 0 and last["removed"] == gone == 0
+        highest = max(each["position"][:, 1].max() for each in moments[1:])
+        assert highest > moments[0]["position"][:, 1].max()
     first, ended = run_parts(config, halts={8})
     assert not ended
-    state = part_of_encoded(first[-1])
-    rest, _ = run_parts(config, left=Left(state.facts["moments"], state.arrays))
-    both = [part for part in [*first, *rest] if part.of == "moment"]
-    for one, other in zip(moments, both, strict=True):
-        assert one.described() == other.described()
-
-
-def part_of_encoded(part):
-    """A Part, written and read."""
-    return part_of(*part.described()[1:])
-
-
-def test_records_come_back_as_they_were():
-    arrays = {"a": np.arange(6.0).reshape(2, 3), "b": np.zeros((0, 2), dtype=np.int64),
-              "c": np.arange(3, dtype=np.int32)}  # fmt: skip
-    found = part_of_encoded(Part("state", arrays, {"x": 1.5, "nan": float("nan")}))
-    assert (found.of, found.facts) == ("state", {"x": 1.5, "nan": None})
-    for name, values in arrays.items():
-        assert found.arrays[name].dtype == values.dtype
-        np.testing.assert_array_equal(found.arrays[name], values)
-
-
-@pytest.mark.parametrize(
-    "listed",
-    [
-        [["a", "f8", [4]]], [["a", "f8", [-1]]], [["a", "O", [1]]], [["a", "f8", [1, 1, 1, 1]]],
-        [["a", "f8", [2**31, 2**31]]], [["a"]], [["a", "f8", 1]], [],
-    ],
-)  # fmt: skip
-def test_records_that_no_flocsim_wrote_are_refused(listed):
-    with pytest.raises(ValueError):
-        part_of({"of": "moment", "arrays": listed}, bytes(8))
+    rest, _ = run_parts(config, left=decoded(first[-1][1]))
+    assert moments_in([*first, *rest]) == moments_in(whole)
 
 
 def start(folder, *words):
@@ -252,10 +220,9 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
     assert ended
     for look in (2, 10, 20):
         first, ended = run_parts(config, halts={look})
-        assert not ended and first[-1].of == "state"
-        rest, _ = run_parts(config, left=Left(first[-1].facts["moments"], first[-1].arrays))
-        both = [part.described() for part in [*first, *rest] if part.of == "moment"]
-        assert both == [part.described() for part in whole if part.of == "moment"]
+        assert not ended and first[-1][0] == "state"
+        rest, _ = run_parts(config, left=decoded(first[-1][1]))
+        assert moments_in([*first, *rest]) == moments_in(whole)
 
 
 @pytest.mark.slow
@@ -301,8 +268,6 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
 @pytest.mark.slow
 def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, monkeypatch):
     """Killed between the last row and the file: the next run computes nothing, makes no trial."""
-    from flocsim.ensembles.swarms import kind
-
     monkeypatch.chdir(tmp_path)
     path = write_swarm_study(tmp_path)
 
@@ -310,7 +275,7 @@ def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, m
         raise FileError("the disk is full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(kind.swarm_file, "write_swarm", full)
+        patch.setattr(swarm_file, "write_swarm", full)
         assert main(["swarm", str(path), "--quiet"]) == 74
     assert main(["swarm", str(path), "--quiet", "--resume"]) == 0
     assert read_swarm("swarm.h5").run["computed"] == 0

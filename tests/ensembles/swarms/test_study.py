@@ -99,21 +99,20 @@ def test_what_finds_no_place_is_said(tmp_path):
         crowded.swarm(0)
 
 
-def test_every_replicate_is_placed_before_the_first_runs(tmp_path):
-    """Of a box given by its sides, where one replicate has drawn too much for it; on any rank."""
+def test_a_replicate_whose_bodies_find_no_place_is_a_failed_one(tmp_path):
+    """In a box given by its sides, where one replicate has drawn too much for it."""
     sides = {"box": ["85 um", "85 um"], "spread": 0.6, "number": 12}
     found = study(tmp_path, {"scene": sides, "replicates": 30}, without("area_fraction"))
-    drawn = [found.draw(found.generator(replicate)).shapes for replicate in range(30)]
+    drawn = [found.drawn(replicate)[0].shapes for replicate in range(30)]
     least = np.array([6.0 * max(shape.radius for shape in shapes) for shapes in drawn])
     faults = np.flatnonzero(least > 85e-6)
     assert len(faults) and faults[0] > 0, "else this shows nothing"
-    for size in (1, 3):
-        known = [seen for rank in range(size) for seen in [Told(rank, size)]]
-        for comm in known[1:]:
-            found.prepare(comm)
-        known[0].others = [comm.given for comm in known[1:]]
-        with pytest.raises(UsageError, match=f"swarm {faults[0]} of 30"):
-            found.prepare(known[0])
+    saved = []
+    row, note = found.run_task(
+        found.conditions[0], int(faults[0]), lambda: False, keep=lambda *part: saved.append(part)
+    )
+    assert row["finished"] == 0 and "box" in note["why"]
+    assert [name for name, *_ in saved] == ["bodies"]
 
 
 def test_the_first_replicate_is_drawn_once_before_it_is_run(tmp_path, monkeypatch):
@@ -130,17 +129,6 @@ def test_the_first_replicate_is_drawn_once_before_it_is_run(tmp_path, monkeypatc
 def without(key):
     """The text of the small study without a key."""
     return "\n".join(line for line in SWARM.splitlines() if not line.startswith(key))
-
-
-class Told:
-    """A communicator of ranks that are asked one after another, rank 0 the last."""
-
-    def __init__(self, rank, size):
-        self.rank, self.size, self.others, self.given = rank, size, [], None
-
-    def gather(self, value):
-        self.given = value
-        return [value, *self.others] if self.rank == 0 else None
 
 
 def test_bodies_begin_at_the_flow_of_their_places(tmp_path):

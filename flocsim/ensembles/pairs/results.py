@@ -275,7 +275,7 @@ def asked(results: Any) -> dict[str, Any]:
             "delta": results.delta.tolist(), "replicates": results.count}  # fmt: skip
 
 
-OF_KIND = partial(later, "ensembles.pairs.kind")
+OF_KIND = partial(later, "ensembles.pairs.study")
 OPENED = later("ensembles.pairs.opened", "open_results")
 
 CONTENTS = Contents(

@@ -1,0 +1,442 @@
+"""What becomes of the parts and rows of a study of swarms: results, so far or for good, and what
+commands show of a file and of two.
+"""
+
+import io
+import json
+import warnings
+from collections.abc import Container, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import attrs
+import numpy as np
+
+import flocsim.arrays as at
+from flocsim.ensembles.contents import (
+    Contents,
+    Differences,
+    Facts,
+    Figures,
+    Joined,
+    Summary,
+    Table,
+    changes_between,
+    common,
+    in_words,
+    labelled_of,
+    later,
+    origin,
+    starred,
+)
+from flocsim.ensembles.kind import Condition, OldResults
+from flocsim.errors import FileError, FlocsimError, UsageError, visible
+from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
+from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
+from flocsim.io.results import swarm_file
+from flocsim.io.results.run_group import stored
+from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.io.terminal import aligned
+
+# What is saved of a replicate while it runs.
+
+Arrays = Mapping[str, np.ndarray]
+
+BODIES, STATE = "bodies", "state"
+
+
+def moment_name(place: int) -> str:
+    """Return the name of the part that has a snapshot."""
+    return f"moment {place}"
+
+
+def has(parts: Container[str], moments: int) -> bool:
+    """Return True if the bodies of a replicate and its first snapshots are there."""
+    return BODIES in parts and all(moment_name(place) in parts for place in range(moments))
+
+
+def encoded(arrays: Arrays) -> bytes:
+    """Return arrays by name as the bytes of a part."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    return buffer.getvalue()
+
+
+def decoded(data: bytes) -> dict[str, np.ndarray]:
+    """Return the arrays of a part."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as found:
+        return dict(found)
+
+
+# Results of the parts.
+
+Groups = dict[str, dict[str, np.ndarray]]
+
+PLACED = ("bond_replicate", "cluster_replicate", "event_replicate")
+"""Columns that count replicates."""
+
+
+def groups_of(swarms: list[Any], times: int) -> Groups:
+    """Return {group: {column: array}} of the Parts of replicates, but for their ends; NaN, or no
+    cluster, at times that a replicate has not reached."""
+    bodies = [decoded(own.read(BODIES)[1]) for own in swarms]
+    moments = [
+        [
+            decoded(own.read(moment_name(place))[1]) if moment_name(place) in own else {}
+            for place in range(times)
+        ]
+        for own in swarms
+    ]
+    known = next((each for own in moments for each in own if each), {})
+    groups: Groups = {"bodies": joined_bodies([{k: v[np.newaxis] for k, v in each.items()}
+                                               for each in bodies])}  # fmt: skip
+    for group in ("counts", "snapshots"):
+        groups[group] = {}
+        for name in swarm_file.GROUPS[group].columns:
+            blank = -1 if name == "cluster" else np.nan
+            # Empty swarms have no means of clusters.
+            default = np.full_like(known.get(name, np.array(np.nan)), blank)
+            groups[group][name] = np.array(
+                [[each.get(name, default) for each in own] for own in moments]
+            )
+    # Lists of pairs and clusters, after the replicate and the time that they are of.
+    for group in ("bonds", "clusters"):
+        columns = swarm_file.GROUPS[group].columns
+        names = list(columns)
+        listed = [
+            np.column_stack([np.broadcast_to([row, place], (len(each[names[2]]), 2)),
+                             *(each[name] for name in names[2:])])
+            for row, own in enumerate(moments) for place, each in enumerate(own) if each
+        ]  # fmt: skip
+        table = np.concatenate([np.zeros((0, len(names))), *listed])
+        groups[group] = {
+            name: values.astype(columns[name].type)
+            for name, values in zip(names, table.T, strict=True)
+        }
+    groups["events"] = swarm_file.events_of(groups["snapshots"]["cluster"])
+    return groups
+
+
+def joined_bodies(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Return the bodies of replicates after each other, their core points filled up with zeros."""
+    most = max(each["points"].shape[1] for each in parts)
+    found = {}
+    for name, first in parts[0].items():
+        columns = [each[name] for each in parts]
+        if name in swarm_file.POINTS | swarm_file.RINGS:
+            columns = [at.grown(each, 1, most) for each in columns]
+        found[name] = np.concatenate(columns).astype(first.dtype)
+    return found
+
+
+def results_from(
+    groups: Groups, asked: Mapping[str, Any], run: Mapping[str, Any],
+    replicates: np.ndarray | None = None,
+) -> SwarmResults:  # fmt: skip
+    """Return the results of whole groups; ``replicates``: their numbers, 0, 1, … unless given."""
+    count, points = groups["bodies"]["points"].shape[:2]
+    times = groups["counts"]["clusters"].shape[1]
+    scales = {
+        "replicate": np.arange(count) if replicates is None else replicates,
+        "time": np.array(asked["times"][:times]), "class": np.array([0.0, *asked["bounds"]]),
+        "body": np.arange(groups["bodies"]["r_eq"].shape[1]),
+        "component": np.array(swarm_file.COMPONENTS), "axis": np.array(swarm_file.AXES),
+        "point": np.arange(points), "bond": np.arange(len(groups["bonds"]["bond_kind"])),
+        "row": np.arange(len(groups["clusters"]["cluster_bodies"])),
+        "event": np.arange(len(groups["events"]["event_time"])),
+    }  # fmt: skip
+    return SwarmResults(scales, groups, dict(run))
+
+
+def results(
+    study: Any, start: Any, count: int, run: dict, output: str | Path | None, in_memory: bool
+) -> SwarmResults:
+    """Return the results of so many replicates; written to ``output`` where there is one."""
+    store = start.store
+    groups = first_of(start.old.found, count) if start.old else {}
+    begun = len(groups["ends"]["finished"]) if groups else 0
+    if begun < count:
+        new = groups_of([store.parts[0, each] for each in range(begun, count)], study.pieces)
+        groups = appended(groups, new, begun) if groups else new
+    rows = store.rows(0, 0, count)
+    groups["ends"] = {name: rows[name].copy() for name in swarm_file.ENDS}
+    made = results_from(groups, study.asked(), run)
+    if output is not None:
+        swarm_file.write_swarm(output, made, start.replacing)
+    return made
+
+
+def first_of(found: SwarmResults, count: int) -> Groups:
+    """Return the groups of the first replicates of results."""
+    groups = {}
+    for group, columns in found.groups.items():
+        listed = [columns[name] for name in PLACED if name in columns]
+        kept = listed[0] < count if listed else slice(count)
+        groups[group] = {name: values[kept] for name, values in columns.items()}
+    return groups
+
+
+def appended(old: Groups, new: Groups, begun: int) -> Groups:
+    """Return the groups of ``begun`` replicates, and of others after them."""
+    groups = {"bodies": joined_bodies([old["bodies"], new["bodies"]])}
+    for group, columns in new.items():
+        if group != "bodies":
+            groups[group] = {
+                name: np.concatenate(
+                    [old[group][name], column + begun if name in PLACED else column]
+                ).astype(column.dtype)
+                for name, column in columns.items()
+            }
+    return groups
+
+
+@contextmanager
+def old_rows(output: str | Path) -> Iterator[OldResults]:
+    """Open a results file that is to be extended."""
+    found = swarm_file.read_swarm(output)
+    ends = found.groups["ends"]
+    rows = np.zeros(len(ends["finished"]), [(name, each.dtype) for name, each in ends.items()])
+    for name, values in ends.items():
+        rows[name] = values
+    condition = Condition("swarm", int(found.run.get("vertices", 0)), 0.0)
+    yield OldResults([condition], len(rows), [(condition, 0, rows)], found.run, found)
+
+
+def so_far(store: Any, asked: dict[str, Any]) -> tuple[SwarmResults, int, int]:
+    """Make results of the swarms that have begun."""
+    swarms = {
+        replicate: parts for (_, replicate), parts in sorted(store.parts.items())
+        if has(parts, 1) and replicate < asked["replicates"]
+    }  # fmt: skip
+    if not swarms:
+        raise FileError(f"{store.journal.path} has no snapshot yet: try again later")
+    planned = len(asked["times"])
+    there = [
+        [place for place in range(planned) if moment_name(place) in parts]
+        for parts in swarms.values()
+    ]
+    groups = groups_of(list(swarms.values()), 1 + max(each[-1] for each in there))
+    groups["ends"] = {
+        name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()
+    }
+    run = {"periodic": asked["periodic"]}
+    made = results_from(groups, asked, run, np.array(list(swarms)))
+    return made, sum(map(len, there)), asked["replicates"] * planned
+
+
+def facts(study: Any) -> dict[str, Any]:
+    """What the results say of a study besides their groups."""
+    return {"periodic": study.scene.periodic, "vertices": study.vertices}
+
+
+def verdict(found: SwarmResults) -> tuple[int, str]:
+    """0, or the code of an error where no swarm has come to its end; what to say of those."""
+    finished = found.groups["ends"]["finished"]
+    missed = int(np.count_nonzero(finished == 0))
+    if not missed:
+        return 0, ""
+    notes = json.loads(found.run.get("failed", "[]"))
+    first = f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
+    line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
+    return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
+
+
+# What commands show.
+
+
+def summary(results: SwarmResults) -> Summary:
+    """What a results file of swarms says of its study; ValueError where that cannot be read."""
+    failed = [f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")]
+    warnings = [str(line) for line in stored(results.run, "warnings")]
+    return Summary(facts_of(results), origin(results.run), warnings, failed)
+
+
+def facts_of(results: SwarmResults) -> Facts:
+    """[(name, value)] of swarms, also of those that still run."""
+    bodies, ends = results.groups["bodies"], results.groups["ends"]
+    free = bodies["floc"][0] != swarm_file.WALL
+    radii = 1e6 * bodies["r_eq"][:, free]
+    width, height = 1e6 * bodies["box"].mean(axis=0)
+    events = results.groups["events"]
+    before, after = events["event_before"], events["event_after"]
+    return [
+        ("swarms", f"{len(radii)} of {np.count_nonzero(free)} bodies, "
+         f"{int(ends['finished'].sum())} were completed"),
+        ("r_eq [um]", f"{radii.min():.4g} to {radii.max():.4g}, median {np.median(radii):.4g}"),
+        ("box [um]", f"{width:.5g} x {height:.5g}"),
+        ("mergers", f"{np.sum(after < before)} of clusters, between snapshots"),
+        ("break-ups", f"{np.sum(after > before)}"),
+        ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
+         f"{ends['rejected'].sum()} rejected"),
+    ]  # fmt: skip
+
+
+def sweep_rows(found: Any) -> list[tuple[str, ...]]:
+    """Clusters at the end at every value, means over swarms, heads first."""
+    table = found.labelled("counts")
+    rows = [(*found.swept, "swarms", "time [s]", "clusters", "mean size", "settling [mm/s]")]
+    axes = [table.axes[name].values.tolist() for name in found.swept]
+    names = ("clusters", "mean_size", "settling")
+    for place in np.ndindex(*map(len, axes)):
+        last = {name: table.columns[name].values[place][:, -1] for name in names}
+        clusters, size, settling = (float(swarm_file.mean(last[name])) for name in names)
+        keys = (visible(in_words(axis[k]), "") for axis, k in zip(axes, place, strict=True))
+        time = in_words(float(table.axes["time"].values[-1]))
+        rows.append((*keys, str(len(last["clusters"])), time,
+                     f"{clusters:.1f}", f"{size:.2f}", f"{1e3 * settling:.4g}"))  # fmt: skip
+    return rows
+
+
+def figures(found: SwarmResults) -> Figures:
+    """{name: function} of the figures that swarms have."""
+    there = {
+        "classes": len(found.scales["class"]) > 1,
+        "speed": len(found.groups["clusters"]["cluster_speed"]) > 0,
+    }
+    return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
+
+
+def first_swarm(found: SwarmResults) -> tuple:
+    """(times, positions, velocities, shapes) of the first swarm; UsageError where bodies have left
+    it."""
+    moments = found.groups["snapshots"]
+    known = slice(last_known(found) + 1)
+    position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
+    if not np.isfinite(position).all():
+        raise UsageError(
+            "bodies have left the first swarm, and exported motion has the same bodies at all "
+            "times: flocsim plot --animation shows it"
+        )
+    shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
+    return found.scales["time"][known], position, velocity, shapes
+
+
+def tables(results: SwarmResults) -> list[Table | str]:
+    """Clusters over time."""
+    heads, *rows = swarm_file.table_rows(results)
+    return [Table("Clusters over time, means over swarms", heads, rows)]
+
+
+def asked(results: SwarmResults) -> dict[str, Any]:
+    """The axes of results, and how many replicates there are."""
+    return {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))], "delta": [0.0],
+            "replicates": len(results.scales["replicate"])}  # fmt: skip
+
+
+OF_MEANS = {
+    "first": "mean over the swarms of the first file",
+    "second": "mean over the swarms of the second file",
+    "difference": "second minus first",
+    "difference_low": "difference, lower 95 % bound",
+    "difference_high": "difference, upper 95 % bound",
+    "n_first": "swarms that count in the first file",
+    "n_second": "swarms that count in the second file",
+}
+"""The arrays of a comparison of one quantity of swarms."""
+
+
+@attrs.frozen(eq=False, repr=False)
+class SwarmComparison(Differences):
+    """What one file of swarms has more of than another: ``arrays`` {column of the counts: {name:
+    (time,)}} at the ``times`` [s] that both have, names as in OF_MEANS; intervals by Student's
+    t."""
+
+    times: np.ndarray = attrs.field(kw_only=True)
+
+    noun = "swarms"
+    indices = {"mean_size": ("time",)} | dict.fromkeys(swarm_file.COUNTS, ("time",))
+    word = "quantity"
+
+    def labelled(self, quantity: str) -> Labelled:
+        """The arrays of one quantity with their axis; UsageError for an unknown one."""
+        axes = {"time": Column(("time",), self.times, about_of(swarm_file.SCALES["time"]))}
+        _, units, text = swarm_file.COUNTS[self.known(quantity)]
+        facts = {"quantity": text, "paired": int(self.paired)}
+        return labelled_of(axes, self.arrays[quantity], OF_MEANS, facts, units)
+
+    def table(self, quantity: str = "mean_size") -> str:
+        """The same as text; a star marks intervals without 0."""
+        arrays = {name: each.values for name, each in self.labelled(quantity).columns.items()}
+        _, units, text = swarm_file.COUNTS[quantity]
+        rows = [["time [s]", "n", "first", "second", "difference [95 %]"]]
+        for place, time in enumerate(self.times):
+            each = {name: values[place] for name, values in arrays.items()}
+            low, high = each["difference_low"], each["difference_high"]
+            star = starred(low, high)
+            found = f"{each['difference']:+.4g} [{low:+.4g}, {high:+.4g}]{star}"
+            numbers = f"{each['n_first']}/{each['n_second']}"
+            firsts = (f"{each[name]:.4g}" for name in ("first", "second"))
+            rows.append([f"{time:.4g}", numbers, *firsts, found])
+        title = f"{text} [{units}], second minus first: {self.how}"
+        return "\n".join([*self.changes, title, "", *aligned(rows)])
+
+
+def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
+    """The SwarmComparison of two files: of replicates of one number, paired where their bodies
+    begin alike."""
+    times = common(first.scales["time"], second.scales["time"], "time")
+    mine, yours = first.groups, second.groups
+    begun, also = (each["snapshots"]["position"][:, 0] for each in (mine, yours))
+    pairs = min(len(begun), len(also))
+    paired = np.array_equal(begun[:pairs], also[:pairs], equal_nan=True)
+    at = [np.flatnonzero(np.isin(each["time"], times)) for each in (first.scales, second.scales)]
+    arrays = {
+        name: mean_differences(
+            mine["counts"][name][:, at[0]], yours["counts"][name][:, at[1]],
+            pairs if paired else None,
+        ) for name in swarm_file.COUNTS
+    }  # fmt: skip
+    changes = changes_between(first, second)
+    return SwarmComparison(paired, pairs if paired else 0, arrays, changes, times=np.array(times))
+
+
+def mean_differences(
+    first: np.ndarray, second: np.ndarray, pairs: int | None
+) -> dict[str, np.ndarray]:
+    """Return the arrays of OF_MEANS of values (replicate, time), NaN where a swarm did not get so
+    far.
+
+    Student's interval of paired differences of the first ``pairs``, or Welch's of independent
+    samples.
+    """
+    from scipy.stats import ttest_ind, ttest_rel
+
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of times to which few swarms got
+        if pairs is not None:
+            first, second = first[:pairs], second[:pairs]
+            known = np.isfinite(first) & np.isfinite(second)
+            first, second = np.where(known, first, np.nan), np.where(known, second, np.nan)
+            test = ttest_rel(second, first, nan_policy="omit")
+        else:
+            test = ttest_ind(second, first, equal_var=False, nan_policy="omit")
+        low, high = test.confidence_interval(0.95)
+        means = [np.nanmean(each, axis=0) for each in (first, second)]
+    difference = means[1] - means[0]
+    # Samples that happen to be alike say nothing of their spread, unless nothing differs.
+    spread = high > low
+    low, high = (np.where(spread, end, np.where(difference == 0.0, 0.0, np.nan))
+                 for end in (low, high))  # fmt: skip
+    counts = [np.isfinite(each).sum(axis=0) for each in (first, second)]
+    return {
+        "first": means[0], "second": means[1], "difference": difference,
+        "difference_low": low, "difference_high": high,
+        "n_first": counts[0], "n_second": counts[1],
+    }  # fmt: skip
+
+
+CONTENTS = Contents(
+    title="results of a swarm study", read=swarm_file.read_swarm, summary=summary,
+    table=swarm_file.table_of, tables=tables,
+    figures=figures, drawn={"a swarm study": SWARM_FIGURES},
+    running=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
+    opened=lambda path, allowed=None: swarm_file.read_swarm(path),
+    compare=compare,
+    compared={name: words for name, (_, _, words) in swarm_file.COUNTS.items()},
+    joined=Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
+    results=results, old_rows=old_rows, so_far=so_far, facts=facts, verdict=verdict,
+    dry_run=later("ensembles.swarms.study", "dry_run"),
+    animate=write_swarm_animation, motion=first_swarm,
+)  # fmt: skip
