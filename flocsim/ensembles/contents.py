@@ -23,6 +23,7 @@ from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.plots.style import Figure
 from flocsim.io.results.run_group import describe_kind, source_line, stored
 from flocsim.io.seals import held
+from flocsim.io.terminal import aligned
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -281,24 +282,89 @@ def open_any(
     return file_kind(source, "opened").opened(source, allowed)
 
 
+MEANINGS = {
+    "first": "in the first file",
+    "second": "in the second file",
+    "difference": "second minus first",
+    "difference_low": "difference, lower 95 % bound",
+    "difference_high": "difference, upper 95 % bound",
+    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
+    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
+    "n_first": "how many count in the first file",
+    "n_second": "how many count in the second file",
+}
+"""The arrays of a comparison of one quantity; changes by numerics only where they are known."""
+
+
 @attrs.frozen(eq=False, repr=False)
 class Differences(Tables):
-    """``arrays`` {quantity: {name: values}} of what the second has more of than the first.
+    """What one file has more of than another: `flocsim.compare` makes it.
 
-    ``paired``: whether replicate k is the same draw in both, so that the difference is that of the
-    ``pairs`` that both have; else samples are independent. ``changes``, lines on what the studies
-    differ in.
+    ``axes`` {name: Column}: the conditions, or times, that both have; ``arrays`` {quantity: {name:
+    values}}, names as in MEANINGS, along them. ``paired``: whether replicate k is the same draw in
+    both, so that the difference is that of the ``pairs`` that both have; else samples are
+    independent. ``changes``: lines on what the studies differ in.
     """
 
     paired: bool
     pairs: int
+    axes: dict[str, Column]
     arrays: dict[str, dict[str, np.ndarray]]
     changes: tuple[str, ...] = ()
+    quantities: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    """{quantity: (unit, meaning)}, the first being the one that is meant where none is named."""
     noun: ClassVar[str] = "replicates"
+    digits: ClassVar[str] = ".4g"
 
-    def table(self, quantity: str = "") -> str:
-        """The differences of one quantity, the first where none is named, as text."""
-        raise NotImplementedError
+    @property
+    def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
+        """{quantity: the axes along which it lies}."""
+        return {name: list(self.axes) for name in self.quantities}
+
+    def labelled(self, quantity: str) -> Labelled:
+        """Return the arrays of one quantity with their axes; UsageError for an unknown one."""
+        unit, text = self.quantities[self.known(quantity)]
+        columns = {
+            name: Column(tuple(self.axes), values, {
+                "units": "1" if name.startswith("n_") else unit,
+                "long_name": f"{text}: {MEANINGS[name]}",
+            }) for name, values in self.arrays[quantity].items()
+        }  # fmt: skip
+        return Labelled(self.axes, columns, {self.word: text, "paired": int(self.paired)})
+
+    def table(self, quantity: str | None = None) -> str:
+        """Return the differences of one quantity, the first where none is named, as text; a star
+        marks intervals, numerics included, without 0."""
+        quantity = self.known(quantity)
+        unit, text = self.quantities[quantity]
+        arrays = self.arrays[quantity]
+        heads = [f"{name} [{each.about['units']}]" if each.about["units"] != "1" else name
+                 for name, each in self.axes.items()]  # fmt: skip
+        numerics = "change_low" in arrays
+        rows = [[*heads, "n", "first", "second", "difference [95 %]" + " numerics" * numerics]]
+        lengths = [len(each.values) for each in self.axes.values()]
+        for place in np.ndindex(*lengths):
+            at = {name: float(values[place]) for name, values in arrays.items()}
+            keys = (in_words(each.values.tolist()[k])
+                    for each, k in zip(self.axes.values(), place, strict=True))  # fmt: skip
+            numbers = f"{at['n_first']:.0f}/{at['n_second']:.0f}"
+            values = (f"{at[name]:{self.digits}}" for name in ("first", "second"))
+            rows.append([*(visible(key, "") for key in keys), numbers, *values, self.interval(at)])
+        title = f"{text}{'' if unit == '1' else f' [{unit}]'}, second minus first: {self.how}"
+        return "\n".join([*self.changes, title, "", *aligned(rows)])
+
+    def interval(self, at: Mapping[str, float]) -> str:
+        """Return "+0.030 [+0.010, +0.050] -0.004 +0.010 *": a difference, what numerics may change
+        of it, and a star where 0 is outside both together."""
+        if np.isnan(at["difference"]):
+            return "-"
+        form = f"+{self.digits}"
+        low, high = at["difference_low"], at["difference_high"]
+        added = [float(np.nan_to_num(at.get(name, 0.0))) for name in ("change_low", "change_high")]
+        star = " *" if low + added[0] > 0.0 or high + added[1] < 0.0 else ""
+        numerics = "".join(f" {at[name]:{form}}" for name in ("change_low", "change_high")
+                           if name in at)  # fmt: skip
+        return f"{at['difference']:{form}} [{low:{form}}, {high:{form}}]{numerics}{star}"
 
     @property
     def how(self) -> str:
@@ -308,29 +374,8 @@ class Differences(Tables):
 
     def __repr__(self) -> str:
         how = f"{self.pairs} pairs" if self.paired else "independent"
-        shape = " × ".join(map(str, next(iter(next(iter(self.arrays.values())).values())).shape))
+        shape = " × ".join(str(len(each.values)) for each in self.axes.values())
         return f"{type(self).__name__}({shape} places, {how})"
-
-
-def starred(low: Any, high: Any) -> str:
-    """A star for an interval without 0."""
-    return " *" if low > 0.0 or high < 0.0 else ""
-
-
-def labelled_of(
-    axes: dict[str, Column], arrays: Mapping[str, np.ndarray], meanings: Mapping[str, str],
-    facts: dict[str, Any], units: str = "1",
-) -> Labelled:  # fmt: skip
-    """Arrays of a comparison along all axes."""
-    return Labelled(
-        axes,
-        {
-            name: Column(tuple(axes), values, {
-                "units": "1" if name.startswith("n_") else units, "long_name": meanings[name],
-            }) for name, values in arrays.items()
-        },
-        facts,
-    )  # fmt: skip
 
 
 def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:

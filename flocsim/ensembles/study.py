@@ -47,7 +47,6 @@ from flocsim.ensembles.preflight import (
     sphere_pairs,
     study_doubts,
 )
-from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 from flocsim.io.results.events import flips_easily
@@ -72,8 +71,7 @@ class Study(StudyKind):
     """Every replicate of a config. All that is random follows from (seed, replicate).
 
     ``flocs`` are grown or read unless given; ``pairings`` say who meets whom in every collision
-    type, ``zones`` has D_0 [m] of their radii (flocs of measured sizes have their own);
-    ``exact`` the more exact methods of second and third runs, None where there are none.
+    type; ``exact`` has the more exact methods of second and third runs, None where there are none.
     """
 
     config: Config
@@ -84,7 +82,6 @@ class Study(StudyKind):
     format: ClassVar[str] = "flocsim results"
     check = staticmethod(check_study)
     pairings: tuple[Pairing, ...] = attrs.field(init=False)
-    zones: dict[str, float] = attrs.field(init=False)
     floc_pool: FlocPool = attrs.field(init=False)
     pools: dict[str, FlocPool] = attrs.field(init=False)
     encounters: dict[tuple, Encounter] = attrs.field(init=False, factory=dict)
@@ -99,10 +96,6 @@ class Study(StudyKind):
         ends = BAND_ENDS if self.is_banded else ()
         self.pools = {end: self.floc_pool.cut(end) for end in ends}
         self.pairings = pairings_of(config, self.flocs, self.floc_pool)
-        self.zones = {
-            each.name: zone_distance(config.zone, config.forces, *each.radii)
-            for each in self.pairings
-        }
 
     @staticmethod
     def flocs_of(config: Config) -> list[Floc]:
@@ -223,20 +216,16 @@ class Study(StudyKind):
                 pool.shape(floc, count, radius)
                 for floc, count, radius in zip(flocs, counts, radii, strict=True)
             ]
+            if pool.own_size:
+                radii = (shapes[0].equivalent_radius, shapes[1].equivalent_radius)
+            zone = zone_distance(self.config.zone, self.config.forces, *radii)
             made = make_encounter(
-                self.config, shapes, self.zone(name, shapes), self.config.integrator.method,
+                self.config, shapes, zone, self.config.integrator.method,
                 self.pairings[condition].meeting, self.first.get(name),
             )  # fmt: skip
             self.first.setdefault(name, made)
             self.encounters[key] = made
         return self.encounters[key]
-
-    def zone(self, name: str, shapes: Sequence[Shape]) -> float:
-        """D_0 [m] of two shapes of a collision type."""
-        if not self.floc_pool.own_size:
-            return self.zones[name]
-        radii = (shape.equivalent_radius for shape in shapes)
-        return zone_distance(self.config.zone, self.config.forces, *radii)
 
     def draw(
         self, condition: int, vertices: int, share: float, replicate: int, end: str = CUT
@@ -268,9 +257,9 @@ class Study(StudyKind):
         self, condition: int, vertices: int, share: float, replicate: int,
         halted: Callable[[], bool] | None = None,
     ) -> dict | None:  # fmt: skip
-        """Run one replicate, as in `draw`. The row as a dict.
+        """Run one replicate, as in `draw`, and those of its further runs that are due.
 
-        ``halted()``, looked at now and then, gives the replicate up: None then.
+        Return its row; None where ``halted()``, looked at now and then, gives it up.
         """
         draw = self.draw(condition, vertices, share, replicate)
         steps = self.config.integrator.max_steps
@@ -278,38 +267,30 @@ class Study(StudyKind):
         if row is not None and (attempt := self.second_attempt(row)):
             second = self.run_carefully(lambda: draw, attempt, halted, row)
             row = second if second is None or says_outcome(second) else row
-        if row is not None and self.is_banded:
-            row = self.with_band(row, condition, vertices, share, replicate, halted)
-        if row is None or self.exact is None:
-            return row
-        easily = bool(flips_easily(row["outcome"], row["bond"]))
-        wanted = self.config.integrator.check_share
-        runs = list(zip(self.exact, (CHECKED, THIRD), strict=True))
-        for method, columns in runs[: further_runs(self.config.seed, replicate, wanted, easily)]:
-            steps *= MORE_STEPS
-            found = self.run_carefully(lambda: draw, (steps, method), halted, WITHOUT_OUTCOME)
+        if row is None:
+            return None
+        further: list[tuple[dict[str, str], Callable[[], Draw], int, Integrator | None]] = []
+        if self.is_banded:
+            further += [
+                (columns_of(end), partial(self.draw, condition, vertices, share, replicate, end),
+                 MORE_STEPS * steps, None) for end in BAND_ENDS
+            ]  # fmt: skip
+        if self.exact is not None:
+            easily = bool(flips_easily(row["outcome"], row["bond"]))
+            wanted = self.config.integrator.check_share
+            count = further_runs(self.config.seed, replicate, wanted, easily)
+            for method, columns in list(zip(self.exact, (CHECKED, THIRD), strict=True))[:count]:
+                steps *= MORE_STEPS
+                further.append((columns, lambda: draw, steps, method))
+        has_outline = vertices > 1 or self.floc_pool.own_size
+        first = row
+        for columns, made, most, again in further:
+            found: dict | None = first  # of a sphere of a given size, which has no outline to cut
+            if has_outline or again is not None:
+                found = self.run_carefully(made, (most, again), halted, WITHOUT_OUTCOME)
             if found is None:
                 return None
-            row |= {name: found[column] for name, column in columns.items()}
-        return row
-
-    def with_band(
-        self, row: dict, condition: int, vertices: int, share: float, replicate: int,
-        halted: Callable[[], bool] | None,
-    ) -> dict | None:  # fmt: skip
-        """The row with the outcomes of its replicate run with both outlines cut closer, and wider;
-        None where one was given up."""
-        budget = MORE_STEPS * self.config.integrator.max_steps, None
-        for end in BAND_ENDS:
-            found: dict | None = row
-            if vertices > 1 or self.floc_pool.own_size:  # a sphere of a given size has no outline
-                found = self.run_carefully(
-                    partial(self.draw, condition, vertices, share, replicate, end),
-                    budget, halted, WITHOUT_OUTCOME,
-                )  # fmt: skip
-            if found is None:
-                return None
-            row = row | {column: found[name] for column, name in columns_of(end).items()}
+            row = row | {column: found[name] for column, name in columns.items()}
         return row
 
     def second_attempt(self, row: dict) -> tuple[int, Integrator | None] | None:

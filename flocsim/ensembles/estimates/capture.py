@@ -126,38 +126,18 @@ def weighted(
     return Weighted(*found)
 
 
-@attrs.frozen(eq=False)
-class Chi:
-    """χ (n,) of points: ``least`` where the unknown ones are taken for 0, ``most`` for 1."""
-
-    least: np.ndarray
-    most: np.ndarray
-
-    @property
-    def known(self) -> np.ndarray:
-        """Whether it is known."""
-        return self.least == self.most
-
-
-def became(outcome: np.ndarray, inside: np.ndarray) -> dict[str, Chi]:
-    """{c, inside, a: Chi} of codes as in the results file."""
-    unknown, touched = np.isin(outcome, WITHOUT_OUTCOME), inside != NOT_APPLICABLE
-    least = {"c": touched, "inside": inside == 1, "a": np.isin(outcome, AGGREGATED)}
+def became(codes: Codes) -> dict[str, Events]:
+    """Return {c, inside, a, alpha: Events} of points that touched, did so inside, aggregated, and
+    aggregated of those that touched: χ is 1 where an event is a success, 0 or 1 where unknown."""
+    outcome, inside = codes[:2]
+    without, touched = np.isin(outcome, WITHOUT_OUTCOME), inside != NOT_APPLICABLE
+    stays, apart = np.isin(outcome, AGGREGATED), without & ~touched
     return {
-        name: Chi(each, each | (unknown if name == "a" else unknown & ~touched))
-        for name, each in least.items()
+        "c": Events(~apart, touched, apart),
+        "inside": Events(~apart, inside == 1, apart),
+        "a": Events(~without, stays, without),
+        "alpha": Events(touched & ~without, stays, without),
     }
-
-
-def counted(codes: Codes) -> dict[str, Events]:
-    """{c, inside, a, alpha: Events} of outcome, inside and bond."""
-    found = became(*codes[:2])
-    told = {
-        name: Events(each.known, each.known & each.least, ~each.known)
-        for name, each in found.items()
-    }
-    touched, stays = found["c"], found["a"]
-    return told | {"alpha": Events(touched.least & stays.known, stays.least, ~stays.known)}
 
 
 def half_width(values: np.ndarray, point: float) -> float:
@@ -174,17 +154,21 @@ def half_width(values: np.ndarray, point: float) -> float:
 
 
 def mean_of(
-    values: np.ndarray, agree: tuple[bool, float], point: float = 0.0
+    values: np.ndarray, unseen: float | None, point: float = 0.0
 ) -> tuple[float, float, float]:
-    """(mean, low, high) of what scrambles gave (S,); ``agree``: whether all points agree, and how
-    much of the sampled mean that bounds; ``point``: see half_width."""
+    """Return (mean, low, high) of what scrambles gave (S,).
+
+    ``unseen``: where all points agree, how much of the sampled mean that bounds; ``point``: see
+    half_width.
+    """
     mean = float(values.mean())
-    half = half_width(values, 0.0 if agree[0] else point)
-    all_agree, unseen = agree
+    half = half_width(values, point if unseen is None else 0.0)
     low, high = max(mean - half, 0.0), mean + half
-    if all_agree and mean == 0.0:
+    if unseen is None:
+        return mean, low, high
+    if mean == 0.0:
         return mean, 0.0, unseen
-    return mean, min(low, mean * (1.0 - unseen)) if all_agree else low, high
+    return mean, min(low, mean * (1.0 - unseen)), high
 
 
 def ratio_of(
@@ -249,13 +233,13 @@ def estimate(
     values, largest = values_of(points, first, meeting, rate, scrambles, most_unknown)
     shifted, _ = values_of(points, moved, meeting, rate, scrambles, most_unknown)
     shifts = {name: shifted[name] - values[name] for name in ESTIMATES}
-    counts = [counted(each) for each in (first, *runs)]
+    counts = [became(each) for each in (first, *runs)]
     changes = {
         name: kind_changes(kinds, runs, [
             gains_and_losses(before[name], after[name]) for before, after in pairwise(counts)
         ]) for name in counts[0]
     }  # fmt: skip
-    now = counted(exact)
+    now = became(exact)
     values["checked"] = float(run_so(exact).sum())
     for name in WHAT:
         both = run_so(exact) & counts[0][name].trials & now[name].trials
@@ -270,7 +254,7 @@ def values_of(
 ) -> tuple[dict[str, float], dict[str, float]]:  # fmt: skip
     """({name: number}, {estimate: by how much a point that flips changes it at most}) by these
     outcomes of a condition's points."""
-    chi = became(*codes[:2])
+    chi = became(codes)
     n = len(points.plane)
 
     def parts(values: np.ndarray) -> np.ndarray:
@@ -292,16 +276,15 @@ def values_of(
         def bounds(
             flags: np.ndarray, weight: np.ndarray = weight, most: float = most
         ) -> tuple[float, float, float]:
-            unseen = high_share * (1.0 if flags.any() else float(weight.mean()))
-            agree = bool(flags.all() or not flags.any()), unseen
-            return mean_of(parts(weight * flags), agree, most * scrambles / n)
+            unseen = None
+            if flags.all() or not flags.any():
+                unseen = high_share * (1.0 if flags.any() else float(weight.mean()))
+            return mean_of(parts(weight * flags), unseen, most * scrambles / n)
 
-        least, low, _ = bounds(chi[what].least)
-        ends = [
-            known_part(least, weight, chi[what].known, most_unknown),
-            low,
-            bounds(chi[what].most)[2],
-        ]
+        each = chi[what]
+        least, low, _ = bounds(each.successes)
+        high = bounds(each.successes | each.unknown)[2]
+        ends = [known_part(least, weight, ~each.unknown, most_unknown), low, high]
         if flow:
             assert rate is not None
             factor = rate * (1.0 if meeting == SHEAR else 2.0)
@@ -312,33 +295,32 @@ def values_of(
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         largest[name] = most
     touched, stays = chi["c"], chi["a"]
+    may_touch, may_stay = (each.successes | each.unknown for each in (touched, stays))
     for name, weight, (under, over) in (
         # The unknown lower α most where all touch and none stays, and raise it where all stay.
-        ("alpha", points.plane, (points.plane * touched.least, points.plane * touched.most)),
+        ("alpha", points.plane, (points.plane * touched.successes, points.plane * may_touch)),
         ("efficiency2", points.plane, (points.reference[0],) * 2),
         ("efficiency3", points.space, (points.reference[1],) * 2),
     ):
-        sure = name == "alpha" and np.array_equal(stays.least, touched.least)
+        sure = name == "alpha" and np.array_equal(stays.successes, touched.successes)
         point = 0.0 if sure else float(weight.max()) * scrambles / n
-        ratios = [ratio_of(parts(weight * each), parts(over), point)
-                  for each in (stays.least, stays.most)]  # fmt: skip
-        ends = [
-            known_part(ratios[0][0], weight, stays.known, most_unknown),
-            ratios[0][1],
-            ratios[1][2],
-        ]
+        fewest, all_of_them = (
+            ratio_of(parts(weight * each), parts(over), point)
+            for each in (stays.successes, may_stay)
+        )
+        value = known_part(fewest[0], weight, ~stays.unknown, most_unknown)
+        ends = [value, fewest[1], all_of_them[2]]
         if name == "alpha":
-            ends = [alpha_of(points.plane, touched, stays, most_unknown)]
-            ends += [
-                widened(each, int(np.sum(flags)), int(np.sum(touched.most)))[side]
-                for side, each, flags in zip((0, 1), ratios, (stays.least, stays.most), strict=True)
-            ]
+            many = int(may_touch.sum())
+            low, _ = widened(fewest, int(stays.successes.sum()), many)
+            _, high = widened(all_of_them, int(may_stay.sum()), many)
+            ends = [alpha_of(points.plane, chi, most_unknown), low, high]
         values |= zip((name, f"{name}_low", f"{name}_high"), ends, strict=True)
         below = float(parts(under).mean())
         largest[name] = float(weight.max()) / below if below > 0.0 else math.nan
     unknown = np.isin(codes[0], WITHOUT_OUTCOME)
-    caught = float(np.sum(points.plane * stays.least))
-    edge = float(np.sum(points.plane * stays.least * points.edge))
+    caught = float(np.sum(points.plane * stays.successes))
+    edge = float(np.sum(points.plane * stays.successes * points.edge))
     values |= {
         "beta2_reference": float(points.reference[0].mean()),
         "beta3_reference": float(points.reference[1].mean()),
@@ -349,15 +331,15 @@ def values_of(
     return values, {name: each / n for name, each in largest.items()}
 
 
-def alpha_of(weight: np.ndarray, touched: Chi, stays: Chi, most_unknown: float) -> float:
-    """Of the flux that touches, and of which it is known what becomes of it, what aggregates; NaN
-    where there is none, or the rest is too much of all that touches or may have."""
-    seen = touched.least & stays.known
-    flux = float(np.sum(weight * seen))
-    lost = float(np.sum(weight * ~stays.known))
-    if not flux > 0.0 or lost > most_unknown * float(np.sum(weight * touched.most)):
+def alpha_of(weight: np.ndarray, chi: dict[str, Events], most_unknown: float) -> float:
+    """Return of the flux that touches, and of which it is known what becomes of it, what
+    aggregates; NaN where there is none, or the rest is too much of all that touches or may have."""
+    flux = float(np.sum(weight * chi["alpha"].trials))
+    lost = float(np.sum(weight * chi["a"].unknown))
+    may_touch = chi["c"].successes | chi["c"].unknown
+    if not flux > 0.0 or lost > most_unknown * float(np.sum(weight * may_touch)):
         return math.nan
-    return float(np.sum(weight * stays.least)) / flux
+    return float(np.sum(weight * chi["a"].successes)) / flux
 
 
 def of_what(name: str) -> str:
@@ -372,14 +354,14 @@ def of_what(name: str) -> str:
 def numerical_parts(found: dict[tuple, Estimated], shape: tuple[int, ...]) -> dict[tuple, dict]:
     """{place: {name_change_low, name_change_high, name_numerical}} of all conditions, by mechanism:
     axis 0 of the shape."""
-    kinds = np.zeros((len(KINDS), 4, *shape))
+    kinds = np.zeros((*shape, len(KINDS), 4))
     for place, each in found.items():
-        kinds[:, :, *place] = each.kinds
+        kinds[place] = each.kinds
     most = {}
     for what in (*WHAT, "alpha"):
-        changes = np.zeros((len(KINDS), 4, *shape))
+        changes = np.zeros_like(kinds)
         for place, each in found.items():
-            changes[:, :, *place] = each.changes[what]
+            changes[place] = each.changes[what]
         most[what] = further(changes, kinds)
     told: dict[tuple, dict] = {}
     for place, each in found.items():

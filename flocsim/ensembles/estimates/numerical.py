@@ -20,7 +20,7 @@ import numpy as np
 
 from flocsim.io.confidence import FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import WITHOUT_OUTCOME, Events, events, events_of, kinds_of
-from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES, last_axis
+from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 
 EACH_SIDE = 0.975
 """Probability of each end of an interval."""
@@ -56,28 +56,38 @@ def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndar
 
 
 def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:
-    """Whole numbers (kind, 4, …): how many of each kind there are, were run a second, and a third
+    """Whole numbers (…, kind, 4): how many of each kind there are, were run a second, and a third
     time, and were run again without an outcome; ``kinds`` as in kinds_of."""
     lost_sight = run_so(again) & np.isin(most_exact(again, third)[0], WITHOUT_OUTCOME)
-    return np.stack([
-        (kinds & each).sum(axis=-1) for each in (True, run_so(again), run_so(third), lost_sight)
-    ], axis=1)  # fmt: skip
+    parts = True, run_so(again), run_so(third), lost_sight
+    return np.stack(
+        [np.stack([(kind & each).sum(axis=-1) for each in parts], axis=-1) for kind in kinds],
+        axis=-2,
+    )
 
 
 def kind_changes(
     kinds: np.ndarray, runs: Sequence[Codes], counted: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> np.ndarray:
-    """Whole numbers (kind, 4, …): how many of each kind gain and lose by the second run, and by the
+    """Whole numbers (…, kind, 4): how many of each kind gain and lose by the second run, and by the
     third one after it.
 
     ``runs``: second and third ones; ``counted``: gains_and_losses of each. A run without an outcome
     may have come to either.
     """
-    found = []
-    for codes, sides in zip(runs, counted, strict=True):
-        lost_sight = np.isin(codes[0], WITHOUT_OUTCOME)
-        found += [(each | lost_sight) & run_so(codes) for each in sides]
-    return np.stack([np.stack([(kind & each).sum(axis=-1) for each in found]) for kind in kinds])
+    flags = [
+        (each | along(np.isin(codes[0], WITHOUT_OUTCOME), each)) & along(run_so(codes), each)
+        for codes, sides in zip(runs, counted, strict=True) for each in sides
+    ]  # fmt: skip
+    return np.stack(
+        [np.stack([(along(kind, each) & each).sum(axis=-1) for each in flags], axis=-1)
+         for kind in kinds], axis=-2,
+    )  # fmt: skip
+
+
+def along(flags: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Return flags (…, replicate), (…, 1, replicate) where those they go with are of each class."""
+    return flags[..., np.newaxis, :] if like.ndim > flags.ndim else flags
 
 
 def count_changes(
@@ -89,8 +99,8 @@ def count_changes(
 
     ``first``, ``again``, ``third``: codes of first, second and third runs, none of the last by
     default; ``of`` gives the Events of codes. And what `change_intervals` follows from:
-    KIND_COUNTS, see kind_counts; "pr_a of kinds" (kind, 4, …), see kind_changes; "pr_a shifted"
-    (2, …), by how much the most exact runs change trials and successes.
+    KIND_COUNTS, see kind_counts; "pr_a of kinds" (…, kind, 4), see kind_changes; "pr_a shifted"
+    (…, 2), by how much the most exact runs change trials and successes.
     """
     runs = again, (np.full_like(again[0], NOT_APPLICABLE),) * 3 if third is None else third
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
@@ -99,37 +109,23 @@ def count_changes(
               for one, other in ((first, exact), runs)]  # fmt: skip
     flags = {"n_checked": checked, "n_flipped": checked & differ[0], "n_third": thrice,
              "n_third_flipped": thrice & differ[1]}  # fmt: skip
-    counts = {name: np.sum(each, axis=-1) for name, each in flags.items()}
-    counts[KIND_COUNTS] = kind_counts(kinds, *runs)
     known = checked & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
-    of_first, of_again, of_third, of_exact = (of(*each) for each in (first, *runs, exact))
-    for name, before in of_first.items():
-        after = of_exact[name]
-        sides = [
-            gains_and_losses(*pair)
-            for pair in (
-                (before, after),
-                (before, of_again[name]),
-                (of_again[name], of_third[name]),
-            )
-        ]
-
-        def behind(values: np.ndarray, axis: int, last: bool = bool(last_axis(name))) -> np.ndarray:
-            """With the axis of classes or bonds behind those of the conditions."""
-            return np.moveaxis(values, axis, -1) if last else values
-
-        flags = {"checked": checked & (before.trials | after.trials)}
-        flags |= {kind: checked & each for kind, each in zip(SIDES, sides[0], strict=True)}
-        counts |= {f"n_{kind}_{name}": behind(np.sum(each, axis=-1), 0)
-                   for kind, each in flags.items()}  # fmt: skip
-        shifts = [(known & now).sum(axis=-1) - (known & then).sum(axis=-1)
+    counts = {KIND_COUNTS: kind_counts(kinds, *runs)}
+    tables = [of(*codes) for codes in (first, *runs, exact)]
+    for name in tables[0]:
+        before, second, last, after = (table[name] for table in tables)
+        gained, lost = gains_and_losses(before, after)
+        again_of, known_of = along(checked, gained), along(known, gained)
+        flags |= {
+            f"n_checked_{name}": again_of & (before.trials | after.trials),
+            f"n_gained_{name}": again_of & gained, f"n_lost_{name}": again_of & lost,
+        }  # fmt: skip
+        shifts = [(known_of & now).sum(axis=-1) - (known_of & then).sum(axis=-1)
                   for now, then in zip(after[:2], before[:2], strict=True)]  # fmt: skip
-        counts[f"{name} {SHIFTED}"] = behind(np.stack(shifts), 1)
-        counts[f"{name} {OF_KINDS}"] = behind(kind_changes(kinds, runs, sides[1:]), 2)
-    return counts
-
-
-SIDES = ("gained", "lost")
+        counts[f"{name} {SHIFTED}"] = np.stack(shifts, axis=-1)
+        sides = gains_and_losses(before, second), gains_and_losses(second, last)
+        counts[f"{name} {OF_KINDS}"] = kind_changes(kinds, runs, sides)
+    return {name: np.sum(each, axis=-1) for name, each in flags.items()} | counts
 
 
 def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
@@ -138,14 +134,15 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
     Without any third run second ones are taken for exact. NaN where no replicate was run again.
     """
     if of_kinds.ndim > counts.ndim:  # each class or bond by itself
-        of_each = [further(of_kinds[..., k], counts) for k in range(of_kinds.shape[-1])]
+        of_each = [further(of_kinds[..., k, :, :], counts) for k in range(of_kinds.shape[-3])]
         return [np.stack(side, axis=-1) for side in zip(*of_each, strict=True)]
-    members, checked, thrice, lost_sight = np.moveaxis(counts, 1, 0)
+    changed = np.moveaxis(of_kinds, (-1, -2), (0, 1))
+    members, checked, thrice, lost_sight = np.moveaxis(counts, (-1, -2), (0, 1))
     found = []
-    for side in range(len(SIDES)):
-        parts = further_of_kinds(of_kinds[:, side], checked, members - checked + lost_sight)
+    for side in range(2):
+        parts = further_of_kinds(changed[side], checked, members - checked + lost_sight)
         if thrice.any():
-            third = of_kinds[:, 2 + side], thrice, members - thrice
+            third = changed[2 + side], thrice, members - thrice
             parts.append(further_of_all(*(each.sum(axis=0) for each in third)))
         found.append(flips_together(parts, EACH_SIDE))
     return found
@@ -163,7 +160,7 @@ def change_intervals(
     found = {}
     for name, (trials, successes, _) in (totals or events_of(counts)).items():
         gained, lost = further(counts[f"{name} {OF_KINDS}"], counts[KIND_COUNTS])
-        more_trials, more_successes = counts[f"{name} {SHIFTED}"]
+        more_trials, more_successes = np.moveaxis(counts[f"{name} {SHIFTED}"], -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = successes / trials
             again = (successes + more_successes) / (trials + more_trials)
@@ -172,18 +169,6 @@ def change_intervals(
             high = np.minimum(change + gained / trials, 1.0 - share)
         found[name] = np.where(trials > 0, low, np.nan), np.where(trials > 0, high, np.nan)
     return found
-
-
-def leading_axes(name: str) -> int:
-    """How many axes an array of count_changes has before those of the conditions."""
-    if name == KIND_COUNTS or name.endswith(OF_KINDS):
-        return 2
-    return 1 if name.endswith(SHIFTED) else 0
-
-
-def over_displacements(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Sums over delta of counts of conditions (type, vertices, delta)."""
-    return {name: values.sum(axis=leading_axes(name) + 2) for name, values in counts.items()}
 
 
 def further_of_kinds(
@@ -226,15 +211,10 @@ study of one condition, of which a few replicates are run a third time, would kn
 of this."""
 
 
-def numerical_errors(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """{"pr_…_numerical": array} of every probability: the larger side of its change."""
-    return numerical_of(change_intervals(counts))
-
-
 def numerical_of(
     intervals: Mapping[str, tuple[np.ndarray, np.ndarray]],
 ) -> dict[str, np.ndarray]:
-    """The same from change_intervals."""
+    """{"pr_…_numerical": array} of every probability: the larger side of its change_intervals."""
     return {
         f"{name}_numerical": np.maximum(np.abs(low), np.abs(high))
         for name, (low, high) in intervals.items()

@@ -13,21 +13,11 @@ better than from independent samples.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 
-import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flocsim.ensembles.config.schema import StopConfig
-from flocsim.ensembles.estimates.numerical import (
-    Codes,
-    further,
-    kind_changes,
-    kind_counts,
-    most_exact,
-    run_so,
-)
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io import confidence
@@ -37,11 +27,9 @@ from flocsim.io.results.events import (
     HELD,
     MISSED,
     UNDECIDED,
-    WITHOUT_OUTCOME,
     Events,
     events,
     events_of,
-    kinds_of,
 )
 from flocsim.io.results.schema import AXES, FURTHER_RUNS, NOT_APPLICABLE
 
@@ -139,11 +127,10 @@ def scrambled_sums(
     """
     if not scrambles:
         return {}
-    found = {}
-    for name, each in events(*codes).items():
-        sums = sums_of_scrambles(np.stack(each), first, scrambles)
-        found[name + OF_SCRAMBLES] = np.moveaxis(sums, 1, -2) if schema.last_axis(name) else sums
-    return found
+    return {
+        name + OF_SCRAMBLES: sums_of_scrambles(np.stack(each), first, scrambles)
+        for name, each in events(*codes).items()
+    }
 
 
 def scrambled_probabilities(
@@ -179,40 +166,24 @@ def borders(stop: StopConfig, replicates: int) -> list[int]:
     return [*looks, replicates]
 
 
-@attrs.define
-class StopRule:
-    """Whether the first so many replicates of every condition are enough. Counts as it goes."""
+def stop_rule(study: StudyKind, store: RowStore) -> Callable[[int], bool]:
+    """Return the rule that may end a study: whether so many replicates of each condition, all of
+    which exist, are enough."""
+    stop: StopConfig = study.config.stop
+    wanted = stop.half_width
+    if wanted is None:
+        return lambda replicates: False
 
-    stop: StopConfig
-    store: RowStore
-    seen: int = 0
-    counts: list[dict[str, np.ndarray]] = attrs.Factory(list)
+    def is_narrow(place: int, replicates: int) -> bool:
+        rows = store.rows(place, 0, replicates)
+        table = probabilities(count(*(rows[name] for name in CODES)))
+        widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in stop.of]
+        return not np.any(0.5 * np.array(widths) > wanted)
 
-    def __call__(self, replicates: int) -> bool:
-        """Whether the study may end with this many, all of which exist."""
-        for place in range(len(self.store.conditions)):
-            rows = self.store.rows(place, self.seen, replicates)
-            more = count(*(rows[name] for name in CODES))
-            if place == len(self.counts):
-                self.counts.append(more)
-            else:
-                before = self.counts[place]
-                self.counts[place] = {name: more[name] + before[name] for name in more}
-        self.seen = replicates
-        if self.stop.half_width is None:
-            return False
-        return all(self.is_narrow(counts) for counts in self.counts)
-
-    def is_narrow(self, counts):
-        """Whether the intervals of a condition are narrow enough."""
-        table = probabilities(counts)
-        widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in self.stop.of]
-        return not np.any(0.5 * np.array(widths) > self.stop.half_width)
-
-
-def stop_rule(study: StudyKind, store: RowStore) -> StopRule:
-    """Return the rule that may end a study early."""
-    return StopRule(study.config.stop, store)
+    return lambda replicates: (
+        stop.half_width is not None
+        and all(is_narrow(place, replicates) for place in range(len(store.conditions)))
+    )
 
 
 def of_each_scramble(first: int, scrambles: int) -> list[slice]:
@@ -300,61 +271,6 @@ def bounded_difference(
         for each in joint
     )
     return known[0], least[1], most[2]
-
-
-def change_of_differences(
-    first: Sequence[Codes], second: Sequence[Codes], of: Callable[..., dict[str, Events]]
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """{probability: (low, high)}: 95 % interval of by how much its difference, second minus first,
-    would change if both studies were run exactly, over the replicates that count in both.
-
-    ``first``, ``second``: codes of first, second and third runs of the same replicates in two
-    studies, (type, vertices, delta, replicate); ``of`` gives Events, not of classes. What was run
-    again in both counts, where it changes the one otherwise than the other: what errs alike is no
-    error of the difference. A replicate is of the kind of the two that flips more easily.
-    """
-    runs = [joint_outcome(*pair) for pair in zip(first, second, strict=True)]
-    easily, surely = ([kinds_of(codes[0][0], codes[0][2])[k] for codes in (first, second)]
-                      for k in (0, 1))  # fmt: skip
-    decided = ~np.isin(runs[0][0], WITHOUT_OUTCOME)
-    kinds = np.stack([easily[0] | easily[1], surely[0] & surely[1]]) & decided
-    kinds = np.concatenate([kinds, (decided & ~kinds.any(axis=0))[np.newaxis]])
-    exact = [most_exact(*codes[1:]) for codes in (first, second)]
-    known = run_so(runs[1]) & ~np.isin(joint_outcome(*exact)[0], WITHOUT_OUTCOME) & decided
-    moved = [[np.where(known, *pair) for pair in zip(now, codes[0], strict=True)]
-             for now, codes in zip(exact, (first, second), strict=True)]  # fmt: skip
-    tables = [[of(*codes) for codes in pair]
-              for pair in (*zip(first, second, strict=True), moved)]  # fmt: skip
-    counts = kind_counts(kinds, *runs[1:])
-    found = {}
-    for name in tables[0][0]:
-        steps = [differences(*(table[name] for table in pair)) for pair in tables]
-        sides = [(after[0] > before[0], after[0] < before[0])
-                 for before, after in pairwise(steps[:3])]  # fmt: skip
-        gained, lost = further(kind_changes(kinds, runs[1:], sides), counts)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value, exactly = (each.sum(axis=-1) / both.sum(axis=-1)
-                              for each, both in (steps[0], steps[3]))  # fmt: skip
-            trials = steps[0][1].sum(axis=-1)
-            change = np.where(np.isnan(exactly), 0.0, exactly - value)
-            low = np.maximum(change - lost / trials, -1.0 - value)
-            high = np.minimum(change + gained / trials, 1.0 - value)
-        found[name] = low, high
-    return found
-
-
-def joint_outcome(one: Codes, other: Codes) -> Codes:
-    """Codes of which the first, alone of meaning, says whether both were run so, and both came to
-    an outcome."""
-    unknown = [np.isin(codes[0], WITHOUT_OUTCOME) for codes in (one, other)]
-    outcome = np.where(unknown[0] | unknown[1], WITHOUT_OUTCOME[0], 0)
-    return (np.where(run_so(one) & run_so(other), outcome, NOT_APPLICABLE),)
-
-
-def differences(one: Events, other: Events) -> tuple[np.ndarray, np.ndarray]:
-    """(by how much a replicate counts more in the other, whether it counts in both)."""
-    both = one.trials & other.trials
-    return both * (other.successes.astype("i1") - one.successes), both
 
 
 def newcombe(

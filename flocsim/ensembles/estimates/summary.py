@@ -17,7 +17,7 @@ from flocsim.ensembles.estimates import numerical, statistics
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
 from flocsim.io.results import schema
-from flocsim.io.results.events import events
+from flocsim.io.results.events import Events, events
 from flocsim.io.results.kernel_group import Kernel
 
 OF_OUTLINES = " of outlines"
@@ -39,13 +39,12 @@ def outline_sums(
     for codes in ends:
         run = codes[0] != schema.NOT_APPLICABLE
         for name, here in events(*codes).items():
-            there = as_cut[name]
-            cells = statistics.bounded_cells(
-                type(here)(*(run & flags for flags in here)),
-                type(there)(*(run & flags for flags in there)),
-            )
-            # (3, class or bond, type, …, 4) → the class or bond before the cells.
-            found[name].append(np.moveaxis(cells, 1, -2) if schema.last_axis(name) else cells)
+            both = [
+                Events(*(numerical.along(run, flags) & flags for flags in each))
+                for each in (here, as_cut[name])
+            ]
+            cells = statistics.bounded_cells(both[0], both[1])
+            found[name].append(cells)
     return {name + OF_OUTLINES: np.stack(cells) for name, cells in found.items()}
 
 
@@ -158,7 +157,8 @@ def tables_of(sums: Sums) -> dict[str, Any]:
     of_outlines = {name: values for name, values in sums.items() if name.endswith(OF_OUTLINES)}
     apart = {JOINT, *pooled, *of_scrambles, *of_outlines}
     counted = {name: values for name, values in sums.items() if name not in apart}
-    together = numerical.numerical_errors(numerical.over_displacements(counted))
+    over_delta = {name: values.sum(axis=2) for name, values in counted.items()}
+    together = numerical.numerical_of(numerical.change_intervals(over_delta))
     changes = numerical.change_intervals(counted)
     table = table_from(counted, changes) | statistics.scrambled_probabilities(of_scrambles)
     pooled_table = statistics.pooled_probabilities(pooled) | statistics.scrambled_probabilities(

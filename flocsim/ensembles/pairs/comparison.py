@@ -1,11 +1,12 @@
 """Two results files of pairs compared: differences of probabilities, condition by condition."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import attrs
 import numpy as np
 
-from flocsim.ensembles.contents import Differences, changes_between, common, labelled_of, starred
+from flocsim.ensembles.contents import Differences, changes_between, common
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
 from flocsim.ensembles.estimates.statistics import (
     EXACT_RUNS,
@@ -13,7 +14,6 @@ from flocsim.ensembles.estimates.statistics import (
     bounded_cells,
     bounded_difference,
     by_runs,
-    change_of_differences,
     joined,
     of_each_scramble,
     sums_of_scrambles,
@@ -22,83 +22,39 @@ from flocsim.ensembles.kind import ORDER
 from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.report import SCRAMBLES
 from flocsim.io.confidence import proportion, scrambled_proportion
-from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.labelled import Column, about_of
 from flocsim.io.results.events import Events, approaches, events
 from flocsim.io.results.schema import AXES, COMPARED, COORDINATES, PER_APPROACH
-
-MEANINGS = {
-    "first": "the probability in the first file",
-    "second": "the probability in the second file",
-    "difference": "second minus first",
-    "difference_low": "difference, lower 95 % bound",
-    "difference_high": "difference, upper 95 % bound",
-    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
-    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
-    "n_first": "replicates that count in the first file",
-    "n_second": "replicates that count in the second file",
-}
-"""The arrays of a comparison of one probability."""
 
 
 @attrs.frozen(eq=False, repr=False)
 class Comparison(Differences):
-    """What one results file has more of than another: `flocsim.compare` makes it.
+    """What one results file of pairs has more of than another: `flocsim.compare` makes it.
 
-    ``types``, ``vertices`` and ``delta`` are the conditions that both have; ``arrays``
-    {probability: {name: (type, vertices, delta)}}, names as in MEANINGS. Where they are ``paired``
-    intervals are Newcombe's.
+    ``arrays`` {probability: {name: (type, vertices, delta)}}; where they are ``paired`` intervals
+    are Newcombe's.
     """
 
-    types: tuple[str, ...] = attrs.field(kw_only=True)
-    vertices: np.ndarray = attrs.field(kw_only=True)
-    delta: np.ndarray = attrs.field(kw_only=True)
-
-    indices = {"pr_a": AXES} | dict.fromkeys(COMPARED, AXES)
+    quantities: ClassVar[Mapping[str, tuple[str, str]]] = {"pr_a": ("1", COMPARED["pr_a"])} | {
+        name: ("1", text) for name, text in COMPARED.items()
+    }
     word = "probability"
+    digits = ".3f"
 
-    def labelled(self, probability: str) -> Labelled:
-        """The arrays of one probability with their axes; UsageError for an unknown one."""
-        values = np.array(self.types, dtype=object), self.vertices, self.delta
-        axes = {
-            name: Column((name,), each, about_of(COORDINATES[name]))
-            for name, each in zip(AXES, values, strict=True)
-        }
-        facts = {"probability": COMPARED[self.known(probability)], "paired": int(self.paired)}
-        return labelled_of(axes, self.arrays[probability], MEANINGS, facts)
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The collision types that both have."""
+        return tuple(self.axes["type"].values.tolist())
 
-    def table(self, probability: str = "pr_a") -> str:
-        """The same as text; a star marks intervals, numerics included, without 0."""
-        arrays = self.labelled(probability).columns
-        lines = [*self.changes, f"{COMPARED[probability]}, second minus first: {self.how}", ""]
-        lines.append(
-            f"{'type':>10} {'N':>5} {'delta':>6} {'n':>13} {'first':>6} {'second':>6}  "
-            "difference [95 %] numerics"
-        )
-        for place in np.ndindex(*(len(each) for each in (self.types, self.vertices, self.delta))):
-            each = {name: column.values[place] for name, column in arrays.items()}
-            ends = [float(each[f"{name}{end}"]) for name in ("difference", "change")
-                    for end in ENDS]  # fmt: skip
-            numbers = f"{each['n_first']}/{each['n_second']}"
-            found = "-" if np.isnan(each["difference"]) else (
-                f"{each['difference']:+.3f} {with_change(*ends)}"
-            )  # fmt: skip
-            lines.append(
-                f"{self.types[place[0]]:>10} {self.vertices[place[1]]:>5} "
-                f"{self.delta[place[2]]:>6g} {numbers:>13} {each['first']:>6.3f} "
-                f"{each['second']:>6.3f}  {found}"
-            )
-        return "\n".join(lines)
+    @property
+    def vertices(self) -> np.ndarray:
+        """The numbers of vertices that both have."""
+        return self.axes["vertices"].values
 
-
-ENDS = ("_low", "_high")
-
-
-def with_change(low: float, high: float, change_low: float, change_high: float) -> str:
-    """ "[+0.010, +0.050] -0.004 +0.010 *": an interval and what numerics may change, a star where
-    0 is outside both together."""
-    added = np.nan_to_num([change_low, change_high])
-    star = starred(low + added[0], high + added[1])
-    return f"[{low:+.3f}, {high:+.3f}] {change_low:+.3f} {change_high:+.3f}{star}"
+    @property
+    def delta(self) -> np.ndarray:
+        """The shares of δ_max that both have."""
+        return self.axes["delta"].values
 
 
 def compare(first: StudyResults, second: StudyResults) -> Comparison:
@@ -115,20 +71,20 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
     kept = pairs if paired else None
     codes = [by_runs([each[name][..., :kept] for name in EXACT_RUNS]) for each in rows]
     trials = [compared_events(*each[0]) for each in codes]
-    changes = (
-        change_of_differences(codes[0], codes[1], compared_events)
-        if paired
-        else changes_apart(codes)
-    )
+    changes = [changes_of(*each) for each in codes]
     arrays = {}
     for name in COMPARED:
         both = trials[0][name], trials[1][name]
         found = paired_of(*both, scrambles[0]) if paired else apart_of(both, scrambles)
-        arrays[name] = found | dict(zip(("change_low", "change_high"), changes[name], strict=True))
-    return Comparison(
-        paired, pairs if paired else 0, arrays, changes_between(first, second),
-        types=tuple(wanted[0]), vertices=np.array(wanted[1]), delta=np.array(wanted[2]),
-    )  # fmt: skip
+        # Each of the two may be off in either direction.
+        (first_low, first_high), (low, high) = (each[name] for each in changes)
+        arrays[name] = found | {"change_low": low - first_high, "change_high": high - first_low}
+    values = np.array(wanted[0], dtype=object), np.array(wanted[1]), np.array(wanted[2])
+    axes = {
+        name: Column((name,), each, about_of(COORDINATES[name]))
+        for name, each in zip(AXES, values, strict=True)
+    }
+    return Comparison(paired, pairs if paired else 0, axes, arrays, changes_between(first, second))
 
 
 def places(results, wanted):
@@ -151,19 +107,15 @@ def compared_events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -
     return {name: found[name] for name in COMPARED}
 
 
-def changes_apart(files: Sequence[Sequence[Codes]]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """{probability: (low, high)} of by how much its difference would change, run exactly, where
-    the replicates of two files are independent."""
-    changes = [
-        change_intervals(count_changes(runs[0], runs[1], runs[2], compared_events), {
-            name: Events(*(flags.sum(axis=-1) for flags in each))
-            for name, each in compared_events(*runs[0]).items()
-        }) for runs in files
-    ]  # fmt: skip
-    return {
-        name: (changes[1][name][0] - changes[0][name][1], changes[1][name][1] - changes[0][name][0])
-        for name in COMPARED
+def changes_of(
+    first: Codes, again: Codes, third: Codes
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return {probability: (low, high)} of how much each of COMPARED would change, run exactly."""
+    totals = {
+        name: Events(*(flags.sum(axis=-1) for flags in each))
+        for name, each in compared_events(*first).items()
     }
+    return change_intervals(count_changes(first, again, third, compared_events), totals)
 
 
 def paired_of(first: Events, second: Events, scrambles: int) -> dict[str, np.ndarray]:

@@ -83,19 +83,14 @@ def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: b
     return draw.begin(driver, steps, integrator=method, record=record)
 
 
-def replicate_of(replicate: int, place: Place, study: Study, most: int | None = None) -> Trajectory:
-    """The Trajectory of one replicate of a `one_count_study`, its ``row`` in words.
-
-    ``most`` steps, where they are less than the config's.
-    """
+def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
+    """Return the Trajectory of one replicate of a `one_count_study`, its ``row`` in words."""
     if not is_whole(replicate) or not replicate >= 0:
         raise UsageError(f"replicate must be a whole number of at least 0, found {replicate!r}")
     began, draw = time.perf_counter(), study.draw(*place, int(replicate))
     system = draw.encounter.system
 
     def attempt(steps: int, method: Integrator | None = None) -> tuple[dict, Trajectory]:
-        steps = steps if most is None else min(most, steps)
-
         fresh = functools.partial(begin_replicate, draw, steps, method)
         run = fresh(record=True)
         status = run.to_end()
@@ -120,9 +115,6 @@ def row_in_words(row: dict) -> dict:
     found = {name: words[name][value] if name in words else value for name, value in row.items()}
     return found | {"failure": FAILURES[row["failure"]]}
 
-
-STEPS_MORE = 1000
-"""Steps beyond twice those of its row after which a replicate is given up as another one."""
 
 REPEATED = ("outcome", "inside", "bond")
 """What of a row has to come out again."""
@@ -247,14 +239,9 @@ class StudyResults(Tables):
             raise UsageError(
                 f"replicate must be a whole number from 0 to {self.count - 1}, found {replicate!r}"
             )
-        for value, known, name in (
-            (type, self.types, "type"), (vertices, self.vertices.tolist(), "vertices"),
-            (delta, self.delta.tolist(), "delta"),
-        ):  # fmt: skip
-            chosen(value, known, name, 0)
         place = place_of(self.config, type, vertices, delta)
         study, row = self.study_with(place[1]), self.row(int(replicate), place)
-        found = replicate_of(int(replicate), place, study, STEPS_MORE + 2 * int(row["steps"]))
+        found = replicate_of(int(replicate), place, study)
         self.hold(found, row)
         return found
 
@@ -295,7 +282,6 @@ class StudyResults(Tables):
         """
         if vertices not in self.studies:
             config, identity = self.config, self.stored("identity")
-            self.refuse(self.contradictions())
             study = one_count_study(config, vertices)
             self.refuse(differences(identity, identity_of(study)))
             self.studies[vertices] = study
@@ -308,20 +294,6 @@ class StudyResults(Tables):
                 f"{self.path} cannot be reproduced: {unlike[0]}; use the version of flocsim, the "
                 "files and the kind of machine that it was made with"
             )
-
-    def contradictions(self) -> list[str]:
-        """What the config asks for that the file does not have, a line each."""
-        shapes, lines = self.config.shapes, []
-        lacking = set(self.config.scene.names) - set(self.types)
-        if lacking:
-            lines.append(f"its config has the type {min(lacking)}, but its rows do not")
-        grown = shapes.own is None and shapes.source == "synthetic" and max(shapes.vertices) > 1
-        if grown and len(self.results.flocs) != shapes.pool:
-            lines.append(
-                f"its config asks for {shapes.pool} flocs, but its rows have "
-                f"{len(self.results.flocs)}"
-            )
-        return lines
 
     def __repr__(self) -> str:
         shape = " × ".join(map(str, self.results.shape))

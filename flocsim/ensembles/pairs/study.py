@@ -14,7 +14,6 @@ from flocsim.ensembles.collision.pairings import class_facts
 from flocsim.ensembles.dry_run import sphere_facts
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.capture import kernel_of
-from flocsim.ensembles.estimates.numerical import leading_axes
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.kind import OldResults
 from flocsim.ensembles.parallel.communicator import StopRequested
@@ -101,13 +100,11 @@ def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     many = len(store.conditions)
     known = {place: counts_of(store, place) for place in range(many) if store.intervals(place)}
     counts = {}
-    for name, values in next(iter(known.values())).items():
-        axis = leading_axes(name)
-        before, behind = values.shape[:axis], values.shape[axis + 3 :]
-        every = np.zeros((*before, many, *behind), values.dtype)
+    for name, like in next(iter(known.values())).items():
+        every = np.zeros((many, *like.shape[3:]), like.dtype)
         for place, found in known.items():
-            every[(slice(None),) * axis + (place,)] = found[name].reshape((*before, *behind))
-        counts[name] = every.reshape(*before, *shape, *behind)
+            every[place] = found[name][0, 0, 0]
+        counts[name] = every.reshape(*shape, *like.shape[3:])
     return summary.table_from(counts)
 
 

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -25,20 +25,17 @@ from flocsim.ensembles.contents import (
     changes_between,
     common,
     in_words,
-    labelled_of,
     later,
     origin,
-    starred,
 )
 from flocsim.ensembles.kind import Condition, OldResults
 from flocsim.errors import FileError, FlocsimError, UsageError, visible
-from flocsim.io.labelled import Column, Labelled, about_of
+from flocsim.io.labelled import Column, about_of
 from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
 from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
 from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
-from flocsim.io.terminal import aligned
 
 # What is saved of a replicate while it runs.
 
@@ -325,52 +322,21 @@ def asked(results: SwarmResults) -> dict[str, Any]:
             "replicates": len(results.scales["replicate"])}  # fmt: skip
 
 
-OF_MEANS = {
-    "first": "mean over the swarms of the first file",
-    "second": "mean over the swarms of the second file",
-    "difference": "second minus first",
-    "difference_low": "difference, lower 95 % bound",
-    "difference_high": "difference, upper 95 % bound",
-    "n_first": "swarms that count in the first file",
-    "n_second": "swarms that count in the second file",
-}
-"""The arrays of a comparison of one quantity of swarms."""
-
-
 @attrs.frozen(eq=False, repr=False)
 class SwarmComparison(Differences):
     """What one file of swarms has more of than another: ``arrays`` {column of the counts: {name:
-    (time,)}} at the ``times`` [s] that both have, names as in OF_MEANS; intervals by Student's
-    t."""
-
-    times: np.ndarray = attrs.field(kw_only=True)
+    (time,)}}; intervals by Student's t."""
 
     noun = "swarms"
-    indices = {"mean_size": ("time",)} | dict.fromkeys(swarm_file.COUNTS, ("time",))
+    quantities: ClassVar[Mapping[str, tuple[str, str]]] = {
+        name: swarm_file.COUNTS[name][1:] for name in ("mean_size", *swarm_file.COUNTS)
+    }
     word = "quantity"
 
-    def labelled(self, quantity: str) -> Labelled:
-        """The arrays of one quantity with their axis; UsageError for an unknown one."""
-        axes = {"time": Column(("time",), self.times, about_of(swarm_file.SCALES["time"]))}
-        _, units, text = swarm_file.COUNTS[self.known(quantity)]
-        facts = {"quantity": text, "paired": int(self.paired)}
-        return labelled_of(axes, self.arrays[quantity], OF_MEANS, facts, units)
-
-    def table(self, quantity: str = "mean_size") -> str:
-        """The same as text; a star marks intervals without 0."""
-        arrays = {name: each.values for name, each in self.labelled(quantity).columns.items()}
-        _, units, text = swarm_file.COUNTS[quantity]
-        rows = [["time [s]", "n", "first", "second", "difference [95 %]"]]
-        for place, time in enumerate(self.times):
-            each = {name: values[place] for name, values in arrays.items()}
-            low, high = each["difference_low"], each["difference_high"]
-            star = starred(low, high)
-            found = f"{each['difference']:+.4g} [{low:+.4g}, {high:+.4g}]{star}"
-            numbers = f"{each['n_first']}/{each['n_second']}"
-            firsts = (f"{each[name]:.4g}" for name in ("first", "second"))
-            rows.append([f"{time:.4g}", numbers, *firsts, found])
-        title = f"{text} [{units}], second minus first: {self.how}"
-        return "\n".join([*self.changes, title, "", *aligned(rows)])
+    @property
+    def times(self) -> np.ndarray:
+        """The times [s] that both have."""
+        return self.axes["time"].values
 
 
 def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
@@ -388,14 +354,15 @@ def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
             pairs if paired else None,
         ) for name in swarm_file.COUNTS
     }  # fmt: skip
+    axes = {"time": Column(("time",), np.array(times), about_of(swarm_file.SCALES["time"]))}
     changes = changes_between(first, second)
-    return SwarmComparison(paired, pairs if paired else 0, arrays, changes, times=np.array(times))
+    return SwarmComparison(paired, pairs if paired else 0, axes, arrays, changes)
 
 
 def mean_differences(
     first: np.ndarray, second: np.ndarray, pairs: int | None
 ) -> dict[str, np.ndarray]:
-    """Return the arrays of OF_MEANS of values (replicate, time), NaN where a swarm did not get so
+    """Return the arrays of MEANINGS of values (replicate, time), NaN where a swarm did not get so
     far.
 
     Student's interval of paired differences of the first ``pairs``, or Welch's of independent

@@ -38,15 +38,16 @@ WITHOUT_OUTCOME = tuple(OUTCOMES.index(name) for name in UNKNOWN)
 
 
 def events(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, Events]:
-    """{probability: Events}, flags as the codes; (class, …), (bond, …) of those."""
+    """{probability: Events}, flags (…, replicate) as the codes; those of classes and of bonds are
+    (…, class, replicate)."""
     decided, aggregated = outcome < DECIDED, np.isin(outcome, AGGREGATED)
     within, without = np.isin(outcome, INSIDE_CLASSES), np.isin(outcome, OUTSIDE_CLASSES)
     unknown, apart = np.isin(outcome, WITHOUT_OUTCOME), inside == NOT_APPLICABLE
-    classes = np.stack([outcome == code for code in range(len(CLASSES))])
-    bonds = np.stack([bond == 1 + place for place in range(len(BONDS))])
+    classes = np.stack([outcome == code for code in range(len(CLASSES))], axis=-2)
+    bonds = np.stack([bond == 1 + place for place in range(len(BONDS))], axis=-2)
 
     def of_each(flags: np.ndarray, like: np.ndarray) -> np.ndarray:
-        return np.broadcast_to(flags, like.shape)
+        return np.broadcast_to(flags[..., np.newaxis, :], like.shape)
 
     return {
         "pr_inside": Events(~apart, inside == 1, unknown & apart),

@@ -11,8 +11,7 @@ from flocsim.ensembles.estimates.numerical import (
     change_intervals,
     count_changes,
     further_of_kinds,
-    numerical_errors,
-    over_displacements,
+    numerical_of,
 )
 from flocsim.ensembles.estimates.statistics import COUNTED, EXACT_RUNS, by_runs, count
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
@@ -309,7 +308,8 @@ def test_tables_from_sums_are_those_of_all_replicates_together():
         ends = (tables["numerics"][f"{name}_change{end}"] for end in ("_low", "_high"))
         np.testing.assert_array_equal(np.maximum(*map(np.abs, ends)), whole[f"{name}_numerical"])
     counted = count(*columns[:3]) | count_changes(*by_runs(columns)[:3])
-    for name, values in numerical_errors(over_displacements(counted)).items():
+    over_delta = {name: values.sum(axis=2) for name, values in counted.items()}
+    for name, values in numerical_of(change_intervals(over_delta)).items():
         if name not in ("pr_class_numerical", "pr_bond_numerical"):
             np.testing.assert_array_equal(tables["pooled"][name], values)
 

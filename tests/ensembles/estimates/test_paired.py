@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim.ensembles.estimates.statistics import (
-    change_of_differences,
     joint_counts,
     newcombe,
     paired_differences,
@@ -14,7 +13,6 @@ from flocsim.ensembles.estimates.statistics import (
     pooled_sums,
 )
 from flocsim.io.confidence import scrambled_difference, wilson
-from flocsim.io.results.events import events
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.synthetic_results import bonds_of, draw_codes
 from tests.helpers.tabulate import tabulate
@@ -158,19 +156,3 @@ def test_joint_counts_of_scrambles_add_up_to_those_of_all():
     np.testing.assert_array_equal(early + joint_counts(*late, 5, 16), parts)
     found = paired_differences(parts, scrambled=True)
     np.testing.assert_array_equal(found["n_pairs"], paired_differences(whole)["n_pairs"])
-
-
-def test_what_errs_alike_is_no_error_of_the_difference():
-    codes = draw_codes(np.random.default_rng(8), (1, 1, 1, 400))
-    departs = np.where(codes[0] == 0, 1, codes[0])
-    exact = departs, codes[1], bonds_of(departs)
-
-    def change(*files):
-        return change_of_differences(*files, lambda *each: {"pr_a": events(*each)["pr_a"]})["pr_a"]
-
-    alike = change((codes, exact, exact), (codes, exact, exact))
-    assert alike[0][0, 0, 0] == alike[1][0, 0, 0] == 0.0
-    # Where the first alone is wrong, the difference rises by what it loses.
-    low, high = change((codes, exact, exact), (codes, codes, codes))
-    lost = np.sum(codes[0] == 0) / np.sum(codes[0] < 4)
-    assert low[0, 0, 0] == high[0, 0, 0] == pytest.approx(lost)
