@@ -68,7 +68,7 @@ def test_measured_flocs_keep_their_sizes(tmp_path):
     np.testing.assert_allclose(radii, sizes, rtol=1e-12)
     assert len(set(drawn.flocs.tolist())) == 3
     few = study(tmp_path, {"scene": {"max_radius": "6 um"}}, MEASURED)
-    assert max(few.draw(few.generator(0)).flocs) < 2
+    assert max(few.drawn(0)[0].flocs) < 2
     with pytest.raises(ConfigError, match="leave no floc"):
         study(tmp_path, {"scene": {"min_radius": "1 mm"}}, MEASURED)
 
@@ -76,7 +76,7 @@ def test_measured_flocs_keep_their_sizes(tmp_path):
 def test_larger_flocs_are_drawn_more_often_by_volume(tmp_path):
     write_star_library(tmp_path / "stars.h5", ratios=(3.0, 6.0))
     made = study(tmp_path, {"scene": {"weight": "volume", "number": 4000}}, MEASURED)
-    share = np.mean(made.draw(made.generator(0)).flocs == 1)
+    share = np.mean(made.drawn(0)[0].flocs == 1)
     assert share == pytest.approx(8.0 / 9.0, abs=0.02)
 
 
