@@ -201,12 +201,11 @@ def shares_of(results, number, name):
         trials, successes, unknown = events_of(counts)[share]
         return proportion(successes, trials, unknown=unknown)
     codes = (results.replicates[column][number] for column in ("outcome", "inside", "bond"))
-    # A replicate is a cluster: (class or bond, vertices, delta, replicate) → over delta.
+    # A replicate is a cluster: (vertices, delta, class or bond, replicate) → over delta.
     trials, successes, unknown = (
-        np.sum(each, axis=2, dtype=np.int64) for each in events(*codes)[share]
+        np.sum(each, axis=1, dtype=np.int64) for each in events(*codes)[share]
     )
-    found = clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
-    return tuple(np.moveaxis(each, 0, -1) for each in found)
+    return clustered_proportion(bounded_sums(successes, trials, unknown))[:3]
 
 
 def draw_line(axes, vertices, bands, index, count, colour, few=None, causes=None):
