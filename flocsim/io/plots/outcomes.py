@@ -305,7 +305,7 @@ def shape_effect(rows: Mapping[str, np.ndarray], name: str) -> ShapeEffect:
     value = np.where(known, np.nanmax(np.where(known, values, -np.inf), axis=0), np.nan)
     places = bins_of(value)
     groups = [places == k for k in range(places.max(initial=-1) + 1)]
-    classes = [np.sum(each, axis=1, dtype=np.int64) for each in found["pr_class"]]
+    classes = [np.sum(each, axis=0, dtype=np.int64) for each in found["pr_class"]]
     middle = np.array([np.median(value[group]) for group in groups])
     pr_a = [pooled(counts, group) for group in groups]
     pr_class = [pooled(classes, group) for group in groups]
