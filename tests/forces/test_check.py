@@ -1,6 +1,5 @@
 """Wrong kernels: each is refused in one line that names the force, the file and the line."""
 
-import inspect
 import math
 
 import attrs
@@ -45,237 +44,152 @@ class Brush(SurfaceForce):
         return strength * (reach - pair.gap)
 
 
-@attrs.frozen
-class Unknown(Brush):
-    @staticmethod
-    def kernel(pair, strenght):
-        return strenght * pair.gap
+def unknown(pair, strenght):
+    return strenght * pair.gap
+
+
+def misspelt(pair, strength):
+    return strength * pair.gapp
+
+
+def misspelt_in_one_branch(pair, strength):
+    if pair.gap < 0.0:
+        return strength * pair.overlap
+    return 0.0
+
+
+def two_numbers(pair):
+    return pair.gap, 0.0
+
+
+def no_return_in_one_branch(pair):
+    if pair.gap_rate > 0.0:
+        return 1e-12
+
+
+def two_parts(body):
+    return 0.0, -body.mass
+
+
+def makes_a_list(contact):
+    return [contact.overlap, 0.0]
+
+
+def limit_of_two(contact, k_n):
+    return contact.overlap, k_n
+
+
+def slope_in_words(pair, strength):
+    return "minus k"
+
+
+def no_parameters():
+    return 0.0
+
+
+def undefined_helper(pair):
+    return no_such_helper(pair.gap)  # noqa: F821
+
+
+def asks_for_text(pair, label):
+    return pair.gap
 
 
 @attrs.frozen
-class Misspelt(Brush):
-    @staticmethod
-    def kernel(pair, strength):
-        opening = pair.gapp
-        return strength * opening
-
-
-@attrs.frozen
-class MisspeltInOneBranch(Brush):
-    @staticmethod
-    def kernel(pair, strength):
-        if pair.gap < 0.0:
-            return strength * pair.overlap
-        return 0.0
-
-
-@attrs.frozen
-class Pair(CentreForce):
-    @staticmethod
-    def kernel(pair):
-        return pair.gap, 0.0
-
-
-@attrs.frozen
-class NoReturn(CentreForce):
-    @staticmethod
-    def kernel(pair):
-        pair.gap  # noqa: B018
-
-
-@attrs.frozen
-class NoReturnInOneBranch(CentreForce):
-    @staticmethod
-    def kernel(pair):
-        if pair.gap_rate > 0.0:
-            return 1e-12
-
-
-@attrs.frozen
-class TwoParts(BodyForce):
-    @staticmethod
-    def kernel(body):
-        return 0.0, -body.mass
-
-
-@attrs.frozen
-class List(ContactForce):
-    @staticmethod
-    def kernel(contact):
-        return [contact.overlap, 0.0]
-
-
-@attrs.frozen
-class WrongLimit(Contact):
-    @staticmethod
-    def slip_limit(contact, k_n):
-        return contact.overlap, k_n
-
-
-@attrs.frozen
-class WrongSlope(Brush):
-    @staticmethod
-    def slope(pair, strength):
-        return "minus k"
-
-
-@attrs.frozen
-class NoParameters(CentreForce):
-    @staticmethod
-    def kernel():
-        return 0.0
-
-
-@attrs.frozen
-class Method(CentreForce):
-    def kernel(self, pair):
-        return pair.gap
-
-
-@attrs.frozen
-class Lambda(CentreForce):
-    kernel = staticmethod(lambda pair: pair.gap)
-
-
-@attrs.frozen
-class Compiled(CentreForce):
-    @staticmethod
-    @numba.njit
-    def kernel(pair):
-        return pair.gap
-
-
-@attrs.frozen
-class UndefinedHelper(CentreForce):
-    @staticmethod
-    def kernel(pair):
-        return no_such_helper(pair.gap)  # noqa: F821
-
-
-@attrs.frozen
-class Text(CentreForce):
+class Labelled(Brush):
     label: str = "strong"
 
-    @staticmethod
-    def kernel(pair, label):
-        return pair.gap
+
+WRONG = [
+    (Brush, "kernel", unknown, "asks for 'strenght'.*strength, brush"),
+    (Brush, "kernel", misspelt, "in {file}:{body}.*no attribute 'gapp'; did you mean 'gap'"),
+    (Brush, "kernel", misspelt_in_one_branch, "no attribute 'overlap'; it has time, gap"),
+    (CentreForce, "kernel", two_numbers, "must return one number, the repulsion"),
+    (CentreForce, "kernel", no_return_in_one_branch, "returns None"),
+    (BodyForce, "kernel", two_parts, r"must return \(fx, fy, torque\)"),
+    (ContactForce, "kernel", makes_a_list, "makes a list in {file}:{body}"),
+    (Contact, "slip_limit", limit_of_two, "must return one number, the largest slip"),
+    (Brush, "slope", slope_in_words, "returns 'minus k'.*slope"),
+    (CentreForce, "kernel", no_parameters, "TypeError.*0 positional arguments"),
+    (CentreForce, "kernel", lambda pair: pair.gap, "is a lambda"),
+    (CentreForce, "kernel", undefined_helper, "fails in {file}:{body}: NameError"),
+    (Labelled, "kernel", asks_for_text, "asks for 'label', which is 'strong'; a kernel takes num"),
+]
 
 
-@attrs.frozen
-class FailingProperty(CentreForce):
-    @property
-    def kappa(self):
-        """A length of zero divides."""
-        return 1.0 / 0.0
-
-    @staticmethod
-    def kernel(pair, kappa):
-        return kappa * pair.gap
+def mine(base, **members):
+    """A force of a class of its own, with these members in place of the base's."""
+    return attrs.frozen(type("Mine", (base,), members))()
 
 
-@attrs.frozen
-class Reaching(CentreForce):
-    limit: object
-
-    @property
-    def reach(self):
-        """Whatever was given."""
-        return self.limit
-
-    @staticmethod
-    def kernel(pair):
-        return pair.gap
-
-
-WRONG = {
-    Unknown: ("kernel", "asks for 'strenght'.*strength, brush"),
-    Misspelt: ("kernel", "in {file}:{body}.*no attribute 'gapp'; did you mean 'gap'"),
-    MisspeltInOneBranch: ("kernel", "no attribute 'overlap'; it has time, gap"),
-    Pair: ("kernel", "must return one number, the repulsion"),
-    NoReturn: ("kernel", "returns None"),
-    NoReturnInOneBranch: ("kernel", "returns None"),
-    TwoParts: ("kernel", r"must return \(fx, fy, torque\)"),
-    List: ("kernel", "makes a list in {file}:{body}"),
-    WrongLimit: ("slip_limit", "must return one number, the largest slip"),
-    WrongSlope: ("slope", "returns 'minus k'.*slope"),
-    NoParameters: ("kernel", "TypeError.*0 positional arguments"),
-    Method: ("kernel", "@staticmethod"),
-    Lambda: ("kernel", "is a lambda"),
-    UndefinedHelper: ("kernel", "fails in {file}:{body}: NameError"),
-    Text: ("kernel", "asks for 'label', which is 'strong'; a kernel takes numbers only"),
-}
-
-
-@pytest.mark.parametrize("kind", WRONG, ids=lambda kind: kind.__name__)
-def test_a_wrong_kernel_is_named_with_file_and_line(kind):
-    name, pattern = WRONG[kind]
-    function = getattr(kind(), name)
+@pytest.mark.parametrize("base, name, function, pattern", WRONG)
+def test_a_wrong_kernel_is_named_with_file_and_line(base, name, function, pattern):
     line = function.__code__.co_firstlineno
-    # A function's first line is that of its decorator; its body begins two further down.
-    pattern = pattern.format(file=__file__, body=line + 2)
-    with pytest.raises(KernelError, match=pattern) as caught:
-        check_kernel(kind(), Fluid())
+    with pytest.raises(KernelError, match=pattern.format(file=__file__, body=line + 1)) as caught:
+        check_kernel(mine(base, **{name: staticmethod(function)}), Fluid())
     message = str(caught.value)
-    assert message.startswith(kind.__name__) and "\n" not in message
-    assert f"({inspect.getsourcefile(kind)}:{line})" in message
+    assert message.startswith("Mine") and "\n" not in message
+    assert f"({__file__}:{line})" in message
 
 
-def test_a_compiled_kernel_is_refused():
-    with pytest.raises(KernelError, match="leave its @njit out"):
-        check_kernel(Compiled(), Fluid())
+@pytest.mark.parametrize(
+    "kernel, pattern",
+    [(misspelt, "@staticmethod"), (staticmethod(numba.njit(unknown)), "leave its @njit out")],
+)
+def test_a_kernel_is_a_plain_function_of_the_class(kernel, pattern):
+    with pytest.raises(KernelError, match=pattern):
+        check_kernel(mine(Brush, kernel=kernel), Fluid())
 
 
 def test_a_property_that_fails_is_named():
+    def kernel(pair, kappa):
+        return kappa * pair.gap
+
+    force = mine(CentreForce, kappa=property(lambda self: 1.0 / 0.0), kernel=staticmethod(kernel))
     with pytest.raises(KernelError, match=r"'kappa' cannot be computed .*ZeroDivisionError"):
-        check_kernel(FailingProperty(), Fluid())
+        check_kernel(force, Fluid())
 
 
 def test_closures_are_refused_with_what_they_capture():
     strength = 2.0
 
-    @attrs.frozen
-    class Capturing(CentreForce):
-        @staticmethod
-        def kernel(pair):
-            return strength * pair.gap
+    def capturing(pair):
+        return strength * pair.gap
 
     with pytest.raises(KernelError, match=rf"\({__file__}:\d+\) captures strength"):
-        check_kernel(Capturing(), Fluid())
+        check_kernel(mine(CentreForce, kernel=staticmethod(capturing)), Fluid())
 
 
 @pytest.mark.parametrize("reach", [math.nan, None, "far"])
 def test_a_reach_that_is_no_gap_is_refused(reach):
-    with pytest.raises(KernelError, match="Reaching: its reach is"):
-        laws_of([Reaching(reach)], Fluid())
+    force = mine(CentreForce, kernel=staticmethod(logarithmic), reach=reach)
+    with pytest.raises(KernelError, match="Mine: its reach is"):
+        laws_of([force], Fluid())
 
 
 @pytest.mark.parametrize("kind", [CentreForce, SurfaceForce, BodyForce, ContactForce])
 def test_a_force_without_a_kernel_is_refused(kind):
     with pytest.raises(TypeError, match="abstract method"):
-        attrs.frozen(type("Mine", (kind,), {}))()
+        mine(kind)
 
 
 def test_a_force_of_no_kind_is_refused():
     kernel = {"kernel": staticmethod(lambda view: 0.0)}
     with pytest.raises(TypeError, match="acts_on"):
-        attrs.frozen(type("Mine", (PairForce,), kernel))()
+        mine(PairForce, **kernel)
     with pytest.raises(UsageError, match="must subclass BodyForce"):
-        laws_of([attrs.frozen(type("Mine", (Force,), kernel))()], Fluid())
+        laws_of([mine(Force, **kernel)], Fluid())
     with pytest.raises(UsageError, match="found 3"):
         laws_of([3], Fluid())
 
 
-@attrs.frozen
-class Logarithmic(CentreForce):
+def logarithmic(pair):
     """Out of its arithmetic for overlaps, where compiled code gives nan and not an exception."""
-
-    @staticmethod
-    def kernel(pair):
-        return 1e-12 * math.log(pair.gap) / max(pair.gap, 0.0)
+    return 1e-12 * math.log(pair.gap) / max(pair.gap, 0.0)
 
 
 def test_what_lies_beyond_a_kernels_arithmetic_is_no_fault_of_its_form():
-    check_kernel(Logarithmic(), Fluid())
+    check_kernel(mine(CentreForce, kernel=staticmethod(logarithmic)), Fluid())
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from flocsim.forces import (
     SurfaceForce,
     VanDerWaals,
 )
-from flocsim.forces.check import SAMPLE_BODIES, SAMPLE_CONTACTS, sample_pairs
+from flocsim.forces.check import SAMPLE_CONTACTS, sample_pairs
 from flocsim.forces.codegen import laws_of
 
 PAIRS = sample_pairs(1e-6)
@@ -66,15 +66,6 @@ def twice_the_speed_of(body):
 
 
 @attrs.frozen
-class Helped(BodyForce):
-    """Reads the velocity in a helper."""
-
-    @staticmethod
-    def kernel(body):
-        return -1e-6 * speed_of(body), 0.0, 0.0
-
-
-@attrs.frozen
 class HelpedTwice(BodyForce):
     """Reads the velocity in a helper's helper."""
 
@@ -97,20 +88,11 @@ def call(pieces, law, view, *more):
     return pieces.laws[law](view, pieces.parameters, *more)
 
 
-def test_body_forces_add_up():
-    fluid = Fluid(gradient=(0.1, 0.2, 0.3, -0.1))
-    forces = [Gravity(), StokesDrag(), Trap()]
-    for body in SAMPLE_BODIES:
-        parts = [call(laws_of([force], fluid), "body_force", body) for force in forces]
-        total = call(laws_of(forces, fluid), "body_force", body)
-        assert total == pytest.approx([sum(part) for part in zip(*parts, strict=True)], rel=1e-14)
-
-
 @pytest.mark.parametrize(
     "force, velocity, position",
     [
         (Gravity(), False, False), (StokesDrag(), True, False), (Trap(), False, True),
-        (Helped(), True, False), (HelpedTwice(), True, False), (Unpacked(), True, False),
+        (HelpedTwice(), True, False), (Unpacked(), True, False),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BodyForce) else "",
 )  # fmt: skip
@@ -118,11 +100,6 @@ def test_derivatives_are_asked_of_the_forces_that_have_them(force, velocity, pos
     pieces = laws_of([force], Fluid())
     assert ("velocity_derivatives" in pieces.laws) is velocity
     assert ("position_derivatives" in pieces.laws) is position
-
-
-def test_a_flow_that_varies_makes_drag_a_function_of_place():
-    shear = laws_of([StokesDrag()], Fluid(gradient=(0.0, 1.0, 0.0, 0.0)))
-    assert "position_derivatives" in shear.laws
 
 
 def central_difference(pieces, law, pair, field, size):
@@ -163,16 +140,6 @@ def test_a_force_ends_at_its_reach_and_the_scene_at_the_farthest():
         single = Lubrication.kernel(pair, 1e-12, 1e-8)
         assert call(pieces, "surface_force", pair) == pytest.approx(count * single)
     assert call(alone, "surface_force", far) == 0.0
-
-
-def test_contact_forces_and_their_slip_limit():
-    pieces = laws_of([Contact(k_n=20.0, k_t=2.0, friction=0.5)], Fluid())
-    for contact in SAMPLE_CONTACTS:
-        limit = call(pieces, "slip_limit", contact)
-        assert limit == pytest.approx(0.5 * 20.0 * contact.overlap / 2.0)
-    free = laws_of([Contact()], Fluid())
-    assert "slip_limit" not in free.laws
-    assert "contact_force" in free.laws
 
 
 def test_events_of_a_contact_force():

@@ -1,7 +1,6 @@
 """Lubrication: its law, against the plain reference, and the closed forms of an approach."""
 
 import math
-from dataclasses import replace
 
 import attrs
 import numpy as np
@@ -75,20 +74,6 @@ def test_loads_are_the_references(seed):
     assert (np.abs(found - wanted) <= 1e-8 * scale * np.array([1.0, 1.0, size])).all()
 
 
-def test_it_takes_no_momentum_and_no_turn_moves_it():
-    case = random_case(3)
-    still = np.zeros_like(case.plain.velocities)
-    rigid = still.copy()
-    place, spin = case.plain.positions, 40.0
-    rigid[:, 0], rigid[:, 1], rigid[:, 2] = -spin * place[:, 1], spin * place[:, 0], spin
-    for velocity in (still, rigid + [1e-3, 2e-3, 0.0]):
-        plain = replace(case.plain, velocities=velocity)
-        found = FastScene(
-            fast_system(plain, [Lubrication()], case.fluid, **case.material), jit=False
-        )
-        assert np.abs(found.loads()[:, :2]).max() < 1e-12 * FILM / 1e-9
-
-
 def pair(gap):
     """Two spheres a gap apart, one above the other, which is held; next to no inertia."""
     return [
@@ -135,15 +120,6 @@ def test_the_least_gap_lets_bodies_touch_in_a_known_time():
     times = np.linspace(0.8, 1.2, 401) * expected
     touch = np.interp(0.0, -gaps_of(run, times), times)
     assert touch == pytest.approx(expected, rel=1e-3)
-
-
-def test_what_it_takes_from_the_push_is_its_work():
-    push, start = 1e-12, 1e-6
-    until = 2.0 * FILM / push
-    run = System(pair(start), [Push(push), Lubrication()], Implicit(1e-10), WATER)
-    found = run.run(until, jit=False).energies()
-    way = start * (1.0 - math.exp(-2.0))
-    assert found.work["Lubrication"][-1] == pytest.approx(-push * way, rel=1e-3, abs=0.0)
 
 
 def test_keys_are_checked():

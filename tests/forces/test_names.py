@@ -10,8 +10,8 @@ import pytest
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.fields import quantity
-from flocsim.forces import CentreForce, Contact, Gravity, SurfaceForce
-from flocsim.forces.base import names_of, told_apart
+from flocsim.forces import CentreForce, Contact, Gravity
+from flocsim.forces.base import names_of
 from flocsim.forces.codegen import laws_of
 from flocsim.swarms.swarm import Swarm
 
@@ -38,26 +38,6 @@ class Pull(CentreForce):
     @staticmethod
     def kernel(pair, k, hole):
         return math.nan if pair.gap < hole else -k
-
-
-@attrs.frozen
-class Skin(SurfaceForce):
-    """−k between outlines."""
-
-    k: float = quantity("N", default=1e-15)
-
-    @property
-    def reach(self):
-        return 1e-7
-
-    @staticmethod
-    def kernel(pair, k):
-        return -k
-
-
-def test_further_ones_of_a_name_are_numbered():
-    assert told_apart(["a", "b", "a", "a", "b"]) == ["a", "b", "a (2)", "a (3)", "b (2)"]
-    assert names_of([Pull(), Gravity(), Pull()]) == ["Pull", "Gravity", "Pull (2)"]
 
 
 @pytest.mark.parametrize("order", [*itertools.permutations(range(3))])

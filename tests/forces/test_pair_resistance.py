@@ -10,7 +10,6 @@ from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
 from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal, VanDerWaals
 from flocsim.hydrodynamics import SpherePair
-from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.fast_scene import FastScene
@@ -157,11 +156,6 @@ def least_of_real_pairs(pairs, poses, law, jit):
 
 
 @pytest.mark.slow
-def test_no_motion_of_two_real_flocs_gets_work_back():
-    assert least_of_real_pairs(3, 100, "shape", jit=False) > 0.3
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ["stokes", "shape"])
 def test_no_motion_of_two_real_flocs_gets_work_back_in_any_of_many_poses(law):
     assert least_of_real_pairs(25, 2_000, law, jit=True) > 0.2
@@ -272,10 +266,3 @@ def test_what_it_does_not_go_with_is_refused(bodies, more, words):
 def test_a_swarm_has_none():
     with pytest.raises(UsageError, match="a swarm cannot have it"):
         Swarm(spheres(5e-6, 5e-6), [StokesDrag(), PairResistance()])
-
-
-def test_engines_without_it_compile_none_of_it():
-    system = System(spheres(5e-6, 5e-6), [StokesDrag()])
-    with_water = System(spheres(5e-6, 5e-6), WATER)
-    assert set(system.fillings()) - set(with_water.fillings())
-    assert evaluate_as_they_lie(with_water.scene(jit=False), FastScene(with_water, jit=False).work)

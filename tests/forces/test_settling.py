@@ -22,16 +22,6 @@ def alone(radius=5e-6, forces=None, fluid=None, fixed=False, **weight):
     return System([body], forces, fluid=fluid or Fluid()), body
 
 
-@pytest.mark.parametrize(
-    ("radius", "speed"),
-    [(4.62e-6, 0.0864e-3), (4.95e-6, 0.0992e-3), (16.41e-6, 1.090e-3), (23.02e-6, 2.146e-3)],
-)
-def test_quartz_spheres_in_water(radius, speed):
-    velocity, _ = terminal_motion(*alone(radius, fluid=Fluid(buoyancy=True)))
-    assert velocity[0] == 0.0
-    assert -velocity[1] == pytest.approx(speed, rel=1e-3)
-
-
 @pytest.mark.parametrize("weight", [{"surface_density": 2.0}, {"density": 2650.0, "depth": 1e-5}])
 def test_stokes_velocity_and_mobility(weight):
     system, body = alone(7e-6, **weight)
@@ -45,11 +35,6 @@ def test_buoyancy_takes_the_displaced_weight_off():
     with_it, _ = terminal_motion(*alone(fluid=Fluid(buoyancy=True)))
     without, _ = terminal_motion(*alone())
     assert with_it[1] / without[1] == pytest.approx(1.0 - 997.0 / 2650.0, rel=1e-10)
-
-
-def test_a_fixed_body_stays():
-    velocity, mobility = terminal_motion(*alone(fixed=True))
-    assert (velocity.tolist(), mobility) == ([0.0, 0.0], 0.0)
 
 
 def test_a_flow_carries_the_body_along():

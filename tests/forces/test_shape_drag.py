@@ -6,19 +6,17 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
-from flocsim import Body, Fluid, Sphere, SpheroPolygon, Swarm, System
+from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import RangeError, UsageError
-from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
+from flocsim.forces import Gravity, StokesDrag, Thermal
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.drag import (
     body_resistance,
     resistance_matrices,
-    resistance_numbers,
 )
-from flocsim.forces.settling import free_mobilities, held_mobility, terminal_motion
-from flocsim.hydrodynamics import prism_drag, rigid_bodies
+from flocsim.forces.settling import free_mobilities, terminal_motion
+from flocsim.hydrodynamics import prism_drag
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.plausibility import all_settled
 from tests.forces.test_strain import SHEAR, ellipse
@@ -78,25 +76,6 @@ def test_a_disc_of_a_depth_is_a_prism():
     flat = resistance_matrices(body_resistance(body_of(Sphere(3e-6), depth=1e-9)))[0]
     sizes = np.array([3e-6, 3e-6, 2.7e-17])
     assert np.diag(flat) / sizes == pytest.approx([32.0 / 3.0] * 3, rel=0.02)
-
-
-def test_a_resistance_that_is_not_positive_is_refused(monkeypatch):
-    def upside_down(rings, height):
-        return attrs.evolve(prism_drag(rings, height), resistance=-np.eye(3))
-
-    monkeypatch.setattr(rigid_bodies, "prism_drag", upside_down)
-    with pytest.raises(UsageError, match="cannot be computed: its resistance"):
-        body_resistance(body_of(TWO_TO_ONE, depth=1.77 * TWO_TO_ONE.equivalent_radius))
-
-
-def test_numbers_grow_with_the_size_and_are_those_of_the_prism():
-    small, large = (np.array(body_resistance(body_of(HOOK.scaled(by)))) for by in (1.0, 3.0))
-    powers = np.array([1, 1, 1, 2, 2, 3, 2, 2, 3, 2, 2, 3])
-    assert large == pytest.approx(small * 3.0**powers, rel=1e-9)
-    resistance, strain = resistance_matrices(small)
-    drag = prism_drag(HOOK.outline())
-    assert resistance == pytest.approx(drag.resistance, rel=1e-3, abs=1e-4 * resistance[2, 2])
-    assert strain[2] == pytest.approx(drag.strain[2], rel=1e-2)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.6, 2.5])
@@ -207,38 +186,12 @@ def test_all_methods_let_a_hook_fall_and_turn_alike():
         assert other == pytest.approx(ends[0], rel=0.03)
 
 
-def test_the_file_columns_are_nothing_without_it():
-    body = body_of(HOOK)
-    assert resistance_numbers([Gravity(), StokesDrag()], body) == (0.0,) * 12
-    scene = system_of(body, drag=StokesDrag()).scene(jit=False)
-    own = slice(at.RESISTANCE, at.SHIELDING)
-    assert not scene.bodies[:, own].any() and scene.bodies.flags.c_contiguous
-    numbers = system_of(body).scene(jit=False).bodies[0, own]
-    assert numbers == pytest.approx(body_resistance(body), rel=1e-15)
-
-
 def test_sizes_alike_but_of_other_shapes_settle_apart():
     radius = HOOK.equivalent_radius / TWO_TO_ONE.equivalent_radius
     bodies = [body_of(HOOK), body_of(TWO_TO_ONE.scaled(radius), position=(1e-4, 0.0))]
     speeds = [each.speed for each in all_settled(system_of(*bodies))]
     assert len(speeds) == 2 and abs(speeds[0] / speeds[1] - 1.0) > 0.005
     assert "of each body's own outline" in system_of(*bodies).explain()
-
-
-def test_a_swarm_knows_how_far_angles_take_bodies_off():
-    bodies = [body_of(TWO_TO_ONE, 0.7), body_of(Sphere(2e-6), position=(1e-5, 0.0))]
-    forces = [Gravity(), DRAG, Contact(1e-2, 1e-3)]
-    swarm = Swarm(bodies, forces, fluid=WATER)
-    from flocsim.swarms.together.bonds import alone
-
-    velocity, resistance, aslant = alone(swarm)
-    assert aslant[1] == pytest.approx(0.0, abs=1e-12) and aslant[0] > 0.0
-    assert resistance[0] == pytest.approx(1.0 / held_mobility(swarm.system, bodies[0]))
-    speeds = [
-        terminal_motion(swarm.system, attrs.evolve(bodies[0], angle=angle))[0]
-        for angle in np.linspace(0.0, math.pi, 40)
-    ]
-    assert np.hypot(*(np.array(speeds) - velocity[0]).T).max() <= aslant[0] * (1.0 + 1e-6)
 
 
 def test_what_cannot_be_is_refused():

@@ -10,7 +10,7 @@ from flocsim.errors import RangeError
 from flocsim.forces import StokesDrag
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
-from flocsim.integrators import DormandPrince54, Implicit, Overdamped
+from flocsim.integrators import Implicit, Overdamped
 from tests.helpers.tiers import rest_slow
 
 SHEAR = 10.0
@@ -78,15 +78,6 @@ def test_an_ellipse_turns_once_in_jefferys_period(method):
     """2π (a/b + b/a)/G = 20.944/G for 3 : 1, from any angle."""
     assert 2.0 * math.pi * (3.0 + 1.0 / 3.0) == pytest.approx(20.944, abs=5e-4)
     assert period_of(method) == pytest.approx(20.944 / SHEAR, rel=5e-4)
-
-
-def test_an_explicit_method_finds_the_same_orbit():
-    body = Body(THREE_TO_ONE, angle=0.2, surface_density=1.0)
-    ends = [
-        System([body], [DRAG], method, FLOW).run(0.2, jit=False).position[-1, 0, 2]
-        for method in (Implicit(1e-10), DormandPrince54(1e-10))
-    ]
-    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
 
 
 def torque(angle, flow, shape=THREE_TO_ONE, spin=0.0, drag=DRAG):

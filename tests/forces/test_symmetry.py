@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from flocsim import SpheroPolygon
 from tests.helpers.fast_scene import FORCES, FastScene, random_case, silenced
 from tests.helpers.tiers import rest_slow
 from tests.reference.samples import SEEDS
@@ -126,13 +125,3 @@ def test_the_first_vertex_does_not_matter(seed):
     slips = renamed(case.slips, number, number)
     plain = Scene(bodies, case.plain.positions, case.plain.velocities)
     assert_same_loads(pair_loads(replace(case, plain=plain, slips=slips)), pair_loads(case))
-
-
-@by_scene
-def test_vertices_given_clockwise_make_the_same_shape(seed):
-    for body in random_case(seed).plain.bodies:
-        if len(body.vertices) > 2:
-            forwards = SpheroPolygon(body.vertices, body.radius)
-            reverse = SpheroPolygon(np.roll(body.vertices[::-1], 1, axis=0), body.radius)
-            assert reverse.vertices == pytest.approx(forwards.vertices, rel=1e-12, abs=1e-20)
-            assert reverse.area == pytest.approx(forwards.area, rel=1e-13)
