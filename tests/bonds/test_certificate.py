@@ -23,7 +23,7 @@ from flocsim.constants import BOLTZMANN
 from flocsim.forces import Contact, VanDerWaals
 from tests.helpers.hydration import Hydration
 from tests.helpers.trial_scenes import Spring
-from tests.helpers.two_bodies import TwoBodies, load, polygon
+from tests.helpers.two_bodies import TwoBodies, load
 
 RADII = (4e-6, 5e-6)
 REDUCED = RADII[0] * RADII[1] / sum(RADII)
@@ -122,17 +122,3 @@ def test_in_kicks_a_well_has_to_be_deep(depth, held):
     two, _ = in_well(1e-16, hamaker, layer=layer)
     pull = load(1e-18, kicks=energy)
     assert is_certain_in_kicks(two.scene, two.work, 0.0, two.bond, pull) == held
-
-
-def test_a_cluster_pries_with_its_own_length():
-    """A lever longer than the two, and no trap where others may add their energy."""
-    square, _ = polygon([(-3, -3), (3, -3), (3, 3), (-3, 3)])
-    places = [(0.0, 0.0, 0.0), (0.0, -6.1e-6 + 1e-10, 0.0)]
-    two = TwoBodies([square, square], places, [VanDerWaals(1e-17), Contact()])
-    ratio = certificate.leverage(two.work, two.bond, 0.0)
-    assert ratio == pytest.approx(math.hypot(3.0, 3.05) / 3.0, rel=1e-2)
-    assert certificate.leverage(two.work, two.bond, 3e-5) == pytest.approx(10.0, rel=1e-2)
-    most = capacity(two.scene, two.work, 0.0, two.bond, 0.0, WHATEVER)[2]
-    for force, lever, held in ((0.9, 0.0, True), (1.1, 0.0, False), (0.9, 3e-5, False)):
-        pull = load(force * most / (SAFETY * ratio), lever=lever)
-        assert certificate.is_held(two.scene, two.work, 0.0, two.bond, pull) == held

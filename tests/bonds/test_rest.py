@@ -84,12 +84,6 @@ def test_what_touches_side_by_side_does_not_hook(friction):
         assert not hooked(two, (0.0, 0.0))
 
 
-def test_two_spheres_never_hook_even_pressed_on_a_fixed_one():
-    discs = [Sphere(1e-6), Sphere(2e-6)]
-    two = TwoBodies(discs, [(0, 0, 0), (0, 3e-6 - 1e-10, 0)], [Contact()], fixed=(True, False))
-    assert not hooked(two)
-
-
 def test_a_sphere_in_a_cup_is_carried_by_it():
     cup = [(-3, 4), (-3, -1), (3, -1), (3, 4), (2.5, 4), (0.0, -0.5), (-2.5, 4)]
     shape, place = polygon(cup)

@@ -11,7 +11,7 @@ from flocsim.body import Fluid
 from flocsim.brownian import repulsion, splitting_probability, stability_ratio
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import UsageError
-from flocsim.forces import Contact, DoubleLayer, Gravity, OrientedForce, VanDerWaals
+from flocsim.forces import DoubleLayer, OrientedForce, VanDerWaals
 from flocsim.geometry.contact.attraction import attraction_energy
 from flocsim.geometry.contact.charges import layer_energy
 from flocsim.geometry.shapes.pieces import outline_pieces
@@ -32,10 +32,6 @@ def test_without_forces_it_is_a_logarithm_or_a_reciprocal(release, escape):
     assert flat == pytest.approx(math.log(escape / release) / math.log(escape), abs=1e-9)
     round_ = splitting_probability([], radii, release, escape, dimensions=3)
     assert round_ == pytest.approx((1 / release - 1 / escape) / (1.0 - 1 / escape), abs=1e-9)
-
-
-def test_released_at_twice_the_distance_of_four_it_is_even():
-    assert splitting_probability([], (0.5, 0.5), 2.0, 4.0) == pytest.approx(0.5, abs=1e-9)
 
 
 @pytest.mark.parametrize("gap", ["equivalent_spheres", "surface"])
@@ -63,13 +59,6 @@ def test_it_is_the_integral_over_the_potential():
     outer = integral(1e-7, 4e-7)
     found = splitting_probability(colloid(), SMALL, 3e-7, 6e-7)
     assert found == pytest.approx(outer / (inner + outer), rel=2e-4)
-
-
-def test_forces_that_are_none_between_bodies_do_not_matter():
-    more = [*colloid(), Gravity(), Contact()]
-    assert splitting_probability(more, SMALL, 3e-7, 6e-7) == splitting_probability(
-        colloid(), SMALL, 3e-7, 6e-7
-    )
 
 
 def test_stability_ratio():
@@ -103,14 +92,6 @@ def test_bad_input_is_refused(changed, words):
     given = {"forces": [], "radii": SMALL, "release": 3e-7, "escape": 6e-7} | changed
     with pytest.raises(UsageError, match=words):
         splitting_probability(**given)
-
-
-def test_colder_bodies_meet_less_often_across_a_barrier():
-    barrier = [DoubleLayer(30e-3, 3.04e-9)]
-    found = [
-        splitting_probability(barrier, SMALL, 3e-7, 6e-7, temperature=t) for t in (250, 300, 350)
-    ]
-    assert np.all(np.diff(found) > 0.0)
 
 
 def energies(shape, gaps, depth, potential=14e-3, debye_length=3.04e-9):

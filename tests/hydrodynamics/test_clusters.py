@@ -103,17 +103,6 @@ def test_a_cluster_resists_less_than_its_bodies_alone_and_more_than_any(drawn):
         assert 1.0 / radii[:count].sum() < values[0] <= values[1] < 1.0 / radii[:count].max()
 
 
-def test_shares_make_the_least_of_the_sum(drawn):
-    places, radii = drawn
-    shares = radii / radii.sum()
-    alike = np.zeros((2, 2))
-    for i, (place, a) in enumerate(zip(places, radii, strict=True)):
-        for j, (other, b) in enumerate(zip(places, radii, strict=True)):
-            xx, xy, yy = (ALONE / a, 0.0, ALONE / a) if i == j else push(*(place - other), a, b)
-            alike += shares[i] * shares[j] * np.array([[xx, xy], [xy, yy]]) / ALONE
-    assert np.trace(mobility(places, radii)) < np.trace(alike)
-
-
 def test_cells_of_many_bodies_count_as_the_bodies_do(monkeypatch):
     rng = np.random.default_rng(4)
     turns = 0.5 * rng.normal(size=400).cumsum()

@@ -70,11 +70,6 @@ def test_without_water_and_forces_all_of_the_kernel_touches(flow, rate):
     assert meeting.in_flow(flow, rate) == pytest.approx(1.0, rel=1e-3)
 
 
-def test_without_water_and_forces_spheres_settle_straight():
-    meeting = Meeting(SpherePair((0.4, 1.0)), np.zeros_like, 1e-6, water=False)
-    assert meeting.settling((0.2, 3.0)) == pytest.approx(1.0, rel=5e-4)
-
-
 @pytest.mark.slow
 def test_a_small_one_goes_round_a_large_one(long_steps):
     # Of spheres of one density that do not attract each other, the more is left the nearer they
@@ -165,7 +160,8 @@ def test_what_water_passes_through_touches_as_its_solid_inside_does_at_a_distanc
     assert found * (1.6 + passed) ** 2 == pytest.approx(solid * 1.6**2, rel=2e-3)
 
 
-@pytest.mark.parametrize("flow", ["", pytest.param("shear", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("flow", ["", "shear"])
 def test_permeable_spheres_touch_more_often_than_solid_ones(long_steps, flow):
     radii = (0.5, 1.0)
     found = permeable(radii, 1e-4, flow)

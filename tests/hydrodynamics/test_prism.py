@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import prism_drag, rigid_bodies
 from tests.helpers.real_images import silhouettes
@@ -27,27 +26,6 @@ def test_an_ellipse_of_two_to_one():
     assert drag.mobility == pytest.approx([1.007, 0.886], rel=0.015)
     # Of an ellipsoid (a² − b²)/(a² + b²).
     assert drag.elongation == pytest.approx(0.6, rel=0.03)
-
-
-@pytest.mark.parametrize("count", [400, 800])
-def test_a_sphere_of_spheres(count):
-    # By the same pushes and the same limit: from two coverings to none.
-    speeds, spacings = [], []
-    for number in (count // 2, count):
-        place = np.arange(number) + 0.5
-        z, angle = 1.0 - 2.0 * place / number, np.pi * (1.0 + 5.0**0.5) * place
-        flat = np.sqrt(1.0 - z * z)
-        points = np.column_stack([flat * np.cos(angle), flat * np.sin(angle), z])
-        spacings.append((4.0 * np.pi / number) ** 0.5)
-        radius = rigid_bodies.RADIUS * spacings[-1]
-        matrix = np.moveaxis(rigid_bodies.pushes(points, points, radius), 2, 1)
-        matrix = matrix.reshape(3 * number, 3 * number)
-        wanted = np.tile(np.eye(3), (number, 1))
-        speeds.append(6.0 * np.pi / (wanted.T @ np.linalg.solve(matrix, wanted))[0, 0])
-    wide, fine = spacings
-    limit = speeds[1] + (speeds[1] - speeds[0]) * fine / (wide - fine)
-    assert limit == pytest.approx(1.0, abs=6e-3)
-    assert 0.95 < speeds[1] < 1.0
 
 
 @pytest.mark.slow
@@ -100,19 +78,6 @@ def test_holes_count():
     assert ring.radius == pytest.approx(0.8, rel=1e-3)
     # What is let through and what is not: less area, as wide.
     assert ring.mobility.max() < prism_drag([DISC]).mobility.min()
-
-
-def test_shapes_of_flocsim():
-    sphere, square = Sphere(2e-6), SpheroPolygon(1e-6 * HOOK, 2e-7)
-    drag = prism_drag(sphere.outline())
-    assert drag.radius == pytest.approx(2e-6, rel=5e-3)
-    assert drag.mobility == pytest.approx(prism_drag([DISC]).mobility, rel=5e-3)
-    assert prism_drag(square.outline()).mobility.max() < 1.0
-
-
-def test_a_deeper_prism_sinks_more_slowly():
-    shallow, deep = (prism_drag([DISC], depth).mobility[0] for depth in (1.0, 3.0))
-    assert deep < shallow
 
 
 @pytest.mark.slow

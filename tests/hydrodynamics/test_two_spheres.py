@@ -29,13 +29,6 @@ def test_both_pulled_across(gap, value):
     assert ONE * (across[0, 0] + across[0, 1]) == pytest.approx(value, abs=1e-4)
 
 
-def test_both_pulled_along():
-    # Stimson and Jeffery (1926) for spheres that touch: 1/.64514.
-    along = mobility(EQUAL, 1e-8)[0]
-    assert ONE * (along[0, 0] + along[0, 1]) == pytest.approx(1.0 / 0.645141, rel=1e-5)
-    assert ONE * (along[0, 0] + along[0, 1]) == pytest.approx(1.5497, rel=5e-4)
-
-
 @pytest.mark.parametrize(("gap", "value"), [(0.01, 0.018719), (0.1, 0.134893)])
 def test_pulled_apart(gap, value):
     along = mobility(EQUAL, gap)[0]
@@ -125,9 +118,7 @@ def test_point_forces_say_the_same(ratio):
         assert known_strain[0] == pytest.approx(strain[places, column], abs=2e-4 * largest)
 
 
-@pytest.mark.parametrize(
-    "ratio", rest_slow([0.02, 0.1, *RATIOS, 50.0], lambda ratio: ratio in (0.02, 0.5))
-)
+@pytest.mark.parametrize("ratio", rest_slow([0.02, 0.1, *RATIOS, 50.0], lambda ratio: ratio == 0.5))
 def test_the_resistance_is_positive_and_reciprocal(ratio):
     pair = SpherePair((1.0, ratio))
     gap = np.geomspace(1e-7, 1e3, 60) * (1.0 + ratio)
@@ -157,16 +148,6 @@ def test_turning_as_one_squeezes_nothing(ratio):
     as_one = np.stack([-arm, arm, np.ones(2), np.ones(2)], axis=1)
     loads = np.einsum("kij,kj->ki", pair.across(gap)[0], as_one)
     assert loads[0] == pytest.approx(loads[1], rel=1e-4, abs=1e-3)
-
-
-@pytest.mark.parametrize("ratio", rest_slow([0.1, 0.5, 1.0], lambda ratio: ratio == 0.5))
-def test_what_is_left_of_lubrication_falls_as_it_should(ratio):
-    # Σ k² |rest| converges for each function where its singular terms are those of the series.
-    for (family, on, of), each in functions_of(ratio).items():
-        k = 2.0 * np.arange(len(each.rest)) + each.odd
-        late = np.abs(each.rest[k > 200.0] * k[k > 200.0] ** 2).max()
-        early = np.abs(each.rest[k < 100.0] * k[k < 100.0] ** 2).max()
-        assert late < 0.35 * early, (family, on, of)
 
 
 @pytest.mark.slow

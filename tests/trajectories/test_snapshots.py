@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from flocsim import Sphere
 from flocsim.ensembles.pairs.opened import replicate_of
-from flocsim.trajectories.figures import frames_at, frames_of, instants_along, travelled
+from flocsim.trajectories.figures import frames_of, instants_along, travelled
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_study
-
-TWO = (Sphere(2e-6), Sphere(1e-6))
 
 
 def fall(count=101):
@@ -50,20 +47,6 @@ def test_evenly_along_the_way_not_in_time():
 def test_what_stays_where_it_is_is_seen_at_its_start_and_end():
     times, position = fall(3)
     assert instants_along(times, 0.0 * position, SIZES, 6).tolist() == [0.0, 1.0]
-
-
-def test_frames_are_seen_from_the_receiver():
-    times, position = fall()
-    rows = [0, 25, 50, 75, 100]
-    frames = frames_at(TWO, times[rows], position[rows], position)
-    assert len(frames.outlines) == len(frames.contacts) == len(frames.times)
-    for (receiver, approaching), distance in zip(
-        frames.outlines, frames.centre_distance, strict=True
-    ):
-        np.testing.assert_allclose(receiver[0].mean(axis=0), 0.0, atol=1e-7)
-        assert approaching[0][:, 1].min() == pytest.approx(distance - 1e-6, rel=1e-6)
-    assert np.all(frames.paths[0] == 0.0)
-    np.testing.assert_allclose(frames.paths[1][-1], [0.0, 3e-6], atol=1e-12)
 
 
 def test_contacts_show_where_the_outlines_touch(tmp_path):
