@@ -7,8 +7,7 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.forces import CentreForce, Contact
-from flocsim.geometry.contact.candidates import list_candidates, spent, time_within
-from flocsim.integrators.loop.driver import too_deep
+from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.system import System
 
 SQUARE = SpheroPolygon([(-1e-5, -1e-5), (1e-5, -1e-5), (1e-5, 1e-5), (-1e-5, 1e-5)], 1e-6)
@@ -48,20 +47,6 @@ def test_pairs_with_a_free_body_are_listed_and_no_others(count, free, shape):
     rows = work.candidates[: work.tally[at.CANDIDATES], [at.VERTEX_BODY, at.EDGE_BODY]].tolist()
     assert all(a in free or b in free for a, b in rows)
     assert bool(rows) == bool(free)
-
-
-@pytest.mark.parametrize("count", [3, at.ALL_PAIRS + 2])
-def test_what_fixed_bodies_do_to_each_other_counts_for_nothing(count):
-    """Not for the depth of overlaps, nor for how long a list is good."""
-    bodies = crossing(count, (), Sphere(1e-5))
-    bodies.append(Body(Sphere(1e-6), (0.0, 1e-3), velocity=(0.0, -1e-3), density=2650.0))
-    scene, work = listed(bodies)
-    assert not too_deep(scene, work)
-    assert spent(scene, work, 0) == 0.0
-    alone, own = listed([bodies[0], bodies[-1]])
-    assert time_within(scene, work, 0.5) >= (
-        0.5 * time_within(alone, own, 0.5) if count <= at.ALL_PAIRS else 0.0
-    )
 
 
 class Push(CentreForce):

@@ -82,13 +82,6 @@ def test_potential_is_one_all_along_the_outline():
     np.testing.assert_allclose(potential, 1.0, atol=0.02)
 
 
-def test_many_charges_are_solved_for_by_those_near_each(monkeypatch):
-    shape, other = SpheroPolygon(3.0 * SQUARE, 1.0), SpheroPolygon(3.0 * SQUARE, 1.0)
-    known = charges_of_shape(shape, 1.0)
-    monkeypatch.setattr(charges, "DENSE", 10)
-    np.testing.assert_allclose(charges_of_shape.__wrapped__(other, 1.0), known, atol=1e-4)
-
-
 def test_charges_behind_reflex_corners_do_not_grow_against_each_other():
     turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     away = 6.0 + 3.0 * np.cos(12.0 * turn)

@@ -9,24 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flocsim.arrays as at
-from flocsim import Body, Composite, Fluid, Sphere, SpheroPolygon
+from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import (
-    CIRCLE_RADIUS,
-    CIRCLE_X,
-    CIRCLE_Y,
     core_distance,
     list_polygons,
     pose_of,
-    run_of,
-    side_of,
 )
 from flocsim.geometry.contact.points import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
-from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, cross, drawn, framed
+from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, framed
 
 list_compounds = compose(list_polygons, compounds.FILLINGS, jit=False)
 swollen_distance = compose(core_distance, compounds.FILLINGS, jit=False)
@@ -106,54 +101,6 @@ def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
         assert gap == pytest.approx(min(gaps.values()), abs=1e-9)
 
 
-@given(*DRAWN)
-def test_the_gap_is_that_of_shapely(a, b, x, y, turn_a, turn_b):
-    import shapely
-    from shapely import affinity
-
-    scene, work = placed(a, b, x, y, turn_a, turn_b)
-    there = affinity.rotate(drawn(b, 60), turn_b, (0.0, 0.0), use_radians=True)
-    there = affinity.translate(there, x, y)
-    here = affinity.rotate(drawn(a, 60), turn_a, (0.0, 0.0), use_radians=True)
-    apart = shapely.distance(here, there)
-    pose = pose_of(scene, work, 1, 0)
-    gap = swollen_distance(scene, 1, 0, pose) - scene.bodies[:, at.RADIUS].sum()
-    if apart > 1e-2:
-        assert gap == pytest.approx(apart, abs=2e-3)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-def test_circles_hold_their_runs(shape):
-    scene, _ = placed(shape, SHAPES[0], 40.0, 0.0, 0.0, 0.0)
-    tree = compounds.compound_tree(shape)
-    rows = compounds.point_columns(shape)
-    side = side_of(scene, 0)
-    node, leaves = 1, side[3]
-    while node < 2 * leaves:
-        least = node
-        while least < leaves:
-            least *= 2
-        most = least + leaves // (1 << (node.bit_length() - 1))
-        first, last = run_of(side, least)[0], run_of(side, most - 1)[1]
-        x, y, reach = tree[node, CIRCLE_X], tree[node, CIRCLE_Y], tree[node, CIRCLE_RADIUS]
-        for point in range(first, last):
-            for each in (point, point + int(rows[point, compounds.ONWARD])):
-                away = math.hypot(rows[each, 0] - x, rows[each, 1] - y)
-                assert away + rows[each, compounds.SWELL] <= reach * (1.0 + 1e-9)
-        node += 1
-
-
-def test_corners_follow_each_other_in_a_ring_alone():
-    scene, _ = placed(framed(), cross(), 40.0, 0.0, 0.0, 0.0)
-    for body, shape in enumerate((framed(), cross())):
-        points, _, edges = features(shape, (0.0, 0.0, 0.0))
-        meet = {(p, p) for p in range(len(points))} | {*edges} | {(q, p) for p, q in edges}
-        first = scene.first[body]
-        for p, q in product(range(len(points)), repeat=2):
-            found = compounds.same_corner(scene, body, first + p, first + q)
-            assert found == ((p, q) in meet)
-
-
 def test_a_disk_in_a_hole_starts_there():
     frame, disk = framed(), Sphere(1.5)
     for x, fault in ((0.0, None), (0.45, None), (1.0, None), (2.6, "one core"), (4.0, "one core")):
@@ -170,10 +117,3 @@ def test_contacts_of_parts_are_seen():
     found = placed_contacts([beads_there, Sphere(0.5)], touching)
     assert len(found) > 0 and np.ptp(found, axis=0).max() < 1e-12  # once from either side
     assert found[0] == pytest.approx([tip[0], tip[1] - 2.0], abs=2e-3)
-
-
-def test_a_lone_disk_as_a_part_is_a_disk():
-    scene, work = placed(Composite([(Sphere(1.0), (7.0, 3.0))]), Sphere(2.0), 3.5, 0.0, 0.0, 0.0)
-    assert list_compounds(scene, work, 0, 1.0) and work.tally[at.CANDIDATES] == 1
-    pose = pose_of(scene, work, 1, 0)
-    assert swollen_distance(scene, 1, 0, pose) == pytest.approx(3.5, rel=1e-14)

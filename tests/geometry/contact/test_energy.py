@@ -5,14 +5,11 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
 from flocsim.geometry.contact.attraction import attraction_energy
 from flocsim.geometry.shapes.pieces import (
     outline_pieces,
-    pieces_of_shape,
-    pieces_that_count,
     polygon_pieces,
 )
 
@@ -64,31 +61,6 @@ def test_the_far_field_is_that_of_areas(angle):
     found = attraction_energy(SQUARE, SQUARE, (away, 0.0, angle), 1.0)
     points = -3.0 / (8.0 * math.pi) / away**5
     assert found == pytest.approx(points * (1.0 + 6.25 * 2.0 * second / away**2), rel=2e-5)
-
-
-def test_the_outline_closes_and_has_the_area_of_the_shape():
-    """∮ x·n ds = 2 A of a shape with reflex corners, whose offsets cross."""
-    star = np.array([[3, 0], [0.6, 0.5], [0, 3], [-0.5, 0.6], [-3, 0], [0, -0.4], [1, -2.0]])
-    shape = SpheroPolygon(star, radius=0.4)
-    x, y, way_x, way_y, size, bend, *_ = outline_pieces(shape.parts).T
-    flat = bend == 0.0
-    normal = np.column_stack([way_y[flat], -way_x[flat]])
-    twice = np.sum(2.0 * size[flat] * np.sum(np.column_stack([x, y])[flat] * normal, axis=1))
-    half = 2.0 * np.arctan(size[~flat])
-    out = 2.0 * np.sin(half) * (x * way_x + y * way_y)[~flat] * bend[~flat]
-    twice += np.sum(out + 2.0 * half * bend[~flat] ** 2)
-    assert twice == pytest.approx(2.0 * shape.area, rel=1e-9)
-
-
-def test_what_rounding_leaves_of_a_side_is_not_looked_at():
-    """At reflex corners; the length of the outline is the same without."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
-    away = np.where(np.arange(12) % 2 == 0, 3e-6, 1.5e-6)[:, None]
-    shape = SpheroPolygon(away * np.column_stack([np.cos(turn), np.sin(turn)]), 4e-7)
-    whole, kept = pieces_of_shape(shape), pieces_that_count(shape)
-    assert kept[:, at.EXTENT].min() > 1e-7 * kept[:, at.EXTENT].max()
-    lengths = [np.sum(each[each[:, at.BEND] == 0.0, at.SIZE]) for each in (whole, kept)]
-    assert lengths[1] == pytest.approx(lengths[0], rel=1e-6)
 
 
 def test_what_is_no_polygon_is_refused():

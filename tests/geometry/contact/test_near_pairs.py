@@ -12,23 +12,9 @@ from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
-from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.contact.near_pairs import (
-    START,
-    at_leaves,
-    core_distance,
-    descended,
     gap_between,
-    leaves_of,
-    level_runs,
     list_polygons,
-    passed,
-    plan_of,
-    pose_of,
-    reversed_pose,
-    run_of,
-    side_of,
-    tree_of,
 )
 from flocsim.geometry.shapes.cores import edges_of, from_edges
 from tests.helpers.tiers import given_often
@@ -150,15 +136,6 @@ def test_the_list_does_not_depend_on_which_body_is_named_first(drawn, cutoff):
     assert len(one) == len(other)
 
 
-@given_often(20, 60, fewer, fewer)
-def test_the_order_of_the_list_does_not_depend_on_the_place(drawn, other):
-    shapes, places = placed(drawn)
-    elsewhere = placed((*drawn[:2], *other[2:]))[1]
-    lists = [listed(*arrays(shapes, where, ROOM), 1e-6) for where in (places, elsewhere)]
-    common = set(lists[0]) & set(lists[1])
-    assert [key for key in lists[0] if key in common] == [key for key in lists[1] if key in common]
-
-
 @given_often(15, 250, numbers)
 def test_the_gap_is_that_of_all_pairs(drawn):
     shapes, places = placed(drawn)
@@ -168,45 +145,3 @@ def test_the_gap_is_that_of_all_pairs(drawn):
     grain = 1e-15 * max(shape.bounding_radius for shape in shapes) + 1e-15 * np.abs(places).max()
     for a, b in ((0, 1), (1, 0)):
         assert gap(scene, work, a, b) == pytest.approx(expected, rel=1e-12, abs=10 * grain)
-
-
-@given_often(8, 100, numbers)
-def test_a_pose_and_its_reverse_take_points_there_and_back(drawn):
-    scene, work = arrays(*placed(drawn))
-    pose = pose_of(scene, work, 0, 1)
-    assert reversed_pose(pose) == pytest.approx(pose_of(scene, work, 1, 0), rel=1e-9, abs=1e-17)
-    assert core_distance(scene, 0, 1, pose) == pytest.approx(
-        core_distance(scene, 1, 0, reversed_pose(pose)), rel=1e-9, abs=1e-18
-    )
-
-
-@pytest.mark.parametrize("points", COUNTS)
-def test_every_circle_holds_its_run_and_the_leaves_hold_all_points_once(points):
-    core = shape(points, 2).vertices
-    tree = tree_of(core)
-    nodes = [1 << level for level in range(10) if 1 << level <= leaves_of(points)]
-    for count in nodes:
-        circles = tree[count : 2 * count]
-        runs = core[level_runs(points, count)]
-        away = np.hypot(*np.moveaxis(runs - circles[:, None, :2], -1, 0))
-        assert (away <= circles[:, 2:]).all()
-    outlines = outlines_of([shape(4, 1), shape(points, 2)])
-    side = side_of(outlines, 1)
-    runs = [run_of(side, leaf) for leaf in range(side[3], 2 * side[3])]
-    assert [point for run in runs for point in range(*run)] == list(range(4, 4 + points))
-
-
-@pytest.mark.parametrize("points", [(1, 1), (1, 16), (64, 2), (16, 16), (5, 512)])
-def test_the_walk_meets_every_pair_of_leaves_once(points):
-    outlines = outlines_of([shape(count, 4) for count in points])
-    sides = [side_of(outlines, body) for body in (0, 1)]
-    plan = plan_of(outlines.tree, *sides)
-    walk, met = START, []
-    while walk[0] > 0:
-        if at_leaves(plan, walk):
-            met.append(walk[:2])
-            walk = passed(plan, walk)
-        else:
-            walk = descended(plan, walk)
-    leaves = [range(side[3], 2 * side[3]) for side in sides]
-    assert sorted(met) == [(i, j) for i in leaves[0] for j in leaves[1]]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim.geometry.contact import points
 from flocsim.geometry.contact.points import cosine_and_sine
 
 
@@ -31,30 +30,6 @@ def test_what_is_remembered_does_not_show():
     in_turn = [cosine_and_sine(work, 0, angle) for angle in angles]
     assert in_turn == [cosine_and_sine(new_work(), 0, angle) for angle in angles]
     assert in_turn[::-1] == [cosine_and_sine(work, 0, angle) for angle in angles[::-1]]
-
-
-def test_opposite_angles_mirror():
-    work = new_work()
-    for angle in np.random.default_rng(3).uniform(0.0, 9.0, 300):
-        cosine, sine = cosine_and_sine(work, 0, angle)
-        assert cosine_and_sine(work, 0, -angle) == (cosine, -sine)
-
-
-def test_no_turn_is_exact():
-    work = new_work()
-    cosine_and_sine(work, 0, 2.0)
-    assert cosine_and_sine(work, 0, 0.0) == (1.0, 0.0)
-
-
-def test_the_library_is_asked_once_for_angles_near_one_another(monkeypatch):
-    asked = []
-    monkeypatch.setattr(points, "math", SimpleNamespace(
-        cos=lambda angle: asked.append(angle) or math.cos(angle), sin=math.sin, floor=math.floor
-    ))  # fmt: skip
-    work = new_work()
-    for angle in (1.0, 1.001, 0.998, 1.005):
-        cosine_and_sine(work, 0, angle)
-    assert asked == [1.0]
 
 
 def test_no_number_gives_none():

@@ -114,47 +114,6 @@ def square_on_slab(tilt):
     return resting_on(slab([-10e-6, 10e-6]), body, 0.0, 2 * RADIUS - OVERLAP - lowest, 1e-3)
 
 
-def test_what_one_corner_loses_another_carries_on_and_only_along_its_own_tangent():
-    scene, work = square_on_slab(0.0)
-    slide(scene, work, 1e-7, steps=10)
-    before = pull(work)
-    closed = np.count_nonzero(work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] < 0.0)
-    # Turned a little about its centre, the square stands on one corner less.
-    work.motion[at.NOW, 1, 2] = 0.03
-    locate_contacts(scene, work, at.NOW)
-    assert (
-        0 < np.count_nonzero(work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] < 0.0) < closed
-    )
-    energy = np.sum(work.slip[at.NOW] ** 2)
-    hand_over(scene, work)
-    # One spring that holds as much as several have the energy of would hold more than they do.
-    assert np.sum(work.slip[at.NOW] ** 2) == pytest.approx(energy, rel=1e-9)
-    assert 0.5 * abs(before) < abs(pull(work)) < abs(before)
-
-
-def test_a_displacement_is_not_handed_on_across_the_bodies():
-    """The left foot of a table opens, its right foot stands 24 µm away: nothing rolls on."""
-    table = SpheroPolygon(
-        1e-6 * np.array([
-            [-12, -4], [-10, -4], [-10, 0], [10, 0], [10, -4], [12, -4], [12, 4], [-12, 4],
-        ]),
-        RADIUS,
-    )  # fmt: skip
-    body = Body(table, surface_density=2.0)
-    lowest = table.placed_vertices()[:, 1].min()
-    scene, work = resting_on(slab([-30e-6, 30e-6]), body, 0.0, 2 * RADIUS - OVERLAP - lowest, 1e-3)
-    slide(scene, work, 1e-7, steps=10)
-    held = work.slip[at.NOW].copy()
-    work.motion[at.NOW, 1, 2] = 0.03
-    locate_contacts(scene, work, at.NOW)
-    open_now = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] >= 0.0
-    assert np.any(held[: len(open_now)][open_now] != 0.0)
-    hand_over(scene, work)
-    closed = np.flatnonzero(~open_now)
-    assert closed.size > 0
-    assert work.slip[at.NOW, closed] == pytest.approx(held[closed], rel=1e-12)
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     rng = np.random.default_rng(seed)
@@ -168,46 +127,6 @@ def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     assert np.sum(work.slip[at.NOW] ** 2) <= energy * (1.0 + 1e-12)
     opened = work.geometry[at.NOW, :rows, 2] >= 0.0
     assert not work.slip[at.NOW, :rows][opened].any()
-
-
-def test_a_displacement_goes_to_a_pair_of_the_same_two_bodies_only():
-    ball = Body(Sphere(BALL), surface_density=2.0)
-    bodies = [slab([-10e-6, 12e-6]), ball, ball]
-    scene = scene_of(bodies, Fluid(), [])
-    height = RADIUS + BALL
-    position = np.array([
-        [*bodies[0].position, 0.0], [0.0, height + OVERLAP, 0.0], [3.9e-6, height - OVERLAP, 0.0],
-    ])  # fmt: skip
-    work = work_of(scene, position, np.zeros((3, 3)))
-    assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
-    gap = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2]
-    opened = int(np.flatnonzero(gap >= 0.0)[0])
-    work.slip[at.NOW, opened] = 1e-9
-    hand_over(scene, work)
-    assert not work.slip[at.NOW].any()
-
-
-def test_where_two_corners_meet_the_pair_that_is_displaced_least_takes_over():
-    """Four pairs have one point there: which of them rounding puts nearest means nothing."""
-    tip = 4e-6 * np.array([[-1, 0], [-0.05, -0.975], [0, -1], [0.05, -0.975], [1, 0]])
-    shape = SpheroPolygon(np.vstack([tip, -tip[1:-1]]), RADIUS)
-    fixed, body = (Body(shape, surface_density=2.0) for _ in range(2))
-    height = 8e-6 + 2 * RADIUS - OVERLAP
-    for which in range(4):
-        scene = scene_of([fixed, body], Fluid(), [])
-        work = work_of(scene, np.array([[0.0, 0.0, 0.0], [0.0, height, 0.0]]), np.zeros((2, 3)))
-        assert list_candidates(scene, work)
-        locate_contacts(scene, work, at.NOW)
-        gap = work.geometry[at.NOW, : work.tally[at.CANDIDATES], at.GAP]
-        closed, opened = np.flatnonzero(gap < 0.0), int(np.flatnonzero(gap >= 0.0)[0])
-        assert len(closed) == 4
-        slips = np.full(4, 2e-9)
-        slips[which] = 1e-10
-        work.slip[at.NOW, closed], work.slip[at.NOW, opened] = slips, 1e-9
-        hand_over(scene, work)
-        changed = np.flatnonzero(work.slip[at.NOW, closed] != slips)
-        assert changed.tolist() == [which]
 
 
 def test_listing_anew_keeps_every_displacement():

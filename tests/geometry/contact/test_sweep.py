@@ -1,4 +1,4 @@
-"""The sweep for near discs, held against all pairs."""
+"""The sweep for near discs, against all pairs."""
 
 import math
 
@@ -69,17 +69,3 @@ def test_a_box_shifted_by_any_vector_has_the_same_pairs():
     moved = discs.copy()
     moved[:, [PLACE_X, PLACE_Y]] += rng.uniform(-30.0, 30.0, 2)
     assert found(moved, (10.0, 8.0)) == found(discs, (10.0, 8.0))
-
-
-def test_the_order_from_before_changes_nothing():
-    rng = np.random.default_rng(4)
-    discs = random_discs(rng, 50, BOXES[0])
-    expected = found(discs, BOXES[0])
-    assert found(discs, BOXES[0], rng.permutation(50)) == expected
-
-
-def test_without_room_it_says_how_much_is_needed():
-    discs = random_discs(np.random.default_rng(5), 40, BOXES[0])
-    count, few = len(found(discs, BOXES[0])), np.zeros((1, 2), dtype=int)
-    order, starts = np.arange(40), np.zeros(41, dtype=int)
-    assert near_pairs(discs, order, *BOXES[0], starts, few) == count > 1

@@ -41,8 +41,8 @@ def open_polygons(count, radius):
             yield vertices
 
 
-@pytest.mark.parametrize("count", [3, 5, 12])
-@pytest.mark.parametrize("radius", [0.3, 1.0, 2.5])
+@pytest.mark.parametrize("count", [3, 12])
+@pytest.mark.parametrize("radius", [0.3, 2.5])
 @pytest.mark.parametrize("outside", [0, 25])
 def test_the_sum_is_the_count_of_pixels(count, radius, outside):
     tried = 0
@@ -54,22 +54,6 @@ def test_the_sum_is_the_count_of_pixels(count, radius, outside):
         assert edges.sum() + mask.sum() == missed + (1 + 2 * outside) * added
         tried += 1
     assert tried >= 5
-
-
-def test_any_directions_at_convex_vertices_give_the_same_sum():
-    mask, rng = blob(1, SIZE, 17.0), np.random.default_rng(2)
-    sums = running_sums(mask)
-    vertices = polygon(rng, 5)
-    angles = np.arctan2(*(vertices - SIZE / 2).T[::-1])
-    vertices = SIZE / 2 + 15.0 * np.column_stack([np.cos(angles), np.sin(angles)])
-    out, edges = np.empty((5, 2)), np.empty(5, np.int64)
-    set_bisectors(vertices, out, 0, 4)
-    set_edge_sums(sums, 1.0, vertices, out, edges, 0, 4)
-    turned = out + 0.1 * rng.normal(size=out.shape)
-    turned /= np.hypot(*turned.T)[:, None]
-    others = np.empty(5, np.int64)
-    assert set_edge_sums(sums, 1.0, vertices, turned, others, 0, 4) < BARRED
-    assert others.sum() == edges.sum()
 
 
 def test_slits_that_the_disk_would_close_are_barred():

@@ -6,7 +6,7 @@ import shapely
 
 from flocsim.errors import ShapeError
 from flocsim.geometry.fit.coverage import wrong_pixels
-from flocsim.geometry.fit.fit import FEWEST_PIXELS, find_holes, fit_mask
+from flocsim.geometry.fit.fit import find_holes, fit_mask
 
 Y, X = np.mgrid[0:90, 0:100]
 OUTER = (X - 50) ** 2 / 1.3 + (Y - 45) ** 2 < 38**2
@@ -64,17 +64,6 @@ def test_masks_without_holes_are_fitted_as_ever():
     one = fit_mask(OUTER, vertices=16, radius=1.5)
     other = fit_mask(OUTER, vertices=16, radius=1.5, holes=True)
     assert np.array_equal(one.vertices, other.vertices) and not other.hole_sizes
-
-
-def test_vertices_go_to_holes_by_their_outlines():
-    found = find_holes(MASK, 64)
-    assert [hole.mask.sum() for hole in found] == [ROUND.sum(), SQUARE.sum(), SMALL.sum()]
-    assert 3 == found[2].vertices < found[1].vertices <= found[0].vertices
-    assert sum(hole.vertices for hole in found) <= 32
-    assert find_holes(MASK, 5) == []
-    specks = OUTER.copy()
-    specks[30, 30 : 30 + FEWEST_PIXELS - 1] = False
-    assert find_holes(specks, 64) == []
 
 
 def test_a_hole_open_by_a_corner_is_none():

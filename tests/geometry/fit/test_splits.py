@@ -1,54 +1,13 @@
-"""The best ring of places, against trying all of them."""
-
-import itertools
+"""Splits of an outline into edges: corners are found, and fewer pixels are wrong."""
 
 import numpy as np
 import pytest
 
-from flocsim.geometry.fit.coverage import BARRED, POSSIBLE, running_sums
-from flocsim.geometry.fit.global_search import best_ring, descend, split_outline
+from flocsim.geometry.fit.coverage import running_sums
+from flocsim.geometry.fit.global_search import descend, split_outline
 from flocsim.geometry.fit.search import DIRECTIONS, even_start, trace_outline
 from flocsim.geometry.fit.simple import is_open
 from tests.geometry.fit.test_fit import blob, count_errors
-
-
-def cost_of(costs, places, picks):
-    size, longest = costs.shape[:2]
-    total = 0
-    for k in range(len(places)):
-        to = (k + 1) % len(places)
-        ahead = (places[to] - places[k]) % size or size
-        if ahead > longest:
-            return BARRED
-        total += costs[places[k], ahead - 1, picks[k], picks[to]]
-    return total
-
-
-@pytest.mark.parametrize("count", [2, 3, 4])
-@pytest.mark.parametrize("start", [0, 5])
-@pytest.mark.parametrize("longest", [3, 6])
-@pytest.mark.parametrize("choices", [1, 2])
-def test_no_ring_is_cheaper(count, start, longest, choices):
-    size, rng = 8, np.random.default_rng(count)
-    costs = rng.integers(-20, 20, (size, longest, choices, choices))
-    costs[rng.uniform(size=costs.shape) < 0.1] = BARRED
-    others = [k for k in range(size) if k != start]
-    rings = [
-        sorted((start, *rest), key=lambda k: (k - start) % size)
-        for rest in itertools.combinations(others, count - 1)
-    ]
-    least = min(
-        cost_of(costs, ring, picks)
-        for ring in rings
-        for picks in itertools.product(range(choices), repeat=count)
-    )
-    places, picks = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    found = best_ring(costs, start, size, places, picks)
-    if least >= POSSIBLE:
-        assert found >= POSSIBLE
-    else:
-        assert found == least == cost_of(costs, places, picks)
-        assert places[0] == start
 
 
 @pytest.mark.parametrize("radius", [1.0, 2.0])

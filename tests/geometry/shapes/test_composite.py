@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from flocsim import Body, Composite, Sphere, SpheroPolygon
 from flocsim.errors import ShapeError
-from flocsim.geometry.shapes.cores import PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import parts_in, table_of
 from flocsim.geometry.shapes.spheropolygon import resized, shape_of_parts
-from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, covers, cross, drawn, framed, lace
-from tests.helpers.tiers import rest_slow
+from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, drawn, framed
 
 
 def lens(r, s, apart):
@@ -63,21 +62,6 @@ def polar(region):
     return total
 
 
-@pytest.mark.parametrize("make", rest_slow(MAKERS, lambda make: make is MAKERS[0]))
-def test_area_is_a_count_of_points(make):
-    found = make()
-    reach, count = found.bounding_radius, 900
-    axis = reach * (2.0 * (np.arange(count) + 0.5) / count - 1.0)
-    # Turned, so that no outline runs along its rows.
-    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
-    grid = np.column_stack([np.repeat(axis, count), np.tile(axis, count)]) @ turn
-    inside = covers(found, grid)
-    pixel = (2.0 * reach / count) ** 2
-    assert found.area == pytest.approx(pixel * inside.sum(), rel=2e-3)
-    moment = pixel * np.sum(grid[inside] ** 2)
-    assert found.second_moment == pytest.approx(moment, rel=4e-3)
-
-
 def test_parts_that_share_their_outline_count_once():
     """The same disk, polygon and frame twice; halves side by side, over each other and in line."""
     for shape in (Sphere(1.3), SpheroPolygon(SQUARE, 0.2), framed()):
@@ -112,13 +96,6 @@ def test_frames_and_units_do_not_matter(make, angle, factor, as_one):
     assert larger.area == pytest.approx(known.area * factor**2, rel=1e-10)
     assert fresh.second_moment == pytest.approx(larger.second_moment, rel=1e-9)
     assert np.abs(fresh.vertices - larger.vertices).max() < 1e-9 * larger.bounding_radius
-
-
-def test_order_of_parts_does_not_matter():
-    known = cross()
-    back = shape_of_parts(known.parts[::-1])
-    assert back.area == pytest.approx(known.area, rel=1e-12)
-    assert back.second_moment == pytest.approx(known.second_moment, rel=1e-12)
 
 
 def test_holes_go_round_the_other_way():
@@ -177,16 +154,6 @@ def test_tables_tell_the_parts_again():
             assert all(map(np.array_equal, one.rings, other.rings))
 
 
-@pytest.mark.parametrize("column, row, value", [
-    ("part", 0, 1), ("part", 3, 5), ("ring", 0, 1), ("ring", 5, 2), ("radius", 2, 9.0),
-])  # fmt: skip
-def test_tables_that_cannot_be_are_refused(column, row, value):
-    table = PointTable(*(np.array(each) for each in table_of(framed().parts)))
-    getattr(table, column)[row] = value
-    with pytest.raises(ValueError, match=r"count up from 0|several radii"):
-        parts_in(table)
-
-
 def test_shapes_travel():
     for make in MAKERS:
         there = pickle.loads(pickle.dumps(make()))
@@ -221,7 +188,3 @@ def test_holes_that_cannot_be_are_refused(holes, words):
 def test_segments_have_no_holes():
     with pytest.raises(ShapeError, match="a point or a segment has no holes"):
         SpheroPolygon(SQUARE[:2], 0.1, holes=[SQUARE * 0.1])
-
-
-def test_lace_keeps_two_holes_open():
-    assert len(lace().outline()) == 3

@@ -143,18 +143,6 @@ def test_edges_bent_ever_so_little(size, sign):
     assert swept_moments(core, 1.0)[0] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("radius", [0.05, 0.3])
-def test_five_hundred_vertices(radius):
-    angles = np.arange(512) * 2 * np.pi / 512
-    core = (1 + 0.3 * np.cos(8 * angles))[:, None] * np.column_stack(
-        [np.cos(angles), np.sin(angles)]
-    )
-    drawn = shapely.Polygon(core).buffer(radius, quad_segs=3000)
-    area, centroid, _ = swept_moments(core, radius)
-    assert area == pytest.approx(drawn.area, rel=1e-7)
-    assert centroid == pytest.approx([0.0, 0.0], abs=1e-12)
-
-
 @given(st.integers(0, 30), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_distances_and_insides_are_those_of_shapely(seed, x, y):
     core = random_core(star, np.random.default_rng(seed))
