@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from flocsim import Body, Sphere, SpheroPolygon, System
+from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, VelocityVerlet
-from flocsim.integrators.amplification import MOST_AMPLIFIED, end_distance, nudge_of, nudged
+from flocsim.integrators.amplification import MOST_AMPLIFIED
 
 RATE = 300.0
 """How fast the bodies of `Saddle` fly apart [1/s]."""
@@ -65,22 +65,6 @@ def test_a_companion_that_ends_early_counts_as_amplified_without_bound():
     assert system.amplification(4.0 / RATE, end, max_steps=3, jit=False) == math.inf
 
 
-def test_every_body_that_moves_is_nudged_as_far_and_no_other():
-    bodies = pair(fixed=True)
-    nudge = nudge_of(bodies)
-    assert nudge == pytest.approx(8e-10)
-    moved = nudged(bodies, nudge)
-    shifts = [math.dist(a.position, b.position) for a, b in zip(bodies, moved, strict=True)]
-    assert shifts == pytest.approx([0.0, nudge], rel=1e-6)
-    assert nudge_of([bodies[0]]) == 0.0
-
-
 def test_fixed_bodies_alone_amplify_nothing():
     found = System([pair(fixed=True)[0]], []).run(1e-6, amplification=True, jit=False)
     assert found.amplification == 0.0
-
-
-def test_the_distance_at_the_end_is_that_of_the_furthest_point_of_an_outline():
-    rod = Body(SpheroPolygon([(-3e-6, 0.0), (3e-6, 0.0)], 1e-6), surface_density=2.0)
-    there = np.array([[0.0, 0.0, 0.0]])
-    assert end_distance([rod], np.array([[3e-7, 4e-7, -0.1]]), there) == pytest.approx(9e-7)

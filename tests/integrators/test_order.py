@@ -69,22 +69,22 @@ def end_of(name, integrator, count):
     return work.motion[at.NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
-def orders(scene, integrator, counts, exact):
-    """Orders between counts, each twice the one before."""
-    errors = [np.linalg.norm(end_of(scene, integrator, count) - exact) for count in counts]
-    return np.log2(np.divide(errors[:-1], errors[1:]))
+def order_of(scene, integrator, counts, exact):
+    """The order between two counts, one twice the other."""
+    coarse, fine = (np.linalg.norm(end_of(scene, integrator, count) - exact) for count in counts)
+    return np.log2(coarse / fine)
 
 
 OWN = Overdamped()
 """Compared with itself: without inertia the motion is another one."""
 
 CASES = [
-    (VelocityVerlet(), "trapped", (128, 256, 512), 2.0),
-    (VelocityVerlet(), "pressed", (128, 256, 512), 2.0),
-    (DormandPrince54(), "trapped", (128, 256, 512), 5.0),
-    (DormandPrince54(), "pressed", (32, 64, 128), 5.0),
-    (Implicit(), "trapped", (32, 64, 128), 6.0),
-    (Implicit(), "pressed", (16, 32, 64), 6.0),
+    (VelocityVerlet(), "trapped", (256, 512), 2.0),
+    (VelocityVerlet(), "pressed", (64, 128), 2.0),
+    (DormandPrince54(), "trapped", (256, 512), 5.0),
+    (DormandPrince54(), "pressed", (64, 128), 5.0),
+    (Implicit(), "trapped", (64, 128), 6.0),
+    (Implicit(), "pressed", (32, 64), 6.0),
     (OWN, "trapped", (256, 512), 5.0),
 ]
 
@@ -96,7 +96,7 @@ CASES = [
 )  # fmt: skip
 def test_order(integrator, scene, counts, order):
     exact = end_of(scene, OWN if integrator is OWN else DormandPrince54(), 2048)
-    assert orders(scene, integrator, counts, exact)[-1] == pytest.approx(order, abs=0.4)
+    assert order_of(scene, integrator, counts, exact) == pytest.approx(order, abs=0.4)
 
 
 @pytest.mark.slow

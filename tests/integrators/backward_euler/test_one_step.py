@@ -10,13 +10,6 @@ from scipy.optimize import minimize
 import flocsim.arrays as at
 from flocsim import Body, Sphere
 from flocsim.forces import Contact, Gravity, StokesDrag
-from flocsim.integrators.backward_euler.contact_mean import (
-    add_held_friction,
-    normal_force,
-)
-from flocsim.integrators.backward_euler.interior import hold_friction
-from flocsim.integrators.backward_euler.path import may_go_apart
-from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import FREE_SHARE
 from flocsim.swarms.placement import floor
 from tests.helpers.one_step import Stage, from_anywhere, from_before
@@ -206,63 +199,6 @@ def test_energy_never_grows_without_gravity(friction, step):
         energy.append(energy_of(stage, bodies, contact))
     assert np.all(np.diff(energy) <= 1e-9 * energy[0])
     assert energy[-1] < 0.95 * energy[0]
-
-
-def sliding_disc(friction):
-    """A Stage of a disc that slides on a floor under gravity, at the end of a step, and its row."""
-    disc = Body(Sphere(R), (0.0, R - 1e-13), 0.0, (1e-3, 0.0), density=2650.0)
-    stage = Stage([floor(20.0 * R, beyond=0.0), disc], forces(friction=friction), WATER)
-    assert stage.end(1e-6)
-    rows = range(stage.work.tally[at.CANDIDATES])
-    return stage, next(row for row in rows if stage.work.geometry[at.NOW, row, at.GAP] < 0.0)
-
-
-def test_what_friction_lacks_that_goes_by_a_held_overlap_is_an_error():
-    """Held at twice the overlap of the end, friction is µ times the load of such an overlap."""
-    friction = 0.3
-    stage, row = sliding_disc(friction)
-    slip, loads = stage.work.slip, stage.work.loads
-    overlap = -stage.work.geometry[at.NOW, row, at.GAP]
-    assert stage.work.candidates[row, at.SLIDING] != 0
-    loads[:] = 0.0
-    slip[at.BEARING, row] = 2.0 * overlap
-    stage.linked(add_held_friction)(stage.scene, stage.work, 1e-6)
-    disc = loads[REAL, 3:].real
-    load = stage.linked(normal_force)
-    held, borne = (load(stage.scene, stage.work, row, 1e-6, by * overlap) for by in (2.0, 1.0))
-    # It has slowed the disc down by more than it should, and turned it so.
-    assert disc[0] == pytest.approx(friction * (held - borne), rel=1e-6)
-    assert disc[2] == pytest.approx(disc[0] * R, rel=1e-3)
-    assert slip[at.BEARING, row] == 2.0 * overlap
-    loads[:] = 0.0
-    slip[at.BEARING, row] = overlap
-    stage.linked(add_held_friction)(stage.scene, stage.work, 1e-6)
-    assert np.abs(loads).max() < 1e-9 * friction * K_N * overlap
-
-
-def test_friction_is_held_once_of_the_pairs_in_play_that_rub():
-    stage, row = sliding_disc(0.3)
-    slip = stage.work.slip
-    slip[at.BEARING] = 0.0
-    slip[at.YIELDS, row], slip[at.LIMIT, row], slip[at.RUBBING, row] = 1e-8, 1e-13, -0.999
-    slip[at.OVERLAP, row] = slip[at.LEFT, row] = 1e-12
-    stage.work.candidates[row, at.CLOSED] = 1
-    hold = stage.linked(hold_friction)
-    assert hold(stage.work, row) and slip[at.BEARING, row] == 1e-12
-    assert slip[at.RUBBING, row] == -0.9  # it begins again within its limit
-    assert not hold(stage.work, row)
-    slip[at.BEARING], slip[at.YIELDS, row] = 0.0, 0.0
-    assert not hold(stage.work, row)
-
-
-@pytest.mark.parametrize(
-    ("law", "may"), [({"friction": 0.3}, True), ({"k_t": 0.0}, True), ({}, False)]
-)
-def test_pairs_go_their_own_shares_but_where_friction_has_no_limit(law, may):
-    stage = Stage(heap(0), [Gravity(), StokesDrag(), Contact(**law)], WATER)
-    assert stage.end(1e-5, from_anywhere)
-    assert (stage.work.candidates[:, at.CLOSED] == at.TOUCHES).any()
-    assert stage.linked(may_go_apart)(stage.scene, stage.work) == may
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.6])

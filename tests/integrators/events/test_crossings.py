@@ -13,7 +13,7 @@ from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate, look_at
+from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate
 from flocsim.integrators.events.first_event import set_modes
 from tests.helpers.fast_scene import bodies_of
 from tests.helpers.methods import by_adaptive
@@ -37,35 +37,6 @@ def stepped(bodies, change, velocities):
     work.motion[at.NEW] = np.hstack([start + change, velocities[1]])
     locate_contacts(scene, work, at.NEW)
     return scene, work
-
-
-def passing(depth, half=1e-7, along=0.5):
-    """A sphere that passes another on a straight line and dips into it by a depth."""
-    height = 2.0 * RADIUS - depth
-    still = Body(Sphere(RADIUS), surface_density=2.0)
-    flying = attrs.evolve(still, position=(-2.0 * half * along, height))
-    change = np.array([[0.0, 0.0, 0.0], [2.0 * half, 0.0, 0.0]])
-    return stepped([still, flying], change, (change, change))
-
-
-@pytest.mark.parametrize("along", [0.05, 0.2, 0.5, 0.83, 0.95])
-@pytest.mark.parametrize("depth", [1e-12, 3e-13, 1e-10])
-def test_a_graze_inside_one_step_is_found(depth, along):
-    """Open at both ends of the step, and overlapping by a picometre in between."""
-    half = 4.0 * math.sqrt(4.0 * RADIUS * depth) / min(along, 1.0 - along) / 2.0
-    scene, work = passing(depth, half, along)
-    assert work.geometry[at.NOW, 0, 2] > 0.0 < work.geometry[at.NEW, 0, 2]
-    share = first_switch(scene, work, 1.0, RESOLUTION, RESOLUTION)
-    assert share < along
-    assert -RESOLUTION <= look_at(scene, work, 1.0, share, 0) < 0.0
-    # Earlier, the outlines are apart.
-    enters = along - math.sqrt(4.0 * RADIUS * depth) / (2.0 * half)
-    assert share == pytest.approx(enters, abs=0.05 * along)
-
-
-@pytest.mark.parametrize("depth", [-1e-12, -1e-15, 0.5 * RESOLUTION])
-def test_a_near_miss_is_none(depth):
-    assert first_switch(*passing(depth), 1.0, RESOLUTION, RESOLUTION) == NEVER
 
 
 def fly_by(depth, integrator):

@@ -1,4 +1,4 @@
-"""Steps that are power series: exact where forces are linear, cut where something happens."""
+"""Steps that are power series: exact where forces are linear, their errors propagated."""
 
 import math
 
@@ -10,20 +10,15 @@ import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
-from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.forces import BodyForce, Contact, StokesDrag
+from flocsim.forces import BodyForce, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.hooks import attempt, cut
-from flocsim.integrators import Implicit, Overdamped
-from flocsim.integrators.events.crossings import interpolate
+from flocsim.hooks import attempt
+from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.exponential.collocation import NODES
-from flocsim.integrators.exponential.samples import parts_of
-from flocsim.integrators.exponential.series import shorten
 from flocsim.integrators.loop.driver import take_new_state
 from flocsim.integrators.rhs.stated_error import carry_vector
-from tests.helpers.trial_scenes import Spring, Trap
+from tests.helpers.trial_scenes import Trap
 
 R = 5e-6
 MASS = 2.0 * math.pi * R**2
@@ -99,25 +94,6 @@ def test_so_is_one_that_drag_slows_down():
     assert scene.work.motion[at.NEW, 0, at.VX] == pytest.approx(speed, abs=1e-14 * RATE)
 
 
-def test_the_swing_is_known_everywhere_in_the_step():
-    scene = Linked(trapped())
-    scene.step(6.0 / RATE)
-    within = scene.linked(interpolate)
-    for share in (0.0, 0.2, 0.55, 0.9, 1.0):
-        within(scene.work, 6.0 / RATE, share, 0)
-        place, speed = swung(6.0 * share / RATE)
-        assert scene.work.motion[at.TRIAL, 0, at.X] == pytest.approx(place, abs=1e-14)
-        assert scene.work.motion[at.TRIAL, 0, at.VX] == pytest.approx(speed, abs=1e-14 * RATE)
-
-
-@pytest.mark.parametrize("method", [Implicit(), Overdamped()])
-def test_steps_that_leave_the_swing_out_are_none(method):
-    bodies = [Body(Sphere(R), (1e-7, 0.0), surface_density=2.0)]
-    scene = Linked(System(bodies, [Trap(STIFFNESS, 1e-12), StokesDrag()], method))
-    scene.step(100.0 / RATE)
-    assert scene.terms == 0
-
-
 def test_what_does_not_move_stays_just_where_it_is():
     bodies = [
         Body(Sphere(R), (0.3e-6, 1e-6), velocity=(0.0, 1e-3), spin=50.0, surface_density=2.0),
@@ -128,38 +104,6 @@ def test_what_does_not_move_stays_just_where_it_is():
     assert scene.terms > 0
     assert scene.work.motion[at.NEW, 0, at.SPIN] == 50.0
     assert np.array_equal(scene.work.motion[at.NEW, 1], scene.work.motion[at.NOW, 1])
-
-
-def test_a_shortened_series_is_that_of_the_shorter_step():
-    long, short = Linked(trapped()), Linked(trapped())
-    long.step(4.0 / RATE)
-    short.step(1.0 / RATE)
-    shorten(long.work, long.terms, 0.25)
-    count = min(long.terms, short.terms)
-    size = np.abs(short.work.series[at.MOTION, :count]).max()
-    np.testing.assert_allclose(
-        long.work.series[at.MOTION, :count], short.work.series[at.MOTION, :count], atol=1e-9 * size
-    )
-    np.testing.assert_allclose(long.work.linear, short.work.linear, rtol=1e-12)
-    np.testing.assert_allclose(
-        long.work.weights[at.MOVED], short.work.weights[at.MOVED], rtol=1e-12
-    )
-
-
-@pytest.mark.parametrize("share", [1.0, 0.3])
-def test_an_error_is_carried_as_it_would_swing(share):
-    scene, step = Linked(trapped()), 5.0 / RATE
-    scene.step(step)
-    work = scene.work
-    work.motion[at.DEVIATION] = 0.0
-    work.motion[at.CARRIED, 0, at.X], work.motion[at.CARRIED, 0, at.VX] = 1e-10, 1e-7
-    work.bodies[:, at.ERROR_PLACE] = 1.0  # more than that may be
-    scene.call(carry_vector, scene.clock, share * step)
-    turn = 5.0 * share
-    place = 1e-10 * math.cos(turn) + 1e-7 / RATE * math.sin(turn)
-    speed = 1e-7 * math.cos(turn) - 1e-10 * RATE * math.sin(turn)
-    assert work.motion[at.CARRIED, 0, at.X] == pytest.approx(place, abs=2e-2 * 1e-10)
-    assert work.motion[at.CARRIED, 0, at.VX] == pytest.approx(speed, abs=2e-2 * 1e-10 * RATE)
 
 
 @attrs.frozen
@@ -206,79 +150,3 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     assert true > 30.0 * nudge
     assert work.motion[at.CARRIED, 0, at.X] == pytest.approx(true, rel=0.2)
     assert work.bodies[0, at.ERROR_PLACE] > 5.0 * true
-
-
-def overlapping(overlap=1e-9, speeds=(0.0, 0.0), pressed=False, **law):
-    """Two discs that are pressed into each other, at speeds against each other along and across the
-    line between them; ``pressed``: held there by a spring between their centres."""
-    half, (along, across) = 0.5 * (2.0 * R - overlap), speeds
-    bodies = [
-        Body(
-            Sphere(R), (side * half, 0.0),
-            velocity=(-0.5 * side * along, 0.5 * side * across), surface_density=2.0,
-        )
-        for side in (-1.0, 1.0)
-    ]  # fmt: skip
-    forces = [Contact(**{"k_n": K_N, "k_t": K_T, "damping_n": 0.0, "damping_t": 0.0} | law)]
-    if pressed:
-        forces.append(Spring(K_N * overlap / 1e-6, -1e-6 - overlap))
-    return System(bodies, forces, Implicit())
-
-
-K_N, K_T = 20.0, 2.0
-NORMAL_RATE = math.sqrt(2.0 * K_N / MASS)
-"""Of two discs on their contact's spring [1/s]."""
-
-TANGENTIAL_RATE = math.sqrt(6.0 * K_T / MASS)
-"""Along it, where they turn as well."""
-
-
-def test_parts_are_short_against_what_swings():
-    scene = Linked(overlapping()).scene
-    assert [parts_of(scene, turns) for turns in (0.0, 1.5, 3.0)] == [1, 1, 1]
-    assert [parts_of(scene, turns) for turns in (3.2, 6.3, 12.6)] == [3, 4, 8]
-    assert parts_of(Linked(overlapping(friction=0.4)).scene, 2.9) == 2
-
-
-@pytest.mark.parametrize("turns", [4.0, 8.0])
-def test_a_step_is_cut_where_contacts_have_swung_open_in_it(turns):
-    """They part after a quarter of a turn; at its end they overlap again, or are apart again."""
-    scene, step = Linked(overlapping()), turns / NORMAL_RATE
-    assert scene.work.candidates[0, at.CLOSED] == at.TOUCHES
-    scene.step(step)
-    parts = parts_of(scene.scene, scene.clock[at.SERIES_TURNS])
-    assert scene.clock[at.SERIES_TURNS] == pytest.approx(turns, rel=0.2)
-    share = scene.call(cut, scene.clock, step, 1e-12, 1e-12)
-    assert 0.5 * math.pi < share * turns < 0.5 * math.pi + turns / parts
-    gap = scene.work.motion[at.NEW, 1, at.X] - scene.work.motion[at.NEW, 0, at.X] - 2.0 * R
-    assert gap == pytest.approx(-1e-9 * math.cos(share * turns), abs=1e-14)
-    assert scene.clock[at.STAGED_STEP] == pytest.approx(share * step, rel=1e-12)
-
-
-def test_one_in_which_nothing_switches_is_left_whole():
-    scene, step = Linked(overlapping()), 1.2 / NORMAL_RATE
-    scene.step(step)
-    assert scene.call(cut, scene.clock, step, 1e-12, 1e-12) == 1.0
-
-
-def test_one_that_presses_too_deep_ends_there():
-    """As deep as it may be at the start, and deeper within."""
-    deep = 0.99 * DEEPEST_OVERLAP * 2.0 * R
-    scene = Linked(overlapping(deep, speeds=(deep * NORMAL_RATE, 0.0)))
-    step = 2.5 / NORMAL_RATE
-    scene.step(step)
-    assert scene.terms > 0
-    assert scene.call(cut, scene.clock, step, 1e-12, 1e-12) == NODES[0]
-
-
-@pytest.mark.parametrize(("reach", "seen"), [(3.0, True), (1.05, True), (0.9, False)])
-def test_a_contact_that_would_slide_for_a_while_is_seen(reach, seen):
-    """Two discs swing along each other for ``reach`` times as far as friction holds, and back again
-    before the end of the step: it is not taken, or cut."""
-    holds = 1e-3 * K_N * 1e-9 / K_T
-    speeds = (0.0, reach * holds * TANGENTIAL_RATE)
-    scene = Linked(overlapping(speeds=speeds, pressed=True, friction=1e-3))
-    step = 2.9 / TANGENTIAL_RATE
-    ratio = scene.step(step)
-    whole = 0.0 <= ratio <= 1.0 and scene.call(cut, scene.clock, step, 1e-2 * holds, 0.0) == 1.0
-    assert whole != seen

@@ -8,7 +8,7 @@ import pytest
 
 import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
+from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from tests.helpers.methods import by_adaptive, by_method, is_adaptive
 from tests.helpers.tiers import rest_slow
@@ -242,7 +242,9 @@ def test_the_instant_of_a_touch_does_not_depend_on_the_method():
     assert max(abs(end.touch_gap) for end in ends) <= 1e-12
 
 
-def test_awaiting_an_event_does_not_change_the_motion_much():
-    system = pair(encounter(), Implicit(1e-12))
-    ends = [watched(system, 1.5e-4, awaited=a).position for a in (False, True)]
-    assert np.abs((ends[0] - ends[1]) * [1.0, 1.0, 1e-5]).max() < 1e-9
+def test_two_spheres_that_pull_each_other_together_try_few_steps_in_vain():
+    bodies = [Body(Sphere(1e-5), (x, 0.0), density=2650.0) for x in (0.0, 2.2e-5)]
+    laws = [StokesDrag(), VanDerWaals(hamaker=1e-18, d_min=1e-9), Contact(k_n=20.0)]
+    found = System(bodies, laws, Implicit()).run(until=1.0)
+    assert found.status.name == "FINISHED"
+    assert found.rejected < 0.3 * found.steps

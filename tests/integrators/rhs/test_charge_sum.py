@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import k0, k1
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
@@ -15,8 +14,7 @@ from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import samples_of
-from flocsim.geometry.contact.charges import charges_of_shape, layer_energy
-from flocsim.integrators.rhs.charge_sum import between_corners, cubics, grid_of, put_charge
+from flocsim.geometry.contact.charges import layer_energy
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import (
@@ -68,36 +66,6 @@ def test_force_and_torque_are_the_slopes_of_the_energy(seed):
     assert abs(found[2] - wanted[2]) < 1e-3 * strength * SIZE
 
 
-def potential_at(pair, x, y):
-    """That of the earlier body by its tables."""
-    nodes = pair.work.nodes
-    if put_charge(pair.scene, nodes, 0, grid_of(pair.scene, 0), x, y, 1.0) == 0:
-        return 0.0
-    across, up = nodes[at.CELL_X, 0], nodes[at.CELL_Y, 0]
-    return between_corners(nodes, 0, cubics(across), cubics(up))
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_force_and_torque_are_the_slopes_of_the_potential_in_the_tables(seed):
-    """At any place, also where tiles meet."""
-    random = np.random.default_rng(seed)
-    one, other = rough(8, SIZE, seed), rough(8 + seed, 1.7 * SIZE, 50 + seed)
-    pose = at_gap(one, other, 1e-9 * 10.0 ** random.uniform(0.0, 3.6), *random.uniform(0, 6.28, 2))
-    pair = Pair(other, one, pose, layer(depth=1.0))
-    [_, strength, _], charges = pair.scene.layer, charges_of_shape(one, 1.0 / DEBYE)
-
-    def energy(each):
-        x, y, angle = each
-        c, s = math.cos(angle), math.sin(angle)
-        placed = charges[:, :2] @ np.array([[c, s], [-s, c]]) + (x, y)
-        potentials = [potential_at(pair, *place) for place in placed]
-        return strength * charges[:, 2] @ potentials
-
-    wanted, found = slopes(energy, pose, 1e-3 * DEBYE, SIZE), pair.loads(*pose)
-    np.testing.assert_allclose(found[:2], wanted[:2], atol=1e-6 * math.hypot(*wanted[:2]))
-    assert abs(found[2] - wanted[2]) < 1e-6 * math.hypot(*wanted[:2]) * SIZE
-
-
 @pytest.mark.parametrize("swapped", [False, True])
 def test_third_law_with_torque_and_turned_together(swapped):
     pair, (x, y, angle), found = balanced(swapped, layer())
@@ -105,15 +73,6 @@ def test_third_law_with_torque_and_turned_together(swapped):
     there = pair.loads(c * x - s * y, s * x + c * y, angle + 0.7, 0.7)
     turned = [c * there[0] + s * there[1], c * there[1] - s * there[0], there[2], there[3]]
     np.testing.assert_allclose(turned, found, atol=1e-9 * SIZE * abs(found[0]))
-
-
-def test_it_adds_to_van_der_waals():
-    one, other = rough(8, SIZE, 1), rough(16, 1.7 * SIZE, 2)
-    pose = at_gap(one, other, 5e-9, 0.3, 1.0)
-    pull, push = VanDerWaals(1e-20, law="outline"), layer()
-    alone = [Pair(other, one, pose, each).loads(*pose) for each in (pull, push)]
-    both = Pair(other, one, pose, pull, push).loads(*pose)
-    np.testing.assert_allclose(both, alone[0] + alone[1], rtol=1e-9, atol=1e-24)
 
 
 PLATES = {
@@ -223,20 +182,3 @@ def test_two_double_layers_and_a_cut_of_a_thick_one_are_refused():
         Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(cut=1e-6))
     with pytest.raises(UsageError, match="one double layer acts along outlines"):
         Pair(sphere, sphere, (5e-6, 0.0, 0.0), layer(), layer())
-
-
-def test_nothing_of_it_is_in_a_scene_without():
-    """Nor of charges where double layers are thin."""
-    sphere, away = Sphere(1e-6), (5e-6, 0.0, 0.0)
-    thin = DoubleLayer(debye_length=1e-9, law="outline")
-    for force, charged in ((thin, False), (layer(), True), (VanDerWaals(law="outline"), False)):
-        pair = Pair(sphere, sphere, away, force)
-        assert pair.system.reached["charges"] == (len(pair.scene.charges) > 0) == charged
-
-
-def test_explain_says_how_far_charges_are_seen():
-    """12/κ, not as far as plates at a gap."""
-    bodies = [Body(Sphere(1e-6), (x, 0.0), density=2000.0) for x in (0.0, 5e-6)]
-    thick = DoubleLayer(debye_length=1e-7, law="outline")
-    words = System(bodies, [thick]).explain()
-    assert "not called at gaps above 1.2e-06 m" in words

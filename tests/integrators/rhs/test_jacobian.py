@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
-from flocsim import Body, forces
+from flocsim import Body
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
@@ -132,19 +132,6 @@ def test_damping_of_all_forces_together(seed, gap):
     assert differences(seed, ALL[gap], True).miss(at.DAMPING, 1e-6) < 1e-5
 
 
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
-@pytest.mark.parametrize("name", [name for name in FORCES if name != "gravity"])
-def test_stiffness_of_every_force_alone(seed, name):
-    allowed = ARMS if name == "contact" else 1e-6
-    assert differences(seed, (name,), False).miss(at.STIFFNESS, 1e-12) < allowed
-
-
-@pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
-@pytest.mark.parametrize("name", ["drag", "contact"])
-def test_damping_of_every_force_alone(seed, name):
-    assert differences(seed, (name,), True).miss(at.DAMPING, 1e-6) < 1e-5
-
-
 def own_scene():
     """Every kind of a user's own force, without derivatives of its own, at work at once."""
     left, right = head_on(0.05, -2e-7)
@@ -158,22 +145,3 @@ def own_scene():
 )
 def test_forces_of_a_user_are_differenced(which, moving, size):
     assert Differences(own_scene(), moving=moving).miss(which, size) < 2e-3
-
-
-def test_damping_of_lubrication_is_that_of_the_gaps_rate():
-    left, right = head_on(0.05, -2e-7)
-    ragged = Body(star(), (3e-6, 13e-6), 0.4, (0.0, -0.05), 300.0, surface_density=2.0)
-    system = PolygonSystem([left, right, ragged], [forces.Lubrication(h_min=3e-7)])
-    assert Differences(system).miss(at.DAMPING, 1e-6) < 1e-5
-
-
-def test_forces_between_bodies_add_up_to_nothing_however_one_is_moved():
-    """Newton's third law in every column of both matrices."""
-    for seed in SCENES[:10]:
-        found = differences(seed, ("contact",), True)
-        found.assemble(found.scene, found.work)
-        for which in (at.STIFFNESS, at.DAMPING):
-            matrix = whole_matrix(found.work, which)
-            total = matrix.reshape(-1, 3, matrix.shape[1]).sum(axis=0)[:2]
-            scale = np.abs(matrix / found.lever)[np.arange(len(matrix)) % 3 < 2].max()
-            assert np.abs(total / found.lever).max() <= 1e-12 * scale

@@ -6,18 +6,14 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.arrays import work_of
-from flocsim.errors import KernelError, UsageError
+from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import OrientedForce, StokesDrag
 from flocsim.integrators import DormandPrince54
-from flocsim.integrators.rhs.forces import add_outline_forces
-from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines
 from flocsim.swarms.swarm import Swarm
-from tests.helpers.matrices import whole_matrix
 
 MOMENT = 2e-33
 """µ²/(4πε) of two dipoles [J m³]."""
@@ -124,47 +120,9 @@ def test_two_dipoles_turn_into_line_and_no_energy_is_made(shape):
     assert spin + arm == pytest.approx(0.0, abs=1e-4 * abs(spin))
 
 
-def derivatives(scene, work):
-    add_outline_forces(scene, work, 0.0, at.NOW)
-    assemble_jacobian(scene, work, 0.0, 1.0)
-
-
-def test_the_jacobian_has_their_derivatives():
-    x, y, angle_j, angle_i = 2.5e-6, 1e-6, 0.7, -0.4
-    system = system_of(x, y, angle_j, angle_i)
-    scene = system.scene(jit=False)
-    work = work_of(scene, *system.motion())
-    system.compose(entry=derivatives, jit=False)(scene, work)
-    stiffness = whole_matrix(work, at.STIFFNESS)
-
-    def both(place):
-        fx, fy, torque_j, torque_i = loads(*(place[3:5] - place[:2]), place[5], place[2])
-        return np.array([-fx, -fy, torque_i, fx, fy, torque_j])
-
-    place = np.array([0.0, 0.0, angle_i, x, y, angle_j])
-    steps = np.diag([1e-9, 1e-9, 1e-3] * 2)
-    wanted = np.column_stack(
-        [-(both(place + each) - both(place - each)) / (2.0 * each.sum()) for each in steps]
-    )
-    size = np.outer([1, 1, 1e-6] * 2, [1, 1, 1e-6] * 2) * abs(wanted[:2, :2]).max()
-    assert np.all(abs(stiffness - wanted) < 0.01 * size)
-
-
 def test_they_are_explained_and_refused_where_only_distances_are_known():
     words = system_of(3e-6, 0.0, 0.0).explain()
     assert "how both bodies are turned" in words
     bodies = [Body(Sphere(1e-6), density=2000.0), Body(Sphere(1e-6), (1e-5, 0.0), density=2000.0)]
     with pytest.raises(UsageError, match="Dipoles asks how bodies are turned, and a swarm has"):
         Swarm(bodies, [Dipoles(), StokesDrag()])
-
-
-@attrs.frozen
-class Misspelt(OrientedForce):
-    @staticmethod
-    def kernel(pair):
-        return pair.angle_k
-
-
-def test_a_wrong_kernel_is_named():
-    with pytest.raises(KernelError, match="OrientedView has no attribute 'angle_k'; did you mean"):
-        System([Body(Sphere(1e-6), density=2000.0)], [Misspelt()])

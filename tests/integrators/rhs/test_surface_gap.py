@@ -11,17 +11,10 @@ from benchmarks.speed.swarms import lone_pair
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.constants import LARGEST_BIAS
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
-from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.near_pairs import gap_between
-from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import Implicit
 from flocsim.integrators.rhs.surface_gap import (
-    RANGE,
-    gap_of,
     length_at,
-    locate_sharing,
-    measure_of,
-    reach_of,
     soften,
 )
 from flocsim.integrators.rhs.views import pair_view
@@ -118,77 +111,6 @@ def test_the_smooth_gap_and_its_force_are_close_to_those_of_the_least(force):
         worst = max(worst, abs(pair.strength(soft) / pair.strength(least) - 1.0))
     assert several >= 8
     assert 0.0 < worst <= LARGEST_BIAS == 0.03
-
-
-def test_what_is_flagged_far_off_has_no_share_and_changes_none():
-    """Every pair flagged, as before a long step: shares are those of the sum over all."""
-    far = 0
-    for pair, place in random_pairs(ATTRACTION, 10):
-        pair.loads(*place)
-        end = int(pair.work.tally[at.CANDIDATES])
-        pair.work.candidates[:end, at.NEAR] = 1
-        soft, _ = soften(pair.scene, pair.work, at.NOW, 0, end)
-        gaps, shares = (
-            pair.work.geometry[at.NOW, :end, at.GAP],
-            pair.work.geometry[at.NOW, :end, at.SHARE],
-        )
-        measures = np.array([measure_of(pair.scene, gap) for gap in gaps])
-        parts = np.exp(measures.min() - measures)
-        own = np.array([length_at(pair.scene, gap) for gap in gaps])
-        expected = gap_of(pair.scene, measures.min() - math.log(parts.sum()))
-        assert soft == pytest.approx(expected, rel=1e-12, abs=1e-20)
-        parts *= length_at(pair.scene, expected) / (own * parts.sum())
-        assert shares == pytest.approx(parts, rel=1e-9, abs=1e-16)
-        assert not shares[measures > measures.min() + 41.0].any()
-        far += np.count_nonzero(measures > measures.min() + 41.0)
-    assert far > 10
-
-
-@FORCES
-def test_of_two_features_at_one_distance_both_count_in_full(force):
-    """A box that lies level over a floor: g̃ is ℓ ln 2 below the gap of its two corners."""
-    pair = over_floor(force)
-    pair.loads(0.0, 8e-6, 0.0)
-    soft, gaps = pair.gaps()
-    assert np.count_nonzero(gaps < gaps.min() + 1e-12) == 2
-    measure = measure_of(pair.scene, 1e-6) - math.log(2.0)
-    assert soft == pytest.approx(gap_of(pair.scene, measure), abs=1e-14)
-
-
-@FORCES
-def test_the_reach_of_a_gap_is_that_of_so_much_more_of_its_measure(force):
-    scene = Pair([hook(), star()], force).scene
-    for gap in np.concatenate(
-        [-np.geomspace(1e-12, 1e-7, 8), [0.0], np.geomspace(1e-12, 1e-4, 30)]
-    ):
-        reach = reach_of(scene, float(gap))
-        assert reach == pytest.approx(gap_of(scene, measure_of(scene, gap) + RANGE), rel=1e-9)
-
-
-@FORCES
-def test_pairs_that_a_stage_leaves_out_have_no_share_in_it(force):
-    """The gap of a stage, and the shares in it, are those of all pairs."""
-    rng, left = np.random.default_rng(4), 0
-    for _ in range(40):
-        pair = Pair([jagged(rng), jagged(rng)], force)
-        gap = 10.0 ** rng.uniform(-8, -6)
-        pair.approach(rng, gap)
-        scene, work = pair.scene, pair.work
-        assert list_candidates(scene, work)
-        locate_contacts(scene, work, at.NOW)
-        stage, end = at.FIRST_STAGE, int(work.tally[at.CANDIDATES])
-        work.candidates[:end, at.NEAR] = 1
-        work.motion[stage] = work.motion[at.NOW]
-        moved = rng.uniform(-0.3, 0.3, 3) * gap
-        work.motion[stage, 1, :3] += moved / [1.0, 1.0, pair.shapes[1].bounding_radius]
-        locate_sharing(scene, work, stage)
-        found = soften(scene, work, stage, 0, end)[0]
-        shares = work.geometry[stage, :end, at.SHARE].copy()
-        left += int(np.isinf(work.geometry[stage, :end, at.GAP]).sum())
-        locate_contacts(scene, work, stage)
-        assert found == pytest.approx(soften(scene, work, stage, 0, end)[0], rel=1e-12)
-        np.testing.assert_allclose(shares, work.geometry[stage, :end, at.SHARE], atol=1e-14)
-    assert left > 20
 
 
 @FORCES

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 import flocsim.arrays as at
@@ -10,7 +9,6 @@ from flocsim import Body, System
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.forces import VanDerWaals
 from flocsim.integrators.rhs import views
-from flocsim.integrators.rhs.views import soft_centre_line
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.fast_scene import FastScene
 from tests.helpers.small_study import small_study
@@ -45,27 +43,6 @@ def test_the_pull_between_centres_fades_out_where_they_meet(fast):
         reach = share / math.sqrt(1.0 + share * share)
         found = attraction(fast, 0.0, share * epsilon)
         assert found == pytest.approx([0.0, -reach * full], rel=1e-3, abs=1e-9 * full)
-
-
-def test_the_pull_between_centres_is_the_same_from_all_sides_and_continuous(fast):
-    epsilon = softening(fast.scene)
-    full = math.hypot(*attraction(fast, 1000.0 * epsilon, 0.0))
-    for way in np.linspace(0.0, 2.0 * math.pi, 7):
-        x, y = math.cos(way), math.sin(way)
-        here, there = (attraction(fast, s * epsilon * x, s * epsilon * y) for s in (1e-3, -1e-3))
-        assert np.abs(here - there).max() < 3e-3 * full
-        assert here @ (x, y) < 0.0
-        steps = np.linspace(-3.0, 3.0, 121)
-        pulls = np.array([attraction(fast, s * epsilon * x, s * epsilon * y) for s in steps])
-        assert np.abs(np.diff(pulls, axis=0)).max() < 0.06 * full
-
-
-def test_elsewhere_the_soft_line_of_centres_is_the_line_of_centres(fast):
-    reach = sum(fast.scene.bodies[:, at.EQUIVALENT_RADIUS])
-    fast.work.motion[at.NOW, 1, :2] = 0.6 * reach, -0.8 * reach
-    nx, ny, distance = soft_centre_line(fast.scene, fast.work, at.NOW, 1, 0)
-    assert (nx, ny) == pytest.approx((0.6, -0.8), rel=1e-8)
-    assert distance == pytest.approx(reach, rel=1e-8)
 
 
 @pytest.mark.slow
