@@ -66,22 +66,6 @@ def test_steps_across_switches_are_taken_and_change_no_bit_with_threads():
     assert runs[0] == runs[1]
 
 
-def test_where_steps_across_switches_are_compiled_changes_no_bit():
-    """In the middle of a window, which is run again, or before the first one."""
-    runs = []
-    for early in (True, False):
-        progress = falling(30, 1)[0].begin(0.5)
-        runner = progress.runner
-        begun = runner.driver
-        if early:
-            runner.driver = begun.whole
-        while progress.advance(0.5) == Status.PAUSED:
-            pass
-        assert runner.driver is begun.whole
-        runs.append(progress.swarm.motion.tobytes())
-    assert runs[0] == runs[1]
-
-
 @pytest.mark.slow
 def test_a_bed_goes_on_from_a_state_to_the_same_bytes():
     swarm, _ = falling(30, 2)
@@ -106,7 +90,7 @@ def test_bodies_that_bounce_are_not_stopped_by_long_steps():
     ]
     law = Contact(damping_n=0.0, k_t=0.0)
     swarm = Swarm(bodies, [law], Implicit(1e-10), box=(12.0 * R, 12.0 * R))
-    run = swarm.run(5e-3)
+    run = swarm.run(2.5e-3)
 
     def energy(at):
         """Of the motion, and of the springs that are pressed just then [J]."""
@@ -173,16 +157,6 @@ def test_polygons_pile_up_as_cheaply_as_those_that_stick(friction):
         assert run.position[-1, 1:, 1].min() > 0.0  # none has fallen through the floor
         steps[attraction] = run.effort.steps
     assert steps[False] <= 3.0 * steps[True]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("friction", ["none", 0.4])
-def test_fifty_polygons_come_to_rest_though_nothing_holds_them(friction):
-    run = pile_of(50, friction, False, 1e-9).run(2.5, max_steps=20_000)
-    assert run.status == Status.FINISHED
-    assert np.abs(run.velocity[-1, :, :2]).max() < 1e-5
-    assert run.position[-1, 1:, 1].min() > 0.0
-    assert run.effort.steps < 60_000
 
 
 def test_sticking_polygons_settle_though_some_part_by_their_tangential_force():

@@ -173,16 +173,6 @@ def test_kicks_open_what_is_shallow(depth, kind):
     assert kinds(floating(), [*sticky(hamaker), KICKS]).kind.tolist() == [kind]
 
 
-def test_what_moves_fast_is_not_held_against_kicks():
-    hamaker = 25.0 * ENERGY / depth_of(1.0)
-    bodies = floating()
-    mass = bodies[0].mass * bodies[1].mass / (bodies[0].mass + bodies[1].mass)
-    flying = np.zeros((2, 3))
-    for energy, kind in ((4.0, CERTIFICATE), (6.0, NO_BOND)):
-        flying[1, 0] = math.sqrt(2.0 * energy * ENERGY / mass)
-        assert kinds(bodies, [*sticky(hamaker), KICKS], flying).kind.tolist() == [kind]
-
-
 @pytest.mark.parametrize("temperature", [298.15, 3e8])
 def test_hooks_hold_where_kicks_cannot_lift_them(temperature):
     """A channel that hangs on an anchor by its lips and has not moved."""

@@ -47,14 +47,6 @@ def test_a_floor_keeps_all():
     assert not progress.gone.any()
 
 
-def test_the_top_lets_out_what_rises():
-    swarm = swarm_at([(4.0 * R, HIGH + 1.5 * R), (12.0 * R, HIGH + 1.5 * R)])
-    progress = progress_of(swarm, REMOVE)
-    progress.swarm.motion[:, 4] = [1e-3, -1e-3]
-    progress.let_leave()
-    assert progress.gone.tolist() == [True, False]
-
-
 def test_a_cluster_leaves_when_all_of_it_is_outside():
     touch = 2.0 * R - 1e-9
     column = [(4.0 * R, y * touch - 1.2 * R) for y in range(3)]

@@ -14,8 +14,8 @@ from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.forces.codegen import laws_of
 from flocsim.integrators import BackwardEuler, DormandPrince54, Overdamped, VelocityVerlet
 from flocsim.swarms.placement import floor
-from flocsim.swarms.together.clusters import Shielding, between, roots, unpacked
-from tests.forces.test_shape_drag import STRAINED, TWO_TO_ONE
+from flocsim.swarms.together.clusters import Shielding
+from tests.forces.test_shape_drag import STRAINED
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_scenes import WATER, R, crowd
 
@@ -90,29 +90,6 @@ def test_what_lies_on_a_wall_keeps_its_drag():
     assert shielding_of(swarm_of(lying))[0, 0] < 0.9
     on_floor = swarm_of([*lying, floor(20.0 * R, 0.0)])
     assert shielding_of(on_floor).tolist() == [[1.0, 0.0, 1.0]] * 4
-
-
-@pytest.mark.parametrize("law", ["stokes", "shape"])
-def test_all_of_a_cluster_resist_as_it_does(law):
-    if law == "stokes":
-        bodies = row(4, 0.5)
-    else:
-        c, s = math.cos(0.5), math.sin(0.5)
-        places = 0.9999e-6 * np.array([(0, 0), (4, 0), (8, 0), (0, 2)]) @ [[c, s], [-s, c]]
-        bodies = [Body(TWO_TO_ONE, tuple(place), 0.5, density=1100.0) for place in places]
-    swarm = swarm_of(bodies, [Gravity(), StokesDrag(law=law, clusters=True), Contact()])
-    position, _ = swarm.system.motion()
-    known = swarm.system.scene(jit=False).bodies.copy()
-    made = Shielding(swarm.bodies, swarm.forces, swarm.gauge())
-    alone = made.resistances(known, position[:, 2], np.arange(4))
-    made.apply(known, position)
-    q = unpacked(known[:, at.SHIELDING : at.SHIELDING + 3])
-    assert np.ptp(q, axis=0) == pytest.approx(0.0, abs=1e-15)
-    whole, together = q[:1] @ alone.sum(axis=0) @ q[:1], (q @ alone @ q).sum(axis=0)
-    least = 1e-12 * np.abs(whole).max()  # off the diagonal all may be rounding
-    assert together == pytest.approx(whole[0], rel=1e-12, abs=least)
-    assert between(alone.sum(axis=0)[None], whole) == pytest.approx(q[:1], rel=1e-12, abs=1e-12)
-    assert 0.0 < roots(q[:1])[0, 0, 0] < 1.0
 
 
 @pytest.mark.parametrize("law", LAWS)

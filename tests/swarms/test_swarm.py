@@ -122,14 +122,6 @@ def test_a_disc_rests_on_a_floor():
     assert trajectory.position[-1, 0, 0] == pytest.approx(2.0 * R, rel=1e-12)
 
 
-def test_a_floor_lies_under_the_seam_too():
-    for x in (0.01 * R, SIDE - 0.01 * R, -7.3 * SIDE):
-        body = Body(Sphere(R), (x, 1.2 * R), density=2650.0)
-        trajectory = Swarm([body, floor(SIDE, beyond=2.0 * R)], forces(), fluid=WATER,
-                           box=(SIDE, None)).run(0.1)  # fmt: skip
-        assert trajectory.position[-1, 0, 1] == pytest.approx(R, rel=1e-6)
-
-
 def test_walls_hold_from_all_sides():
     side = 8.0 * R
     corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)]
