@@ -17,7 +17,6 @@ SURFACE = [
     DoubleLayer(15e-3, 0.98e-6, gap="surface"),
 ]
 CENTRES = [VanDerWaals(1e-18), DoubleLayer(15e-3, 0.98e-6)]
-PAIR_LAWS = [CONTACT, *SURFACE, *CENTRES]
 SEEDS = range(40)
 
 

@@ -1,4 +1,7 @@
-"""Forces held against Newton's third law, symmetries, and gradients of potentials."""
+"""Forces of the reference against gradients of potentials and the signs of the laws.
+
+Its symmetries are those of the engine, which agrees with it: tests/forces/test_symmetry.py.
+"""
 
 from dataclasses import replace
 
@@ -8,71 +11,10 @@ import pytest
 from tests.reference.contacts import measure, pairs_of
 from tests.reference.forces import Contact, Drag, VanDerWaals, loads, reduced
 from tests.reference.samples import (
-    CONTACT,
-    PAIR_LAWS,
     SEEDS,
     VISCOSITY,
-    displacements,
     scene_of,
 )
-from tests.reference.shapes import Scene, rotation
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_pair_forces_leave_momentum_and_angular_momentum_alone(seed):
-    scene = scene_of(seed)
-    for law in PAIR_LAWS:
-        total = loads(scene, [law], displacements(scene) if law is CONTACT else None)
-        scale = np.abs(total[:, :2]).max() + 1e-30
-        x, y, _ = scene.positions.T
-        moments = x * total[:, 1] - y * total[:, 0] + total[:, 2]
-        assert np.abs(total[:, :2].sum(axis=0)).max() < 1e-12 * scale
-        assert abs(moments.sum()) < 1e-12 * scale * 1e-4
-
-
-def turned(scene, angle, shift):
-    """The scene turned about the origin and shifted."""
-    turn = rotation(angle)
-    positions, velocities = scene.positions.copy(), scene.velocities.copy()
-    positions[:, :2] = positions[:, :2] @ turn.T + shift
-    positions[:, 2] += angle
-    velocities[:, :2] = velocities[:, :2] @ turn.T
-    return Scene(scene.bodies, positions, velocities)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_turning_and_shifting_the_scene_turns_the_forces(seed):
-    scene, history = scene_of(seed), displacements(scene_of(seed))
-    before = loads(scene, PAIR_LAWS, history)
-    after = loads(turned(scene, 2.1, [3e-5, -1e-5]), PAIR_LAWS, history)
-    before[:, :2] = before[:, :2] @ rotation(2.1).T
-    assert_same_loads(after, before)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_mirrored_scene_has_mirrored_forces(seed):
-    scene, history = scene_of(seed), displacements(scene_of(seed))
-    flip, turn = np.array([-1.0, 1.0]), np.array([-1.0, 1.0, -1.0])
-    bodies = tuple(replace(body, vertices=body.vertices * flip) for body in scene.bodies)
-    mirrored = Scene(bodies, scene.positions * turn, scene.velocities * turn)
-    opposite = {key: -xi for key, xi in history.items()}
-    assert_same_loads(loads(mirrored, PAIR_LAWS, opposite), loads(scene, PAIR_LAWS, history) * turn)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_order_of_bodies_and_vertices_does_not_matter(seed):
-    scene = scene_of(seed)
-    bodies = tuple(
-        replace(body, vertices=np.roll(body.vertices, 1, axis=0)) for body in scene.bodies[::-1]
-    )
-    swapped = Scene(bodies, scene.positions[::-1], scene.velocities[::-1])
-    assert_same_loads(loads(swapped, PAIR_LAWS)[::-1], loads(scene, PAIR_LAWS))
-
-
-def assert_same_loads(found, expected):
-    for columns, arm in ((slice(0, 2), 1.0), (slice(2, 3), 1e-5)):
-        tolerance = 1e-10 * arm * np.abs(expected[:, :2]).max()
-        assert np.abs(found[:, columns] - expected[:, columns]).max() <= tolerance
 
 
 @pytest.mark.parametrize("seed", SEEDS)

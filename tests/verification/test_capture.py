@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.collision.draw import Draw, points_of
-from flocsim.ensembles.collision.offsets import settling_interval
-from flocsim.ensembles.collision.start import place_pair
+from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.runner import run
 from flocsim.forces import Contact, StokesDrag, VanDerWaals
 from flocsim.geometry.shapes.shape import Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
 from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.integrators import Overdamped
 from flocsim.io.results.schema import OUTCOMES
@@ -217,34 +214,3 @@ def test_without_attraction_the_influx_is_exact(tmp_path):
     arrays = run(config).kernel.arrays
     exact = 2.0 * 10.0 * SIZE**2
     assert arrays["beta2_c"][0, 0, 0, 1] == pytest.approx(exact, rel=1e-12, abs=0.0)
-
-
-CLAW = SpheroPolygon(
-    1e-6 * np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 9.0], [16.0, 9.0], [16.0, 3.0], [0.0, 4.0]]),
-    1e-6,
-)
-BAR = SpheroPolygon(1e-6 * np.array([[0.0, 0.0], [30.0, 2.0], [18.0, 6.0]]), 2e-6)
-ZONE = 1.3e-5
-
-
-def inside_width(points):
-    """⟨∫ χ_inside db⟩ of points (n, 5): where j first touches i in its fall, is d_c < ZONE?"""
-    angles = 2.0 * np.pi * points[:, 1:3]
-    low, high = settling_interval((CLAW, BAR), angles[:, 0], angles[:, 1], 0.0, 0.0)
-    offsets = low + points[:, 0] * (high - low)
-    found = np.zeros(len(points))
-    for k, (pair, offset) in enumerate(zip(angles.tolist(), offsets.tolist(), strict=True)):
-        height = place_pair((CLAW, BAR), pair, offset, 1e-10)[1, 1]
-        found[k] = math.hypot(offset, height) < ZONE
-    return float(np.mean((high - low) * found))
-
-
-@pytest.mark.slow
-def test_even_points_vary_at_least_three_times_less_than_random_ones():
-    runs, size = 24, 4096
-    rng = np.random.default_rng(5)
-    random = [inside_width(rng.random((size, 5))) for _ in range(runs)]
-    even = [inside_width(points_of(seed, 1, 0, size)) for seed in range(runs)]
-    assert np.mean(even) == pytest.approx(np.mean(random), rel=0.04)
-    ratio = np.var(random, ddof=1) / np.var(even, ddof=1)
-    assert ratio >= 3.0, ratio

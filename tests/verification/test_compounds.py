@@ -2,14 +2,13 @@
 
 import math
 
-import attrs
 import numpy as np
 import pytest
 
 from flocsim import Body, Composite, Fluid, Sphere, SpheroPolygon, Swarm, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
-from tests.helpers.compound_shapes import SQUARE, beads, cross, framed, lace, wavy
+from tests.helpers.compound_shapes import beads, cross, framed, lace, wavy
 from tests.helpers.tiers import rest_slow
 
 UNIT = 1e-6
@@ -74,21 +73,6 @@ def test_one_part_moves_as_the_shape_itself():
 
 def plain_places(bodies):
     return np.array([[*body.position, body.angle] for body in bodies])
-
-
-def test_a_hole_that_nothing_enters_changes_no_contact():
-    """Given the mass and the inertia of the solid one, a frame moves as that."""
-    solid, open_one = SpheroPolygon(5.0 * SQUARE * UNIT, UNIT), framed(UNIT)
-    runs = []
-    for shape in (solid, open_one):
-        bodies = thrown([shape, Sphere(3.0 * UNIT)])
-        wanted = Body(solid, surface_density=2.0)
-        thin = attrs.evolve(bodies[0], surface_density=wanted.mass / shape.area)
-        runs.append((thin.inertia, finished(System([thin, bodies[1]], [CONTACT]), 3e-4)))
-    # A frame is harder to turn: only the first touch, before it has, is alike.
-    assert runs[1][0] > 1.1 * runs[0][0]
-    touch = [run.t[np.argmax(np.abs(np.diff(run.velocity[:, 0, 0])) > 1e-6)] for _, run in runs]
-    assert touch[0] == pytest.approx(touch[1], rel=1e-6)
 
 
 def test_settling_is_that_of_the_union():

@@ -65,14 +65,6 @@ def drift(integrator, until):
     return end.contacts, energies[1] / energies[0] - 1.0, np.abs(change / unit).max()
 
 
-@pytest.mark.slow
-def test_velocity_verlet_over_two_thousand_contacts():
-    count, energy_change, momenta_change = drift(VelocityVerlet(5e-8), 0.085)
-    assert count >= 2000
-    assert abs(energy_change) < 0.01
-    assert momenta_change < 1e-10
-
-
 @by_adaptive
 def test_adaptive_methods_lose_less_energy_at_a_finer_tolerance(integrator):
     # Over three decades: what is lost at one tolerance may be next to nothing by chance.

@@ -101,6 +101,7 @@ def test_where_overlaps_are_at_rounding_contacts_let_go_when_they_do(
     assert OUTCOMES[row["outcome"]] == outcome
 
 
+@pytest.mark.slow
 def test_rattles_are_rare_and_mostly_cut_short():
     """Single ones are chance; in the mean it was 5,200 steps while every cycle was followed."""
     study = study_of("III", 2e5)

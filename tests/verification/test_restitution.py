@@ -76,13 +76,6 @@ def test_restitution_and_contact_time_with_tension(z, integrator, allowed):
 
 
 @by_method
-@pytest.mark.parametrize("tension", [True, False])
-def test_largest_overlap_at_critical_damping(tension, integrator, allowed):
-    _, _, deepest = bounce(1.0, tension, integrator)
-    assert deepest == pytest.approx(1.0 / math.e, rel=SEEN)
-
-
-@by_method
 def test_critical_damping_with_tension_never_parts(integrator, allowed):
     restitution, _, _ = bounce(1.0, True, integrator)
     assert abs(restitution) < 1e-3

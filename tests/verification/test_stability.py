@@ -4,13 +4,10 @@ The table itself is benchmarks/stability/run.py; here some of its cases go throu
 functions, in this process and without a limit of time.
 """
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
-from benchmarks.stability.case import RANGES
-from benchmarks.stability.families import FAMILIES, case_of, family_of
+from benchmarks.stability.families import family_of
 from benchmarks.stability.spheres import bounce, resting_overlap, settle
 from benchmarks.stability.verdict import judge
 from flocsim.integrators import Status
@@ -47,29 +44,6 @@ def test_cases_of_few_scenes(index):
 @pytest.mark.parametrize("index", [each for each in range(LONG) if each not in SHORT])
 def test_more_cases(index):
     assert_right_or_typed(index)
-
-
-def test_the_families_come_round():
-    assert sum(family.weight for family in FAMILIES.values()) == 100
-    counted = Counter(family_of(index) for index in range(1000, 1100))
-    assert counted == {name: family.weight for name, family in FAMILIES.items()}
-
-
-def test_cases_depend_on_their_index_alone():
-    first, places = case_of(7)
-    again, same = case_of(7)
-    assert places == same
-    assert [body.position for body in first.bodies] == [body.position for body in again.bodies]
-    assert first.until == again.until
-
-
-@pytest.mark.slow
-def test_draws_cover_their_ranges():
-    drawn = [case_of(index)[1] for index in range(300)]
-    for name in RANGES:
-        places = [each[name] for each in drawn if name in each]
-        assert all(-1e-9 <= place <= 1.0 + 1e-9 for place in places)
-        assert max(places) - min(places) > 0.3, name
 
 
 @pytest.mark.parametrize("tension", [True, False])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim import Body, Sphere, Swarm, System
+from flocsim import Body, Sphere, Swarm
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Status
 from flocsim.swarms.placement import place_at_random
@@ -136,21 +136,3 @@ def clusters_of(grown):
     position = np.column_stack([places, np.zeros(len(places))])
     near = swarm.gauge().neighbours(position, 1e-12)
     return Clusters.of(swarm.bodies, position, np.zeros_like(position), near)
-
-
-@pytest.mark.slow
-def test_a_thousand_pairs_end_as_each_by_itself():
-    """Forces of finite reach, far apart in one box: no pair knows of the others."""
-    from benchmarks.speed.swarms import APART, lone_pair
-
-    count, until = 1000, 0.3
-    bodies = [body for each in range(count) for body in lone_pair(each, count)]
-    sticky = [Gravity(), StokesDrag(), VanDerWaals(1e-19, gap="surface", cut=1e-6), Contact()]
-    side = APART * math.ceil(math.sqrt(count))
-    run = finished(Swarm(bodies, sticky, fluid=WATER, box=(side, side)), until)
-    # Most meet, and some do not.
-    assert 0.5 * count < len(run.neighbours().pairs) < 0.97 * count
-    for k in range(0, 2 * count, 2):
-        alone = System(bodies[k : k + 2], sticky, fluid=WATER).run(until, record=False)
-        apart = np.hypot(*(run.position[-1, k : k + 2] - alone.position[-1])[:, :2].T).max()
-        assert apart <= alone.error + run.error[-1]

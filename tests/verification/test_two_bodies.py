@@ -60,14 +60,6 @@ def test_elliptic_orbit(shapes, integrator, allowed):
     assert miss(orbit(*shapes), integrator, 1.3) < allowed
 
 
-@pytest.mark.slow
-def test_velocity_verlet_is_of_second_order():
-    bodies = orbit(star(), hook())
-    errors = [miss(bodies, VelocityVerlet(period(bodies) / n), 0.8) for n in (250, 500, 1000)]
-    orders = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert orders == pytest.approx([2.0, 2.0], abs=0.1)
-
-
 @by_adaptive
 def test_the_error_falls_with_the_tolerance_and_stays_near_it(integrator):
     bodies = orbit(star(), hook())
@@ -76,13 +68,6 @@ def test_the_error_falls_with_the_tolerance_and_stays_near_it(integrator):
     falls = np.divide(errors[:-1], errors[1:]) > 3.0
     assert np.all(falls | (np.array(errors[1:]) < 1e-16))  # rounding
     assert np.all(errors < 20.0 * tolerances)
-
-
-def test_spins_and_the_common_drift_are_kept():
-    bodies = orbit(star(), hook())
-    end = watched(PolygonSystem(bodies, [ELASTIC, isotropic(bodies)], Implicit(1e-11)), 1e-3)
-    assert end.position[:, 2] == pytest.approx(exact_motion(bodies, 1e-3)[:, 2], rel=1e-12)
-    assert end.velocity[:, 2].tolist() == [50.0, -70.0]
 
 
 def test_body_tied_to_a_fixed_one_swings_back():
