@@ -163,13 +163,6 @@ def test_what_a_unit_raises_comes_through(made):
         driver(-1.0)
 
 
-def test_functions_to_compile_are_those_of_units_that_are_not_there(made):
-    driver = compose(drive, {})
-    assert units.to_compile(driver.code.entry) == 3
-    driver(VALUES, 2.0)
-    assert units.to_compile(compose(watched, {}).code.entry) == 1
-
-
 def test_what_is_postponed_is_compiled_where_it_is_asked_for_and_nothing_else_anew(made):
     function = compose(drive_rarely, {common: rare})
     assert function(2.0) == (2.0, -1.0)
