@@ -137,15 +137,6 @@ def test_a_run_of_a_system_names_the_force_that_gives_no_number(tmp_path, monkey
     sys.modules.pop("wrong")
 
 
-def test_a_stalled_run_without_such_a_force_is_undecided(tmp_path):
-    write(tmp_path, "CentreForce", "", "0.0")
-    config = load_text(
-        tmp_path, STUDY.format(replicates=1, allowed=1), {"integrator": {"max_steps": 5}}
-    )
-    row, note = run_safely(Study(config), (0, 1, 0.0), 0)
-    assert (FAILURES[row["failure"]], note) == ("step budget", None)
-
-
 @pytest.mark.parametrize(
     ("answer", "allowed", "words", "said", "kept"),
     rest_slow([

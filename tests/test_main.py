@@ -159,14 +159,3 @@ def test_without_a_compiler_it_says_so(study, words):
     assert done.returncode == 2
     assert done.stderr.splitlines()[-1].startswith("flocsim: NUMBA_DISABLE_JIT is set")
     assert len(done.stderr.splitlines()) == 1
-
-
-def test_importing_the_package_loads_nothing_heavy():
-    code = (
-        "import sys, flocsim, flocsim.__main__\n"
-        "print({'h5py', 'matplotlib', 'skimage', 'mpi4py', 'numba'} & set(sys.modules))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE
-    )
-    assert (done.stdout, done.stderr) == ("set()\n", "")

@@ -193,18 +193,6 @@ def test_python_without_venv_names_the_package_to_install(stage, monkeypatch, ca
     assert "apt install python3-venv" in capsys.readouterr().err
 
 
-def test_works_from_another_folder(stage, monkeypatch, tmp_path, capsys):
-    monkeypatch.chdir(tmp_path)
-    stage.run("setup")
-    assert Path.cwd() == stage.folder
-    assert capsys.readouterr().out.startswith(f"$ cd '{stage.folder}'\n")
-
-
-def test_windows_paths(stage, monkeypatch):
-    monkeypatch.setattr(stage.run_py, "WINDOWS", True)
-    assert stage.run_py.tool("python") == os.path.join(".venv", "Scripts", "python.exe")
-
-
 @pytest.fixture
 def installed(tmp_path):
     """Gives a maker of folders with the real run.py and a stand-in for .venv's Python."""
@@ -227,19 +215,6 @@ def test_commands_are_shown_as_typed_and_their_exit_codes_returned(installed, tm
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     shown = ["$ .venv/bin/python -m pytest -k 'a b'", "got -m pytest -k a b"]
     assert (done.returncode, done.stdout.splitlines()[-2:], done.stderr) == (7, shown, "")
-
-
-@posix
-def test_missing_program_is_one_line(installed, tmp_path):
-    done = subprocess.run([*installed("exit 0"), "demo"], capture_output=True, text=True)
-    assert done.returncode == 70
-    assert done.stderr.count("\n") == 1 and ".venv/bin/flocsim" in done.stderr
-
-
-@posix
-def test_killed_command_gives_the_exit_code_of_a_shell(installed, tmp_path):
-    done = subprocess.run([*installed("kill -9 $$"), "test"], capture_output=True, text=True)
-    assert done.returncode == 128 + signal.SIGKILL
 
 
 @posix

@@ -8,7 +8,6 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact import points as contacts
-from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.hooks import HOOKS, compiled_calls
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
 from tests.helpers.tiers import rest_slow
@@ -28,18 +27,6 @@ REFUSED = {
     "until 0": (lambda: System([BALL]).run(0.0), "above 0 s, found 0"),
     "until negative": (lambda: System([BALL]).run(-1.0), "found -1"),
     "until not a number": (lambda: System([BALL]).run(NAN), "found nan"),
-    "position not finite": (lambda: attrs.evolve(BALL, position=(NAN, 0.0)), "position must be 2"),
-    "position of three": (lambda: attrs.evolve(BALL, position=(0, 0, 0)), "position must be 2"),
-    "velocity not finite": (lambda: attrs.evolve(BALL, velocity=(0, INF)), "velocity must be 2"),
-    "no density": (lambda: Body(Sphere(1e-6)), "either surface_density"),
-    "both densities": (lambda: Body(Sphere(1e-6), surface_density=2.0, density=1.0), "not both"),
-    "negative density": (lambda: Body(Sphere(1e-6), density=-1.0), "above 0, found -1"),
-    "depth a word": (lambda: Body(Sphere(1e-6), density=1.0, depth="flat"), "found 'flat'"),
-    "a number for a shape": (lambda: Body(3, surface_density=2.0), "Sphere or a SpheroPolygon"),
-    "buoyancy without density": (
-        lambda: System([BALL], [Gravity()], fluid=Fluid(buoyancy=True)).run(1e-3),
-        "buoyancy needs the bodies' density",
-    ),
     "too deep a start": (lambda: System(head_on(gap=-6e-6)).run(1e-3), "bodies 0 and 1 start"),
     "the same place": (lambda: System([BALL, BALL]).run(1e-3), "move them apart"),
     "one core inside another": (
@@ -150,24 +137,6 @@ def test_no_force_at_all_is_free_flight():
     assert found.position[-1, 0] == pytest.approx([5e-4, -1e-3, 1.5], rel=1e-12)
 
 
-def test_explain_names_what_is_in_and_what_is_out():
-    forces = [Gravity(g=0.0), StokesDrag(), VanDerWaals(hamaker=0.0), DoubleLayer(potential=0.0)]
-    lines = System([BALL], [*forces, Contact()]).explain().splitlines()
-    assert lines[0].startswith("1 bod")
-    assert "spheres only" in lines[0]
-    for name in ("StokesDrag", "Contact"):
-        assert any(line.startswith(f"in:  {name}") for line in lines)
-    for name, why in (("Gravity", "g is zero"), ("VanDerWaals", "hamaker"), ("DoubleLayer", "po")):
-        assert any(line.startswith(f"out: {name}: {why}") for line in lines)
-    assert any(line.startswith("out:") and "no body has an edge" in line for line in lines)
-
-
-def test_explain_of_polygons_leaves_no_polygon_code_out():
-    text = System([attrs.evolve(BALL, shape=hook())], [Contact()]).explain()
-    assert "polygons" in text
-    assert "no body has an edge" not in text
-
-
 def test_absent_forces_are_not_called():
     """The same run, bit for bit, with and without forces of zero strength."""
     bodies = head_on()
@@ -178,62 +147,6 @@ def test_absent_forces_are_not_called():
         System(bodies, [ELASTIC, *absent]).pieces.parameters
         == System(bodies, [ELASTIC]).pieces.parameters
     )
-
-
-def names_reached(function, seen=None):
-    """Names of all plain functions that an uncompiled driver reaches."""
-    seen = {} if seen is None else seen
-    if function not in seen:
-        seen[function] = function.__qualname__
-        for value in function.__globals__.values():
-            if type(value) is type(function):
-                names_reached(value, seen)
-    return set(seen.values())
-
-
-def test_spheres_alone_reach_no_polygon_code():
-    def code_of(system):
-        return " ".join(names_reached(system.compose(jit=False)))
-
-    spheres, polygons = (
-        code_of(System(head_on(), [ELASTIC])),
-        code_of(System([BALL, Body(hook(), (5e-5, 0.0), surface_density=2.0)], [ELASTIC])),
-    )
-    for name in ("locate_polygons", "list_one_way", "edge_end", "turned"):
-        assert name in polygons
-        assert name not in spheres
-    for name in ("locate_spheres", "list_spheres"):
-        assert name in spheres
-    fillings = System(head_on(), [ELASTIC]).fillings()
-    assert fillings[contacts.locate_polygons] is contacts.locate_spheres
-    assert SPHERES_ONLY.items() <= fillings.items()
-
-
-def test_few_bodies_leave_out_what_only_many_need():
-    row = [Body(BALL.shape, (3e-5 * k, 0.0), surface_density=2.0) for k in range(7)]
-    few, many = (
-        set(names_reached(system.compose(jit=False)))
-        for system in (System(row[:6], [ELASTIC]), System(row, [ELASTIC]))
-    )
-    for name in ("near_pairs", "wandered", "find_pattern", "factorise_sparse", "solve_sparse"):
-        assert name in many
-        assert name not in few
-    assert System(row, [ELASTIC]).fillings() == System(row[:6], [ELASTIC]).fillings(grows=True)
-
-
-def test_a_scene_leaves_out_what_no_force_of_it_asks_for():
-    def reached(*forces):
-        driver = System(head_on(), [ELASTIC, *forces]).compose(jit=False)
-        return set(names_reached(driver))
-
-    plain, full = (
-        reached(StokesDrag()),
-        reached(StokesDrag(law="shape"), VanDerWaals(law="outline")),
-    )
-    assert plain >= {"plain_body_view", "add_none"}
-    assert not plain & {"body_view", "sum_along"}
-    assert full >= {"body_view", "sum_along", "add_outlines"}
-    assert not full & {"plain_body_view", "add_none"}
 
 
 CLOSE_FORCES = [

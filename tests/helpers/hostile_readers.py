@@ -11,6 +11,7 @@ import numpy as np
 from flocsim.ensembles.storage.identity import short
 from flocsim.errors import ConfigError, FileError, FlocsimError
 from tests.helpers import hostile_files
+from tests.helpers.hostile_files import hdf5_file
 
 
 def read_results_file(path):
@@ -84,17 +85,6 @@ def read_masks_file(path):
         assert mask.ndim == 2 and mask.min() >= 0
         if mask.size < 20_000:
             segment_mask(mask)
-
-
-def read_config_file(path):
-    """Load it, and take its text for a setting of the command line."""
-    from flocsim.ensembles.config.loader import load_config, nested, parse_setting
-
-    text = path.read_bytes().decode("utf-8", "replace")
-    try:
-        load_config(path)
-    finally:
-        nested([parse_setting("scene.delta=" + text[:5000])])
 
 
 def read_swarm_file(path):
@@ -234,33 +224,28 @@ class JournalReader:
             journal.release()
 
 
+MAKERS = {
+    "results": (hdf5_file(hostile_files.valid_results), read_results_file),
+    "kernels": (hdf5_file(hostile_files.valid_kernel), read_kernel_file),
+    "libraries": (hdf5_file(hostile_files.valid_library), read_library_file),
+    "compounds": (hdf5_file(hostile_files.valid_compounds), read_library_file),
+    "strengths": (hdf5_file(hostile_files.valid_strengths), read_strengths_file),
+    "swarms": (hdf5_file(hostile_files.valid_swarm), read_swarm_file),
+    "sweeps": (hdf5_file(hostile_files.valid_sweep), read_sweep_file),
+    "trajectories": (hdf5_file(hostile_files.valid_trajectory), read_trajectory_file),
+    "pictures": (hostile_files.picture_file, read_picture_file),
+    "masks": (hostile_files.masks_file, read_masks_file),
+}
+JOURNALS = {"journals": JournalReader, "swarm_journals": SwarmJournalReader}
+KINDS = (*MAKERS, *JOURNALS)
+
+
 def reader(name, folder):
-    """(maker of hostile files, function that reads one) of a kind."""
-    if name == "journals":
-        journals = JournalReader(folder)
+    """Return (maker of hostile files, function that reads one) of a kind."""
+    if name in JOURNALS:
+        journals = JOURNALS[name](folder)
         return journals.make, journals.read
-    if name == "swarm_journals":
-        swarms = SwarmJournalReader(folder)
-        return swarms.make, swarms.read
-    return {
-        "swarms": (hostile_files.swarm_file, read_swarm_file),
-        "results": (hostile_files.results_file, read_results_file),
-        "libraries": (hostile_files.library_file, read_library_file),
-        "compounds": (hostile_files.compounds_file, read_library_file),
-        "kernels": (hostile_files.kernel_file, read_kernel_file),
-        "strengths": (hostile_files.strengths_file, read_strengths_file),
-        "sweeps": (hostile_files.sweep_file, read_sweep_file),
-        "trajectories": (hostile_files.trajectory_file, read_trajectory_file),
-        "pictures": (hostile_files.picture_file, read_picture_file),
-        "masks": (hostile_files.masks_file, read_masks_file),
-        "configs": (hostile_files.config_file, read_config_file),
-    }[name]
-
-
-KINDS = (
-    "results", "libraries", "journals", "pictures", "masks", "configs", "swarms", "swarm_journals",
-    "compounds", "kernels", "strengths", "sweeps", "trajectories",
-)  # fmt: skip
+    return MAKERS[name]
 
 
 def outcome(read, path):

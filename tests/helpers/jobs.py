@@ -84,15 +84,6 @@ def alive(pids):
                 yield pid
 
 
-def listens(pid):
-    """Whether a process has a handler of its own for SIGTERM."""
-    with contextlib.suppress(OSError, StopIteration):
-        lines = Path("/proc", str(pid), "status").read_text().splitlines()
-        caught = next(line for line in lines if line.startswith("SigCgt:"))
-        return bool(int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1)
-    return False
-
-
 def errors_of(folder):
     """Where what a job says on stderr goes: not to its own disk, which may be full. There mpirun
     cannot write either, and ends with 255 whatever its ranks end with."""
@@ -125,15 +116,6 @@ class Job:
         until = time.monotonic() + PATIENCE
         while self.process.poll() is None and time.monotonic() < until:
             if path.exists() and len(records_in(path)) > before:
-                return
-            time.sleep(0.005)
-
-    def wait_for_handlers(self):
-        """Until every rank listens: before that a signal ends it as it ends any program."""
-        until = time.monotonic() + PATIENCE
-        while self.process.poll() is None and time.monotonic() < until:
-            ranks = [pid for pid in descendants(self.process.pid) if is_python(pid)]
-            if len(ranks) >= self.ranks and all(listens(pid) for pid in ranks):
                 return
             time.sleep(0.005)
 

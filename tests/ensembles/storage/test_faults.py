@@ -4,10 +4,8 @@ import random
 import resource
 import signal
 
-import numpy as np
 import pytest
 
-from tests.helpers import damage, damaged_cache
 from tests.helpers.jobs import Job, errors_of, make_study, run_here, verdict
 from tests.helpers.small_study import mpirun, problems
 from tests.helpers.tiers import rest_slow
@@ -81,17 +79,3 @@ def test_a_full_disk_ends_with_74_and_whole_chunks(root, reference, kind, size):
     assert len(problems(errors)) == 1
     assert "study.h5.journal could not be written: " in errors
     assert verdict(folder, reference) == ""
-
-
-@pytest.mark.slow
-def test_every_damage_is_found_and_nothing_wrong_is_believed(root, reference, monkeypatch):
-    monkeypatch.setattr(damage, "WHOLE_RERUNS", 3)
-    rng = np.random.default_rng(2)
-    assert damage.damage_journal(root, reference, 60, rng) == []
-    assert damage.damage_results(root, reference, 100, rng) == []
-
-
-@pytest.mark.slow
-def test_no_damage_of_the_code_cache_makes_a_wrong_row_or_runs_what_was_planted(root):
-    ways = len(damaged_cache.WAYS)
-    assert damaged_cache.damage_often(root / "cache", ways, np.random.default_rng(3)) == []

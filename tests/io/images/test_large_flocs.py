@@ -38,13 +38,6 @@ def test_a_large_floc_stays_whole_and_is_taken_for_the_floc(share, options, dark
     assert (seen & mask).sum() / (seen | mask).sum() > 0.93
 
 
-def test_a_large_floc_and_its_mirror_image_have_mirrored_light():
-    grey, _ = picture(0.3, dark=True, centre=0.4)
-    light, mirrored = smooth_surface(grey, 6), smooth_surface(grey[:, ::-1], 6)
-    # Every second or third pixel tells the light, from one side on.
-    np.testing.assert_allclose(light, mirrored[:, ::-1], atol=0.02)
-
-
 def test_the_light_of_a_picture_without_large_flocs_is_that_of_all_of_it():
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     light = 0.7 - 0.3 * ((x / SHAPE[1] - 0.5) ** 2 + (y / SHAPE[0] - 0.3) ** 4)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_dilation, distance_transform_edt, find_objects, label
-from skimage.feature import peak_local_max
+from scipy.ndimage import distance_transform_edt, label
 from skimage.segmentation import watershed
 
-from flocsim.io.images.outlines import EIGHT, FAR, FRINGE, lit_at_ends
+from flocsim.io.images.outlines import EIGHT
 from flocsim.io.images.regions import bodies, has_neck, joined, peaks_of
 
 
@@ -30,17 +29,6 @@ def depth_of(mask):
     return distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
 
 
-@pytest.mark.parametrize("apart", [1, 2, 5])
-def test_peaks_are_those_of_scikit_image(apart):
-    for seed in range(40):
-        mask = blob(seed)
-        depth = depth_of(mask)
-        known = peak_local_max(
-            depth, min_distance=apart, labels=mask.astype(int), exclude_border=False
-        )
-        assert np.array_equal(peaks_of(depth, apart), known)
-
-
 @pytest.mark.parametrize("neck", [0.3, 0.5, 0.8, 1.0])
 def test_where_no_peak_is_cut_off_all_basins_would_be_joined(neck):
     joins, cuts = 0, 0
@@ -60,16 +48,3 @@ def test_where_no_peak_is_cut_off_all_basins_would_be_joined(neck):
             assert parts.max() == 1
     assert cuts > 5
     assert joins > 5 or neck == 1.0
-
-
-def test_no_more_is_lit_than_what_lies_beside_an_island():
-    rng = np.random.default_rng(3)
-    for seed in range(60):
-        mask = blob(seed)
-        mask = mask[find_objects(mask.astype(int))[0]]
-        corner = tuple(rng.integers(0, 2 * FAR, 2).tolist())
-        whole = np.pad(mask, [(start, FAR) for start in corner])
-        lit = ~binary_dilation(rng.random(whole.shape) < 0.003, iterations=4)
-        away = distance_transform_edt(~whole)
-        beside = np.count_nonzero(lit & (away > FRINGE) & (away <= FAR))
-        assert 0 < lit_at_ends(lit, mask, corner) <= beside

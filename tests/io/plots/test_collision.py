@@ -17,7 +17,7 @@ from flocsim.io.plots.collision import (
     time_unit,
     write_animation,
 )
-from flocsim.io.plots.style import add_foot, save
+from flocsim.io.plots.style import add_foot
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * 1e-5
 
@@ -107,11 +107,6 @@ def test_what_pushes_is_solid_and_what_pulls_is_dashed():
     assert axes.get_yscale() == "log"
 
 
-def test_forces_of_nothing_can_be_drawn(tmp_path):
-    save(draw_forces([0.0, 1.0], {"none": np.zeros(2)}), tmp_path / "f.png")
-    assert (tmp_path / "f.png").stat().st_size > 0
-
-
 def test_energies_are_drawn_one_by_one():
     times, work = np.linspace(0.0, 1e-3, 4), {"Gravity": np.full(4, 3e-15)}
     axes = draw_energies(times, work, np.full(4, 1e-17)).axes[0]
@@ -149,12 +144,6 @@ def test_all_frames_of_an_animation_are_there_and_differ(tmp_path):
             animation.seek(place)
             pictures.append(animation.convert("RGB").tobytes())
     assert len(set(pictures)) == 4
-
-
-@pytest.mark.slow
-def test_the_same_frames_are_the_same_bytes(tmp_path):
-    pair = [written(tmp_path / name, 2).read_bytes() for name in ("a.gif", "b.gif")]
-    assert pair[0] == pair[1]
 
 
 def test_a_strip_names_bodies_lines_and_contacts():
