@@ -54,7 +54,10 @@ def group_of(group):
 """,
     "shear": """\
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.kind import study_of
+try:
+    from flocsim.ensembles.kind import study_of
+except ImportError:  # in older versions
+    from flocsim.ensembles.kernels import study_of
 
 config = load_any_config(Path(sys.argv[1]))
 study = study_of(config)
