@@ -72,6 +72,7 @@ def run_forked(argv, folder):
 
 
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+OF_RESULTS = [kind for kind in MAKERS if kind not in ("pictures", "masks")]
 LONG = {
     "report": ["-o", "out.html"], "strength": ["-o", "out.h5", "--count", "1"],
     "trajectory": ["-o", "out.png"], "plot": ["--format", "png", "--figures", "overview"],
@@ -80,15 +81,17 @@ LONG = {
 
 
 @needs_fork
-@pytest.mark.parametrize("files", rest_slow([1, 20], lambda files: files == 1))
-@pytest.mark.parametrize("kind", [each for each in MAKERS if each not in ("pictures", "masks")])
+@pytest.mark.parametrize(
+    ("kind", "files"),
+    [("results", 2), *(pytest.param(kind, 20, marks=pytest.mark.slow) for kind in OF_RESULTS)],
+)
 def test_commands_end_with_plain_lines_and_little_work(tmp_path, monkeypatch, kind, files):
     monkeypatch.chdir(tmp_path)
     make, _ = MAKERS[kind]
     for number in range(files):
         path = str(made(make, f"commands {kind}", number, tmp_path))
         lines = [["info", path], ["compare", path, path], ["export", "csv", path, "-o", "out.csv"]]
-        if files > 1:
+        if files > 2:
             lines += [[name, path, *more] for name, more in LONG.items()]
         for words in lines:
             code, printed, seconds, peak = run_forked(words, tmp_path)
