@@ -4,15 +4,18 @@
 `<!-- of the schema: NAME -->` and `<!-- end -->`.
 """
 
+import ast
 import inspect
+import itertools
 import re
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 
-from flocsim.ensembles.config import SCENE_WORDS, presets
-from flocsim.ensembles.config.pair_scene import PAIR_SCENES
-from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, keys_of
+import attrs
+
+from flocsim.ensembles.config import SCENE_WORDS
+from flocsim.ensembles.config.schema import FORCES, SCENES, STUDY_KEYS, TABLES, Config, keys_of
 from flocsim.errors import UsageError
 from flocsim.io.results.kernel_group import KERNEL
 from flocsim.io.results.schema import (
@@ -31,9 +34,7 @@ DOCS = Path(__file__).parent
 FORCES_BY_TABLE = {f"forces.{name}": force for name, force in FORCES.items()}
 
 SCENE_HEADINGS = {
-    "": SCENES["settling"],
-    " in a flow": SCENES["shear"],
-    " in thermal motion": SCENES["brownian"],
+    "": SCENES["binary"],
     **{f" of a {word}": SCENES[word] for word in SCENE_WORDS},
     " of a kernel study": SCENES["kernel"],
 }
@@ -43,17 +44,16 @@ QUOTED_WORD = re.compile(r"['\"]([^\W\d][\w-]*)['\"]")
 
 def config_parts() -> dict[str, str]:
     """{name: text} of all that docs/config.md has of the schema: the keys, and the presets."""
-    parts = ["## At the top\n", key_table(STUDY_KEYS)]
-    first = keys_of(SCENES["settling"])
+    parts = ["## At the top\n", key_table(Config, STUDY_KEYS)]
     for name, table_class in (TABLES | FORCES_BY_TABLE).items():
         scenes = SCENE_HEADINGS if name == "scene" else {"": table_class}
         for heading, each in scenes.items():
             keys = keys_of(each)
-            if each in PAIR_SCENES.values():  # what is as in [scene] itself need not be said again
-                known = first if heading else {}
-                keys = {key: field for key, field in keys.items() if field != known.get(key)}
-            parts += [f"## [{name}]{heading}\n", about(each, name), key_table(keys)]
-    return {"keys": "\n".join(parts), "presets": f"{about(presets, '')}\n{preset_table()}"}
+            if heading == " of a kernel study":  # what it inherits is said above
+                keys = {key: keys[key] for key in vars(each)["__annotations__"] if key in keys}
+            parts += [f"## [{name}]{heading}\n", about(each, name), key_table(each, keys)]
+    presets = Path(inspect.getfile(Config)).with_name("presets.toml").read_text("utf-8")
+    return {"keys": "\n".join(parts), "presets": f"```text\n{presets}```"}
 
 
 def about(documented, name):
@@ -62,25 +62,47 @@ def about(documented, name):
     return text[0].upper() + text[1:] + "\n"
 
 
-def key_table(keys):
+def help_of(some_class):
+    """{name: text} of the docstrings below the attributes of a class and its bases."""
+    found = {}
+    for each in [each for each in reversed(some_class.__mro__) if attrs.has(each)]:
+        body = ast.parse(textwrap.dedent(inspect.getsource(each))).body[0].body
+        for node, after in itertools.pairwise(body):
+            if isinstance(node, ast.AnnAssign) and isinstance(after, ast.Expr):
+                found[node.target.id] = " ".join(str(after.value.value).split()).removesuffix(".")
+    return found
+
+
+def key_table(some_class, keys):
+    helps = help_of(some_class)
     rows = [
-        [f"`{key}`", takes(field), default_of(field), field.metadata.get("help", "")]
+        [f"`{key}`", takes(field), default_of(field), meaning(field, helps)]
         for key, field in keys.items()
     ]
     return markdown_table(["key", "takes", "default", "meaning"], rows) + "\n"
 
 
+def meaning(field, helps):
+    """What a key means, and with which other key it applies."""
+    text = field.metadata.get("help") or helps.get(field.name, "")
+    if "only_for" not in field.metadata:
+        return text
+    other, words, _ = field.metadata["only_for"]
+    return f"{text}; only with {other} = {' or '.join(f'`{as_toml(word)}`' for word in words)}"
+
+
 def takes(field):
-    metadata = field.metadata
-    if metadata.get("flag"):
-        return "`true` or `false`"
-    words = metadata.get("allowed") or f"a list of {metadata['vector']} numbers"
-    words = QUOTED_WORD.sub(r'`"\1"`', words)
-    return f"{words} [{metadata['unit']}]" if metadata.get("unit") else words
+    if "own" in field.metadata:
+        return '`"module:Class"`'
+    reader = field.metadata["reader"]
+    words = QUOTED_WORD.sub(r'`"\1"`', reader.allowed)
+    words = "`true` or `false`" if words == "true or false" else words
+    return f"{words} [{reader.unit}]" if reader.unit else words
 
 
 def default_of(field):
-    shown = field.metadata.get("shown") or as_toml(field.default)
+    usual = as_toml(field.metadata.get("usual", field.default))
+    shown = field.metadata.get("shown") or usual
     return shown if shown == "none" else f"`{shown}`"
 
 
@@ -93,26 +115,6 @@ def as_toml(value):
     if isinstance(value, bool):
         return str(value).lower()
     return f'"{value}"' if isinstance(value, str) else repr(value)
-
-
-def preset_table():
-    """Every value of every preset; empty where it does not give a key, "on" for a bare table."""
-    columns = [
-        {key: "on" if value == {} else as_toml(value) for key, value in flat(preset)}
-        for preset in PRESETS.values()
-    ]
-    keys = list(dict.fromkeys(key for column in columns for key in column))
-    rows = [[f"`{key}`", *(column.get(key, "") for column in columns)] for key in keys]
-    return markdown_table(["key", *(f"`{name}`" for name in PRESETS)], rows) + "\n"
-
-
-def flat(table, around=""):
-    """(dotted key, value) of all values in a nested table; an empty table is a value."""
-    for key, value in table.items():
-        if isinstance(value, dict) and value:
-            yield from flat(value, f"{around}{key}.")
-        else:
-            yield f"{around}{key}", value
 
 
 ENDS = ("_low", "_high", "_numerical")

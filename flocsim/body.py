@@ -17,7 +17,18 @@ from flocsim.constants import (
     WATER_VISCOSITY,
 )
 from flocsim.errors import RangeError, UsageError
-from flocsim.fields import choice, flag, in_unit, is_number, only, quantity, word_or_quantity
+from flocsim.fields import (
+    choice,
+    field,
+    flag,
+    in_unit,
+    is_number,
+    number,
+    only,
+    quantity,
+    several,
+    word_or_quantity,
+)
 from flocsim.geometry.contact.charges import charges_of_bodies, field_of_bodies
 from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.shapes.pieces import pieces_of_bodies
@@ -49,10 +60,6 @@ def read_position(values: Iterable[float]) -> tuple[float, float]:
 
 def read_velocity(values: Iterable[float]) -> tuple[float, float]:
     return read_vector("velocity", 2, "m/s", values)
-
-
-def read_gradient(values: Iterable[float]) -> tuple[float, float, float, float]:
-    return read_vector("gradient", 4, "1/s", values)
 
 
 @attrs.frozen(eq=False)
@@ -91,20 +98,14 @@ class Fluid:
         shown=f"{WATER_DENSITY}",
     )  # fmt: skip
     buoyancy: bool = flag(default=False, help="subtract the displaced fluid's weight")
-    velocity: tuple[float, float] = attrs.field(
-        default=(0.0, 0.0),
-        converter=read_velocity,
-        metadata={"vector": 2, "unit": "m/s", "help": "of the background flow at the origin"},
-    )
-    gradient: tuple[float, float, float, float] = attrs.field(
-        default=(0.0, 0.0, 0.0, 0.0),
-        converter=read_gradient,
-        metadata={
-            "vector": 4,
-            "unit": "1/s",
-            "help": "of the background flow: ∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y",
-        },
-    )
+    velocity: tuple[float, float] = field(
+        several(number("m/s"), 2, distinct=False), default=(0.0, 0.0),
+        help="of the background flow at the origin",
+    )  # fmt: skip
+    gradient: tuple[float, float, float, float] = field(
+        several(number("1/s"), 4, distinct=False), default=(0.0, 0.0, 0.0, 0.0),
+        help="of the background flow: ∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y",
+    )  # fmt: skip
 
     def __attrs_post_init__(self) -> None:
         if self.salinity is not None and self.ionic_strength is not None:

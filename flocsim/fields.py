@@ -1,12 +1,13 @@
 """Makers of attrs fields that carry their unit and their permitted range; numbers with units.
 
 The range is checked when an object is made, in Python as from a config file; the unit lets both
-read "16.41 um" as 16.41e-6 m, converted in decimals, and refuse "3 kg". Metadata keys: ``allowed``
-(what the field takes, in words), ``unit``, ``choices``, ``flag``, ``help``.
+read "16.41 um" as 16.41e-6 m, converted in decimals, and refuse "3 kg". A field's metadata has its
+``reader`` and a ``help``.
 """
 
 import functools
 import math
+import os
 import re
 from collections.abc import Callable, Iterable
 from decimal import Decimal, localcontext
@@ -16,7 +17,7 @@ from typing import Any
 import attrs
 
 from flocsim.constants import BOLTZMANN
-from flocsim.errors import RangeError, UsageError
+from flocsim.errors import LONGEST_SHOWN, RangeError, UsageError, suggestion
 
 KINDS = {
     "m": ("a length", "16.41 um"),
@@ -82,52 +83,24 @@ def is_whole(value: Any) -> bool:
 
 
 def list_words(words: Iterable[str]) -> str:
-    """'a', 'b' or 'c'."""
+    """Return "'a', 'b' or 'c'"."""
     *most, last = [repr(word) for word in words]
     return f"{', '.join(most)} or {last}" if most else last
 
 
-def number_range(
-    above: float | None = None,
-    at_least: float | None = None,
-    at_most: float | None = None,
-    below: float | None = None,
-) -> tuple[Callable[[Any], bool], str]:
-    """(check, words): whether a value is a finite number within the limits, and those in words."""
+def in_unit(value: Any, unit: str, name: str, word: str | None = None) -> Any:
+    """Return a text such as "16.41 um" as a number of the unit; all else as it is.
 
-    def check(value: Any) -> bool:
-        return (
-            is_number(value)
-            and (above is None or value > above)
-            and (at_least is None or value >= at_least)
-            and (at_most is None or value <= at_most)
-            and (below is None or value < below)
-        )
-
-    limits = [
-        ("above", above), ("at least", at_least), ("at most", at_most), ("below", below)
-    ]  # fmt: skip
-    words = " and ".join(f"{word} {limit:g}" for word, limit in limits if limit is not None)
-    return check, f"a finite number {words}".strip()
-
-
-def may_be_none(default: Any) -> bool:
-    """Whether a field with this default may hold None: it is the default, or may come of it."""
-    return default is None or isinstance(default, attrs.Factory)  # type: ignore[arg-type]
-
-
-def in_unit(value: Any, unit: str, name: str) -> Any:
-    """A text such as "16.41 um" as a number of the unit; all else as it is.
-
-    RangeError, with the ``name`` of what it is for, for a text that is no such quantity.
+    RangeError, with the ``name`` of what it is for, for a text that is no such quantity;
+    ``word`` is what may stand there instead.
     """
     if not isinstance(value, str):
         return value
     try:
         return read_quantity(value, unit)
     except ValueError as reason:
-        hint = f" ({reason})" if str(reason) else ""
-        raise RangeError(f"{name} must be {kind_of(unit)}, found {value!r}{hint}") from None
+        hint = suggestion(value, [word] if word else []) or (f" ({reason})" if str(reason) else "")
+    raise refused(name, f"{word!r} or {kind_of(unit)}" if word else kind_of(unit), value, hint)
 
 
 def above_zero(value: Any, unit: str, name: str) -> float:
@@ -145,36 +118,138 @@ def check_whole(value: Any, least: int, name: str) -> None:
         raise UsageError(f"{name} must be a whole number of at least {least}, found {value!r}")
 
 
-def checked_field(
-    check: Callable[[Any], bool], allowed: str, default: Any, *, kw_only: bool = False,
-    **metadata: Any,
-) -> Any:  # fmt: skip
-    """A field whose values pass ``check``; RangeError says what is ``allowed`` of all others.
+def refused(name: str, allowed: str, value: object, hint: str = "") -> RangeError:
+    """Return the error that says what a field takes and what was found."""
+    text = repr(value)
+    text = text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}…"
+    return RangeError(f"{name} must be {allowed}, found {text}{hint}")
 
-    With a ``unit`` in its metadata it takes texts such as "16.41 um".
+
+@attrs.frozen
+class Reader:
+    """What a field takes: in words, and as a function of a value and the field's name.
+
+    ``read`` returns the value that flocsim computes with, the same for values from Python and from
+    a config file, and raises RangeError, whose text begins with the name, for one that does not
+    fit.
     """
-    unit, words = metadata.get("unit"), metadata.get("choices", ())
 
-    def read(value: Any) -> Any:
-        try:
-            return in_unit(value, unit, "") if unit and value not in words else value
-        except RangeError:
-            return value  # validate, which knows the name, says what is wrong
+    allowed: str
+    read: Callable[[Any, str], Any]
+    unit: str = ""
 
-    def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-        if not (check(value) or (value is None and may_be_none(default))):
-            if unit and not words:
-                in_unit(value, unit, attribute.name)
-            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
 
-    metadata = {"allowed": allowed, **metadata}
-    return attrs.field(
-        default=default,
-        converter=read if unit else None,
-        validator=validate,
-        metadata=metadata,
-        kw_only=kw_only,
+def number(unit: str = "", word: str | None = None, **limits: float | None) -> Reader:
+    """Return a reader of finite numbers, of texts such as "16.41 um", and of one special word.
+
+    ``limits``: above, at_least, at_most, below.
+    """
+    bounds = {name: limit for name, limit in limits.items() if limit is not None}
+    words = " and ".join(f"{name.replace('_', ' ')} {limit:g}" for name, limit in bounds.items())
+    allowed = f"a finite number {words}".strip()
+    allowed = f"{word!r} or {allowed}" if word else allowed
+    inside = {
+        "above": float.__gt__, "at_least": float.__ge__, "at_most": float.__le__,
+        "below": float.__lt__,
+    }  # fmt: skip
+
+    def read(value: Any, name: str) -> float | str:
+        if isinstance(value, str) and value == word:
+            return value
+        found = in_unit(value, unit, name, word) if unit else value
+        if is_number(found):
+            found = float(found)
+            if all(inside[bound](found, float(limit)) for bound, limit in bounds.items()):
+                return found
+        raise refused(name, f"{allowed} [{unit}]" if unit else allowed, value)
+
+    return Reader(allowed, read, unit)
+
+
+def whole(at_least: int, at_most: int) -> Reader:
+    """Return a reader of integers within limits; 3.0 is none."""
+    allowed = f"an integer from {at_least} to {at_most}"
+
+    def read(value: Any, name: str) -> int:
+        if not is_whole(value) or not at_least <= value <= at_most:
+            raise refused(name, allowed, value)
+        return int(value)
+
+    return Reader(allowed, read)
+
+
+def one_of(*words: str) -> Reader:
+    """Return a reader of one of these words."""
+
+    def read(value: Any, name: str) -> str:
+        if not isinstance(value, str) or value not in words:
+            hint = suggestion(value, words) if isinstance(value, str) else ""
+            raise refused(name, list_words(words), value, hint)
+        return value
+
+    return Reader(list_words(words), read)
+
+
+def text(allowed: str = "a string") -> Reader:
+    """Return a reader of a line of printable characters that is not blank, and of paths."""
+
+    def read(value: Any, name: str) -> str | os.PathLike:
+        if isinstance(value, os.PathLike):
+            return value
+        if not isinstance(value, str) or not value.strip() or not value.isprintable():
+            raise refused(name, "a string that is not blank", value)
+        return value
+
+    return Reader(allowed, read)
+
+
+def several(item: Reader, length: int | None = None, distinct: bool = True) -> Reader:
+    """Return a reader of lists, as tuples, of at least one item or of a ``length``."""
+    allowed = (
+        f"a list of {length or ('different values' if distinct else 'values')}, each {item.allowed}"
     )
+
+    def read(value: Any, name: str) -> tuple:
+        value = value.tolist() if hasattr(value, "tolist") else value
+        if not isinstance(value, list | tuple) or not value or len(value) != (length or len(value)):
+            raise refused(name, allowed, value)
+        found = tuple(item.read(each, f"{name}[{place}]") for place, each in enumerate(value))
+        if distinct and len(set(found)) < len(found):
+            twice = next(place for place, each in enumerate(found) if each in found[:place])
+            raise refused(f"{name}[{twice}]", "another value than those before it", value[twice])
+        return found
+
+    return Reader(allowed, read, item.unit)
+
+
+def either(one: Reader, many: Reader) -> Reader:
+    """Return a reader of lists by ``many``, and of all else by ``one``."""
+
+    def read(value: Any, name: str) -> Any:
+        return (many if isinstance(value, list | tuple) else one).read(value, name)
+
+    return Reader(f"{one.allowed}, or {many.allowed}", read, one.unit or many.unit)
+
+
+def field(
+    reader: Reader, *, default: Any = attrs.NOTHING, kw_only: bool = False, **metadata: Any
+) -> Any:
+    """Return an attrs field whose values a Reader reads; None where that is the default.
+
+    ``metadata`` of flocsim's own: ``help``; ``table``, a class whose objects it takes as well.
+    """
+
+    def convert(value: Any, attribute: attrs.Attribute) -> Any:
+        # A default that is computed may be None, too.
+        optional = default is None or isinstance(default, attrs.Factory)  # type: ignore[arg-type]
+        if (value is None and optional) or isinstance(value, table):
+            return value
+        return reader.read(value, attribute.name)
+
+    metadata = {"reader": reader, **metadata}
+    table = metadata.get("table", ())
+    converter = attrs.Converter(convert, takes_field=True)
+    return attrs.field(default=default, converter=converter, metadata=metadata, kw_only=kw_only)
 
 
 def quantity(
@@ -187,55 +262,26 @@ def quantity(
     default: Any = attrs.NOTHING,
     help: str = "",
     word: str | None = None,
-    **metadata: Any,
+    **more: Any,
 ) -> Any:
     """A field with a unit ("" for a pure number), e.g. ``quantity("J", at_least=0.0)``.
 
     It takes numbers in that unit, and texts with any of the same dimension: 5e-21 or "5 zJ"; and
     one special ``word``, where there is one.
     """
-    check, allowed = number_range(above, at_least, at_most, below)
-    more = {"unit": unit, "help": help, **metadata}
-    if word is None:
-        return checked_field(check, allowed, default, **more)
-    return checked_field(
-        lambda value: check(value) or (isinstance(value, str) and value == word),
-        f"{word!r} or {allowed}",
-        default,
-        choices=(word,),
-        **more,
-    )
+    reader = number(unit, word, above=above, at_least=at_least, at_most=at_most, below=below)
+    return field(reader, default=default, help=help, **more)
 
 
 def quantity_of_each(unit: str, *, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes a quantity of both bodies of a pair, or a list of one for each."""
-
-    def numbers(value: Any, name: str) -> Any:
-        if isinstance(value, list | tuple):
-            return tuple(in_unit(each, unit, name) for each in value)
-        return in_unit(value, unit, name)
-
-    def read(value: Any) -> Any:
-        try:
-            return numbers(value, "")
-        except RangeError:
-            return value  # validate, which knows the name, says what is wrong
-
-    def validate(instance: object, attribute: attrs.Attribute, value: Any) -> None:
-        found = numbers(value, attribute.name)
-        each = found if isinstance(found, tuple) and len(found) == 2 else (found,)
-        if not all(map(is_number, each)):
-            raise RangeError(f"{attribute.name} must be {allowed}, found {value!r}")
-
-    allowed = "a finite number, or a list of two"
-    metadata = {"allowed": allowed, "unit": unit, "of_each": True, "help": help}
-    return attrs.field(default=default, converter=read, validator=validate, metadata=metadata)
+    one = number(unit)
+    return field(either(one, several(one, 2, distinct=False)), default=default, help=help)
 
 
-def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **metadata: Any) -> Any:
+def choice(*options: str, default: Any = attrs.NOTHING, help: str = "", **more: Any) -> Any:
     """A field that takes one of the given words."""
-    metadata = {"choices": options, "help": help, **metadata}
-    return checked_field(lambda value: value in options, list_words(options), default, **metadata)
+    return field(one_of(*options), default=default, help=help, **more)
 
 
 def word_or_quantity(word: str, unit: str, **more: Any) -> Any:
@@ -245,9 +291,13 @@ def word_or_quantity(word: str, unit: str, **more: Any) -> Any:
 
 def flag(*, default: Any = attrs.NOTHING, help: str = "") -> Any:
     """A field that takes true or false."""
-    return checked_field(
-        lambda value: isinstance(value, bool), "true or false", default, flag=True, help=help
-    )
+
+    def read(value: Any, name: str) -> bool:
+        if not isinstance(value, bool):
+            raise refused(name, "true or false", value)
+        return value
+
+    return field(Reader("true or false", read), default=default, help=help)
 
 
 def only(kind: type, allowed: str) -> Callable[[object, attrs.Attribute, Any], None]:

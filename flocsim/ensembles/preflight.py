@@ -27,8 +27,7 @@ from flocsim.ensembles.collision.meetings import refuse_release
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
-from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.schema import Config
+from flocsim.ensembles.config.schema import PRESETS, Config
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from flocsim.ensembles.config.loader import lay_over, load_any_config, nested
 from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.toml_text import parse, read_text_file, toml_text, value_text
+from flocsim.ensembles.config.toml_text import parse, read_text_file, settings_of
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
@@ -142,7 +142,8 @@ class Study:
             place = Path("." if folder is None else folder) / "study.toml"
             if not place.parent.is_dir():
                 raise UsageError(f"{place.parent} is not a folder: name an existing one")
-            self._take(place, toml_text(source), {})
+            text = "".join(f"{key} = {value}\n" for key, value in settings_of(source))
+            self._take(place, text, {})
         elif folder is None:
             self._take(Path(source), read_text_file(source), {})
         else:
@@ -254,12 +255,3 @@ class Study:
 
 
 WAYS = 'give mode="resume" to resume or extend it, or overwrite=True, which keeps the old one'
-
-
-def settings_of(table: Mapping[str, Any], place: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
-    """(dotted key, TOML text) of every value in nested dicts."""
-    for key, value in table.items():
-        if isinstance(value, Mapping) and value:
-            yield from settings_of(value, (*place, key))
-        elif value is not None:
-            yield ".".join((*place, key)), value_text(value, (*place, key))

@@ -223,7 +223,8 @@ def value_of(config: Config, key: str) -> tuple[Any, str]:
     field = keys_of(type(owner)).get(rest[0]) if len(rest) == 1 else None
     if field is None:
         return None, "1"
-    return getattr(owner, field.name, None), field.metadata.get("unit") or "1"
+    unit = getattr(field.metadata.get("reader"), "unit", "")
+    return getattr(owner, field.name, None), unit or "1"
 
 
 def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]:

@@ -7,7 +7,7 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.commands.init import COMMANDS, KINDS, TEMPLATES
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.config.presets import PRESETS
+from flocsim.ensembles.config.schema import PRESETS
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.tiers import rest_slow
 
@@ -71,12 +71,12 @@ def test_a_library_is_written_in(kind, tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("init --kind pictures", "flocsim: --kind pictures needs the flocs of your pictures: fit"),
+        ("init --kind pictures", "flocsim: --kind pictures needs --shapes FILE, your flocs"),
         ("init --shapes none.h5", "none.h5"),
         ("init --shapes damaged.h5", "damaged.h5 does not end in flocsim's checksum"),
         (
             "init --kind spheres --shapes mine.h5",
-            "this kind of study, or this library, has spheres",
+            "this study, or this library, has spheres",
         ),
     ],
 )

@@ -99,6 +99,6 @@ def test_a_diff_is_all_that_is_needed(copy, section):
 
 
 def test_a_diff_that_does_not_fit_is_noticed(copy):
-    wrong = diffs()["Add a config key"].replace("for methods with a fixed", "for a fixed")
+    wrong = diffs()["Add a config key"].replace("For methods with a fixed", "For a fixed")
     with pytest.raises(ValueError, match="substring not found"):
         apply(wrong, copy)

@@ -77,11 +77,10 @@ def test_which_flocs_are_drawn_follows_from_seed_and_replicate_alone(folder):
     ("old", "new", "why"),
     [
         ('file = "stars.h5"', 'file = "stars.h5"\nsize = "scene"',
-         'study.toml:9: shapes.size: "scene" cannot be combined with scene.pairs = "measured", '
-         "which takes every floc at its own size: leave size out"),
+         'study.toml:9: shapes.size: must be "own" with scene.pairs = "measured": leave it out'),
         ('source = "library"\nfile = "stars.h5"', "",
-         'study.toml:4: scene.pairs: "measured" draws measured flocs, but shapes.source '
-         'is not a library: give source = "library" and file, written by `flocsim fit`'),
+         'study.toml:4: scene.pairs: "measured" needs a library of flocs: give shapes.source = '
+         '"library" and file'),
         ('"measured"', '"measurd"',
          "study.toml:4: scene.pairs must be 'measured', found 'measurd' (did you mean "
          "'measured'?)"),

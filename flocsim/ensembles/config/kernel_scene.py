@@ -1,122 +1,77 @@
 """[scene] kind = "kernel": rates of encounters, of size classes by size classes."""
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import attrs
 
-from flocsim.ensembles.config import pair_scene, values
+from flocsim.ensembles.config import pair_scene
 from flocsim.errors import ConfigError
-from flocsim.fields import choice, number_range, quantity, word_or_quantity
+from flocsim.fields import Reader, choice, field, one_of, quantity, several, whole, word_or_quantity
 from flocsim.forces.body_forces import thermal_in
 
-MOST_SCRAMBLES = 64
+WORDS = several(one_of(*pair_scene.MECHANISMS))
 
-KERNEL_REPLICATES = 4096
-"""Of every condition of a kernel study where nothing is said."""
-
-read_meetings = values.list_of(
-    values.one_of(pair_scene.MECHANISMS), "one of, or a list of, 'settling', 'shear', 'extension'"
+MEETINGS = Reader(
+    f"one of 'settling', 'shear' and 'extension', or {WORDS.allowed}",
+    lambda value, name: WORDS.read([value] if isinstance(value, str) else value, name),
 )
-
-
-def as_tuple(value: Any) -> tuple[str, ...]:
-    """One word as a tuple of it."""
-    return (value,) if isinstance(value, str) else tuple(value)
+"""Reader of mechanisms, of which a single one need not be in a list."""
 
 
 @attrs.frozen
-class KernelScene(pair_scene.DrivenScene):
+class KernelScene(pair_scene.PairScene):
     """With `kind = "kernel"`: the sizes of the bodies, what brings them together, how their
-    orientations and offsets are sampled, and how their meetings begin and end."""
+    orientations and offsets are sampled, and how their meetings begin and end. `pairs`, `weight`,
+    `classes`, `min_radius`, `max_radius`, `rate`, `escape_gap`, `rest_time` and `time_limit` are as
+    above; these are its own:"""
 
-    usual_replicates: ClassVar[int | None] = KERNEL_REPLICATES
+    usual_replicates: ClassVar[int | None] = 4096
 
-    kind: str = choice("kernel", default="kernel", help="rates of encounters")
-    meeting: tuple[str, ...] = attrs.field(
-        default=(pair_scene.SETTLING,),
-        converter=as_tuple,
-        metadata={
-            "read": lambda value: read_meetings([value] if isinstance(value, str) else value),
-            "allowed": '"settling", "shear" or "extension", or a list of them',
-            "shown": '"settling"',
-            "help": "mechanisms that bring bodies together, one at a time: weight alone, or a "
-            "flow alone, u = (G y, 0) or u = (s x, -s y), without weight",
-        },
+    kind: str = choice("kernel", default="kernel")
+    """Rates of encounters."""
+
+    meeting: tuple[str, ...] = field(MEETINGS, default=(pair_scene.SETTLING,))
+    """Mechanisms that bring bodies together, one at a time: weight alone, or a flow alone, u = (G
+    y, 0) or u = (s x, -s y), without weight."""
+
+    sizes: tuple[float, ...] | None = field(several(pair_scene.SIZE), default=None)
+    """Ascending equivalent radii of the size classes, instead of `pairs = "measured"`, flocs of a
+    library at their own sizes, in `classes`."""
+
+    start_gap: float | str = word_or_quantity(
+        "auto", "m", above=0.0, at_most=pair_scene.LARGEST_LENGTH, default="auto"
     )
-    rate: float | None = quantity(
-        "1/s", above=0.0, default=None, help="G or s of the flow in which they meet"
-    )
-    sizes: tuple[float, ...] | None = values.read_by(
-        values.list_of(
-            values.number("m", *number_range(above=0.0, at_most=pair_scene.LARGEST_LENGTH)),
-            "a list of radii such as ['5 um', '10 um']",
-        ),
-        "a list of ascending radii, each above 0 and at most 0.01",
-        default=None,
-        unit="m",
-        help='equivalent radii of the size classes; without it, pairs = "measured"',
-    )
-    pairs: str | None = choice(
-        pair_scene.MEASURED,
-        default=None,
-        help="measured: instead of `sizes`, flocs of a library at their own sizes, in `classes`",
-    )
-    weight: str | None = pair_scene.WEIGHT
-    classes: int | tuple[float, ...] | None = pair_scene.CLASSES
+    """Distance of the outlines at the start; auto: where the forces between them have fallen to
+    `far`."""
+
+    far: float = quantity("", above=0.0, at_most=0.1, default=1e-3)
+    """Speed that the forces between two bodies may cause at an automatic start, as a share of the
+    speed at which the bodies approach each other."""
+
+    scrambles: int = field(whole(2, 64), default=8)
+    """Independent scrambles of the Sobol sequence among which the replicates are divided, from
+    whose scatter the intervals follow; replicates = scrambles times a power of 2."""
+
     types: None = attrs.field(init=False, default=None)
     delta: tuple[float, ...] = attrs.field(init=False, default=(1.0,))
     delta_max: str = attrs.field(init=False, default="radius")
-    start_gap: float | str = word_or_quantity(  # type: ignore[assignment]
-        "auto",
-        "m",
-        above=0.0,
-        at_most=pair_scene.LARGEST_LENGTH,
-        default="auto",
-        help="distance of the outlines at the start; auto: where the forces between them have "
-        "fallen to `far`",
-    )
-    far: float = quantity(
-        "",
-        above=0.0,
-        at_most=0.1,
-        default=1e-3,
-        help="speed that the forces between two bodies may cause at an automatic start, as a share "
-        "of the speed at which the bodies approach each other",
-    )
-    scrambles: int = values.whole_field(
-        2,
-        MOST_SCRAMBLES,
-        default=8,
-        help="independent scrambles of the Sobol sequence among which the replicates are divided, "
-        "from whose scatter the intervals follow; replicates = scrambles times a power of 2",
-    )
-
-    flow_in_fluid = pair_scene.FlowScene.flow_in_fluid
+    receiver: str = attrs.field(init=False, default="free")
+    release: Any = attrs.field(init=False, default=None)
+    escape: Any = attrs.field(init=False, default=None)
 
     def __attrs_post_init__(self):
-        if (self.sizes is None) == (self.pairs is None):
-            found = "neither" if self.sizes is None else "both"
+        if (self.sizes is None) == (self.pairs is None) or isinstance(self.pairs, tuple):
+            found = "neither" if self.sizes is self.pairs is None else "other pairs, or both"
             raise ConfigError(
                 f'needs sizes, the radii of size classes, or pairs = "measured", found {found}'
             )
-        if list(self.sizes or ()) != sorted(self.sizes or ()):
+        sizes = self.sizes or ()
+        if list(sizes) != sorted(sizes):
             raise ConfigError("sizes must be ascending radii")
-        if len(self.sizes or ()) > pair_scene.MOST_CLASSES:
-            raise ConfigError(
-                f"there may be at most {pair_scene.MOST_CLASSES} sizes, found {len(self.sizes)}"
-            )
-        if self.sizes and len(self.sizes) == 1 and pair_scene.SETTLING in self.meeting:
-            raise ConfigError(
-                "bodies of one size settle equally fast and never meet: give several sizes, or "
-                "a meeting in shear or extension"
-            )
-        if any(each in pair_scene.FLOWS for each in self.meeting) != (self.rate is not None):
-            raise ConfigError(
-                'rate belongs to a flow: meeting = "shear" or "extension" needs it, as in '
-                'rate = "10 1/s", and "settling" alone has none'
-            )
+        if len(sizes) == 1 and pair_scene.SETTLING in self.meeting:
+            raise ConfigError("sizes must be several: bodies of one size settle equally fast")
         super().__attrs_post_init__()
 
     @property
@@ -141,7 +96,7 @@ class KernelScene(pair_scene.DrivenScene):
         )
 
     def meeting_of(self, place: int) -> str:
-        """The mechanism of the collision type at a place of `names`."""
+        """Return the mechanism of the collision type at a place of `names`."""
         return self.meeting[self.conditions[place][0]]
 
     @property
@@ -164,20 +119,15 @@ class KernelScene(pair_scene.DrivenScene):
         return tuple((i, j) for _, i, j in self.conditions)
 
     def only(self, places: Any) -> "KernelScene":
-        """The scene as it is: its classes stay together."""
+        """Return the scene as it is: its classes stay together."""
         return self
 
-    def problems(self, parts: Mapping[str, Any]) -> Iterator[pair_scene.Problem]:
-        """What does not go together with the other tables of a config, by their names."""
-        yield from super().problems(parts)
-        if thermal_in(parts["forces"]):
-            text = (
-                "brings bodies together from beyond the offsets that a study of rates samples, "
-                "and the rates would miss them: leave it out, or let two bodies meet by "
-                'scene.meeting = "brownian"'
-            )
-            yield ("forces", "thermal"), text
-        given = {"replicates": KERNEL_REPLICATES, **parts}
+    def problems(self, config: Any) -> Iterator[pair_scene.Problem]:
+        """Yield what does not go together with the other tables of a config."""
+        yield from super().problems(config)
+        if thermal_in(config.forces):
+            text = "brings bodies together from beyond the offsets that are sampled: leave it out"
+            yield "forces.thermal", text
         yield from pair_scene.uneven_points(
-            given, self.scrambles, f"scene.scrambles = {self.scrambles}"
+            config, self.scrambles, f"scene.scrambles = {self.scrambles}"
         )

@@ -1,161 +1,93 @@
-"""A config file → Config: TOML read strictly, every problem told at once with its line; what
-is laid over it, preset, file, `--set key=value` of the command line; what keys exclude and imply.
+"""A config file → Config: TOML, with what lies under it (the preset) and over it (`--set`), made
+into the classes of the schema; every problem reported at once, with its line.
 """
 
+import contextlib
+import copy
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import attrs
+import cattrs
+from cattrs.gen import make_dict_structure_fn, override
 
-from flocsim.body import Fluid, FractalDensity
-from flocsim.ensembles.config import toml_text
+from flocsim.body import Fluid
 from flocsim.ensembles.config.own_classes import FORCE, load_class
 from flocsim.ensembles.config.pair_scene import (
     MEASURED,
-    PAIR_SCENES,
     SOBOL,
     SOBOL_SCRAMBLES,
     PairScene,
     Problem,
-    SettlingScene,
+    applies,
     uneven_points,
 )
-from flocsim.ensembles.config.presets import PRESETS
 from flocsim.ensembles.config.schema import (
-    ALTERNATIVES,
     BAND,
+    EXCLUSIVE,
     FOLLOWING,
     FORCES,
-    INSTEAD_OF,
+    PRESETS,
     SCENES,
-    SOBOL_REPLICATES,
     STUDY_KEYS,
     TABLES,
     TOP_KEYS,
-    WATER,
-    BodiesConfig,
     Config,
     keys_of,
 )
 from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.config.values import (
-    Misfit,
-    Problems,
-    dotted,
-    misfit,
-    reader_of,
-    show,
-)
-from flocsim.errors import ConfigError, suggestion
-from flocsim.fields import list_words
+from flocsim.ensembles.config.toml_text import STANDARD_INPUT, key_lines, parse
+from flocsim.errors import ConfigError, suggestion, visible
+from flocsim.fields import is_number, list_words, number, refused, several
 from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED
 
+MOST_SHOWN = 50
+"""Problems of one file that are reported."""
 
-def lay_over(below: Mapping, above: Mapping, path: tuple[str, ...] = ()) -> dict[str, Any]:
-    """``below`` with everything that ``above`` gives put over it; tables are merged.
+OWN_SIZES = (MEASURED, "library")
+"""`scene.pairs` and `shapes.source` with which flocs keep their own sizes."""
+
+
+def value_at(table: Any, name: str) -> Any:
+    """Return the value of a dotted key in nested dicts; None where there is none."""
+    for key in name.split("."):
+        table = table.get(key) if isinstance(table, Mapping) else None
+    return table
+
+
+def lay_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested dicts with everything that ``above`` gives put over them.
 
     A key replaces those below that it excludes, or that follow from it. A value None in ``above``
-    counts as not given. A table over ``false`` starts afresh.
+    counts as not given.
     """
-    given = {key: value for key, value in above.items() if value is not None}
-    gone = excluded_by(".".join(path), given.keys())
-    merged = {key: value for key, value in below.items() if key not in gone}
-    merged = merged if path else without_following(merged, given)
-    for key, value in given.items():
-        if isinstance(value, dict) and len(path) < toml_text.DEEPEST_TABLE:
-            under = merged.get(key)
-            value = lay_over(under if isinstance(under, dict) else {}, value, (*path, key))
-        merged[key] = value
-    return merged
+    merged: dict[str, Any] = copy.deepcopy(dict(below))
+    replaced = [*EXCLUSIVE, *((other, key) for key, other in EXCLUSIVE)]
+    replaced += [(each, key) for key, sources in FOLLOWING.items() for each in sources]
+    for key, gone in replaced:
+        table, _, last = gone.rpartition(".")
+        inner = value_at(merged, table)
+        if value_at(above, key) is not None and isinstance(inner, dict):
+            inner.pop(last, None)
+    return merge(merged, above)
 
 
-def excluded_by(table: str, given: Collection[str]) -> set[str]:
-    """The keys of a table that do not go with the given ones."""
-    alternatives = ALTERNATIVES.get(table, ())
-    chosen = [keys for keys in alternatives if keys & set(given)]
-    found = set().union(*(keys for keys in alternatives if chosen and keys not in chosen))
-    for key, others in INSTEAD_OF.get(table, {}).items():
-        found |= others if key in given else set()
-        found |= {key} if others & set(given) else set()
-    return found
-
-
-def without_following(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """A config's nested dicts without what follows from the water that those above them tell."""
-    left: dict[str, Any] = dict(below)
-    fluid = above.get("fluid")
-    told = {key for key in WATER if isinstance(fluid, Mapping) and fluid.get(key) is not None}
-    for (*tables, key), sources in FOLLOWING.items() if told else ():
-        table = left
-        for name in tables:
-            inner = table.get(name)
-            if not isinstance(inner, Mapping):
-                break
-            table[name] = table = dict(inner)
-        else:
-            if told & set(sources):
-                table.pop(key, None)
-    return left
-
-
-def of_water(fluid: Fluid) -> dict[tuple[str, str], float]:
-    """(force, key) → value that follows from the water: each holds where its force is."""
-    values = {
-        ("double_layer", "permittivity"): fluid.permittivity,
-        ("double_layer", "debye_length"): fluid.debye_length,
-        ("thermal", "temperature"): fluid.temperature,
-    }
-    told = {key for key in WATER if getattr(fluid, key) is not None}
-    return {
-        place: value
-        for place, value in values.items()
-        if value is not None and told & set(FOLLOWING["forces", *place])
-    }
-
-
-def implied(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that follow from others of a config's nested dicts, where they are not given."""
-    scene, shapes = (table.get(name) for name in ("scene", "shapes"))
-    found: dict[str, Any] = {}
-    if usual := scene_class(table).usual_replicates:
-        found["replicates"] = usual
-    elif table.get("sampling") == SOBOL:
-        found["replicates"] = SOBOL_REPLICATES
-    if not isinstance(scene, Mapping) or not isinstance(shapes, Mapping):
-        return found
-    if scene.get("pairs") != MEASURED or shapes.get("source") != "library":
-        return found
-    return found | {"shapes": {"size": "own"}}
-
-
-def scene_class(table: Mapping[str, Any]) -> Any:
-    """The class of a config's [scene], by its kind and meeting; of unknown ones SettlingScene,
-    whose keys tell that."""
-    scene = table.get("scene")
-    given = scene if isinstance(scene, Mapping) else {}
-    kind, meeting = (str(given.get(key)) for key in ("kind", "meeting"))
-    if kind in SCENES and kind not in PAIR_SCENES:
-        return SCENES[kind]
-    return PAIR_SCENES.get(meeting, SettlingScene)
-
-
-def elsewhere(key: str, scene: type) -> dict[str, attrs.Attribute]:
-    """{`meeting = "brownian"`: field} of every other kind of [scene] that has a key."""
-    found = {}
-    for word, each in SCENES.items():
-        if key in keys_of(each):
-            tag = f'kind = "{word}"'
-            if word in PAIR_SCENES:
-                binary = scene in PAIR_SCENES.values()
-                tag = f'meeting = "{word}"' if binary else 'kind = "binary"'
-            found[tag] = keys_of(each)[key]
-    return found
+def merge(below: dict[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Put every value of nested dicts into others, in place; tables are merged."""
+    for key, value in above.items():
+        if isinstance(value, Mapping):
+            inner = below.get(key)
+            below[key] = merge(inner if isinstance(inner, dict) else {}, value)
+        elif value is not None:
+            below[key] = value
+    return below
 
 
 def parse_setting(text: str) -> tuple[list[str], Any]:
-    """(keys, value) of "scene.delta=[0.0, 0.5]"; a value that is no TOML is a string.
+    """Return (keys, value) of "scene.delta=[0.0, 0.5]"; a value that is no TOML is a string.
 
     So `--set forces.contact.k_n='10 N/m'` needs no quotes within quotes.
     """
@@ -163,51 +95,253 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
     keys = [part.strip() for part in key.split(".")]
     if not equals or not all(keys):
         raise ConfigError(f"--set {text!r}: write KEY=VALUE, e.g. --set scene.delta='[0.0, 0.5]'")
-    value = value.strip()
     try:
-        table = toml_text.parse("--set", f"value = {value}\n")
+        table = parse("--set", f"value = {value.strip()}\n")
     except ConfigError:
-        return keys, value
-    return keys, table["value"] if len(table) == 1 else value
+        table = {}
+    return keys, table["value"] if len(table) == 1 else value.strip()
 
 
 def nested(settings: Iterable[tuple[list[str], Any]]) -> dict[str, Any]:
-    """{"scene": {"delta": …}} of (keys, value) pairs; ConfigError where two cannot both hold."""
+    """Return {"scene": {"delta": …}} of (keys, value) pairs; later ones win."""
     table: dict[str, Any] = {}
     for keys, value in settings:
-        inner = table
-        for key in keys[:-1]:
-            inner = inner.setdefault(key, {})
-            if not isinstance(inner, dict):
-                raise ConfigError(f"--set {'.'.join(keys)}: {key} has been set to a value already")
-        inner[keys[-1]] = value
+        for key in reversed(keys):
+            value = {key: value}
+        merge(table, value)
     return table
 
 
-DEFAULTS = {"source": "synthetic"}
-"""Of keys that others go with."""
+CONVERTER = cattrs.Converter()
+"""Makes the classes of the schema, and a user's own, of dicts."""
+
+
+@CONVERTER.register_structure_hook_factory(attrs.has)
+def table_hook(some_class: type) -> Any:
+    """Return cattrs' function that makes an attrs class of a dict, its fields read as declared."""
+    hooks: dict[str, Any] = {
+        field.name: override(rename=key, struct_hook=value_hook(field))
+        for key, field in keys_of(some_class).items()
+    }
+    return make_dict_structure_fn(some_class, CONVERTER, _cattrs_forbid_extra_keys=True, **hooks)
+
+
+def value_hook(field: attrs.Attribute) -> Any:
+    """Return cattrs' function that reads the value of a field."""
+
+    def structure(value: Any, _: Any) -> Any:
+        if isinstance(value, dict) and "table" in field.metadata:
+            return CONVERTER.structure(value, field.metadata["table"])
+        if "reader" in field.metadata:
+            return field.metadata["reader"].read(value, field.name)
+        return value if "own" in field.metadata else plain_value(value, field)
+
+    return structure
+
+
+def plain_value(value: Any, field: attrs.Attribute) -> Any:
+    """Return the value of a field that declares nothing: a number, a text, a flag or numbers."""
+    is_float = field.type in (float, "float")
+    if isinstance(value, list):
+        return several(number(), distinct=False).read(value, field.name)
+    if isinstance(value, str | bool) and not is_float:
+        return value
+    if not is_number(value):
+        hint = " (the field declares no unit: see flocsim.fields.quantity)"
+        allowed = "a finite number in SI units"
+        raise refused(field.name, allowed, value, hint if isinstance(value, str) else "")
+    return float(value) if is_float else value
+
+
+def problems_of(error: Exception, some_class: type, place: str) -> Iterator[Problem]:
+    """Yield what cattrs, or the class itself, found wrong with a table."""
+    keys = keys_of(some_class)
+    names = {field.name: key for key, field in keys.items()}
+    if isinstance(error, cattrs.ClassValidationError):
+        inside, others = error.group_exceptions()
+        lacking = [names[note.name] for each, note in inside if isinstance(each, KeyError)]
+        if lacking:
+            yield place, f": needs {', '.join(lacking)}"
+        for each, note in inside:
+            key = names[note.name]
+            if isinstance(each, cattrs.ClassValidationError):
+                yield from problems_of(each, keys[key].metadata["table"], f"{place}.{key}")
+            elif not isinstance(each, KeyError):
+                yield problem(f"{place}.{key}", each)
+        for each in others:
+            yield from problems_of(each, some_class, place)
+    elif isinstance(error, cattrs.ForbiddenExtraKeysError):
+        yield from (unknown(f"{place}.{key}", keys) for key in sorted(error.extra_fields))
+    else:
+        # What a class says of its values together may begin with a key.
+        word = str(error).partition(" ")[0]
+        yield problem(f"{place}.{word}" if word in keys else place, error)
+
+
+def problem(place: str, error: Exception) -> Problem:
+    """Return what an error says of a key or a table."""
+    # A user's class may raise anything; attrs puts the text first, then objects.
+    text = error.args[0] if error.args and isinstance(error.args[0], str) else error
+    text = " ".join(str(text).split()) or type(error).__name__
+    key = place.rpartition(".")[2]
+    begins = text.startswith((f"{key} ", f"{key}["))
+    return place, text.removeprefix(key) if begins else f": {text}"
+
+
+def unknown(place: str, known: Iterable[str]) -> Problem:
+    """Return what is said of an unknown key."""
+    table, _, key = place.rpartition(".")
+    owners = [kind for kind, each in SCENES.items() if table == "scene" and key in keys_of(each)]
+    if owners:
+        return place, f": applies only with kind = {list_words(owners)}: remove it"
+    return place, f": unknown key{suggestion(key, known)}; known: {', '.join(known) or 'none'}"
+
+
+@attrs.define
+class Reading:
+    """Makes the parts of a Config of nested dicts; what is wrong is noted in ``found``.
+
+    ``folder`` is where the file lies, and the modules and libraries that it names; ``sources`` has
+    what was read of them.
+    """
+
+    folder: Path
+    sources: Sources
+    found: list[Problem] = attrs.Factory(list)
+
+    def note(self, place: str, text: str) -> None:
+        """Note what is wrong at a dotted key."""
+        self.found.append((place, text))
+
+    def parts(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Return the arguments of Config that a whole file gives."""
+        self.found += [unknown(key, TOP_KEYS) for key in table if key not in TOP_KEYS]
+        for key, other in EXCLUSIVE:
+            if value_at(table, key) is not None and value_at(table, other) is not None:
+                around, _, last = other.rpartition(".")
+                del value_at(table, around)[last]
+                word = key.removeprefix(f"{around}.")
+                self.note(other, f": excludes {word}, which is given too: remove one of them")
+        parts: dict[str, Any] = {}
+        for key in STUDY_KEYS.keys() & table.keys():
+            try:
+                parts[key] = STUDY_KEYS[key].metadata["reader"].read(table[key], key)
+            except ValueError as error:
+                self.found.append(problem(key, error))
+        scene = SCENES.get(str(value_at(table, "scene.kind")), PairScene)
+        if (value_at(table, "scene.pairs"), value_at(table, "shapes.source")) == OWN_SIZES:
+            table["shapes"].setdefault("size", "own")
+        for name, some_class in (TABLES | {"scene": scene}).items():
+            parts[name] = self.made(some_class, table.get(name, {}), name)
+        if parts["shapes"] is not None and parts["shapes"].source == "library":
+            file = self.library(parts["shapes"].file)
+            parts["shapes"] = attrs.evolve(parts["shapes"], file=file)
+        if parts["fluid"] is not None:
+            self.add_water(table, parts["fluid"])
+        forces = self.forces(table.get("forces", {}))
+        return parts | {"forces": tuple(forces.values()), "force_names": tuple(forces)}
+
+    def made(self, some_class: type, table: Any, place: str) -> Any:
+        """Return an object of a class with the values of a table; None where something is wrong."""
+        if not isinstance(table, dict):
+            return self.note(place, f"{refused('', f'a table [{place}]', table)}")
+        keys, given = keys_of(some_class), dict(table)
+        if "class" in keys and "class" in table:
+            # All keys but those of flocsim that stay beside it are the parameters of that class.
+            beside = {key for key, field in keys.items() if field.metadata.get("beside_class")}
+            own = {key: given.pop(key) for key in table if key not in beside}
+            given["class"] = self.own_object(keys["class"].metadata["own"], own, place)
+            if given["class"] is None:
+                return None
+            for key in beside & keys_of(type(given["class"])).keys():
+                text = f": {key} is a key of flocsim's own: rename the field"
+                return self.note(f"{place}.class", text)
+        for key, field in keys.items():
+            other, words, elsewhere = field.metadata.get("only_for", ("", (), None))
+            if other and key in given:
+                usual = keys[other].metadata.get("usual", keys[other].default)
+                if not applies(table.get(other, usual), words):
+                    value = given.pop(key)
+                    with contextlib.suppress(ValueError):
+                        value = field.metadata["reader"].read(value, key)
+                    if value != elsewhere:
+                        text = f": applies only with {other} = {list_words(words)}: remove it"
+                        self.note(f"{place}.{key}", text)
+        try:
+            return CONVERTER.structure(given, some_class)
+        except Exception as error:
+            self.found.extend(problems_of(error, some_class, place))
+
+    def own_object(self, bases: tuple[type, ...], table: dict[str, Any], place: str) -> Any:
+        """Return an object of the user's class that a table names; None if something is wrong."""
+        try:
+            own_class = load_class(table["class"], self.folder, bases, self.sources)
+        except (ConfigError, ValueError) as error:
+            return self.found.append(problem(f"{place}.class", error))
+        parameters = {key: value for key, value in table.items() if key != "class"}
+        return self.made(own_class, parameters, place)
+
+    def library(self, name: Any) -> Any:
+        """Return the path of a shape library, pinned; noted where there is none."""
+        path = self.folder / name
+        if str(name) == NAME_OF_SHIPPED and not os.path.lexists(path):
+            return SHIPPED
+        if not os.path.isfile(path):
+            text = f": {path} is not a file: name a library written by `flocsim fit`, or "
+            self.note("shapes.file", f'{text}"{NAME_OF_SHIPPED}", the one included in flocsim')
+        return self.sources.library(path)
+
+    def add_water(self, table: dict[str, Any], fluid: Fluid) -> None:
+        """Put what follows from the water into the tables of forces; note it where it is given."""
+        for name, sources in FOLLOWING.items():
+            around, _, key = name.rpartition(".")
+            inner = value_at(table, around)
+            given = [each for each in sources if value_at(table, each) is not None]
+            if around == "fluid" or not given or not isinstance(inner, dict):
+                continue
+            value = getattr(fluid, key)
+            if key in inner:
+                self.note(name, f": follows from {given[0]}, which gives {value:.4g}: remove it")
+            elif value is not None:
+                inner[key] = value
+
+    def forces(self, tables: Any) -> dict[str, Any]:
+        """Return {name: force} in the fixed order, then the user's own as in the file."""
+        if not isinstance(tables, dict):
+            self.note("forces", f"{refused('', 'tables [forces.NAME]', tables)}")
+            return {}
+        made = {}
+        for name in dict.fromkeys(name for name in (*FORCES, *tables) if name in tables):
+            place, table = f"forces.{name}", tables[name]
+            if name in FORCES:
+                made[name] = None if table is False else self.made(FORCES[name], table, place)
+            elif isinstance(table, dict) and "class" in table:
+                made[name] = self.own_object(FORCE, table, place)
+            else:
+                known = f"known: {', '.join(FORCES)}, or one of your own by class = 'module:Class'"
+                self.note(place, f": unknown force{suggestion(name, FORCES)}; {known}")
+        if not tables or all(table is False for table in tables.values()):
+            text = ": there are none: add [forces.gravity], [forces.drag], …, or a preset"
+            self.note("forces", text)
+        return {name: force for name, force in made.items() if force is not None}
 
 
 def load_config(
     path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
 ) -> Config:
-    """The config file of a study of binary collisions: see `load_any_config`; ConfigError for one
+    """Return the config of a study of binary collisions: see `load_any_config`; ConfigError for one
     of another kind."""
     config = load_any_config(path, overrides, sources)
     if not isinstance(config.scene, PairScene):
-        kind = config.scene.kind
-        raise ConfigError(
-            f'{path} describes a study of kind "{kind}" (scene.kind), not one of two bodies: '
-            "run it with `flocsim ensemble`, and look at its results with `flocsim info` and "
-            "`flocsim plot`"
-        )
+        text = f'{path} has scene.kind = "{config.scene.kind}", and is not one of two bodies: '
+        raise ConfigError(text + "run it with `flocsim ensemble`")
     return config
 
 
 def load_any_config(
     path: str | os.PathLike, overrides: dict | None = None, sources: Sources | None = None
 ) -> Config:
-    """The config file at ``path`` as a Config, checked and with its preset filled in.
+    """Return the config file at ``path`` as a Config, checked and with its preset filled in.
 
     ``overrides``: nested dict laid over the file, e.g. ``{"output": {"file": "b.h5"}}``; None
     values in it count as not given. ``sources``: what of the file and of the modules that it names
@@ -215,264 +349,64 @@ def load_any_config(
     problem, "FILE:LINE: key …: what was found, what is allowed". The Config's ``scene`` is one of
     SCENES.
     """
-    sources = sources or Sources()
-    text = sources.text(path)
-    overrides, folder = overrides or {}, Path(path).parent
-    problems = Problems(file=str(path), text=text, overrides=overrides)
-    table = lay_over(toml_text.parse(path, text), overrides)
-    given, preset = table.keys(), table.get("preset")
-    if isinstance(preset, str):
-        table = lay_over(PRESETS.get(preset, {}), table)
-    table = lay_over(implied(table), table)
-    reader = Reader(folder, problems, sources)
-    scene = scene_class(table)
-    for name in scene.without & given:
-        problems.note(
-            (name,), f"is for binary collisions: leave it out of a {table['scene']['kind']}"
-        )
-    parts = reader.config_parts(table)
-    problems.raise_if_any()
-    if "file" not in table.get("output", {}):
-        stem = "study" if str(path) == toml_text.STANDARD_INPUT else Path(path).stem
+    sources, overrides = sources or Sources(), overrides or {}
+    text, folder = sources.text(path), Path(path).parent
+    reading = Reading(folder, sources)
+    try:
+        given = lay_over(parse(path, text), overrides)
+        parts = reading.parts(lay_over(PRESETS.get(str(given.get("preset")), {}), given))
+    except RecursionError as error:
+        raise ConfigError(f"{path}: nested too deeply") from error
+    found = reading.found
+    if any(place not in TABLES and "." not in place and place != "forces" for place, _ in found):
+        # Without the preset that was meant, what it would have given is not missing.
+        found = [each for each in found if each[0] not in ("bodies", "forces")]
+    refuse(found, path, text, overrides)
+    if value_at(given, "output.file") is None:
+        stem = "study" if str(path) == STANDARD_INPUT else Path(path).stem
         parts["output"] = attrs.evolve(parts["output"], file=f"{stem}.h5")
-    return Config(
+    config = Config(
         text=text, folder=folder, overrides=overrides, modules=dict(sources.modules), **parts
     )
+    found = [(place, f": {words}") for place, words in contradictions(config, given)]
+    refuse(found, path, text, overrides)
+    return config
 
 
-@attrs.frozen
-class Reader:
-    """Reads the tables of one config file; what is wrong is noted in ``problems`` and left out.
-
-    ``folder`` is where the file lies, and the modules and libraries that it names; ``sources`` has
-    what was read of them.
-    """
-
-    folder: Path
-    problems: Problems
-    sources: Sources
-
-    def config_parts(self, table):
-        for key in table:
-            if key not in TOP_KEYS:
-                self.problems.unknown((key,), TOP_KEYS)
-        given = {key: table[key] for key in STUDY_KEYS if key in table}
-        parts = self.values(STUDY_KEYS, given, ())
-        for name, table_class in (TABLES | {"scene": scene_class(table)}).items():
-            parts[name] = self.table(name, table_class, table.get(name, {}))
-        forces = self.forces(self.in_water(table.get("forces", {}), parts["fluid"]))
-        parts |= {"forces": tuple(forces.values()), "force_names": tuple(forces)}
-        if not self.problems.at("preset", "bodies", "fluid", "scene", "shapes"):
-            for place, text in contradictions(parts):
-                self.problems.note(place, text)
-        return parts
-
-    def table(self, name, table_class, table):
-        """One top-level table as its class; None where something in it is wrong."""
-        if not isinstance(table, dict):
-            self.problems.misfit((name,), misfit(f"a table [{name}]", table))
-            return None
-        keys, own = keys_of(table_class), {}
-        self.check_alternatives(name, table, keys)
-        if "class" in keys and "class" in table:
-            beside = [key for key, field in keys.items() if field.metadata.get("beside_class")]
-            others = {*beside, *set().union(*ALTERNATIVES[name])} - {"class"}
-            parameters = {key: table[key] for key in table if key not in others}
-            table = {key: table[key] for key in beside if key in table}
-            kind = keys["class"].metadata["own"]
-            own = {"own": self.own_object(kind, (name,), parameters, beside)}
-        if name == "scene":
-            table = self.without_keys_of_others(table_class, table)
-        values = self.values(keys, table, (name,)) | own
-        if "file" in values and values.get("source") == "library":
-            values["file"] = self.library(values["file"])
-        # Without the preset that was meant, what it would have given is not missing.
-        if self.problems.at(name) or (name == "bodies" and self.problems.at("preset")):
-            return None
-        return self.made(table_class, values, (name,))
-
-    def without_keys_of_others(self, scene, table):
-        """The table [scene] without the keys of other kinds of it, each of which is noted unless
-        it says what is so anyway."""
-        fixed = {each.name: each.default for each in attrs.fields(scene) if not each.init}
-        others = {key: elsewhere(key, scene) for key in table if key not in keys_of(scene)}
-        owners = {key: found for key, found in others.items() if found}
-        for key, found in owners.items():
-            try:
-                said = reader_of(next(iter(found.values())))(table[key])
-            except Misfit as error:
-                self.problems.misfit(("scene", key), error)
-                continue
-            if said != fixed.get(key):
-                self.problems.note(
-                    ("scene", key), f"applies only with {' or '.join(found)}: remove it"
-                )
-        return {key: value for key, value in table.items() if key not in owners}
-
-    def check_alternatives(self, name, table, keys):
-        present = [sorted(each & table.keys()) for each in ALTERNATIVES.get(name, ())]
-        first, *others = [each for each in present if each] or [[]]
-        for key in [key for each in others for key in each]:
-            text = f"excludes {first[0]}, which is given too: remove one of them"
-            self.problems.note((name, key), text)
-        for key, against in INSTEAD_OF.get(name, {}).items():
-            # A class of the user's own may have parameters of these names.
-            for other in sorted(against & table.keys()) if key in table and not others else ():
-                text = f"excludes {key}, which is given too: remove one of them"
-                self.problems.note((name, other), text)
-        for key in [key for key in table if key in keys and "class" not in table]:
-            other, word = keys[key].metadata.get("only_for", ("", ""))
-            given = table.get(other, DEFAULTS.get(other))
-            if other and given != word:
-                found = f"but {other} is {show(given)}" if given else f"and there is no {other}"
-                self.problems.note(
-                    (name, key), f'applies only with {other} = "{word}", {found}: remove it'
-                )
-
-    def library(self, name):
-        path = self.folder / name
-        if str(name) == NAME_OF_SHIPPED and not os.path.lexists(path):
-            return SHIPPED
-        if not os.path.isfile(path):
-            what = "is not an ordinary file" if os.path.exists(path) else "does not exist"
-            text = (
-                f"{path} {what}; name a library written by `flocsim fit`, or "
-                f'"{NAME_OF_SHIPPED}", the one included in flocsim'
-            )
-            self.problems.note(("shapes", "file"), text)
-        return self.sources.library(path)
-
-    def in_water(self, table, fluid):
-        """The tables of the forces with what follows from the water; noted where it is given."""
-        found = table if isinstance(table, dict) else {}
-        for (name, key), value in (of_water(fluid) if fluid else {}).items():
-            if not isinstance(found.get(name), dict):
-                continue
-            if key in found[name]:
-                text = f"follows from the water of [fluid], which gives {value:.4g}: remove it"
-                self.problems.note(("forces", name, key), text)
-            found = found | {name: {key: value} | found[name]}
-        return found or table
-
-    def forces(self, table):
-        """{name: force} in the fixed order, then the user's own as in the file."""
-        if not isinstance(table, dict):
-            self.problems.misfit(("forces",), misfit("tables [forces.NAME]", table))
-            return {}
-        names = [*(n for n in FORCES if n in table), *(n for n in table if n not in FORCES)]
-        made = {name: self.force(name, table[name]) for name in names}
-        made = {name: force for name, force in made.items() if force is not None}
-        if not made and not self.problems.at("preset", "forces"):
-            self.problems.note(
-                ("forces",), "there are none: add [forces.gravity], [forces.drag], …, or a preset"
-            )
-        return made
-
-    def force(self, name, table):
-        """The force of the table [forces.NAME], None where it is left out or wrong."""
-        place = ("forces", name)
-        if table is False and name in FORCES:
-            return None
-        if not isinstance(table, dict):
-            hint = suggestion(name, FORCES) if name not in FORCES else ""
-            wrong = misfit(f"a table [{dotted(place)}] or false", table, hint)
-            self.problems.misfit(place, wrong)
-            return None
-        if name in FORCES:
-            return self.object_of(FORCES[name], table, place)
-        if "class" in table:
-            return self.own_object(FORCE, place, table)
-        self.problems.note(
-            place,
-            f"unknown force{suggestion(name, FORCES)}; known: {list_words(FORCES)}; a force of "
-            "your own needs class = 'module:Class'",
-        )
-        return None
-
-    def own_object(self, kind, place, table, beside=()):
-        """An object of the user's own class that a table names; ``beside`` are keys of flocsim's.
-
-        None, and a note, where something is wrong with it.
-        """
-        try:
-            own_class = load_class(table["class"], self.folder, kind, self.sources)
-        except Misfit as error:
-            self.problems.misfit((*place, "class"), error)
-            return None
-        except ConfigError as error:
-            self.problems.note((*place, "class"), str(error))
-            return None
-        taken = [key for key in keys_of(own_class) if key in beside]
-        if taken:
-            self.problems.note(
-                (*place, "class"),
-                f"its parameter {taken[0]} has the same name as one of flocsim's own keys: rename "
-                "it",
-            )
-            return None
-        parameters = {key: value for key, value in table.items() if key != "class"}
-        return self.object_of(own_class, parameters, place, beside)
-
-    def object_of(self, some_class, table, place, beside=()):
-        """An object of the class with the values of a table; None where something is wrong."""
-        before = len(self.problems.found)
-        values = self.values(keys_of(some_class), table, place, beside)
-        fine = len(self.problems.found) == before
-        return self.made(some_class, values, place) if fine else None
-
-    def values(self, keys, table, place, beside=()):
-        """Key → value of every key of a table that is known and fits."""
-        values = {}
-        for key, value in table.items():
-            if key not in keys:
-                self.problems.unknown((*place, key), [*keys, *beside])
-                continue
-            try:
-                values[key] = reader_of(keys[key])(value)
-            except Misfit as error:
-                self.problems.misfit((*place, key), error)
-        missing = [
-            key + field.metadata.get("as_in", "")
-            for key, field in keys.items()
-            if field.default is attrs.NOTHING and key not in table
-        ]
-        if missing:
-            self.problems.note(place, f"needs {', '.join(missing)}")
-        return values
-
-    def made(self, some_class, values, place):
-        """An object of the class; None, and a note, where it refuses the values together."""
-        try:
-            return some_class(**values)
-        except Exception as error:
-            # A user's class may raise anything; attrs puts the text first, then objects.
-            text = error.args[0] if error.args and isinstance(error.args[0], str) else error
-            self.problems.note(place, " ".join(str(text).split()) or type(error).__name__)
-            return None
+def refuse(
+    found: Sequence[Problem], path: str | os.PathLike, text: str, overrides: Mapping[str, Any]
+) -> None:
+    """Raise ConfigError with one line per problem, in the order of the file; nothing without."""
+    lines, located = key_lines(text) if found else {}, []
+    for place, words in found[:MOST_SHOWN]:
+        around = place
+        while around and around not in lines:
+            around = around.rpartition(".")[0]
+        number = lines.get(around, 0)
+        where = f"{path}:{number}" if number else f"{path}"
+        if value_at(overrides, place) is not None:
+            where, number = f"override of {path}", -1
+        shown = place if place.isprintable() else repr(place)[1:-1]
+        located.append((number, visible(f"{where}: {shown}{words}", keep="")))
+    if located:
+        raise ConfigError("\n".join(line for _, line in sorted(located, key=itemgetter(0))))
 
 
-def contradictions(parts: Mapping[str, Any]) -> Iterator[Problem]:
-    """What does not go together though each is right by itself; ``parts``: a config's tables."""
-    yield from weight_contradictions(parts["bodies"], parts["fluid"])
-    if parts.get("sampling") == SOBOL and isinstance(parts["scene"], tuple(PAIR_SCENES.values())):
-        yield from uneven_points(parts, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
-    if parts["shapes"].outlines == BAND and parts["scene"].kind != "binary":
-        text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
-        yield ("shapes", "outlines"), f"{text}, and compare the results"
-    yield from parts["scene"].problems(parts)
-
-
-def weight_contradictions(bodies: BodiesConfig, fluid: Fluid) -> Iterator[Problem]:
-    """What of the bodies' weight does not go with buoyancy."""
-    if not fluid.buoyancy:
-        return
-    if bodies.density is None:
+def contradictions(config: Config, given: Mapping[str, Any]) -> Iterator[Problem]:
+    """Yield what does not go together though each table is right by itself."""
+    for name in sorted(config.scene.without & given.keys()):
+        yield name, f"is for binary collisions: leave it out of a {config.scene.kind}"
+    density, fluid = config.bodies.density, config.fluid
+    solid: Any = getattr(density, "solid", density)
+    if fluid.buoyancy and solid is None:
         text = "true needs bodies.density, but bodies.surface_density is given: give density and "
-        yield ("fluid", "buoyancy"), text + "depth instead, or buoyancy = false"
-        return
-    fractal = isinstance(bodies.density, FractalDensity)
-    solid = bodies.density.solid if isinstance(bodies.density, FractalDensity) else bodies.density
-    if solid <= fluid.density:
+        yield "fluid.buoyancy", text + "depth instead, or buoyancy = false"
+    elif fluid.buoyancy and solid <= fluid.density:
         text = f"{solid:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
-        place = ("bodies", "density", "solid") if fractal else ("bodies", "density")
-        yield place, text + "give a larger density, or fluid.buoyancy = false"
+        yield "bodies.density", text + "give a larger density, or fluid.buoyancy = false"
+    if config.sampling == SOBOL and config.scene.kind == "binary":
+        yield from uneven_points(config, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
+    if config.shapes.outlines == BAND and config.scene.kind != "binary":
+        text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
+        yield "shapes.outlines", f"{text}, and compare the results"
+    yield from config.scene.problems(config)

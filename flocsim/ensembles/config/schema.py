@@ -1,18 +1,21 @@
 """The schema of a config file: one attrs class per table, and Config, which holds them all.
 
-To add a key, add an attribute here, and nothing else: its name is the key, its metadata say what
-it takes (flocsim.fields, and ``read_by`` of values.py for what those cannot say). The loader reads
-it, its messages name it, `--set` sets it, and `python docs/schema_tables.py` writes it into
-docs/config.md. A new table is a class here and an attribute of Config. Keys that exclude each
-other stand in ALTERNATIVES and INSTEAD_OF; what is checked between tables, in ``problems`` of the
-scene. [scene] has a class for each kind of it, SCENES.
-Metadata of this schema alone: ``shown`` is the default where it depends on other keys, ``only_for``
-another key and the word that it must have; ``beside_class`` marks keys that stay where a class is
-named, and ``as_in`` says how a needed key is written.
+To add a key, add an attribute here, and nothing else: its name is the key, its field
+(flocsim.fields) has type, unit, range and default, and the text below it says what it means. The
+loader reads it, its messages name it, `--set` sets it, and `python docs/schema_tables.py` writes it
+into docs/config.md. A new table is a class here and an attribute of Config. [scene] has a class for
+each kind of it, SCENES. Keys that exclude each other stand in EXCLUSIVE, those that follow from the
+water in FOLLOWING; what is checked between tables, in ``problems`` of the scene.
+
+Metadata of this schema alone: ``only_for`` says with which other key a key applies, ``usual`` is
+what a default that depends on other keys is mostly; ``beside_class`` marks keys that stay where a
+class of the user's own is named, whose kind is ``own``; ``table`` is a class that a table is read
+as.
 """
 
 import os
-from collections.abc import Callable, Collection
+import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +24,18 @@ import attrs
 from flocsim.body import Fluid, FractalDensity
 from flocsim.ensembles.config import own_classes, pair_scene, scenes
 from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.presets import PRESETS
-from flocsim.ensembles.config.values import (
-    list_of,
-    number_or_table,
-    one_of,
-    read_by,
-    read_text,
-    whole,
-    whole_field,
-)
+from flocsim.ensembles.config.pair_scene import applies_with
 from flocsim.errors import ConfigError
-from flocsim.fields import choice, quantity, word_or_quantity
+from flocsim.fields import (
+    choice,
+    field,
+    one_of,
+    quantity,
+    several,
+    text,
+    whole,
+    word_or_quantity,
+)
 from flocsim.forces import (
     Contact,
     DoubleLayer,
@@ -58,12 +61,14 @@ from flocsim.io.results.events import MOST_UNKNOWN
 from flocsim.io.results.schema import BAND_ENDS
 from flocsim.io.shape_library import SHIPPED
 
+PRESETS: dict[str, Any] = tomllib.loads(Path(__file__).with_name("presets.toml").read_text("utf-8"))
+"""Name → values, nested like the config file, for keys that the file does not give."""
 
-def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> Any:
-    """A default: the value, or what follows from the user's own object where there is one."""
-    return attrs.Factory(
-        lambda self: value if self.own is None else of_own(self.own), takes_self=True
-    )
+
+def unless_own(value: Any, of_own: Callable[[Any], Any] = lambda own: None) -> dict[str, Any]:
+    """Return a default: the value, or what follows from the user's own object, if there is one."""
+    default = attrs.Factory(lambda self: value if self.own is None else of_own(self.own), True)
+    return {"default": default, "usual": value}
 
 
 ESTIMATES = ("pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a")
@@ -80,47 +85,22 @@ class StopConfig:
     less often than they state.
     """
 
-    half_width: float | None = quantity(
-        "",
-        above=0.0,
-        at_most=0.5,
-        default=None,
-        help="largest half-width of the 95 % intervals; none: run all",
-    )
-    of: tuple[str, ...] = read_by(
-        list_of(one_of(ESTIMATES), "a list of estimates"),
-        f"a list of {', '.join(ESTIMATES)}",
-        default=("pr_inside", "pr_a"),
-        help="the estimates whose intervals count",
-    )
-    least: int = whole_field(
-        1, 10**9, default=100, help="replicates after which the rule first looks"
-    )
-    failed: float = quantity(
-        "",
-        at_least=0.0,
-        at_most=1.0,
-        default=0.1,
-        help="share of all replicates that may fail; beyond it the study stops, exit code 70",
-    )
-    undecided: float = quantity(
-        "",
-        at_least=0.0,
-        at_most=1.0,
-        default=MOST_UNKNOWN,
-        help="share of a condition's replicates, or of a rate's encounters, that may be undecided "
-        "or failed; beyond it the study is completed, but ends with exit code 65, and such rates "
-        "are given as intervals only",
-    )
+    half_width: float | None = quantity("", above=0.0, at_most=0.5, default=None)
+    """Largest half-width of the 95 % intervals; none: run all."""
 
+    of: tuple[str, ...] = field(several(one_of(*ESTIMATES)), default=("pr_inside", "pr_a"))
+    """The estimates whose intervals count."""
 
-SOBOL_REPLICATES = 128
-"""Of every condition where nothing is said."""
+    least: int = field(whole(1, 10**9), default=100)
+    """Replicates after which the rule first looks."""
 
-LARGEST_SEED = 2**63 - 1
-MOST_REPLICATES = 10**9
-MOST_STEPS = 10**12
-MOST_VERTICES = 512
+    failed: float = quantity("", at_least=0.0, at_most=1.0, default=0.1)
+    """Share of all replicates that may fail; beyond it the study stops, exit code 70."""
+
+    undecided: float = quantity("", at_least=0.0, at_most=1.0, default=MOST_UNKNOWN)
+    """Share of a condition's replicates, or of a rate's encounters, that may be undecided or
+    failed; beyond it the study is completed, but ends with exit code 65, and such rates are
+    given as intervals only."""
 
 
 CUT, BAND = "cut", "band"
@@ -132,114 +112,69 @@ class ShapesConfig:
     """[shapes]: the flocs that collide."""
 
     own: Shape | None = attrs.field(
-        default=None,
-        kw_only=True,
-        metadata=own_classes.named_class(
-            own_classes.SHAPE,
-            "a shape of your own instead of a `source`, the same for both bodies, scaled to "
-            "their sizes; its parameters are further keys, and of the keys here only `vertices` "
-            "can be given with it",
-        ),
+        default=None, kw_only=True, metadata={"key": "class", "own": (Shape,)}
     )
-    source: str | None = choice(
-        "synthetic",
-        "library",
-        default=unless_own("synthetic"),
-        shown='"synthetic"',
-        help="flocs grown by flocsim, or fitted to images",
+    """A shape of your own instead of a `source`, the same for both bodies, scaled to their sizes;
+    its parameters are further keys, and of the keys here only `vertices` can be given with it."""
+
+    source: str | None = choice("synthetic", "library", **unless_own("synthetic"))
+    """Flocs grown by flocsim, or fitted to images."""
+
+    file: str | os.PathLike | None = field(
+        text("a path, relative to the config file"), **applies_with("source", "library")
     )
-    file: str | os.PathLike | None = attrs.field(
-        default=None,
-        metadata={
-            "read": read_text,
-            "allowed": "a path, relative to the config file",
-            "help": 'shape library written by `flocsim fit`, or "synthetic", the one included in '
-            'flocsim (24 grown flocs at N = 4, 8, 16, 32, 64, 128); only with source = "library"',
-            "only_for": ("source", "library"),
-        },
-    )
-    vertices: tuple[int, ...] = read_by(
-        list_of(whole(1, MOST_VERTICES), "a list of integers such as [1, 4, 16]"),
-        f"a list of distinct integers from 1 to {MOST_VERTICES}",
-        default=unless_own((1, 4, 16, 64), lambda own: (len(own.vertices),)),
-        shown="[1, 4, 16, 64]",
+    """Shape library written by `flocsim fit`, or "synthetic", the one included in flocsim (24
+    grown flocs at N = 4, 8, 16, 32, 64, 128)."""
+
+    vertices: tuple[int, ...] = field(
+        several(whole(1, 512)),
+        **unless_own((1, 4, 16, 64), lambda own: (len(own.vertices),)),
         beside_class=True,
-        help="numbers N of vertices of the spheropolygons; 1 is the equivalent sphere",
     )
-    radius: float = quantity(
-        "m",
-        above=0.0,
-        at_most=pair_scene.LARGEST_LENGTH,
-        default=1e-6,
-        help="spheroradius r of the flocs after resizing",
-    )
-    pool: int = whole_field(
-        1,
-        10**6,
-        default=10,
-        help="number of flocs, nearest in size-to-spheroradius ratio, from which each replicate "
-        "draws its pair",
-    )
-    size: str = choice(
-        "scene",
-        "own",
-        default="scene",
-        help="scene: every floc is resized to the radius required by its collision type; own: it "
-        "keeps its measured size and spheroradius, and is drawn from the `pool` flocs nearest to "
-        'that radius, or as `scene.pairs = "measured"` says, which implies "own"; the faster of '
-        "the two approaches",
-        only_for=("source", "library"),
-    )
-    pairs_alike_in: str = choice(
-        "vertices",
-        "error",
-        default="vertices",
-        help="vertices: both flocs have N vertices; error: of the numbers of vertices with which "
-        "the receiver was fitted, it has the one whose relative error RE is nearest to that of the "
-        "approaching floc with N vertices",
-    )
-    outlines: str = choice(
-        CUT,
-        *BAND_ENDS,
-        BAND,
-        default=CUT,
-        help="cut: outlines as they were cut from the pictures; closer, wider: at the ends of "
-        "their bands, as another observer might have cut them; band: as cut, and every replicate "
-        "is run twice more, with both outlines cut closer and wider, which gives every probability "
-        "of a study of pairs a third error, shape; all except cut need a library made by "
-        "`flocsim fit --band`",
-        only_for=("source", "library"),
-    )
+    """Numbers N of vertices of the spheropolygons; 1 is the equivalent sphere."""
+
+    radius: float = quantity("m", above=0.0, at_most=pair_scene.LARGEST_LENGTH, default=1e-6)
+    """Spheroradius r of the flocs after resizing."""
+
+    pool: int = field(whole(1, 10**6), default=10)
+    """Number of flocs, nearest in size-to-spheroradius ratio, from which each replicate draws its
+    pair."""
+
+    size: str = choice("scene", "own", **applies_with("source", "library", value="scene"))
+    """scene: every floc is resized to the radius required by its collision type; own: it keeps its
+    measured size and spheroradius, and is drawn from the `pool` flocs nearest to that radius,
+    or as `scene.pairs = "measured"` says, which implies "own"; the faster of the two
+    approaches."""
+
+    pairs_alike_in: str = choice("vertices", "error", default="vertices")
+    """vertices: both flocs have N vertices; error: of the numbers of vertices with which the
+    receiver was fitted, it has the one whose relative error RE is nearest to that of the
+    approaching floc with N vertices."""
+
+    outlines: str = choice(CUT, *BAND_ENDS, BAND, **applies_with("source", "library", value=CUT))
+    """cut: outlines as they were cut from the pictures; closer, wider: at the ends of their bands,
+    as another observer might have cut them; band: as cut, and every replicate is run twice
+    more, with both outlines cut closer and wider, which gives every probability of a study of
+    pairs a third error, shape; all except cut need a library made by `flocsim fit --band`."""
+
     fractal_dimension: float = quantity(
-        "",
-        at_least=1.2,
-        at_most=1.95,
-        default=1.8,
-        only_for=("source", "synthetic"),
-        help="fractal dimension of the synthetic flocs, in the plane",
+        "", at_least=1.2, at_most=1.95, **applies_with("source", "synthetic", value=1.8)
     )
-    primary_particles: int = whole_field(
-        2,
-        2000,
-        default=60,
-        only_for=("source", "synthetic"),
-        help="number of primary particles in each synthetic floc",
-    )
+    """Fractal dimension of the synthetic flocs, in the plane."""
+
+    primary_particles: int = field(whole(2, 2000), **applies_with("source", "synthetic", value=60))
+    """Number of primary particles in each synthetic floc."""
 
     def __attrs_post_init__(self):
         if self.own is not None:
             own_classes.check_shape(self.own)
             known = (1, len(self.own.vertices))
-            for count in self.vertices:
-                if count not in known:
-                    raise ConfigError(
-                        f"vertices may be 1, the equivalent sphere, and {known[1]}, the core "
-                        f"points of {own_classes.full_name(self.own)}, found {count}"
-                    )
+            if other := set(self.vertices).difference(known):
+                raise ConfigError(
+                    f"vertices may be 1, the sphere, and {known[1]}, its core points, found {other}"
+                )
         if self.source == "library" and self.file is None:
-            raise ConfigError(
-                'source = "library" needs file, a shape library written by `flocsim fit`'
-            )
+            raise ConfigError('source = "library" needs file, written by `flocsim fit`')
 
     @property
     def label(self) -> str:
@@ -257,62 +192,48 @@ class ShapesConfig:
         return f"{count} flocs of {Path(self.file).name}"
 
 
-FRACTAL = (
-    'a density above 0, or {law = "fractal", primary = "4 um", dimension = 2.1, solid = 2650.0}'
-)
-
-
 @attrs.frozen
 class BodiesConfig:
     """[bodies]: what the flocs weigh; either ``surface_density``, or ``density`` and ``depth``."""
 
-    surface_density: float | None = quantity(
-        "kg/m^2", above=0.0, default=None, help="ρ_s: mass m = ρ_s A, A the floc's area"
+    surface_density: float | None = quantity("kg/m^2", above=0.0, default=None)
+    """ρ_s: mass m = ρ_s A, A the floc's area."""
+
+    density: float | FractalDensity | None = quantity(
+        "kg/m^3", above=0.0, default=None, table=FractalDensity
     )
-    density: float | FractalDensity | None = attrs.field(
-        default=None,
-        metadata={
-            "read": number_or_table("kg/m^3", FractalDensity, FRACTAL),
-            "unit": "kg/m^3",
-            "allowed": FRACTAL,
-            "help": "ρ: ρ_s = ρ · depth; as a table, for flocs that are less dense the larger they "
-            "are: ρ = ρ_f + (solid − ρ_f)(primary/D)^(3 − dimension), D = 2 r_eq, ρ_f of the fluid",
-        },
-    )
-    depth: float | str = word_or_quantity(
-        "sphere",
-        "m",
-        above=0.0,
-        default="sphere",
-        help='thickness of the flocs; "sphere" = 4/3 r_eq, the mass of the equivalent sphere',
-    )
+    """ρ: ρ_s = ρ · depth; as a table {law = "fractal", primary = "4 um", dimension = 2.1, solid =
+    2650.0}, for flocs that are less dense the larger they are: ρ = ρ_f + (solid −
+    ρ_f)(primary/D)^(3 − dimension), D = 2 r_eq, ρ_f of the fluid."""
+
+    depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere")
+    """Thickness of the flocs; "sphere" = 4/3 r_eq, the mass of the equivalent sphere."""
 
     def __attrs_post_init__(self):
         if (self.surface_density is None) == (self.density is None):
-            raise ConfigError(
-                "needs either surface_density [kg/m^2], or density [kg/m^3] with depth: add e.g. "
-                "surface_density = 2.0 (the paper's weights), or density = 2650.0"
-            )
+            example = "surface_density = 2.0 (the paper's weights), or density = 2650.0"
+            raise ConfigError(f"needs either surface_density, or density with depth: add {example}")
 
 
 @attrs.frozen
 class ZoneConfig:
     """[zone]: the attraction zone d_c < D_0; one of ``root``, ``distance`` and ``centre``."""
 
-    distance: float | None = quantity(
-        "m", at_least=0.0, default=None, help="d_0: D_0 = r_i + r_j + d_0"
-    )
-    centre: float | None = quantity("m", above=0.0, default=None, help="D_0 itself")
+    distance: float | None = quantity("m", at_least=0.0, default=None)
+    """d_0: D_0 = r_i + r_j + d_0."""
+
+    centre: float | None = quantity("m", above=0.0, default=None)
+    """D_0 itself."""
+
     root: str | None = choice(
         "inner",
         "outer",
         default=attrs.Factory(
-            lambda self: "outer" if self.distance is None and self.centre is None else None,
-            takes_self=True,
+            lambda self: "outer" if self.distance is None and self.centre is None else None, True
         ),
-        shown='"outer"',
-        help="d_0 is this root of attraction = repulsion; it must exist",
+        usual="outer",
     )
+    """d_0 is this root of attraction = repulsion; it must exist."""
 
 
 METHODS: dict[str, type] = {
@@ -330,61 +251,41 @@ class IntegratorConfig:
     """[integrator]: how the motion is integrated in time."""
 
     own: Integrator | None = attrs.field(
-        default=None,
-        kw_only=True,
-        metadata=own_classes.named_class(
-            own_classes.INTEGRATOR,
-            "an integrator of your own instead of a `name`; its parameters are further keys, and "
-            "of the keys here only `max_steps` and `check_share` can be given with it",
-        ),
+        default=None, kw_only=True, metadata={"key": "class", "own": (Integrator,)}
     )
-    name: str | None = choice(
-        *METHODS,
-        default=unless_own("implicit"),
-        shown='"implicit"',
-        help="the method: see `flocsim.integrators`",
-    )
-    tolerance: float = quantity(
-        "m",
-        above=0.0,
-        default=1e-9,
-        help="largest error of a step, including the later errors that follow from it",
-    )
-    max_steps: int = whole_field(
-        1,
-        MOST_STEPS,
-        default=200_000,
-        beside_class=True,
-        help="largest number of steps of a replicate; one that has not ended by then, or has "
-        "failed, is tried once more with five times as many; in a swarm, the largest number that "
-        "an island may try from one common time to the next (for an island of more than 50 bodies "
-        "this number times 50 over its bodies)",
-    )
-    step: float | None = quantity(
-        "s", above=0.0, default=None, help="for methods with a fixed step"
-    )
+    """An integrator of your own instead of a `name`; its parameters are further keys, and of the
+    keys here only `max_steps` and `check_share` can be given with it."""
+
+    name: str | None = choice(*METHODS, **unless_own("implicit"))
+    """The method: see `flocsim.integrators`."""
+
+    tolerance: float = quantity("m", above=0.0, default=1e-9)
+    """Largest error of a step, including the later errors that follow from it."""
+
+    max_steps: int = field(whole(1, 10**12), default=200_000, beside_class=True)
+    """Largest number of steps of a replicate; one that has not ended by then, or has failed, is
+    tried once more with five times as many; in a swarm, the largest number that an island may
+    try from one common time to the next (for an island of more than 50 bodies this number times
+    50 over its bodies)."""
+
+    step: float | None = quantity("s", above=0.0, default=None)
+    """For methods with a fixed step."""
+
     check_share: float | str = word_or_quantity(
-        "auto",
-        "",
-        at_least=0.0,
-        at_most=1.0,
-        default="auto",
-        beside_class=True,
-        help="share of the replicates that are run again at a 100 times tighter tolerance (with a "
-        "fixed step: at a quarter of it); the outcomes that change give the numerical error of the "
-        'probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval '
-        "of a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most "
-        "3.5 % and at least 1 %; three times as many of the hooks, rests and misses, which flip "
-        "most often; one in sixteen of these is run a third time, tighter still; 0: none",
+        "auto", "", at_least=0.0, at_most=1.0, default="auto", beside_class=True
     )
+    """Share of the replicates that are run again at a 100 times tighter tolerance (with a fixed
+    step: at a quarter of it); the outcomes that change give the numerical error of the
+    probabilities. "auto": of n replicates 1.96 √(n + 3.84) − 3.84, which makes the interval of
+    a flip rate of 0 as narrow as a sampling interval; where that is more than 16, at most 3.5 %
+    and at least 1 %; three times as many of the hooks, rests and misses, which flip most often;
+    one in sixteen of these is run a third time, tighter still; 0: none."""
 
     def __attrs_post_init__(self):
         if self.own is not None:
             own_classes.check_integrator(self.own)
         if self.name == "velocity_verlet" and self.step is None:
-            raise ConfigError(
-                'name = "velocity_verlet" needs integrator.step, the fixed step in seconds'
-            )
+            raise ConfigError('name = "velocity_verlet" needs step, the fixed step')
 
     @property
     def label(self) -> str:
@@ -405,13 +306,12 @@ class IntegratorConfig:
 class OutputConfig:
     """[output]: where the results go."""
 
-    file: str = read_by(
-        read_text,
-        "a string",
-        default="study.h5",
-        shown='"study.h5"',
-        help="results file, relative to the current folder; by default it has the config's name",
-    )
+    file: str = field(text(), default="study.h5")
+    """Results file, relative to the current folder; by default it has the config's name."""
+
+
+SOBOL_REPLICATES = 128
+"""Of every condition of a study by Sobol's points, where nothing is said."""
 
 
 @attrs.frozen(eq=False)
@@ -424,22 +324,31 @@ class Config:
     {place: source} of the user's own classes.
     """
 
-    preset: str | None = choice(
-        *PRESETS, default=None, help="set of values for keys that the file does not give"
+    preset: str | None = choice(*PRESETS, default=None)
+    """Set of values for keys that the file does not give."""
+
+    seed: int = field(whole(0, 2**63 - 1), default=1)
+    """Seed of all random numbers."""
+
+    sampling: str = choice("random", pair_scene.SOBOL, default="random")
+    """How orientations and flocs of two bodies are drawn: independently, or evenly, by the points
+    of 16 scrambled Sobol sequences, from whose scatter the intervals follow (studies of rates
+    always use Sobol sequences)."""
+
+    scene: pair_scene.PairScene = attrs.Factory(pair_scene.PairScene)
+    replicates: int = field(
+        whole(1, 10**9),
+        default=attrs.Factory(
+            lambda self: (
+                self.scene.usual_replicates
+                or (SOBOL_REPLICATES if self.sampling == pair_scene.SOBOL else 100)
+            ),
+            takes_self=True,
+        ),
+        usual=100,
     )
-    seed: int = whole_field(0, LARGEST_SEED, default=1, help="seed of all random numbers")
-    replicates: int = whole_field(
-        1, MOST_REPLICATES, default=100, help="pairs of orientations drawn per condition"
-    )
-    sampling: str = choice(
-        "random",
-        pair_scene.SOBOL,
-        default="random",
-        help="how orientations and flocs of two bodies are drawn: independently, or evenly, by the "
-        f"points of {pair_scene.SOBOL_SCRAMBLES} scrambled Sobol sequences, from whose scatter the "
-        "intervals follow (studies of rates always use Sobol sequences)",
-    )
-    scene: pair_scene.PairScene = attrs.Factory(pair_scene.SettlingScene)
+    """Pairs of orientations drawn per condition."""
+
     shapes: ShapesConfig = attrs.Factory(ShapesConfig)
     bodies: BodiesConfig = attrs.field(kw_only=True)
     fluid: Fluid = attrs.Factory(Fluid)
@@ -458,11 +367,8 @@ class Config:
     def scrambles(self) -> int:
         """Of how many scrambles of a Sobol sequence the replicates of two bodies are points; 0
         where they are drawn independently."""
-        return (
-            pair_scene.SOBOL_SCRAMBLES
-            if self.sampling == pair_scene.SOBOL and self.scene.kind == "binary"
-            else 0
-        )
+        even = self.sampling == pair_scene.SOBOL and self.scene.kind == "binary"
+        return pair_scene.SOBOL_SCRAMBLES if even else 0
 
     @property
     def is_kernel(self) -> bool:
@@ -488,16 +394,16 @@ def keys_of(some_class: type) -> dict[str, attrs.Attribute]:
     }
 
 
-TABLES = {
+TABLES: dict[str, Any] = {
     field.name: field.type for field in attrs.fields(Config) if field.type and attrs.has(field.type)
 }
 """Name of a top-level table → class; [forces] is read by itself."""
 
-STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "allowed" in field.metadata}
+STUDY_KEYS = {key: field for key, field in keys_of(Config).items() if "reader" in field.metadata}
 """The keys above all tables."""
 
-SCENES: dict[str, type] = pair_scene.PAIR_SCENES | {"kernel": KernelScene} | scenes()
-"""`[scene] meeting` of binary encounters, or `[scene] kind` of others → class of the table."""
+SCENES: dict[str, Any] = {"binary": pair_scene.PairScene, **scenes(), "kernel": KernelScene}
+"""`[scene] kind` → class of the table."""
 
 TOP_KEYS = (*STUDY_KEYS, *TABLES, "forces")
 
@@ -513,27 +419,28 @@ FORCES: dict[str, type] = {
 }
 """Name of the table [forces.NAME] → class, in the order of Config.forces."""
 
-ALTERNATIVES: dict[str, tuple[set[str], ...]] = {
-    "scene": ({"types"}, {"pairs"}),
-    "shapes": ({"source"}, {"class"}),
-    "bodies": ({"surface_density"}, {"density", "depth"}),
-    "fluid": ({"salinity"}, {"ionic_strength"}),
-    "zone": ({"root"}, {"distance"}, {"centre"}),
-    "integrator": ({"name"}, {"class"}),
+EXCLUSIVE = [
+    ("scene.types", "scene.pairs"),
+    ("shapes.class", "shapes.source"),
+    ("bodies.surface_density", "bodies.density"),
+    ("bodies.surface_density", "bodies.depth"),
+    ("fluid.salinity", "fluid.ionic_strength"),
+    ("zone.root", "zone.distance"),
+    ("zone.root", "zone.centre"),
+    ("zone.distance", "zone.centre"),
+    ("integrator.class", "integrator.name"),
+    *((f"forces.contact.{key}", f"forces.contact.{other}") for key, other in INSTEAD.items()),
+]
+"""Pairs of keys that cannot both be given: one of them replaces the other from below."""
+
+WATER = ("fluid.temperature", "fluid.salinity", "fluid.ionic_strength")
+
+FOLLOWING = {
+    "fluid.viscosity": WATER[:2],
+    "fluid.density": WATER[:2],
+    "forces.double_layer.permittivity": WATER,
+    "forces.double_layer.debye_length": WATER[1:],
+    "forces.thermal.temperature": WATER[:1],
 }
-"""Table → sets of keys that exclude each other: one of them replaces the others from below."""
-
-WATER = ("temperature", "salinity", "ionic_strength")
-"""The keys of [fluid] that say what water it is."""
-
-FOLLOWING: dict[tuple[str, ...], Collection[str]] = {
-    ("fluid", "viscosity"): WATER[:2],
-    ("fluid", "density"): WATER[:2],
-    ("forces", "double_layer", "permittivity"): WATER,
-    ("forces", "double_layer", "debye_length"): WATER[1:],
-    ("forces", "thermal", "temperature"): WATER[:1],
-}
-"""Place of a key → the keys of [fluid] that it follows from: these replace it from below."""
-
-INSTEAD_OF = {"forces.contact": {material: {key} for material, key in INSTEAD.items()}}
-"""Table → key → further keys that it excludes, and that go with one another."""
+"""Key → the keys that it follows from: these replace it from below. Those of forces are properties
+of Fluid, and are not given beside these."""

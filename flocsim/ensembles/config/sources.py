@@ -26,12 +26,6 @@ from flocsim.errors import ConfigError
 from flocsim.io.json_text import matches, read_json
 from flocsim.io.seals import held
 
-LONGEST_SOURCE = 2**20
-"""Bytes of a module that are kept as text; of longer ones the digest is."""
-
-KEPT = {"digest": str, "source": str}
-"""What a file keeps of a module, as a pattern of `flocsim.io.json_text`."""
-
 
 def digest_of(source: bytes) -> str:
     """Return a hash of a module's source."""
@@ -44,10 +38,7 @@ def kept_sources(modules: Mapping[str, bytes]) -> str:
     A record for the user: it permits nothing.
     """
     found = {
-        place: {
-            "digest": digest_of(source),
-            "source": source.decode("utf-8", "replace") if len(source) <= LONGEST_SOURCE else "",
-        }
+        place: {"digest": digest_of(source), "source": source.decode("utf-8", "replace")}
         for place, source in sorted(modules.items())
     }
     return json.dumps(found)
@@ -59,7 +50,7 @@ def read_sources(run: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     ValueError where it is none that flocsim wrote.
     """
     found = read_json(run["modules"], {}) if "modules" in run else {}
-    if not all(matches(each, KEPT) for each in found.values()):
+    if not all(matches(each, {"digest": str, "source": str}) for each in found.values()):
         raise ValueError("run/modules cannot be read: its form is unknown")
     return found
 
@@ -100,10 +91,6 @@ class Sources:
             self.config = read_text_file(path)
         return self.config
 
-    def has(self, path: str | os.PathLike, folder: Path) -> bool:
-        """Return True if a module of that file is here, or could be read."""
-        return place(path, folder) in self.modules or os.path.isfile(path)
-
     def module(self, path: str | os.PathLike, folder: Path) -> bytes:
         """Return the bytes of a module's file, found by way of the config's folder.
 
@@ -111,9 +98,7 @@ class Sources:
         """
         name = place(path, folder)
         if self.allowed is not None and name.startswith(os.pardir):
-            raise ConfigError(
-                f"{path} was not imported, because it is a link that leads out of {folder}"
-            )
+            raise ConfigError(f"{path} was not imported: it is a link that leads out of {folder}")
         if name not in self.modules:
             self.modules[name] = Path(path).read_bytes()
         return self.modules[name]
@@ -139,7 +124,8 @@ class Neighbours(importlib.abc.MetaPathFinder):
         base = self.folder.joinpath(*name.split("."))
         packages = [each / "__init__.py" for each in base.parents if self.folder in each.parents]
         for file in (base / "__init__.py", base.with_suffix(".py")):
-            if all(self.sources.has(each, self.folder) for each in (file, *packages)):
+            parts = [each for each in (file, *packages) if not os.path.isfile(each)]
+            if all(place(each, self.folder) in self.sources.modules for each in parts):
                 return file
         return None
 

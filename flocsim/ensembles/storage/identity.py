@@ -93,12 +93,10 @@ def method_facts(config):
 
 def settings(table, values):
     """The fields of an attrs object under the names that the config file has for them."""
-    left_out, pair = VARIABLE.get(table, ()), getattr(values, "kind", None) == "binary"
     return {
         f"{table}.{field.name}": plain(getattr(values, field.name))
         for field in attrs.fields(type(values))
-        # Of pairs, what is fixed in one way to meet is a key in others.
-        if field.name not in left_out and (field.init or (table == "scene" and pair))
+        if field.name not in VARIABLE.get(table, ()) and field.init
     }
 
 

@@ -11,7 +11,7 @@ from flocsim.ensembles.collision.pairings import (
     quantile,
     size_classes,
 )
-from flocsim.ensembles.config.pair_scene import SettlingScene
+from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.errors import ConfigError
 from tests.helpers.tiers import rest_slow
 
@@ -24,7 +24,7 @@ def flocs_of(sizes):
 
 
 def pair_of(sizes=SIZES, places=(0, 0), **words):
-    classes = size_classes(SettlingScene(pairs="measured", **words), flocs_of(sizes))
+    classes = size_classes(PairScene(pairs="measured", **words), flocs_of(sizes))
     return TwoClasses("pair", *(classes[place] for place in places))
 
 
@@ -90,7 +90,7 @@ def test_limits_and_borders_choose_the_flocs():
 
 def test_classes_of_equal_weight_and_one_size_in_one_class():
     def numbers(count, sizes=SIZES, **words):
-        scene = SettlingScene(pairs="measured", classes=count, **words)
+        scene = PairScene(pairs="measured", classes=count, **words)
         return [each.sizes.tolist() for each in size_classes(scene, flocs_of(sizes))]
 
     assert numbers(2) == [[2e-6, 4e-6, 4e-6], [6e-6, 9e-6, 12e-6]]
@@ -141,6 +141,6 @@ def test_types_of_measured_sizes_span_the_flocs_that_are_drawn():
 
 def test_a_floc_counts_for_as_many_as_its_pictures_have_hidden():
     flocs = [attrs.evolve(each, weight=k + 1.0) for k, each in enumerate(flocs_of(SIZES))]
-    (alone,) = size_classes(SettlingScene(pairs="measured"), flocs)
+    (alone,) = size_classes(PairScene(pairs="measured"), flocs)
     expected = [flocs[place].weight for place in alone.places]
     assert np.allclose(alone.weights, np.array(expected) / sum(expected))

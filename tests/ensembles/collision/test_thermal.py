@@ -30,7 +30,7 @@ from flocsim.ensembles.collision.outcomes import (
     return_bound,
     watch_kicked_pair,
 )
-from flocsim.ensembles.config.pair_scene import BrownianScene
+from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.errors import UsageError
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
@@ -289,12 +289,12 @@ def test_what_attracts_everywhere_is_no_cage():
 
 
 SPHERES = (Sphere(1e-6), Sphere(3e-6))
-SCENE = BrownianScene(release=1.5, escape=5.0)
+SCENE = PairScene(meeting="brownian", release=1.5, escape=5.0)
 
 
 def test_distances_are_multiples_of_the_sum_of_radii():
     assert ends_of(SCENE, SPHERES) == pytest.approx((6e-6, 2e-5))
-    usual = BrownianScene()
+    usual = PairScene(meeting="brownian")
     assert (usual.release, usual.escape, usual.delta) == (2.0, 4.0, (0.0,))
 
 

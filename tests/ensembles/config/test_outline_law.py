@@ -60,7 +60,7 @@ def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
     [
         ('meeting = "extension"\nrate = 10.0', "", "is for pairs that settle"),
         ('meeting = "brownian"', '[forces.thermal]\ntemperature = "298 K"', "pairs that settle"),
-        ("", '[forces.thermal]\ntemperature = "298 K"', "leave one of them out"),
+        ("", '[forces.thermal]\ntemperature = "298 K"', "cannot be combined with"),
     ],
 )
 def test_elsewhere_it_is_refused(tmp_path, scene, more, words):

@@ -196,12 +196,12 @@ def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_module, monkeypat
         (
             "own:Yukawa",
             "strength = 1\npower = true",
-            "must be a finite number in SI units, found t",
+            "must be a finite number in SI units, found T",
         ),
         ("own:Yukawa", "", "3: forces.own: needs strength"),
-        ("own:Yukawe", "", "has no 'Yukawe'; its forces: Yukawa, NoKernel, Undecorated"),
-        ("own:Apple", "", "is not a subclass of flocsim.forces.BodyForce"),
-        ("own:SCALE", "", "is not a subclass of flocsim.forces.BodyForce"),
+        ("own:Yukawe", "", "has no 'Yukawe' (did you mean 'Yukawa'?)"),
+        ("own:Apple", "", "is not a subclass of flocsim.forces"),
+        ("own:SCALE", "", "is not a subclass of flocsim.forces"),
         ("own:NoKernel", "", "does not define kernel"),
         ("own:Undecorated", "", "is not decorated: put @attrs.frozen"),
         ("math:pi", "", "is not a subclass of flocsim.forces"),
@@ -225,7 +225,7 @@ def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own
     ("source", "said"),
     [
         ("\n1/0\n", "own.py:2: ZeroDivisionError: division by zero"),
-        ("x = (\n", "own.py:1: '(' was never closed"),
+        ("x = (\n", "SyntaxError: '(' was never closed (own.py, line 1)"),
         ("import sys\nsys.exit('bye\\nbye')\n", "own.py:2: SystemExit: bye bye"),
         (
             "import no_such_thing\n",
@@ -307,27 +307,26 @@ def test_a_name_makes_flocsims_own_integrator(name, made):
         (
             "own:Mine",
             "step = 1\nfaktor = 1",
-            "5: integrator.faktor: unknown key (did you mean 'factor'?); "
-            "known: step, factor, max_steps",
+            "5: integrator.faktor: unknown key (did you mean 'factor'?); known: step",
         ),
         (
             "own:Mine",
             "step = 1\ntolerance = 1",
-            "tolerance: unknown key; known: step, factor, ",
+            "tolerance: unknown key; known: step, factor",
         ),
-        ("own:Mine", "step = 1\nname = 'implicit'", "3: integrator.class: excludes name, which is"),
+        ("own:Mine", "step = 1\nname = 'implicit'", "5: integrator.name: excludes class, which"),
         ("own:Mein", "", "3: integrator.class: module 'own' ("),
-        ("own:Mein", "", "has no 'Mein'; its integrators: Mine, Stepless, Lost, Backward"),
-        ("own:Rod", "", "is not a subclass of flocsim.integrators.Integrator"),
+        ("own:Mein", "", "has no 'Mein' (did you mean 'Mine'?)"),
+        ("own:Rod", "", "is not a subclass of flocsim.integrators"),
         ("own:Stepless", "", "does not define attempt, next_step"),
         ("own:Lost", "", "2: integrator: module 'flocsim.hooks' has no attribute 'no_such_hook'"),
         ("own:Backward", "", "2: integrator: first_step must be a number above 0, found -1.0"),
         (
             "own:Greedy",
             "",
-            "its parameter max_steps has the same name as one of flocsim's own keys",
+            "max_steps is a key of flocsim's own",
         ),
-        ("own", "", "must be 'module:Class' such as 'mine:SemiImplicitEuler', found 'own'"),
+        ("own", "", "must be 'module:Class', found 'own'"),
         ("nowhere:A", "", "there is no module 'nowhere', neither nowhere.py nor installed"),
     ],
 )
@@ -371,8 +370,8 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
             "length = '1 s'",
             "4: shapes.length must be a length such as '16.41 um'",
         ),
-        ("own:Rod", "length = 1\nraduis = 1", "known: length, radius, points, vertices"),
-        ("own:Rod", "length = 1\nsource = 'library'", "3: shapes.class: excludes source, which is"),
+        ("own:Rod", "length = 1\nraduis = 1", "did you mean 'radius'?"),
+        ("own:Rod", "length = 1\nsource = 'library'", "5: shapes.source: excludes class, which"),
         (
             "own:Rod",
             "length = 1\npool = 3",
@@ -381,8 +380,7 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
         (
             "own:Rod",
             "length = 1\nvertices = [1, 4]",
-            "2: shapes: vertices may be 1, the equivalent sphere, and 2, the core points of "
-            "own:Rod, found 4",
+            "5: shapes.vertices may be 1, the sphere, and 2, its core points, found {4}",
         ),
         ("own:Rod", "length = 1\npoints = 1", "2: shapes: one core point is a sphere: leave class"),
         ("own:Rod", "length = 1\npoints = -1", "2: shapes: Number of samples, -1, must be non-neg"),
@@ -392,10 +390,10 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
         (
             "own:Outline",
             "",
-            "its parameter vertices has the same name as one of flocsim's own keys",
+            "vertices is a key of flocsim's own",
         ),
         ("own:Mine", "", "is not a subclass of flocsim.geometry.shapes.shape.Shape"),
-        ("own:Rood", "", "has no 'Rood'; its shapes: Rod, Stiff, Hollow, Broken, Outline"),
+        ("own:Rood", "", "has no 'Rood' (did you mean 'Rod'?)"),
     ],
 )
 def test_a_shape_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):

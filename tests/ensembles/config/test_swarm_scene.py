@@ -22,7 +22,7 @@ def test_a_swarm_is_a_scene_of_its_own(tmp_path):
     [
         ("area_fraction", "needs area_fraction or box, found neither"),
         ({"scene": {"box": ["1 mm", "1 mm"]}}, "needs area_fraction or box, found both"),
-        ({"scene": {"floor": True}}, 'a floor needs periodic = "x" or "none"'),
+        ({"scene": {"floor": True}}, 'scene.floor = true needs periodic = "x" or "none"'),
         ({"scene": {"leaving": "remove"}}, 'leaving = "remove" needs periodic = "x" or "none"'),
         ({"scene": {"leaving": "fly", "periodic": "x"}}, "leaving"),
         ({"scene": {"min_radius": "6 um"}}, "is not between min_radius and max_radius"),
@@ -30,7 +30,7 @@ def test_a_swarm_is_a_scene_of_its_own(tmp_path):
         ({"scene": {"classes": ["2 um", "1 um"]}}, "classes must be ascending radii"),
         ("radius spread", "needs radius, the median r_eq, or measured"),
         ("radius", "spread needs radius"),
-        ({"shapes": {"vertices": [1, 4]}}, "bodies of one number of vertices, found [1, 4]"),
+        ({"shapes": {"vertices": [1, 4]}}, "must be one number in a swarm, found [1, 4]"),
         ({"scene": {"types": ["I"]}}, "types"),
         ({"scene": {"kind": "crowd"}}, "kind"),
     ],

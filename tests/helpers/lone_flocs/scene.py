@@ -1,12 +1,12 @@
 """[scene] kind = "lone": a floc settles along an upright wall."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import attrs
 
-from flocsim.ensembles.config.pair_scene import LARGEST_LENGTH, Problem
-from flocsim.fields import choice, quantity
+from flocsim.ensembles.config.pair_scene import SIZE, Problem
+from flocsim.fields import choice, field, quantity
 
 
 @attrs.frozen
@@ -18,14 +18,19 @@ class LoneScene:
     names: ClassVar[tuple[str, ...]] = ("lone",)
     delta: ClassVar[tuple[float, ...]] = (0.0,)
 
-    kind: str = choice("lone", default="lone", help="a floc that settles alone past a wall")
-    radius: float = quantity(
-        "m", above=0.0, at_most=LARGEST_LENGTH, default=1e-5, help="equivalent radius"
-    )
-    gap: float = quantity("m", above=0.0, default=1e-7, help="from the wall, at the start")
-    duration: float = quantity("s", above=0.0, default=0.01, help="simulated time")
+    kind: str = choice("lone", default="lone")
+    """A floc that settles alone past a wall."""
 
-    def problems(self, parts: Mapping[str, Any]) -> Iterator[Problem]:
+    radius: float = field(SIZE, default=1e-5)
+    """Equivalent radius."""
+
+    gap: float = quantity("m", above=0.0, default=1e-7)
+    """From the wall, at the start."""
+
+    duration: float = quantity("s", above=0.0, default=0.01)
+    """Simulated time."""
+
+    def problems(self, config: Any) -> Iterator[Problem]:
         """Nothing in it contradicts another table."""
         yield from ()
 
