@@ -203,14 +203,20 @@ def text(allowed: str = "a string") -> Reader:
     return Reader(allowed, read)
 
 
-def several(item: Reader, length: int | None = None, distinct: bool = True) -> Reader:
-    """Return a reader of lists, as tuples, of at least one item or of a ``length``."""
+def several(
+    item: Reader, length: int | None = None, distinct: bool = True, or_word: bool = False
+) -> Reader:
+    """Return a reader of lists, as tuples, of at least one item or of a ``length``.
+
+    ``or_word``: a single word is a list of it.
+    """
     allowed = (
         f"a list of {length or ('different values' if distinct else 'values')}, each {item.allowed}"
     )
 
     def read(value: Any, name: str) -> tuple:
         value = value.tolist() if hasattr(value, "tolist") else value
+        value = [value] if or_word and isinstance(value, str) else value
         if not isinstance(value, list | tuple) or not value or len(value) != (length or len(value)):
             raise refused(name, allowed, value)
         found = tuple(item.read(each, f"{name}[{place}]") for place, each in enumerate(value))

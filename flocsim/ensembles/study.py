@@ -37,7 +37,7 @@ from flocsim.ensembles.collision.offsets import as_draws, offsets_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.kernel_scene import KernelScene
-from flocsim.ensembles.config.pair_scene import BROWNIAN, PAIR_SCENES, SETTLING
+from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
 from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
 from flocsim.ensembles.preflight import (
@@ -78,7 +78,7 @@ class Study(StudyKind):
     flocs: list[Floc] = attrs.field(
         default=attrs.Factory(lambda self: self.flocs_of(self.config), takes_self=True)
     )
-    scenes: ClassVar[Sequence[type]] = tuple(PAIR_SCENES.values())
+    scenes: ClassVar[Sequence[type]] = (PairScene,)
     format: ClassVar[str] = "flocsim results"
     check = staticmethod(check_study)
     pairings: tuple[Pairing, ...] = attrs.field(init=False)

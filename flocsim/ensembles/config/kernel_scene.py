@@ -8,16 +8,8 @@ import attrs
 
 from flocsim.ensembles.config import pair_scene
 from flocsim.errors import ConfigError
-from flocsim.fields import Reader, choice, field, one_of, quantity, several, whole, word_or_quantity
+from flocsim.fields import choice, field, one_of, quantity, several, whole, word_or_quantity
 from flocsim.forces.body_forces import thermal_in
-
-WORDS = several(one_of(*pair_scene.MECHANISMS))
-
-MEETINGS = Reader(
-    f"one of 'settling', 'shear' and 'extension', or {WORDS.allowed}",
-    lambda value, name: WORDS.read([value] if isinstance(value, str) else value, name),
-)
-"""Reader of mechanisms, of which a single one need not be in a list."""
 
 
 @attrs.frozen
@@ -32,9 +24,11 @@ class KernelScene(pair_scene.PairScene):
     kind: str = choice("kernel", default="kernel")
     """Rates of encounters."""
 
-    meeting: tuple[str, ...] = field(MEETINGS, default=(pair_scene.SETTLING,))
-    """Mechanisms that bring bodies together, one at a time: weight alone, or a flow alone, u = (G
-    y, 0) or u = (s x, -s y), without weight."""
+    meeting: tuple[str, ...] = field(
+        several(one_of(*pair_scene.MECHANISMS), or_word=True), default=(pair_scene.SETTLING,)
+    )
+    """Mechanisms that bring bodies together, one at a time (a single one may stand without a list):
+    weight alone, or a flow alone, u = (G y, 0) or u = (s x, -s y), without weight."""
 
     sizes: tuple[float, ...] | None = field(several(pair_scene.SIZE), default=None)
     """Ascending equivalent radii of the size classes, instead of `pairs = "measured"`, flocs of a

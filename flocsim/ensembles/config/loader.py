@@ -47,9 +47,6 @@ from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED
 MOST_SHOWN = 50
 """Problems of one file that are reported."""
 
-OWN_SIZES = (MEASURED, "library")
-"""`scene.pairs` and `shapes.source` with which flocs keep their own sizes."""
-
 
 def value_at(table: Any, name: str) -> Any:
     """Return the value of a dotted key in nested dicts; None where there is none."""
@@ -229,7 +226,8 @@ class Reading:
             except ValueError as error:
                 self.found.append(problem(key, error))
         scene = SCENES.get(str(value_at(table, "scene.kind")), PairScene)
-        if (value_at(table, "scene.pairs"), value_at(table, "shapes.source")) == OWN_SIZES:
+        where = value_at(table, "scene.pairs"), value_at(table, "shapes.source")
+        if where == (MEASURED, "library"):
             table["shapes"].setdefault("size", "own")
         for name, some_class in (TABLES | {"scene": scene}).items():
             parts[name] = self.made(some_class, table.get(name, {}), name)
@@ -399,14 +397,13 @@ def contradictions(config: Config, given: Mapping[str, Any]) -> Iterator[Problem
     density, fluid = config.bodies.density, config.fluid
     solid: Any = getattr(density, "solid", density)
     if fluid.buoyancy and solid is None:
-        text = "true needs bodies.density, but bodies.surface_density is given: give density and "
-        yield "fluid.buoyancy", text + "depth instead, or buoyancy = false"
+        yield "fluid.buoyancy", "true needs bodies.density in the place of surface_density"
     elif fluid.buoyancy and solid <= fluid.density:
         text = f"{solid:g} kg/m^3 does not sink in the fluid of {fluid.density:g} kg/m^3: "
         yield "bodies.density", text + "give a larger density, or fluid.buoyancy = false"
     if config.sampling == SOBOL and config.scene.kind == "binary":
         yield from uneven_points(config, SOBOL_SCRAMBLES, f"{SOBOL_SCRAMBLES} scrambles")
     if config.shapes.outlines == BAND and config.scene.kind != "binary":
-        text = '"band" is for studies of two bodies; run this one with "closer" and with "wider"'
-        yield "shapes.outlines", f"{text}, and compare the results"
+        text = '"band" is for studies of two bodies: run this one with "closer" and with "wider"'
+        yield "shapes.outlines", text
     yield from config.scene.problems(config)

@@ -57,7 +57,7 @@ WRONG = {
     "[bodies]\ndensity = "
     + "9" * 400: "bodies.density must be a finite number above 0 [kg/m^3], found 9",
     "[fluid]\nbuoyancy = 1": "fluid.buoyancy must be true or false, found 1",
-    "[fluid]\nbuoyancy = true": "fluid.buoyancy: true needs bodies.density, but",
+    "[fluid]\nbuoyancy = true": "fluid.buoyancy: true needs bodies.density",
     "[fluid]\nbuoyancy = true\n[bodies]\ndensity = 500": "bodies.density: 500 kg/m^3 does not sink",
     "[fluid]\nvelocity = [1.0]": "fluid.velocity must be a list of 2, each a finite number",
     "[fluid]\ngradient = [0, 0, nan, 0]": "fluid.gradient[2] must be",
