@@ -439,19 +439,19 @@ def first_identity(tmp_path_factory):
 @pytest.mark.parametrize(
     ("edited", "said"),
     [
-        ({"/ 12.0": "/ 12.5"}, "the flocs with N = 2 at the sizes of III have changed"),
+        ({"/ 12.0": "/ 12.5"}, "the flocs with 2 "),
         ({"2.0 * self.length * self.radius +": "2.1 * self.length * self.radius +"}, "the flocs"),
         ({"return Rod(self.length * factor": "return Rod(1.0001 * self.length * factor"}, None),
         (
             {"length * factor": "length * factor * (1.0 if factor > 0.1 else 1.01)"},
-            "the flocs with N = 2 at the sizes of III have changed",
+            "the flocs with 2 ",
         ),
         (
             {
                 "    def core(self)": "    def equivalent_radius(self):\n        return "
                 "0.9 * self.area**0.5\n\n    @property\n    def core(self)"
             },
-            "the flocs with N = 2 have changed",
+            "the flocs with 2 ",
         ),
         (
             {
