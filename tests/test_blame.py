@@ -9,8 +9,8 @@ import pytest
 from flocsim import System
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.draw import FAILED, FAILURES, run_safely
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.kind import Condition
-from flocsim.ensembles.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.forces import Contact

@@ -10,8 +10,8 @@ import numpy as np
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.contents import Contents, Figures, Summary
+from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
-from flocsim.ensembles.preflight import check_study, inputs_of
 from flocsim.errors import UsageError
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.plots.style import checked_format, save

@@ -20,7 +20,7 @@ from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
-from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent
+from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
 UNSHARED = ("quiet", "run", "read", "command")
 """Arguments in which ranks may differ: the others say what is run."""
@@ -89,8 +89,8 @@ def read_config(arguments, sources, first):
     """The config of a study; on the ``first`` rank found to make one whose results can be written
     where they should go."""
     from flocsim.ensembles.config.loader import load_any_config
+    from flocsim.ensembles.diagnose.preflight import inputs_of
     from flocsim.ensembles.kind import kind_of
-    from flocsim.ensembles.preflight import inputs_of
 
     config = load_any_config(arguments.config, overrides(arguments), sources)
     if not first:
@@ -213,7 +213,10 @@ def guarded(comm, arguments):
             from flocsim.ensembles.kind import kind_of
 
             shown = contents_of(kind_of(config).format)
-            tell(shown.dry_run(config, max(comm.size, arguments.jobs), arguments.pilot))
+            text = shown.dry_run(config, max(comm.size, arguments.jobs), arguments.pilot)
+            if stop_requested():
+                raise StopRequested(f"stopped by {INTERRUPTION.name}")
+            tell(text)
         comm.close()
         return code
     except StopRequested:

@@ -20,6 +20,7 @@ from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.diagnose.preflight import IMPLIED
 from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import (
     MOST_ROWS,
@@ -36,7 +37,6 @@ from flocsim.ensembles.parallel.communicator import (
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
-from flocsim.ensembles.preflight import said_doubts
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
@@ -124,7 +124,7 @@ def run_to_file(
             )  # fmt: skip
         # Once nothing else stands in the way: what is refused is refused in one line.
         doubts = study.doubts()
-        said = (f"warning: {line}" for line in said_doubts(config, doubts))
+        said = (f"warning: {line}" for line in doubts if line != IMPLIED)
         for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
         ended = lead(study, start, comm, progress, output)

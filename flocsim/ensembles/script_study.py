@@ -20,11 +20,11 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse, read_text_file, settings_of
 from flocsim.ensembles.contents import open_any
+from flocsim.ensembles.diagnose.preflight import inputs_of
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
-from flocsim.ensembles.preflight import inputs_of
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
 from flocsim.fields import is_whole
 from flocsim.io.journal import SUFFIX

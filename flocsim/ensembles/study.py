@@ -32,6 +32,7 @@ from flocsim.ensembles.collision.draw import (
     run_safely,
 )
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
+from flocsim.ensembles.collision.equivalent import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.offsets import as_draws, offsets_of
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
@@ -39,14 +40,8 @@ from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
+from flocsim.ensembles.diagnose.preflight import check_study, study_doubts
 from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
-from flocsim.ensembles.preflight import (
-    check_study,
-    kinds,
-    placed_system,
-    sphere_pairs,
-    study_doubts,
-)
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 from flocsim.io.results.events import flips_easily

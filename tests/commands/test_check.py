@@ -6,11 +6,12 @@ from itertools import product
 import attrs
 import pytest
 
-from flocsim.__main__ import main, make_parser
+from flocsim.__main__ import main
 from flocsim.commands import check
-from flocsim.ensembles.collision.draw import Draw
 from flocsim.ensembles.config.loader import load_config
+from flocsim.ensembles.diagnose.accuracy import Comparison
 from flocsim.forces import Contact
+from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import write_small
 from tests.helpers.tiers import rest_slow
@@ -23,16 +24,6 @@ def call(capsys, *words):
     assert errors == ""
     lines = output.splitlines()
     return code, lines[4:-2], lines[-1]
-
-
-def parsed(*words):
-    return make_parser().parse_args(["check", "small.toml", *words])
-
-
-def cases(*words):
-    args = parsed(*words)
-    config = check.sized(load_config(args.config), check.ends("--size", args.size, "m"))
-    return config, list(check.cases_of(config, args))
 
 
 @pytest.mark.parametrize("types", rest_slow([["III"], ["I", "III"]], lambda types: len(types) == 1))
@@ -53,16 +44,6 @@ def test_every_combination_of_ends_is_run_and_judged(folder, capsys, types):
     assert [path.name for path in folder.iterdir()] == ["small.toml"]
 
 
-def test_what_is_refused_fails_with_its_reason_and_the_others_go_on(folder, capsys):
-    words = ["--stiffness", "1e-5 N/m", "20 N/m", "--count", "1", "--set", 'scene.types=["I"]']
-    code, rows, last = call(capsys, *words)
-    assert code == 1
-    assert [("failed: I: an impact at" in row, "right" in row) for row in rows] == [
-        (True, False), (True, False), (False, True), (False, True),
-    ]  # fmt: skip
-    assert last.startswith("2 right") and last.endswith("2 failed")
-
-
 def test_a_run_that_does_not_end_fails_with_its_reason(folder, capsys):
     words = ["--count", "1", "--set", "integrator.max_steps=5", "--set", 'scene.types=["I"]']
     code, rows, _ = call(capsys, *words)
@@ -70,144 +51,98 @@ def test_a_run_that_does_not_end_fails_with_its_reason(folder, capsys):
     assert all(row.endswith("failed: undecided (step budget)") for row in rows)
 
 
-class Judged:
-    """One case of the small study, as the command would judge it."""
-
-    def __init__(self):
-        config, found = cases("--count", "1")
-        self.checker, self.case = check.Checker(config), found[0]
-
-    def __call__(self):
-        return self.checker.judge(self.case, 1e-13)
+def end(outcome, inside=1, distance=1e-5):
+    """What a row says of its end."""
+    return {
+        "outcome": OUTCOMES.index(outcome), "inside": inside, "d_c_collision": distance,
+        "failure": 0, "r_i": 1e-5, "r_j": 2e-5,
+    }  # fmt: skip
 
 
-def test_an_error_beyond_the_tolerance_must_be_within_what_is_stated(folder, monkeypatch):
-    judge = Judged()
-    assert judge().kind == check.RIGHT
-    monkeypatch.setattr(check, "allowed", lambda scene: 0.0)
-    verdict = judge()
-    assert verdict.kind == check.STATED and 0.0 < verdict.error <= verdict.stated
-    monkeypatch.setattr(check.Run, "error", property(lambda run: 0.9 * verdict.error))
-    assert judge().why.startswith("no good reference: off by ")
-    monkeypatch.setattr(check.Run, "error", property(lambda run: 0.1 * verdict.error))
-    beyond = judge()
-    assert (beyond.kind, beyond.error) == (check.WRONG, verdict.error)
-    assert beyond.why.endswith("10 times its stated error")
-
-
-def test_an_outcome_that_is_not_the_references_fails(folder, monkeypatch):
-    judge, rows = Judged(), []
-    judge()  # warm
-
-    def row_of(draw, run, status):
-        rows.append(plain(draw, run, status))
-        return rows[-1] | ({"outcome": 1} if len(rows) == 2 else {})
-
-    plain = Draw.row
-    monkeypatch.setattr(Draw, "row", row_of)
-    verdict = judge()
-    assert verdict.kind == check.WRONG
-    assert verdict.why.startswith("A, inside, and the reference B, inside")
-
-
-def test_without_a_reference_nothing_is_right(folder, monkeypatch):
-    judge = Judged()
-    judge()
-    monkeypatch.setattr(check, "MORE_STEPS", 0)
-    verdict = judge()
-    assert verdict.kind == check.WRONG
-    assert verdict.why == "no reference: it ends undecided (step budget)"
-
-
-def test_an_exception_is_a_row(folder, monkeypatch):
-    judge = Judged()
-    monkeypatch.setattr(check, "judged", lambda *arguments: 1 / 0)
-    assert judge().why == "ZeroDivisionError: division by zero"
-
-
-def test_a_motion_that_amplifies_a_nudge_says_so(folder, monkeypatch):
-    judge = Judged()
-    monkeypatch.setattr(check, "allowed", lambda scene: 0.0)
-    monkeypatch.setattr(check, "MOST_AMPLIFIED", 0.0)
-    monkeypatch.setattr(check.Run, "error", property(lambda run: 1e-20))
-    words = judge().why
-    assert "; the motion amplifies a perturbation " in words
-    # Spheres that fall head on forget what they were moved by along their way, and no more grows.
-    assert 0.0 < float(words.split()[-2]) < 10.0
-
-
-def test_the_ends_of_what_is_stated(folder):
-    config, found = cases(
-        "--size", "5 um", "40 um", "--tolerance", "1e-11", "1 um", "--count", "1",
-        "--stiffness", "1 N/m", "1e3",
+def verdict(error, stated=0.0, slack=0.0, method=None, one=None, two=None):
+    found = Comparison(
+        one or end("A"), two or end("A"), error=error, stated=stated, slack=slack
     )  # fmt: skip
-    radii = [radii for _, radii in config.scene.given]
-    assert [pair[1] for pair in radii] == [5e-6, 40e-6]
-    assert all(pair[0] / pair[1] == pytest.approx(16.41 / 23.02, rel=5e-3) for pair in radii)
-    assert {case.method.tolerance for case in found} == {1e-11, 1e-6}
-    assert {case.stiffness for case in found} == {1.0, 1e3}
-    assert len(found) == 8
+    return check.verdict_on(found, method or Implicit(1e-9))
+
+
+def test_an_error_beyond_the_tolerance_must_be_within_what_is_stated():
+    assert verdict(1e-9) == (check.RIGHT, "")
+    assert verdict(1e-8, 2e-8) == (check.STATED, "")
+    assert verdict(1e-8, 5e-9, 1e-9) == (
+        check.WRONG, "off by 1e-08 m, the reference by at most 1e-09 m",
+    )  # fmt: skip
+
+
+def test_a_method_without_a_tolerance_may_be_off_by_a_share_of_the_smaller_radius():
+    fixed = VelocityVerlet(1e-8)
+    assert verdict(0.9e-7, math.nan, method=fixed) == (check.RIGHT, "")
+    assert verdict(1.1e-7, math.nan, method=fixed)[0] == check.WRONG
+
+
+def test_an_outcome_that_is_not_the_references_fails():
+    assert verdict(0.0, two=end("B")) == (check.WRONG, "A, inside, and the reference B, inside")
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "kind"),
+    [
+        (end("missed", 255, math.nan), end("D", 0), check.STATED),
+        (end("B"), end("missed", 255, math.nan), check.STATED),
+        (end("missed", 255, math.nan), end("C", 0), check.WRONG),
+        (end("A"), end("C", 0, 1e-5 + 1e-10), check.STATED),
+        (end("A"), end("C", 0, 1.1e-5), check.WRONG),
+        (end("A"), end("B"), check.WRONG),
+    ],
+)
+def test_a_graze_and_the_border_of_the_zone_are_close_calls(one, two, kind):
+    assert verdict(1e-10, 0.0, one=one, two=two)[0] == kind
+    assert verdict(1e-8, 0.0, one=one, two=two)[0] == check.WRONG
+
+
+def test_without_a_reference_nothing_is_right():
+    found = Comparison(end("A"), why="no reference: it ends undecided (step budget)")
+    assert check.verdict_on(found, Implicit(1e-9)) == (check.WRONG, found.why)
 
 
 def test_the_stiffness_takes_the_tangential_one_with_it(folder):
-    law = check.law_of(check.stiff(load_config("small.toml"), 500.0))
+    law = check.contact_of(check.stiff(load_config("small.toml"), 500.0))
     assert (law.k_n, law.k_t) == (500.0, 50.0)
 
 
-def test_a_default_end_is_none_that_is_refused_anyway(folder):
+def test_an_end_of_the_stiffness_is_none_that_is_refused_anyway(folder):
     write_small(folder, vertices="[4]")
     config = load_config("small.toml", {"bodies": {"surface_density": 8.0}})
-    assert check.stiffnesses(config, None) == [20.0, 200.0]
-    assert check.stiffnesses(load_config("small.toml"), None) == [2.0, 200.0]
+    assert check.stiffnesses(config) == (20.0, 200.0)
+    assert check.stiffnesses(load_config("small.toml")) == (2.0, 200.0)
 
 
 def test_a_law_without_k_n_is_run_as_it_is(folder):
     config = load_config("small.toml")
     others = tuple(force for force in config.forces if not isinstance(force, Contact))
     bare = attrs.evolve(config, forces=others)
-    assert all(map(math.isnan, check.stiffnesses(bare, None)))
+    assert all(map(math.isnan, check.stiffnesses(bare)))
     assert check.stiff(bare, math.nan) is bare
-    with pytest.raises(check.UsageError, match=r"--stiffness needs forces\.contact"):
-        check.stiffnesses(bare, (1.0, 2.0))
 
 
-VERLET = ["--set", "integrator.name=velocity_verlet", "--set", "integrator.step=1e-7"]
+def test_the_extremes_of_sizes_and_vertices(folder):
+    more = {"scene": {"types": ["II", "I", "III"]}, "shapes": {"vertices": [4, 1, 16]}}
+    found = check.of_extremes(load_config("small.toml", more))
+    assert sorted(found.scene.names) == ["I", "III"] and found.shapes.vertices == (1, 16)
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["--count", "0"], "--count must be at least 1, found 0"),
-        (["--stiffness", "5", "1"], "--stiffness must be two values above 0, LOW and HIGH"),
-        (["--tolerance", "nm", "1"], "--tolerance: "),
-        (["--size", "1 um", "2 kg"], "--size: "),
-        (["--tolerance", "1e-9", "1e-8", *VERLET], "has no tolerance: leave --tolerance out"),
-        (["--set", "forces.contact=false"], "a collision needs a contact force"),
+        (["--set", "forces.contact=false"], "bodies that meet need a contact force"),
+        (["--set", "bodies.surface_density=20"], "I: an impact at"),
     ],
 )
 def test_what_is_wrong_is_one_line(folder, capsys, words, said):
+    write_small(folder, vertices="[4]")
     assert main(["check", "small.toml", *words]) == 2
     output, errors = capsys.readouterr()
     [line] = errors.splitlines()
     assert said in line
     assert output == ""
-
-
-def ends(outcome, inside, distance):
-    """What a row says of its end."""
-    return {"outcome": OUTCOMES.index(outcome), "inside": inside, "d_c_collision": distance}
-
-
-@pytest.mark.parametrize(
-    ("one", "two", "expected"),
-    [
-        (ends("missed", 255, math.nan), ends("D", 0, 1e-5), True),
-        (ends("B", 1, 1e-5), ends("missed", 255, math.nan), True),
-        (ends("missed", 255, math.nan), ends("C", 0, 1e-5), False),
-        (ends("A", 1, 1e-5), ends("C", 0, 1e-5 + 1e-10), True),
-        (ends("A", 1, 1e-5), ends("C", 0, 1.1e-5), False),
-        (ends("A", 1, 1e-5), ends("B", 1, 1e-5), False),
-    ],
-)
-def test_a_graze_and_the_border_of_the_zone_are_close_calls(one, two, expected):
-    assert check.is_close_call(one, two, 1e-9) is expected

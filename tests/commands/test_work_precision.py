@@ -1,62 +1,63 @@
-"""`flocsim work-precision`: the table of one replicate."""
+"""`flocsim work-precision`: error, flips and CPU time of every setting."""
 
 import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands import work_precision
-from flocsim.commands.check import HEADER
-from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.integrators import Implicit
 from tests.helpers.small_study import write_small
 
 
 @pytest.fixture
-def few(monkeypatch, tmp_path):
-    """The small config, with few settings to run."""
+def implicit_alone(monkeypatch, tmp_path):
+    """The small config; only the method that is compiled already, at two rungs."""
     write_small(tmp_path)
     monkeypatch.chdir(tmp_path)
-    # One method: each is compiled.
-    settings = [Implicit(1e-8), Implicit(1e-10)]
-    monkeypatch.setattr(work_precision, "methods", lambda duration: settings)
+    monkeypatch.setattr(work_precision, "DormandPrince54", Implicit)
+    monkeypatch.setattr(work_precision, "DECADES", (1.0, 1e-2))
+    monkeypatch.setattr(work_precision, "STEP_COUNTS", ())
 
 
 def rows_of(text):
-    """{(method, setting): (error, verdict)} of the printed table."""
-    table = text.split(HEADER)[1].strip().splitlines()
-    words = [line.split() for line in table]
-    return {(w[4], w[5]): (w[11], " ".join(w[13:])) for w in words}
+    """[{title: word}] of the printed rows; the unit of a tolerance is a word by itself."""
+    titles = ["method", "setting", "m", "flips", "%", "low", "high", "error", "most"]
+    lines = [line.split() for line in text.splitlines() if line.startswith("Implicit")]
+    return [dict(zip(titles, words, strict=False)) for words in lines]
 
 
-@pytest.fixture
-def table(few, capsys):
-    """What the command prints."""
-    command = "work-precision small.toml --type III --vertices 4 --replicate 2"
-    assert main(command.split()) == 0
-    return capsys.readouterr().out
+def test_a_row_for_every_type_and_setting(implicit_alone, capsys):
+    assert main(["work-precision", "small.toml", "--vertices", "4", "--count", "6"]) == 0
+    text = capsys.readouterr().out
+    assert "type I, 6 replicates" in text and "type III, 6 replicates" in text
+    rows = rows_of(text)
+    assert len(rows) == 8
+    for loose, tight in zip(rows[::2], rows[1::2], strict=True):
+        assert (loose["setting"], tight["setting"]) == ("1e-06", "1e-08")
+        assert float(tight["most"]) < float(loose["most"]) < 1e-3
+    assert "the sampling error of the study is 37 %" in text
 
 
-def test_it_says_the_replicate_and_the_error_at_each_tolerance(table):
-    assert table.startswith("type III, N = 4, delta = 0, replicate 2: A after ")
-    assert float(rows_of(table)["Implicit", "1e-08"][0]) < 1e-7
+def test_one_replicate(implicit_alone, capsys):
+    words = "work-precision small.toml --type III --vertices 4 --replicate 2"
+    assert main(words.split()) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("\ntype III, N = 4, delta = 0, replicate 2\n")
+    loose, tight = rows_of(text)[:2]
+    assert loose["error"] == loose["most"]
+    assert float(tight["error"]) < float(loose["error"]) < 1e-5
 
 
-def test_errors_fall_with_the_tolerance(table):
-    assert float(rows_of(table)["Implicit", "1e-10"][0]) < 1e-9
-
-
-def test_every_method_gets_its_settings():
-    found = work_precision.methods(1e-3)
-    assert {type(method) for method in found} == {Implicit, DormandPrince54, VelocityVerlet}
-    tolerances = [method.tolerance for method in found if isinstance(method, Implicit)]
-    assert max(tolerances) / min(tolerances) >= 1e5
-
-
-def test_a_method_that_fails_shows_no_error(few, monkeypatch, capsys):
-    monkeypatch.setattr(work_precision, "MOST_STEPS", 2)
-    assert main(["work-precision", "small.toml", "--replicate", "0"]) == 0
-    found = rows_of(capsys.readouterr().out)
-    assert set(found.values()) == {("-", "failed: undecided (step budget)")}
-
-
-def test_an_unknown_type_is_one_line(few, capsys):
-    assert main(["work-precision", "small.toml", "--type", "IV"]) == 2
-    assert capsys.readouterr().err == "flocsim: --type must be one of I, III, found IV\n"
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--count 0", "--count must be at least 1, found 0"),
+        ("--replicate -1", "--replicate must be at least 0, found -1"),
+        ("--replicate 1 --count 3", "--count is for the whole study"),
+        ("--delta 0.3", "--delta must be one of 0.0, 1.0, found 0.3"),
+        ("--type IV", "--type must be one of I, III, found IV"),
+    ],
+)
+def test_what_is_wrong_is_one_line(implicit_alone, capsys, words, said):
+    assert main(["work-precision", "small.toml", *words.split()]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert said in line

@@ -10,7 +10,7 @@ from flocsim import Body, Sphere, System
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.fingerprint import refuse_interpreter
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.errors import KernelError
 from flocsim.forces import CentreForce
 from tests.helpers.small_study import SMALL, write_small

@@ -9,8 +9,8 @@ import pytest
 from flocsim.__main__ import main
 from flocsim.body import Fluid
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.dry_run import sphere_facts
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
+from flocsim.ensembles.diagnose.spheres import sphere_facts
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
 from flocsim.forces import Thermal

@@ -104,7 +104,7 @@ MORE = [
     ('[integrator]\nname = "implicite"', "found 'implicite' (did you mean 'implicit'?)"),
     ('[integrator]\nname = "velocity_verlet"', "needs integrator.step"),
     ("[forces]\ndrag = false", "no terminal velocity"),
-    ("[forces]\ncontact = false", "a collision needs a contact force"),
+    ("[forces]\ncontact = false", "bodies that meet need a contact force"),
     ("[forces]\ngravity = false", "settle at the same speed"),
 ]
 

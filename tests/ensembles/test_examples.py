@@ -6,7 +6,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import load_any_config, load_config
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm

@@ -5,7 +5,7 @@ import pytest
 
 import flocsim.arrays as at
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.study import Study
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.forces import StokesDrag
@@ -60,7 +60,6 @@ def test_pairs_in_a_flow_are_drawn_with_it(tmp_path, meeting):
 
 
 def test_an_engine_for_drag_of_shapes_is_not_taken_for_pairs_without(tmp_path):
-    """A pilot runs pairs of a study with other forces, too."""
     study = Study(written(tmp_path, 'meeting = "shear"\nrate = "10 1/s"'))
     encounter = study.draw(0, 4, 0.5, 0).encounter
     others = [

@@ -18,7 +18,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Allowed, Sources
 from flocsim.ensembles.contents import Example, file_kind, stored_in
-from flocsim.ensembles.dry_run import water_facts
+from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.report import checked_line, format_table
 from flocsim.ensembles.storage.identity import differences, identity_of

@@ -299,7 +299,7 @@ CONTENTS = Contents(
     results=OF_KIND("results"), old_rows=OF_KIND("old_rows"), so_far=OF_KIND("so_far"),
     facts=OF_KIND("facts"), verdict=report.verdict,
     stop_rule=later("ensembles.estimates.statistics", "stop_rule"),
-    dry_run=later("ensembles.dry_run", "dry_run"),
+    dry_run=later("ensembles.diagnose.dry_run", "dry_run"),
     rates=lambda found: found.kernel,
     water=lambda path, allowed: list(map(run_group.water_words, OPENED(path, allowed).in_water())),
 )  # fmt: skip

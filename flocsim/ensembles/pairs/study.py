@@ -11,13 +11,12 @@ import numpy as np
 from flocsim.ensembles import kind, report
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.ensembles.collision.pairings import class_facts
-from flocsim.ensembles.dry_run import sphere_facts
+from flocsim.ensembles.diagnose.spheres import settling_facts, sphere_facts
 from flocsim.ensembles.estimates import summary
 from flocsim.ensembles.estimates.capture import kernel_of
 from flocsim.ensembles.estimates.statistics import COUNTED
 from flocsim.ensembles.kind import OldResults
 from flocsim.ensembles.parallel.communicator import StopRequested
-from flocsim.ensembles.preflight import settling_facts
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import KernelStudy, Study

@@ -20,8 +20,8 @@ from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
+from flocsim.ensembles.diagnose.preflight import doubts_in, require_contact, warning_lines
 from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Going, Keep, StudyKind
-from flocsim.ensembles.preflight import names_in
 from flocsim.ensembles.swarms.results import (
     BODIES,
     STATE,
@@ -32,16 +32,15 @@ from flocsim.ensembles.swarms.results import (
     moment_name,
 )
 from flocsim.ensembles.swarms.scene import SwarmScene
-from flocsim.errors import ConfigError, UsageError
+from flocsim.errors import UsageError
 from flocsim.explain import force_lines, scale_lines
-from flocsim.forces import ContactForce
 from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
 from flocsim.io.results.swarm_file import ENDS, FORMAT, GONE, WALL
 from flocsim.io.terminal import duration
-from flocsim.plausibility import doubts_of, settled
+from flocsim.plausibility import settled
 from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
@@ -93,6 +92,7 @@ class SwarmStudy(StudyKind):
     row: ClassVar[np.dtype] = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
+    check = staticmethod(require_contact)
     in_common: ClassVar[Sequence[str]] = (*ORDER, "times", "bounds", "replicates")
     pool: FlocPool = attrs.field(init=False)
     choosable: np.ndarray = attrs.field(init=False, factory=lambda: np.zeros(0, int))
@@ -110,15 +110,6 @@ class SwarmStudy(StudyKind):
         needed = config.scene.is_measured or max(shapes.vertices) > 1
         return load_flocs(shapes, config.seed) if needed else []
 
-    @staticmethod
-    def check(config: Config) -> None:
-        """Raise ConfigError for a swarm whose bodies have no contact force."""
-        if not any(isinstance(force, ContactForce) for force in config.forces):
-            raise ConfigError(
-                "bodies that meet need a contact force, found none among "
-                f"{', '.join(config.force_names)}: add [forces.contact]"
-            )
-
     def prepare(self) -> None:
         """Raise the FlocsimError that the first swarm, or the laws of its forces, would meet."""
         for law in self.first.system.pieces.laws.values():
@@ -127,7 +118,7 @@ class SwarmStudy(StudyKind):
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible."""
-        return doubts_of([self.largest_pair()], names_in(self.config, self.config.forces))
+        return doubts_in(self.config, [self.largest_pair()], self.config.forces)
 
     def largest_pair(self) -> System:
         """Return a System of the two largest bodies, for what is said of a swarm."""
@@ -550,6 +541,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *(f"  {line}" for line in force_lines(pair)),
         "stiffness, of the two largest:",
         *(f"  {line}" for line in scale_lines(pair)),
+        *warning_lines(study.doubts()),
         "nothing was run (--dry-run)",
     ]
     return "\n".join(lines)

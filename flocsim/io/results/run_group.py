@@ -35,7 +35,7 @@ SETTLED = {
 SPHERES = {
     "type": str, "release": float, "escape": float, "diffusion": float,
 }  # fmt: skip
-"""Of a brownian study: `flocsim.ensembles.dry_run.sphere_facts`; three numbers more,
+"""Of a brownian study: `flocsim.ensembles.diagnose.spheres.sphere_facts`; three numbers more,
 each of which may be none."""
 
 SIZE_CLASS = {"label": str, "low": float, "high": float, "flocs": int}

@@ -17,8 +17,8 @@ from flocsim.ensembles.collision.draw import (
     further_runs,
     run_safely,
 )
-from flocsim.ensembles.dry_run import checked_words
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.dry_run import checked_words
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.errors import ConfigError
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
@@ -93,7 +93,7 @@ def test_a_method_without_tolerance_and_step_is_not_checked_and_cannot_be_asked_
     assert exact_method(Unchangeable()) is None
     config = small_config(tmp_path, {"shapes": {"vertices": (1,)}})
     own = with_method(config, Unchangeable())
-    assert "no tolerance or step" in checked_words(own)
+    assert "none" in checked_words(own)
     with pytest.raises(ConfigError, match=r"check_share = 0\.2 cannot be: .*Unchangeable") as told:
         check_study(with_method(config, Unchangeable(), check_share=0.2))
     assert "\n" not in str(told.value)

@@ -18,7 +18,7 @@ from flocsim.ensembles.config.schema import (
     ShapesConfig,
     ZoneConfig,
 )
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.errors import UsageError
 from flocsim.geometry.shapes.shape import Sphere
 from tests.helpers.small_study import write_star_library

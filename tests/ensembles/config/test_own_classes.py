@@ -10,7 +10,7 @@ import pytest
 from flocsim import Sphere
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import IntegratorConfig
-from flocsim.ensembles.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import KernelError

@@ -24,7 +24,7 @@ NOT_PHYSICS = {
     "io/shape_library.py": "reads flocs, and these are compared themselves",
     "io/hdf5.py": "reads flocs, and these are compared themselves",
     "io/hdf5_child.py": "reads flocs, and these are compared themselves",
-    "ensembles/preflight.py": "what is refused, or looks implausible",
+    "ensembles/diagnose/preflight.py": "what is refused, or looks implausible",
     "ensembles/kind.py": "what is asked of studies, and how rows are stored",
     "io/results/run_group.py": "text for people",
     "trajectories/": "what a run was, for people; a row is what comes of the Run itself",

@@ -9,18 +9,20 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from flocsim.ensembles import cli
+from flocsim.ensembles.collision.equivalent import sphere_pairs
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.contents import text_of
-from flocsim.ensembles.dry_run import dry_run
-from flocsim.ensembles.preflight import (
+from flocsim.ensembles.diagnose.dry_run import dry_run
+from flocsim.ensembles.diagnose.preflight import (
+    IMPLIED,
     check_study,
     depth,
     rounded_up,
-    said_doubts,
-    settling_facts,
     study_doubts,
 )
+from flocsim.ensembles.diagnose.spheres import settling_facts
 from flocsim.errors import ConfigError, KernelError
+from flocsim.explain import pairs_of
 from flocsim.fields import quantity
 from flocsim.forces import ContactForce
 from flocsim.io.results.file import read_results
@@ -128,9 +130,6 @@ def test_a_law_of_ones_own_is_judged_by_its_work(tmp_path):
 
 def min_mass(config):
     """M [kg] of the pair of Type I."""
-    from flocsim.ensembles.preflight import sphere_pairs
-    from flocsim.explain import pairs_of
-
     return next(mass for _, _, mass in pairs_of(next(sphere_pairs(config))[1].system))
 
 
@@ -186,24 +185,22 @@ def test_doubts_have_the_names_of_the_config(tmp_path):
 
 
 def test_the_fastest_body_of_all_types_is_held_to_the_drag_law(tmp_path):
-    [line] = study_doubts(small_config(tmp_path))
-    assert "r_eq = 23.02 um settles at 84.58 mm/s: Re = 4.4" in line
+    heavy = {"bodies": {"surface_density": 2.1}}
+    [line] = study_doubts(small_config(tmp_path, heavy))
+    assert "r_eq = 23.02 um settles at 88.81 mm/s: Re = 4.6" in line
     assert "give forces.drag law =" in line
     law = {"forces": {"drag": {"law": "schiller_naumann"}}}
-    assert study_doubts(small_config(tmp_path, law)) == []
+    assert study_doubts(small_config(tmp_path, heavy | law)) == []
 
 
-def test_what_the_paper_preset_implies_is_said_once_and_calmly(tmp_path):
-    """By the dry run, in the place of a warning of every run; other weights are doubted still."""
+def test_what_the_paper_preset_implies_is_a_note_in_place_of_a_warning(tmp_path):
+    """Of the dry run and the results file; other weights are doubted still."""
     config = small_config(tmp_path)
-    lines = study_doubts(config)
-    assert len(lines) == 1 and said_doubts(config, lines) == []
+    assert study_doubts(config) == [IMPLIED]
     text = dry_run(config, 1)
     assert text.count("note: preset tang2014 gives") == 1 and "warning:" not in text
     heavier = small_config(tmp_path, {"bodies": {"surface_density": 3.0}})
-    assert said_doubts(heavier, study_doubts(heavier)) == study_doubts(heavier) != []
-    assert said_doubts(small_config(tmp_path, WILD), ["a"]) == ["a"]
-    assert "note: preset" not in dry_run(heavier, 1)
+    assert IMPLIED not in study_doubts(heavier) and "note: preset" not in dry_run(heavier, 1)
 
 
 OWN = """\
@@ -241,8 +238,8 @@ def test_numbers_of_every_body(tmp_path):
 def test_a_dry_run_tells_numbers_and_doubts(tmp_path):
     lines = dry_run(small_config(tmp_path, WILD), 1, pilot=False).splitlines()
     assert sum(line.startswith("warning: ") for line in lines) == 4
-    [told] = [line for line in lines if line.startswith("    at terminal speed: body i Re = ")]
-    assert "; body j Re = " in told and "St = " in told
+    [told] = [line for line in lines if line.startswith("    settling alone: i ")]
+    assert "; j " in told and "Re = " in told and "St = " in told
 
 
 def test_a_run_tells_them_once_and_keeps_them(folder, capsys):

@@ -6,11 +6,11 @@ import pytest
 
 from flocsim.commands.init import KINDS
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.preflight import trivial_values
+from flocsim.ensembles.diagnose.preflight import trivial_values
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.small_study import load_text
 
-FOLDER = Path(__file__).parents[2] / "examples"
+FOLDER = Path(__file__).parents[3] / "examples"
 EXAMPLES = [path for path in sorted(FOLDER.glob("**/*.toml")) if path.stem != "readings"]
 
 PAIRS = 'preset = "tang2014"\n[scene]\ntypes = ["I", "II"]\ndelta = [{delta}]\n[shapes]\n{shapes}\n'

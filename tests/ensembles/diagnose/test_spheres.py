@@ -3,7 +3,7 @@
 import pytest
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.ensembles.dry_run import water_facts
+from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.errors import UsageError
 from flocsim.io.results.run_group import water_words
 

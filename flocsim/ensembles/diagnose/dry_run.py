@@ -1,0 +1,148 @@
+"""`--dry-run`: what is known of a study without running it, a question a line.
+
+Its collisions, forces, time scales and warnings; with a pilot, what it will take.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from flocsim.ensembles.collision.draw import count_checks, exact_method
+from flocsim.ensembles.collision.equivalent import measured_flocs, sphere_pairs
+from flocsim.ensembles.collision.flocs import Floc, read_flocs
+from flocsim.ensembles.collision.pairings import class_facts, pairings_of
+from flocsim.ensembles.config.pair_scene import BROWNIAN
+from flocsim.ensembles.config.schema import CUT, Config
+from flocsim.ensembles.diagnose.pilot import forecast_of
+from flocsim.ensembles.diagnose.preflight import study_doubts, warning_lines
+from flocsim.ensembles.diagnose.spheres import settling_facts, sphere_facts
+from flocsim.ensembles.kind import study_of
+from flocsim.explain import force_lines, scale_lines
+from flocsim.io.fit_report import coarse_line
+from flocsim.io.results.run_group import class_words, sphere_words
+from flocsim.io.results.schema import OUTCOMES
+from flocsim.io.terminal import duration
+
+NOTHING_RUN = (
+    "nothing was run (--dry-run); --pilot runs some replicates, to estimate core-hours and file "
+    "size"
+)
+
+
+def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
+    """Return what is known of a study of pairs or rates before it is run, as text."""
+    measured = measured_flocs(config)
+    pairs = list(sphere_pairs(config, measured))
+    return "\n".join([
+        *study_lines(config, ranks),
+        "collisions:",
+        *(f"  {line}" for line in collision_lines(config, measured)),
+        "forces:",
+        *(f"  {line}" for line in force_lines(pairs[0][1].system)),
+        "stiffness:",
+        *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
+        *warning_lines([*coarse_lines(config, measured), *study_doubts(config, measured)]),
+        *(["pilot:", *(f"  {line}" for line in pilot_lines(config, ranks))] if pilot else []),
+        "only the pilot was run (--dry-run)" if pilot else NOTHING_RUN,
+    ])  # fmt: skip
+
+
+def study_lines(config: Config, ranks: int) -> list[str]:
+    """Return lines on how many replicates there are, of which flocs, by which method."""
+    scene, shapes, method = config.scene, config.shapes, config.integrator.method
+    count = len(scene.names) * len(shapes.vertices) * len(scene.delta)
+    if scene.meeting == BROWNIAN:
+        meeting = f"brownian: from {scene.release:g} to {scene.escape:g} (r_i + r_j) apart"
+    else:
+        offsets = f"delta {list(scene.delta)} of the {scene.delta_max} delta_max"
+        meeting = f"{offsets}, receiver {scene.receiver}"
+    flocs = [f"{shapes.label} {shapes.file or ''}".strip()]
+    if shapes.size == "own":
+        flocs += ["at their measured sizes and spheroradii"]
+        flocs += [f"drawn by {scene.weight}"] if scene.is_measured else []
+    elif shapes.own is None:
+        flocs += [f"spheroradius {1e6 * shapes.radius:.4g} um"]
+    flocs += [f"outlines {shapes.outlines}"] if shapes.outlines != CUT else []
+    flocs += ["pairs alike in error"] if shapes.pairs_alike_in == "error" else []
+    accuracy = f"tolerance {method.tolerance:g} m" if method.tolerance < math.inf else "fixed step"
+    return [
+        f"{count} conditions x {config.replicates} replicates = {count * config.replicates}, "
+        f"seed {config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
+        f"  vertices {list(shapes.vertices)}, {meeting}",
+        f"  flocs: {', '.join(flocs)}",
+        *([f"  {words}"] if (words := config.fluid.words) else []),
+        f"  integrator: {config.integrator.label}, {accuracy}",
+        f"  run again: {checked_words(config)}",
+    ]
+
+
+def checked_words(config: Config) -> str:
+    """Return how many replicates are run again, and by what."""
+    exact, share = exact_method(config.integrator.method), config.integrator.check_share
+    count = 0 if exact is None else count_checks(config.seed, config.replicates, share)
+    if exact is None or not count:
+        return "none, so that the numerical error stays unknown (integrator.check_share)"
+    finer = exact.tolerance < math.inf
+    how = f"tolerance of {exact.tolerance:g} m" if finer else f"step of {exact.first_step:g} s"
+    more = ", more of those that flip easily" * (share == "auto")
+    return f"{count} of the {config.replicates} replicates of each condition{more}, at a {how}"
+
+
+def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
+    """Yield lines on every collision type: sizes, zone, motion of the equivalent spheres."""
+    facts, own = settling_facts(config, flocs), config.shapes.size == "own"
+    thermal = {each["type"]: each for each in sphere_facts(config, flocs)}
+    found = pairings_of(config, flocs)
+    if classes := class_words(class_facts(found)):
+        yield classes
+    for pairing, (name, pair) in zip(found, sphere_pairs(config, flocs), strict=True):
+        radius_i, radius_j = (1e6 * shape.equivalent_radius for shape in pair.shapes)
+        sizes = f"{name}: r_i = {radius_i:.4g} um, r_j = {radius_j:.4g} um"
+        turn = "" if name in thermal else f"; turn time {pair.turn_time:.3g} s"
+        yield f"{sizes}, D_0 = {1e6 * pair.zone_distance:.4g} um{turn}"
+        if name in thermal:
+            yield f"  {sphere_words(thermal[name])}"
+        if own:
+            spans = (f"{1e6 * low:.4g} to {1e6 * high:.4g} um" for low, high in pairing.spans)
+            yield (
+                f"  measured sizes, r_i {', r_j '.join(spans)}; delta_max and D_0 are those of "
+                "each pair"
+            )
+        numbers = [
+            f"{each['body']} {1e3 * each['speed']:.4g} mm/s, Re = {each['reynolds']:.2g}, "
+            f"St = {each['stokes']:.2g}"
+            for each in facts
+            if each["type"] == name and each["speed"] > 0.0
+        ]
+        if numbers:
+            yield f"  settling alone{', the largest' * own}: {'; '.join(numbers)}"
+
+
+def coarse_lines(config: Config, measured: Sequence[Floc]) -> list[str]:
+    """Return a line where the largest N is too small for flocs of the library."""
+    if config.shapes.source != "library":
+        return []
+    flocs = measured or read_flocs(config.shapes)
+    return list(filter(None, [coarse_line({floc.name: floc.errors for floc in flocs})]))
+
+
+def pilot_lines(config: Config, ranks: int) -> list[str]:
+    """Run a pilot; return lines on what the study will take, or why it could not be run."""
+    try:
+        study = study_of(config)
+        study.compile(study.kinds)
+        found = forecast_of(study, ranks)
+    except MemoryError:
+        raise
+    except Exception as error:  # a class of the user's own may raise anything
+        return [f"none could be run: {' '.join(str(error).split())}"]
+    words = ", ".join(f"{found.ended[name]} {name}" for name in OUTCOMES if found.ended[name])
+    most = f" at {found.replicates} replicates of a condition"
+    hours = [each / 3600.0 for each in (found.cpu, found.low, found.high)]
+    return [
+        f"ran {found.ended.total()} replicates; they ended {words}",
+        f"core-hours{most * (found.replicates < config.replicates)}: {hours[0]:.2g} "
+        f"({hours[1]:.2g} to {hours[2]:.2g}); on {ranks} rank{'s' * (ranks != 1)} "
+        f"{duration(found.cpu / ranks)}, and some tens of seconds where code is compiled first",
+        f"results file: about {found.size / 1e6:.3g} MB; its journal takes as much again until the "
+        "study is done",
+    ]

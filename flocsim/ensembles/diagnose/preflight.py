@@ -1,0 +1,348 @@
+"""What is wrong or implausible in a study, known before anything is compiled or run.
+
+Each question about a study is one function here. Those of REFUSALS raise the error that the study
+would meet; `study_doubts` collects warnings, of which `flocsim.plausibility` asks those that any
+scene has. Measured flocs are judged by the largest of each collision type, which settle fastest.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from flocsim.arrays import ContactView, OrientedView, OutlineView, PairView
+from flocsim.compiler.fingerprint import refuse_interpreter
+from flocsim.constants import DEEPEST_OVERLAP
+from flocsim.ensembles.collision.draw import exact_method
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.equivalent import kinds, measured_flocs, sphere_pairs
+from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
+from flocsim.ensembles.collision.meetings import refuse_release
+from flocsim.ensembles.collision.pairings import pairings_of
+from flocsim.ensembles.collision.start import zone_distance
+from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
+from flocsim.ensembles.config.schema import PRESETS, Config
+from flocsim.errors import ConfigError, KernelError
+from flocsim.explain import pairs_of
+from flocsim.forces import Contact, ContactForce, Force
+from flocsim.forces.codegen import laws_of
+from flocsim.forces.contact import impact_exponent
+from flocsim.geometry.shapes.shape import Shape, Sphere
+from flocsim.integrators.loop.driver import advance
+from flocsim.io.outputs import loaded_sources
+from flocsim.plausibility import ROUNDING, Names, doubts_of
+from flocsim.run import wrong_answer
+from flocsim.system import System
+
+Flocs = Sequence[Floc]
+
+CLOSE_GAPS = (1e-9, 1e-12, 0.0, -1e-12)
+"""Gaps [m] that any two bodies that collide come through: a pole at 0 turns a repulsion into an
+attraction there."""
+
+PARTS = 16
+"""Intervals of the work of the contact force."""
+
+
+def inputs_of(config: Config, path: str) -> list[str]:
+    """Return the files of a study: the config at ``path``, its library, its own classes."""
+    library = [str(config.shapes.file)] if config.shapes.file else []
+    return [path, *library, *loaded_sources()]
+
+
+def check_study(config: Config) -> None:
+    """Raise the FlocsimError that a study of pairs or rates would meet."""
+    flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
+    for question in REFUSALS:
+        question(config, flocs)
+
+
+def require_contact(config: Config, _: Flocs = ()) -> None:
+    """Raise ConfigError without a contact force."""
+    if not any(isinstance(force, ContactForce) for force in config.forces):
+        raise ConfigError(
+            "bodies that meet need a contact force, found none among "
+            f"{', '.join(config.force_names)}: add [forces.contact]"
+        )
+
+
+def require_core(config: Config, _: Flocs) -> None:
+    """Raise ConfigError where the spheroradius is as large as the smallest body."""
+    if resizes(config) and config.shapes.radius >= smallest(config):
+        raise ConfigError(
+            f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
+            f"body, of r_eq = {smallest(config):g} m: choose a smaller shapes.radius"
+        )
+
+
+def resizes(config: Config) -> bool:
+    """Return True if flocs are resized to the radii of the scene, their spheroradius given."""
+    shapes = config.shapes
+    return shapes.own is None and shapes.size == "scene" and max(shapes.vertices) > 1
+
+
+def smallest(config: Config) -> float:
+    """Return the smallest radius of a scene that gives them [m]."""
+    return min(min(radii) for _, radii in config.scene.given)
+
+
+def require_apart(config: Config, flocs: Flocs) -> None:
+    """Raise ConfigError where outlines may touch as a brownian meeting begins.
+
+    Of flocs that are yet to grow it is not known.
+    """
+    if config.scene.meeting != BROWNIAN:
+        return
+    pool = pool_of(config.shapes, flocs)
+    shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
+    for each in pairings_of(config, flocs, pool):
+        for radius in each.radii:
+            for place, floc in enumerate(flocs):
+                shapes += [pool.shape(place, n, radius) for n in floc.shapes]
+    farthest = max(shapes, key=lambda shape: shape.bounding_radius / shape.equivalent_radius)
+    refuse_release(config.scene, [farthest, farthest])
+
+
+def require_meeting(config: Config, flocs: Flocs) -> None:
+    """Raise the error of spheres that never meet, and of forces that cannot act on them."""
+    for name, pair in sphere_pairs(config, flocs):
+        # The upper body j never reaches the lower one; a shear flow may bring it.
+        if pair.drift[1] >= 0.0 and not any(config.fluid.gradient):
+            fall_i, fall_j = (-1e3 * velocity[1] for velocity, _ in pair.settling)
+            raise ConfigError(
+                f"{name}: the approaching body j (above) settles at {fall_j:.4g} mm/s and never "
+                f"reaches the receiving body i (below) at {fall_i:.4g} mm/s: give scene.pairs as "
+                "[smaller radius, larger radius], or set scene.receiver = 'fixed'"
+            )
+        check_laws(pair)
+
+
+def check_laws(pair: Encounter) -> None:
+    """Raise KernelError where a kernel cannot be compiled, or gives no number at touch."""
+    system = pair.system
+    for law in system.pieces.laws.values():
+        refuse_interpreter(law)
+    refuse_interpreter(advance, system.fillings(pair.observer))
+    if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
+        system.laws()
+    views = close_views(system)
+    for name, force in system.pieces.used.items():
+        if words := wrong_answer(force, laws_of([force], system.fluid), views, system.fluid):
+            raise KernelError(
+                f"{name}: {words}, which every collision reaches: bound whatever it divides by or "
+                "takes a root, power or logarithm of, as in max(pair.gap, 1e-10)"
+            )
+
+
+VIEWS: dict[str, Any] = {
+    "centre": PairView, "surface": PairView, "contact": ContactView, "outline": OutlineView,
+    "oriented": OrientedView,
+}  # fmt: skip
+"""What laws of each name are shown of two bodies."""
+
+
+def close_views(system: System) -> dict[str, list]:
+    """Return what laws are shown of two bodies that come to touch, spheres of their size."""
+    i, j = system.bodies
+    radius_i, radius_j = i.shape.equivalent_radius, j.shape.equivalent_radius
+    known = {
+        "time": 0.0, "slip": 0.0, "slip_rate": 0.0, "angle_i": 2.0, "angle_j": -1.0,
+        "radius_i": radius_i, "radius_j": radius_j, "smaller_radius": min(radius_i, radius_j),
+        "reduced_radius": radius_i * radius_j / (radius_i + radius_j), "depth": radius_i,
+        "effective_mass": j.mass if i.fixed else i.mass * j.mass / (i.mass + j.mass),
+    }  # fmt: skip
+    views: dict[str, list] = {name: [] for name in VIEWS}
+    for gap, rate in itertools.product(CLOSE_GAPS, (-1e-4, 1e-4)):
+        known |= {"gap": gap, "gap_rate": rate, "centre_distance": radius_i + radius_j + gap}
+        known |= {"parted_gap": gap, "overlap": max(abs(gap), 1e-12), "overlap_rate": rate}
+        known |= dict.fromkeys(("plate_gap", "depth_gap"), max(gap, 1e-10))
+        for name, view in VIEWS.items():
+            views[name].append(view(*map(known.__getitem__, view._fields)))
+    return views
+
+
+def require_exactness(config: Config, _: Flocs) -> None:
+    """Raise ConfigError where second runs are asked for that no parameter makes more exact."""
+    share, method = config.integrator.check_share, config.integrator.method
+    if not isinstance(share, str) and share > 0.0 and exact_method(method) is None:
+        raise ConfigError(
+            f"integrator.check_share = {share:g} cannot be: {config.integrator.label} has no "
+            "parameter `tolerance` or `step` that could be made smaller for a second run: give it "
+            "one, or leave check_share out"
+        )
+
+
+def require_stiffness(config: Config, flocs: Flocs) -> None:
+    """Raise ConfigError where bodies meet so fast that they leave the contact law: the worst pair.
+
+    Polygons touch with their spheroradii, measured ones with about their median.
+    """
+    found: list[tuple[float, str]] = []
+    for name, pair in sphere_pairs(config, flocs, "fastest"):
+        for shapes in kinds(config, pair.shapes):
+            radii = [shape.radius for shape in shapes]
+            spheres = shapes is pair.shapes
+            if flocs and config.shapes.size == "own" and not spheres:
+                measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
+                radii = [float(np.median(measured))] * 2
+            what = "the spheres" if spheres else "the outlines, their spheroradii"
+            found += impact(name, pair, radii, what)
+    if found:
+        raise ConfigError(max(found)[1])
+
+
+REFUSALS = (
+    require_contact, require_core, require_apart, require_meeting, require_exactness,
+    require_stiffness,
+)  # fmt: skip
+"""Questions (config, flocs of its library) whose answer may be an error."""
+
+
+def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
+    """Return the deepest overlap [m] of a mass at a speed on a spring and a dashpot [N s/m].
+
+    v √(M/k) exp(−ζ acos ζ/√(1 − ζ²)), for critical damping v √(M/k)/e.
+    """
+    omega = math.sqrt(stiffness / mass)
+    return speed / omega * math.exp(-impact_exponent(0.5 * damping / (mass * omega)))
+
+
+def spring_and_dashpot(
+    pair: Encounter, mass: float, radii: Sequence[float], speed: float
+) -> tuple[float, float] | None:
+    """Return (stiffness [N/m], damping [N s/m]) that stand for the pair's contact law.
+
+    As much work up to the deepest overlap, as much damping half way. None for a law that gives
+    no numbers, or does not push apart.
+    """
+    law, known = pair.system.pieces.laws["contact_force"], pair.system.pieces.parameters
+    deepest = DEEPEST_OVERLAP * sum(radii)
+    smaller = min(shape.equivalent_radius for shape in pair.shapes)
+
+    def normal(overlap: float, rate: float = 0.0) -> float:
+        view = ContactView(overlap, rate, 0.0, 0.0, mass, radii[0], radii[1], smaller)
+        return float(law(view, known)[0])
+
+    try:
+        with np.errstate(all="ignore"):
+            # Midpoint rule; the force is the spring's at no rate.
+            mean = sum(normal(deepest * (k + 0.5) / PARTS) for k in range(PARTS)) / PARTS
+            damped = normal(0.5 * deepest, 0.5 * speed) - normal(0.5 * deepest)
+    except (ArithmeticError, ValueError):
+        return None
+    if not (0.0 < mean < math.inf and math.isfinite(damped)):
+        return None
+    return 2.0 * mean / deepest, max(2.0 * damped / speed, 0.0)
+
+
+def impact(
+    name: str, pair: Encounter, radii: Sequence[float], what: str
+) -> Iterator[tuple[float, str]]:
+    """Yield how many times too soft a contact is and the words on it, where it is too soft.
+
+    ``radii`` [m] of the outlines that touch, of ``what``: the law is valid to half of their sum.
+    The speed is that at which the spheres settle onto each other.
+    """
+    speed, deepest = math.hypot(*pair.drift), DEEPEST_OVERLAP * sum(radii)
+    [mass] = [mass for _, _, mass in pairs_of(pair.system)]
+    law = spring_and_dashpot(pair, mass, radii, speed)
+    if law is None or (reached := depth(speed, mass, *law)) <= deepest:
+        return
+    # At a given share of critical damping the depth falls as 1/√k.
+    factor = (reached / deepest) ** 2
+    [alone, *others] = [each for each in pair.system.forces if isinstance(each, ContactForce)]
+    cure = f"make the contact {rounded_up(factor):g} times as stiff"
+    if type(alone) is Contact and not others:
+        key, unit = alone.stiffness_key
+        wanted = rounded_up(getattr(alone, key) * factor)
+        cure = f"give forces.contact.{key} {wanted:g} {unit} or more"
+    words = (
+        f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * reached:.3g} um deep, more than "
+        f"the {1e6 * deepest:.3g} um for which the contact law is valid (half of r_i + r_j of "
+        f"{what}): {cure}, or lighter bodies"
+    )
+    yield factor, words
+
+
+def rounded_up(value: float) -> float:
+    """Return a value to two digits, not below it."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.2g}")
+
+
+IMPLIED = (
+    "preset tang2014 gives flocs the paper's 2 kg/m2 of projected area, 65 to 325 times as dense "
+    "as water at its sizes: they settle too fast for Stokes's drag, and shape decides the outcome. "
+    'At real weight (preset = "si") whatever touches stays together: see docs/presets.md'
+)
+"""Stands for the doubt about the drag that the paper's preset implies; no run repeats it."""
+
+
+def warning_lines(doubts: Sequence[str]) -> list[str]:
+    """Return what a dry run prints of doubts."""
+    return [f"{'note' if line == IMPLIED else 'warning'}: {line}" for line in doubts]
+
+
+def doubts_in(config: Config, systems: Sequence[System], acting: Sequence[Force]) -> list[str]:
+    """Return lines on what is implausible of scenes of a config, in its own words.
+
+    ``acting``: those of its forces that the scenes have.
+    """
+    known = [id(force) for force in acting]
+    forces = zip(config.force_names, config.forces, strict=True)
+    names = Names(
+        fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
+        forces=tuple(f"forces.{name}" for name, force in forces if id(force) in known),
+    )  # fmt: skip
+    lines = doubts_of(systems, names)
+    weight = PRESETS.get(config.preset or "", {}).get("bodies", {}).get("surface_density")
+    if weight is not None and weight == config.bodies.surface_density:
+        lines = [IMPLIED, *(line for line in lines if "Re = " not in line)]
+    return lines
+
+
+def study_doubts(config: Config, flocs: Flocs | None = None) -> list[str]:
+    """Return lines on what is implausible in a study; none where all is usual.
+
+    ``flocs``: those of the study, where they have been read.
+    """
+    systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
+    # In a flow bodies meet without their weight.
+    lines = doubts_in(config, systems, systems[0].forces)
+    if resizes(config):
+        share = config.shapes.radius / smallest(config)
+        lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
+    return [line for line in lines if line] + trivial_values(config, flocs)
+
+
+def trivial_values(config: Config, flocs: Flocs | None = None) -> list[str]:
+    """Return lines on values that make the answer of a study known beforehand."""
+    scene, shapes, lines = config.scene, config.shapes, []
+    if shapes.source == "library" and shapes.vertices == (1,):
+        lines.append(
+            "shapes.vertices = [1] takes every floc of the library for its equivalent sphere, so "
+            "that no shape counts: add a number of vertices, as in [1, 16]"
+        )
+    if scene.kind != "binary" or scene.meeting == BROWNIAN:
+        return lines
+    # D_0 over r_i + r_j of every collision type.
+    reaches = [
+        zone_distance(config.zone, config.forces, *pairing.largest) / sum(pairing.largest)
+        for pairing in pairings_of(config, measured_flocs(config) if flocs is None else flocs)
+    ]
+    beyond = [delta for delta in scene.delta if delta > max(1.0, *reaches)]
+    if beyond and scene.meeting == SETTLING:
+        lines.append(
+            f"scene.delta = {beyond[-1]:g} misses by construction: offsets are fractions of "
+            "delta_max, at 1 of which the outlines just graze, and the attraction zone ends at "
+            f"{max(reaches):.3g} of it: give fractions up to 1, as 0.5 for 50 %"
+        )
+    # Ten times as far as the farthest offset: a body that falls past is inside however it moves.
+    if min(reaches) > 10.0 * max(1.0, *scene.delta):
+        lines.append(
+            f"[zone] reaches to {min(reaches):.3g} (r_i + r_j) of the centres at least, farther "
+            "than any offset of scene.delta, so that every pair is inside: give a smaller distance"
+        )
+    return lines
