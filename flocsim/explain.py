@@ -7,23 +7,18 @@ uncompiled kernels by differences, so that a user's own force counts like the bu
 
 import collections
 import math
-import types
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from flocsim.arrays import ContactView, PairView
-from flocsim.compiler.linker import reached
 from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
-from flocsim.forces.codegen import PLACES, VELOCITIES
-from flocsim.forces.outline import ASK_FOR_BOTH, layer_along
+from flocsim.forces.outline import layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import lone_view
 from flocsim.integrators.implicit import Overdamped
-from flocsim.integrators.loop.driver import advance
-from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.plausibility import all_settled, doubts_of, settled
 
 LAWLESS = (
@@ -33,12 +28,6 @@ LAWLESS = (
     ("contact_event", "search for kinks of the contact law", "it has none with these parameters"),
 )
 """(law, what is left out where a scene has none, why)."""
-
-UNDERIVED = (
-    ("position_derivatives", "derivative by position", "no body force depends on position or time"),
-    ("velocity_derivatives", "derivative by the velocity", "no body force reads a velocity"),
-)
-"""The same for the derivatives that an implicit method would take."""
 
 STIFF = 100.0
 """A scale this much shorter than the slowest one is stiff."""
@@ -87,29 +76,24 @@ def heading(system):
 
 def force_lines(system):
     """ "in: …" or "out: …" for every force object, two of one class each by itself."""
-    implicit = differentiates(system)
     named = [*zip(names_of(system.forces), system.forces, strict=True)]
     lines = [
-        f"in:  {force}: {'; '.join(about(system, force, implicit))}"
-        for _, force in named
-        if not force.absent
+        f"in:  {force}: {'; '.join(about(system, force))}" for _, force in named if not force.absent
     ]
     lines += [f"out: {name}: {force.absent}" for name, force in named if force.absent]
     return lines or ["out: forces: none are given, bodies move freely"]
 
 
-def about(system, force, implicit):
-    """Where a force acts and, for an implicit method, whence its derivatives come."""
+def about(system, force):
+    """Return where a force acts, in a few words each."""
     if isinstance(force, BodyForce):
-        parts, derivative = ["on every body"], body_derivative(system, force)
+        parts = ["on every body"]
     elif not counting(system.bodies):
         return [f"never called, {no_partner(system)}"]
     elif isinstance(force, PairResistance):
         parts = [f"between the two, up to {force.cut:g} (r_i + r_j) apart"]
-        derivative = "analytic derivatives, by position only through the gap"
     elif isinstance(force, ContactForce):
         parts = ["at every overlapping pair", sliding(system, force)]
-        derivative = "derivatives from differences of its kernel"
     else:
         centres, reach = force.acts_on == "centres", force.reach
         place = "along the line of centres" if centres else "between the outlines"
@@ -123,9 +107,7 @@ def about(system, force, implicit):
                 if force.boundary == "superposition":
                     reach = system.pieces.layer[2]
         parts = [f"{place}, {reach_words(system, force, reach)}"]
-        derivative = pair_derivative(system, force)
-    parts += force.remarks(system.fluid)
-    return [*parts, derivative] if implicit else parts
+    return [*parts, *force.remarks(system.fluid)]
 
 
 def no_partner(system):
@@ -133,24 +115,6 @@ def no_partner(system):
     if len(system.bodies) == 1:
         return "a single body has no partner"
     return "fixed bodies do not act on each other"
-
-
-def body_derivative(system, force):
-    reads = check.fields_read(force, system.fluid, force.kernel_in(system.fluid))
-    known = (("velocity", VELOCITIES), ("position", PLACES))
-    by = [name for name, fields in known if reads & fields]
-    if not by:
-        return "constant, nothing to differentiate"
-    return f"derivative by {' and '.join(by)} from differences of its kernel"
-
-
-def pair_derivative(system, force):
-    if force.acts_on in ASK_FOR_BOTH:
-        return "derivatives from differences of its sum"
-    damped = "gap_rate" in check.fields_read(force, system.fluid, force.kernel)
-    slope = "from differences of its kernel" if force.slope is None else "analytic"
-    rate = ", by the gap's rate from differences" if damped else ""
-    return f"derivative by the gap {slope}{rate}"
 
 
 def reach_words(system, force, reach):
@@ -198,10 +162,6 @@ def machinery_lines(system):
         lines.append("out: vertex-edge pairs, rotation of vertices: no body has an edge")
     lines += [spin_line(system), history_line(system)]
     lines += [f"out: {what}: {why}" for law, what, why in LAWLESS if law not in laws]
-    if not differentiates(system):
-        lines.append("out: Jacobian of the forces: the method is explicit")
-    else:
-        lines += [f"out: {what}: {why}" for law, what, why in UNDERIVED if law not in laws]
     if isinstance(system.integrator, Overdamped):
         lines.append("out: inertia: the method balances forces and drag at every instant")
     return lines
@@ -266,19 +226,6 @@ def tried(system, force, kernel, views):
     """What a kernel, uncompiled, returns for some views."""
     arguments = check.kernel_arguments(force, system.fluid, kernel)
     return list(check.results(force, kernel, views, arguments))
-
-
-def differentiates(system):
-    """Whether the method needs the Jacobian of the forces: whether its driver reaches it."""
-    fillings, found, pending = system.fillings(), set(), [advance]
-    while pending:
-        function = pending.pop()
-        function = fillings.get(function, function)
-        if function not in found:
-            found.add(function)
-            values = reached(function).values()
-            pending += [value for value in values if isinstance(value, types.FunctionType)]
-    return assemble_jacobian in found
 
 
 def scale_lines(system):

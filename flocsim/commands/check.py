@@ -1,9 +1,7 @@
-"""`flocsim check study.toml`: whether a study's own scene is computed right, at its extremes.
-
-Some replicates of the study are run at the ends of its sizes, numbers of vertices, contact
-stiffness and tolerance, each combination by itself, and compared with runs at a hundredth of the
-tightest tolerance: how far each is off, and whether that is within what it states. Nothing is
-written.
+"""Run some replicates of a study at the extremes of its sizes, numbers of vertices, contact
+stiffness and tolerance, each combination by itself, compare them with runs at a hundredth of the
+tightest tolerance, and print how far each is off, and whether that is within what it states.
+Nothing is written. Exit code 0 if all are right or within their stated error, 1 otherwise.
 """
 
 import itertools
@@ -56,12 +54,7 @@ COLUMNS = {
     "steps": 8, "CPU [ms]": 10, "error [m]": 11, "stated [m]": 12, "  verdict": -1,
 }  # fmt: skip
 
-DESCRIPTION = (
-    "Run some replicates of a study at the extremes of its sizes, numbers of "
-    "vertices, contact stiffness and tolerance, compare them with runs at a much tighter "
-    "tolerance, and print each result. Exit code 0 if all are right or within their "
-    "stated error, 1 otherwise."
-)
+DESCRIPTION = __doc__
 
 
 def add_arguments(parser: ArgumentParser) -> None:

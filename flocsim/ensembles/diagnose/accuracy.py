@@ -16,7 +16,7 @@ from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.errors import FlocsimError
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Integrator
-from flocsim.io.results.schema import OUTCOMES, UNKNOWN
+from flocsim.io.results.schema import OUTCOMES
 from flocsim.run import Run
 
 Task = tuple[tuple[int, int, float], int]
@@ -48,11 +48,6 @@ class Comparison:
     def flipped(self) -> bool:
         """Return True if the two end differently, as the column n_flipped counts."""
         return any(self.row.get(name) != self.exact.get(name) for name in ("outcome", "inside"))
-
-    @property
-    def undecided(self) -> bool:
-        """Return True if the run came to no outcome."""
-        return not self.row or OUTCOMES[self.row["outcome"]] in UNKNOWN
 
 
 def ending(row: Mapping[str, Any]) -> str:

@@ -22,11 +22,6 @@ from flocsim.io.results.run_group import class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
 
-NOTHING_RUN = (
-    "nothing was run (--dry-run); --pilot runs some replicates, to estimate core-hours and file "
-    "size"
-)
-
 
 def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
     """Return what is known of a study of pairs or rates before it is run, as text."""
@@ -42,7 +37,8 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
         *warning_lines([*coarse_lines(config, measured), *study_doubts(config, measured)]),
         *(["pilot:", *(f"  {line}" for line in pilot_lines(config, ranks))] if pilot else []),
-        "only the pilot was run (--dry-run)" if pilot else NOTHING_RUN,
+        "only the pilot was run (--dry-run)" if pilot
+        else "nothing was run (--dry-run); --pilot runs some replicates, to estimate the cost",
     ])  # fmt: skip
 
 

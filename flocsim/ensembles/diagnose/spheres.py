@@ -51,28 +51,25 @@ def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[di
     ``free`` and ``touch``: probabilities to touch without and with the forces between the spheres;
     None for what is not a number, as for a potential beyond all bounds.
     """
-    return [
-        {"type": name, **brownian_facts(pair)}
-        for name, pair in sphere_pairs(config, flocs)
-        if pair.meeting == BROWNIAN
-    ]
-
-
-def brownian_facts(pair: Encounter) -> dict[str, Any]:
-    """Return the same of one pair of spheres."""
-    system, (near, far) = pair.system, pair.ends
-    radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
-    radii = radius_i, radius_j
-    [thermal] = thermal_in(system.forces)
-    known: dict[str, Any] = {"temperature": thermal.temperature, "fluid": system.fluid}
-    with np.errstate(all="ignore"):
-        found = {
-            "free": splitting_probability([], radii, near, far, **known),
-            "touch": splitting_probability(system.forces, radii, near, far, **known),
-            "stability": stability_ratio(system.forces, radii, **known),
-        }
-    plain = {name: value if math.isfinite(value) else None for name, value in found.items()}
-    return {"release": near, "escape": far, "diffusion": pair.diffusion} | plain
+    facts = []
+    for name, pair in sphere_pairs(config, flocs):
+        if pair.meeting != BROWNIAN:
+            continue
+        forces, ends = pair.system.forces, pair.ends
+        radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
+        radii = radius_i, radius_j
+        [thermal] = thermal_in(forces)
+        known: dict[str, Any] = {"temperature": thermal.temperature, "fluid": pair.system.fluid}
+        with np.errstate(all="ignore"):
+            found = {
+                "free": splitting_probability([], radii, *ends, **known),
+                "touch": splitting_probability(forces, radii, *ends, **known),
+                "stability": stability_ratio(forces, radii, **known),
+            }
+        plain = {each: value if math.isfinite(value) else None for each, value in found.items()}
+        about = {"type": name, "release": ends[0], "escape": ends[1], "diffusion": pair.diffusion}
+        facts.append(about | plain)
+    return facts
 
 
 def water_facts(config: Config) -> list[dict]:
