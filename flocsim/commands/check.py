@@ -28,6 +28,7 @@ from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.errors import ConfigError, UsageError
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
+from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import AGGREGATED, CLASSES, OUTCOMES
 from flocsim.io.terminal import tell
@@ -174,6 +175,10 @@ def run(args: Namespace) -> int:
                 found = bench.compare(task, each)
                 verdict, why = verdict_on(found, each)
                 verdicts[verdict] += 1
+                if verdict == WRONG and found.exact:
+                    until = float(min(found.row["t_end"], found.exact["t_end"]))
+                    if (factor := bench.amplification(task, until)) > MOST_AMPLIFIED:
+                        why += f"; the motion amplifies a perturbation {factor:.2g} times"
                 tell(table_line(COLUMNS, [
                     config.scene.names[condition], n,
                     "as given" if math.isnan(stiffness) else f"{stiffness:g}",

@@ -39,8 +39,8 @@ CORE = 0.25
 COUNT = 60
 """Replicates of each type, by default."""
 
-PATIENCE = 20
-"""Times the mean steps of the references that an explicit run may take."""
+PATIENCE, MOST_STEPS = 20, 1_000_000
+"""Steps of an explicit run at most: times those of the references, of a single replicate in all."""
 
 COLUMNS = {
     "method": -18, "setting": 11, "flips": 7, "[%]": 7, "95 %": 14, "error [m]": 11,
@@ -74,12 +74,13 @@ def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[str]:
     bench = Bench(study, Implicit(0.1 * tolerances[-1]))
     references = [bench.reference(task) for task in tasks]
     patience = int(PATIENCE * np.mean([run.steps for run, _ in references]))
+    budget = MOST_STEPS if alone else patience
     for tolerance in tolerances:
         yield rung(bench, tasks, Implicit(tolerance))
     for tolerance in tolerances:
-        yield rung(bench, tasks, DormandPrince54(tolerance), patience)
+        yield rung(bench, tasks, DormandPrince54(tolerance), budget)
     for count in STEP_COUNTS if alone else ():
-        yield rung(bench, tasks, VelocityVerlet(references[0][0].time / count), 2 * count)
+        yield rung(bench, tasks, VelocityVerlet(references[0][0].time / count), budget)
 
 
 def rung(bench: Bench, tasks: Sequence[Task], method: Integrator, budget: int | None = None) -> str:
