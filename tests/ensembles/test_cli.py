@@ -64,8 +64,8 @@ def test_a_dry_run_says_what_would_happen_and_writes_nothing(folder, capsys):
     code, output, errors = call(capsys, "small.toml", "--dry-run", "--output", "no/where.h5")
     assert (code, errors) == (0, "")
     assert output.startswith("4 conditions x 3 replicates = 12, seed 1, on 1 rank, ")
-    for said in ("D_0 = 45.35 um", "settling 60.29 and 84.58 mm/s", "in:  StokesDrag(",
-                 "out: vertex-edge pairs", "nothing was run (--dry-run)"):  # fmt: skip
+    for said in ("D_0 = 45.35 um", "settling alone: i 60.29 mm/s", "in:  StokesDrag(",
+                 "nothing was run (--dry-run)"):  # fmt: skip
         assert said in output
     assert [path.name for path in folder.iterdir()] == ["small.toml"]
 

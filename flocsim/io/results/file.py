@@ -5,7 +5,6 @@ reader takes all of it, a summary, or single rows.
 """
 
 import contextlib
-import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -64,13 +63,6 @@ def groups_of(results: Results) -> dict[str, Labelled]:
     if results.flocs:
         groups["flocs"] = FLOCS.labelled({"floc": results.flocs})
     return groups | {"replicates": results.labelled("replicates")}
-
-
-def size_of(results: Results) -> int:
-    """Return the size [bytes] of a results file without its group ``run``."""
-    image = io.BytesIO()
-    RESULTS.write_data(image, groups_of(results))
-    return len(image.getbuffer())
 
 
 def parts_of(shape: Sequence[int], most: int) -> Iterator[list[slice]]:

