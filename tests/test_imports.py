@@ -77,6 +77,7 @@ INNER_ROWS = {
         ["runner"],
         ["strength"],
         [folder.name for folder in STUDIES.values()],
+        ["one_table"],
         ["report"],
         ["parallel"],
         ["estimates"],

@@ -16,16 +16,18 @@ import json
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import product
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import attrs
 import numpy as np
 
 from flocsim.ensembles.config import STUDIES
-from flocsim.ensembles.config.schema import Config
 from flocsim.errors import visible
 from flocsim.io.results.run_group import SOURCE, package_version
 from flocsim.io.results.schema import REPLICATES
+
+if TYPE_CHECKING:  # a kind in one file is imported before the schema, which has its scene
+    from flocsim.ensembles.config.schema import Config
 
 MOST_ROWS = 16_384
 """Rows of the longest chunk, 2.3 MB."""
@@ -141,7 +143,7 @@ class StudyKind:
     from (seed, replicate).
     """
 
-    config: Config
+    config: "Config"
     flocs: list
     scenes: ClassVar[Sequence[type]]
     """The classes of its [scene]."""
@@ -175,12 +177,12 @@ class StudyKind:
         raise NotImplementedError
 
     @staticmethod
-    def flocs_of(config: Config) -> list:
+    def flocs_of(config: "Config") -> list:
         """Grow or read the flocs that a config's study needs."""
         return []
 
     @staticmethod
-    def check(config: Config) -> None:
+    def check(config: "Config") -> None:
         """Raise the FlocsimError that a config's study would meet."""
 
     def prepare(self) -> None:
@@ -303,17 +305,17 @@ def kinds() -> dict[type, type[StudyKind]]:
     return {scene: each for each in found for scene in each.scenes}
 
 
-def kind_of(config: Config) -> type[StudyKind]:
+def kind_of(config: "Config") -> type[StudyKind]:
     """Return the kind of a config's study."""
     return kinds()[type(config.scene)]
 
 
-def study_of(config: Config, flocs: Sequence | None = None) -> Any:
+def study_of(config: "Config", flocs: Sequence | None = None) -> Any:
     """Return the study of a config of any kind; ``flocs`` are grown or read unless given."""
     made: Any = kind_of(config)
     return made(config, flocs_of(config) if flocs is None else list(flocs))
 
 
-def flocs_of(config: Config) -> list:
+def flocs_of(config: "Config") -> list:
     """Grow or read the flocs that a config's study needs."""
     return kind_of(config).flocs_of(config)

@@ -11,11 +11,10 @@ shape. May import forces, integrators, geometry and body, and nothing else of
 The readers are our own, not cattrs: that would replace one loop of twelve lines, while units,
 dimensions and every message stayed ours and its exceptions had to be turned back into places.
 
-All that a kind of study is lies in its folder, whose modules are loaded by name, when something of
-the kind is there: `scene` has the class of its [scene] as SCENE, where that has a `kind` of its
-own; `study` what runs it as KINDS, classes of
-`flocsim.ensembles.kind.StudyKind`; `results` what its files hold as
-CONTENTS, a `flocsim.ensembles.contents.Contents`.
+All that a kind of study is lies in one file or folder, whose modules are loaded by name when
+something of the kind is there: `scene` has the class of its [scene] as SCENE, where that has a
+`kind` of its own; `study` what runs it as KINDS, classes of `flocsim.ensembles.kind.StudyKind`;
+`results` what its files hold as CONTENTS, a `flocsim.ensembles.contents.Contents`.
 """
 
 import importlib
@@ -23,13 +22,17 @@ from typing import Any, NamedTuple
 
 
 class Folder(NamedTuple):
-    """The folder of a kind in flocsim/ensembles, and its `[scene] kind`, if it has one itself."""
+    """The folder of a kind in flocsim/ensembles, or its file if it is in one, and its `[scene]
+    kind`, if it has one itself."""
 
     name: str
     scene: str = ""
 
     def part(self, module: str) -> Any:
-        """Return one of its modules."""
+        """Return one of its modules; the only one of a kind in one file."""
+        whole = importlib.import_module(f"flocsim.ensembles.{self.name}")
+        if not hasattr(whole, "__path__"):
+            return whole
         return importlib.import_module(f"flocsim.ensembles.{self.name}.{module}")
 
 
@@ -39,13 +42,14 @@ STUDIES = {
 }
 """What a results file says that it is → the Folder of the kind."""
 
-FILES = {name: f"ensembles.{folder.name}.results" for name, folder in STUDIES.items()} | {
+FILES = dict.fromkeys(STUDIES, "") | {
     "flocsim strength": "ensembles.strength.contents",
     "flocsim sweep": "ensembles.sweep",
     "flocsim trajectory": "commands.trajectory:TRAJECTORY",
     "flocsim shape library": "commands.shapes:LIBRARY",
 }
-"""What any file says that it is → the module of its CONTENTS, or of what a colon precedes."""
+"""What any file says that it is → the module of its CONTENTS, or of what a colon precedes; that of
+a study is in its Folder."""
 
 SCENE_WORDS = tuple(each.scene for each in STUDIES.values() if each.scene)
 
@@ -57,5 +61,7 @@ def scenes() -> dict[str, type]:
 
 def contents_of(file_format: str) -> Any:
     """The Contents of a kind of file, by what such a file says that it is."""
+    if file_format in STUDIES:
+        return STUDIES[file_format].part("results").CONTENTS
     module, _, name = FILES[file_format].partition(":")
     return getattr(importlib.import_module(f"flocsim.{module}"), name or "CONTENTS")
