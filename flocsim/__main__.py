@@ -5,33 +5,25 @@ import sys
 from collections.abc import Sequence
 
 from flocsim import __version__
+from flocsim.commands import STUDIES, SUMMARIES, add_command
 from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
 from flocsim.process import check_memory, forget_left_over_launch, install, is_limited
 
-if {"ensemble", "kernel", "swarm"}.intersection(sys.argv[1:2]):
+if STUDIES.intersection(sys.argv[1:2]):
     fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
     check_memory()
 
-from flocsim.commands import SUMMARIES, add_command
 from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
 from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
 
-STUDIES = {"ensemble", "kernel", "swarm"}
-"""Commands that run studies, also under mpirun."""
-
-ALONE = (
-    "flocsim: {} runs on one rank only, and the other ranks of this job have ended: start it "
-    "without mpirun or srun, with --jobs where it takes that"
-)
-
 
 def make_parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
-    """The parser of a command line ``words``: of the command that they name alone, for the others
-    need not be loaded for it; of all commands where words are not told."""
+    """Return the parser of a command line ``words``, with the arguments of its command alone, as
+    the others need not be loaded for it; of all commands without words."""
     parser = Parser(
         prog="flocsim",
         description="When two flocs of real shape meet in water: do they collide, do they stick?",
@@ -60,7 +52,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             if launched_rank() > 0:
                 return 0  # what is no study is one rank's work
             if (launched_size() or 0) > 1:
-                print(ALONE.format(arguments.command), file=sys.stderr)
+                print(
+                    f"flocsim: {arguments.command} runs on one rank only, and the other ranks of "
+                    "this job have ended: start it without mpirun or srun, with --jobs where it "
+                    "takes that",
+                    file=sys.stderr,
+                )
                 if arguments.command == "sweep" and not arguments.dry_run:
                     return UsageError.exit_code  # it starts processes of its own
         code = run(arguments)
@@ -73,20 +70,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Run a command; the exit code, also of what went wrong, which is told in one line."""
     try:
         return arguments.run(arguments)
     except FlocsimError as error:
-        print(f"flocsim: {error}", file=sys.stderr)
-        return error.exit_code
+        code, text = error.exit_code, str(error)
     except MemoryError:
-        print("flocsim: out of memory", file=sys.stderr)
-        return FlocsimError.exit_code
+        code, text = FlocsimError.exit_code, "out of memory"
     except KeyboardInterrupt:
-        print("flocsim: interrupted", file=sys.stderr)
-        return 130
+        code, text = 130, "interrupted"
     except BrokenPipeError:
         # The reader of our output has gone (`| head`): not an error, but nothing more to say.
         return 0
+    print(f"flocsim: {text}", file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

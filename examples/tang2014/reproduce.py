@@ -143,8 +143,8 @@ def draw_trajectory(path, replicate, changes):
         return
     strip, distance, forces = (paths_of(f"{path}{which}") for which in ("", "-distance", "-forces"))
     flocsim(
-        path.parent, path.stem, "trajectory", STUDY, *settings(changes), "--scene", "I,64,0",
-        "--replicate", replicate, "--output", *strip, "--distance", *distance,
+        path.parent, path.stem, "trajectory", STUDY, *settings(changes),
+        "--type", "I", "--vertices", 64, "--delta", 0, "--replicate", replicate, "--output", *strip, "--distance", *distance,
         "--forces", *forces, "--animation", path.with_suffix(".gif"), "--overwrite",
     )  # fmt: skip
 

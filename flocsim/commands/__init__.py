@@ -1,12 +1,23 @@
-"""The subcommands of ``flocsim``; ``fit_pictures`` and ``processes`` are the work behind ``fit``,
-``show`` has those that show what is in a file.
+"""The subcommands of ``flocsim``, a file each; ``fit_pictures`` and ``processes`` are the work
+behind ``fit``.
 
-The file of a command has ``add_arguments(parser)``, ``run(arguments)``, which gives the exit code,
-and a DESCRIPTION; each has a line in SUMMARIES, and one in FILES where its file has another name.
+The file of a command has ``add_arguments(parser)``, whose docstring is the command's help
+(`flocsim.io.arguments.document`), and ``run(arguments)``, which returns the exit code. Each has a
+line in SUMMARIES. Options of several commands, and their help:
+
+--output FILE: file to write
+--overwrite: replace files that exist; each is kept, study.h5 as study.1.h5
+--quiet: print warnings and errors only
+--set KEY=VALUE: override any value of the config, as in flocsim ensemble; may be repeated
+--folder DIR: folder of the study's shape library and of the modules of its own classes, which are
+    run (default: the library is looked for beside the results, and no module is run)
+--own MODULE: installed module of the study's own classes, which is imported; may be repeated
 """
 
 import importlib
 from typing import Any
+
+from flocsim.io.arguments import document
 
 SUMMARIES = {
     "init": "write an example config file",
@@ -30,16 +41,24 @@ SUMMARIES = {
 }
 """{command: what it does}, in the order of the help, which needs no more of them than this."""
 
+STUDIES = frozenset({"ensemble", "kernel", "swarm"})
+"""Commands that run a study, also under mpirun: one command by the names of kinds of scenes."""
+
+
+def add_overwrite(parser: Any) -> None:
+    """Add the option that lets a command replace files."""
+    parser.add_argument("--overwrite", action="store_true")
+
+
+def add_settings(parser: Any) -> None:
+    """Add the option that overrides values of a config."""
+    parser.add_argument("--set", action="append", default=[], dest="settings")
+
 
 def add_allowed(parser: Any) -> None:
     """Add the options that say which modules a file may name; `allowed_by` reads them."""
-    parser.add_argument("--folder", metavar="DIR",
-        help="folder of the study's shape library and of the modules of its own classes, which are "
-        "run (default: the library is looked for beside the results, and no module is "
-        "run)")  # fmt: skip
-    parser.add_argument("--own", action="append", default=[], metavar="MODULE",
-        help="installed module of the study's own classes, which is imported; may be "
-        "repeated")  # fmt: skip
+    parser.add_argument("--folder")
+    parser.add_argument("--own", action="append", default=[])
 
 
 def allowed_by(arguments: Any) -> Any:
@@ -49,21 +68,13 @@ def allowed_by(arguments: Any) -> Any:
     return Allowed(arguments.folder, arguments.own)
 
 
-ENSEMBLES = "ensemble", "kernel", "swarm"
-"""A study by the name of its kind of scene."""
-
-FILES = {
-    **{name: ("commands.show", f"_{name}") for name in ("plot", "export", "compare", "info")},
-    **dict.fromkeys(ENSEMBLES, ("ensembles.cli", "")),
-}
-"""{command: (the module that it shares, how the names of its functions end)}."""
-
-
 def add_command(subparsers: Any, command: str) -> None:
     """Add the parser of a command."""
-    name, end = FILES.get(command, (f"commands.{command.replace('-', '_')}", ""))
+    name = "ensembles.cli" if command in STUDIES else f"commands.{command.replace('-', '_')}"
     module, summary = importlib.import_module(f"flocsim.{name}"), SUMMARIES[command]
-    about = getattr(module, "DESCRIPTION", summary)
-    parser = subparsers.add_parser(command, help=summary, description=about)
-    getattr(module, f"add_arguments{end}")(parser)
-    parser.set_defaults(run=getattr(module, f"run{end}"))
+    parser = subparsers.add_parser(
+        command, help=summary, description=getattr(module, "DESCRIPTION", None)
+    )
+    module.add_arguments(parser)
+    document(parser, module.add_arguments.__doc__ or summary, __doc__)
+    parser.set_defaults(run=module.run)

@@ -7,8 +7,9 @@ import os
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import attrs
 import numpy as np
@@ -17,20 +18,13 @@ from flocsim.commands.processes import Lost, workers
 from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
+from flocsim.io.files import Rule
 from flocsim.io.fit_report import picture_line, plural, warn_of_coarse
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.paper import segment_as_paper
 from flocsim.io.images.pictures import Segmentation, check_names, corrected, segment, weighed
-from flocsim.io.images.reading import (
-    ANNOUNCED,
-    BYTES_PER_PIXEL,
-    SUFFIXES,
-    check_file,
-    grey_of,
-    read_grey,
-    read_pixels,
-)
+from flocsim.io.images.reading import SUFFIXES, check_file, grey_of, read_grey, read_pixels
 from flocsim.io.images.regions import Region, mask_measures, with_holes
 from flocsim.io.images.stacks import Plane, pixel_size_in, planes_of, stack_of
 from flocsim.io.plots.shapes import draw_overlay, single_fit
@@ -45,9 +39,6 @@ LOST = FlocsimError.exit_code
 
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
-
-MOST_NAMES = 5
-"""Files that one line names."""
 
 
 @attrs.frozen(eq=False)
@@ -65,44 +56,42 @@ class Picture:
     plane: Plane | None = None
     fits: dict[int, list[Fits]] = attrs.Factory(dict)
 
+    def finest(self, region: Region) -> Fit:
+        """Return the fit of a region at the largest N and the smallest spheroradius."""
+        first = self.fits[region.label][0]
+        fits = first[min(first)]
+        return fits[max(fits)]
+
 
 def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Picture], list[str]]:
-    """Pictures with their fits, and the names of pictures lost; ``options`` as `fit.read_numbers`
-    leaves them.
+    """Return pictures with their fits, and the names of pictures lost.
 
-    A file that cannot be read as a picture is told and passed over. One that the machine has
+    A file that cannot be read as a picture is reported and passed over. One that the machine has
     failed on, for want of memory or because a process was killed, is lost, with all its flocs.
     """
     background = find_background(paths, options)
     tasks = [(p, t, background, options) for p, t in zip(paths, titles_of(paths), strict=True)]
-    lost: dict[str, None] = {}
-
-    def lose(name, result):
-        if name not in lost:
-            report(f"{name} was not fitted: {result.reason}; the other pictures were")
-        lost[name] = None
-
+    lost: dict[str, str] = {}
+    pictures: list[Picture] = []
+    masks_found: list[str] = []
     with workers(options.jobs, compile_fit) as mapped:
-        pictures: list[Picture] = []
-        masks_found: list[str] = []
-        for task, result in zip(tasks, mapped(find_flocs, tasks), strict=True):
+        for (_, title, *_), result in zip(tasks, mapped(find_flocs, tasks), strict=True):
             if isinstance(result, Lost):
-                lose(task[1], result)
-                continue
-            if isinstance(result, FlocsimError):
+                lost[title] = result.reason
+            elif isinstance(result, FlocsimError):
                 report(result)
-                continue
-            if result is None:
-                masks_found.append(task[1])
-                continue
-            for picture in result:
-                print(picture_line(picture.name, picture.found, len(picture.regions)), flush=True)
-                warn_of_coarse(picture.name, picture.regions, options.radii)
-                pictures.append(picture)
+            elif result is None:
+                masks_found.append(title)
+            else:
+                for picture in result:
+                    line = picture_line(picture.name, picture.found, len(picture.regions))
+                    print(line, flush=True)
+                    warn_of_coarse(picture.name, picture.regions, options.radii)
+                pictures += result
         if masks_found:
             report(
                 f"{plural(len(masks_found), 'file')} of masks or labels among the pictures: "
-                f"{some_of(masks_found)}; left out, fit them with --masks"
+                f"{', '.join(masks_found)}; left out, fit them with --masks"
             )
         if not options.masks:
             found = weighed([e.found for e in pictures], options.segmentation["max_blur"])
@@ -111,177 +100,145 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
                 for each, one in zip(pictures, found, strict=True)
             ]
         check_names(options.correction, [(each.name, each.found) for each in pictures])
-        regions = [(each.name, region) for each in pictures for region in each.regions]
-        masks = [
+        regions = [(each, region) for each in pictures for region in each.regions]
+        masks = []
+        for picture, region in regions:
             # At the ends of a band that is not known lies the mask itself.
-            (f"{name}#{each.label}",
-             (each.mask, *((each.band or (each.mask, each.mask)) if options.band else ())), options)
-            for name, each in regions
-        ]  # fmt: skip
+            ends = (region.band or (region.mask, region.mask)) if options.band else ()
+            masks.append((f"{picture.name}#{region.label}", (region.mask, *ends), options))
         progress = Progress(len(masks), not sys.stderr.isatty(), sys.stderr, "flocs")
-        fits = []
-        for fit in mapped(fit_region, masks):
-            fits.append(fit)
-            progress.report(len(masks) - len(fits))
+        for place, fits in enumerate(mapped(fit_region, masks)):
+            picture, region = regions[place]
+            if isinstance(fits, Lost):
+                lost.setdefault(picture.name, fits.reason)
+            else:
+                picture.fits[region.label] = fits
+            progress.report(len(masks) - place - 1)
         progress.finish()
-    for (name, _), fit in zip(regions, fits, strict=True):
-        if isinstance(fit, Lost):
-            lose(name, fit)
-    results = iter(fits)
-    fitted = [
-        attrs.evolve(each, fits={region.label: next(results) for region in each.regions})
-        for each in pictures
-    ]
-    return [each for each in fitted if each.name not in lost], list(lost)
-
-
-def some_of(names: Sequence[str]) -> str:
-    """The first names of a list, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
+    for name, reason in lost.items():
+        report(f"{name} was not fitted: {reason}; the other pictures were")
+    return [each for each in pictures if each.name not in lost], list(lost)
 
 
 def titles_of(paths: Sequence[Path]) -> list[str]:
-    """What pictures are called in tables and libraries: all different, and all of them text.
+    """Return what pictures are called in tables and libraries: all different, and all of them text.
 
     Pictures of one name in several folders are told apart by their paths; a byte that is no UTF-8
     is written as \\xe9.
     """
-    names = [printable(path.name) for path in paths]
-    pairs = zip(names, paths, strict=True)
-    return distinct(
-        (name if names.count(name) == 1 else printable(path.as_posix())) for name, path in pairs
-    )
+    names = [path.name for path in paths]
+    plain = [path.name if names.count(path.name) == 1 else path.as_posix() for path in paths]
+    return different([os.fsencode(name).decode("utf-8", "backslashreplace") for name in plain])
 
 
-def distinct(names: Iterable[str], suffix: str = "") -> list[str]:
-    """The names, of which those that have come before get as many primes as they need."""
+def different(names: Sequence[str]) -> list[str]:
+    """Return the names of files; those that came before get as many primes as they need."""
     found: list[str] = []
-    for name in names:
-        while name + suffix in found:
-            name += "'"
-        found.append(name + suffix)
+    for name in map(Path, names):
+        while str(name) in found:
+            name = name.with_stem(f"{name.stem}'")
+        found.append(str(name))
     return found
 
 
-def printable(text):
-    return os.fsencode(str(text)).decode("utf-8", "backslashreplace")
+def file_stem(name: str, suffixes: Sequence[str]) -> str:
+    """Return the name of a picture in names of files, without one of these endings."""
+    plain = Path(name.replace(":", "-").replace("/", "-"))
+    return plain.stem if plain.suffix.lower() in suffixes else plain.name
 
 
-def compile_fit():
+def compile_fit() -> None:
     """Compile before there are several processes that would all do it."""
     fit_mask(np.ones((9, 9), bool), vertices=5)
 
 
-def report(error):
-    print(f"flocsim: {printable(error)}", file=sys.stderr, flush=True)
+def report(error: object) -> None:
+    """Print a line on stderr."""
+    print(f"flocsim: {error}", file=sys.stderr, flush=True)
 
 
-def find_flocs(task):
-    """[Picture] of (path, name, background, options); the error of its file, None of a mask."""
+def find_flocs(task: tuple[Path, str, np.ndarray | None, Namespace]) -> Any:
+    """Return the Pictures of (path, name, background, options); the error of its file; None of a
+    mask among pictures."""
     path, name, background, options = task
     try:
         if options.masks:
-            return masked(path, name, options)
-        size, pictures = None, []
+            return [
+                picture_of(path, name + inner[len(path.name) :], segment_mask(
+                    mask, **{key: options.segmentation[key] for key in ("min_radius", "max_radius")
+                             if key in options.segmentation}), options)
+                for inner, mask in read_masks(path, options.memory)
+            ]  # fmt: skip
+        pictures = []
         for page, plane in planes_in(path, options):
             pixels = read_pixels(path, plane, options.memory)
             if is_mask(pixels):
                 return None
-            announce(name + page, pixels.shape)
-            size = size or known_size(path, options)
             grey = grey_of(pixels, path)
             if options.finder == "paper":
                 found = segment_as_paper(grey, **options.segmentation)
             else:
                 found = segment(grey, background=background, **options.segmentation)
-            pictures.append(chosen(path, name + page, found, options, size, plane))
+            pictures.append(picture_of(path, name + page, found, options, plane))
         return pictures
     except FlocsimError as error:
         return error
 
 
-def announce(name, shape):
-    """Say before it begins what the work on a large picture takes."""
-    needed = BYTES_PER_PIXEL * shape[0] * shape[1]
-    if needed > ANNOUNCED:
-        report(
-            f"{name}: {shape[0] * shape[1] / 1e6:.3g} Mpixel may take up to {needed / 1e9:.2g} GB "
-            "of memory (--memory)"
-        )
-
-
-def planes_in(path, options):
-    """[(what is put behind its name, Plane)] of the pictures of a file that are asked for."""
+def planes_in(path: Path, options: Namespace) -> list[tuple[str, Plane]]:
+    """Return [(what follows its name, Plane)] of the pictures of a file that are asked for."""
     check_file(path, "picture file")
     if path.suffix.lower() in ARRAYS:
         raise ImageError(f"{path}: {path.suffix} files hold masks, not pictures: give --masks")
     return planes_of(path, stack_of(path), options.page, options.channel, options.crop)
 
 
-def known_size(path, options):
-    """The size of a file's pixels [m]: the one that was given, or its own; ImageError for none."""
-    if options.pixel_size is not None:
-        return options.pixel_size
-    if (found := pixel_size_in(path, stack_of(path))) is None:
+def picture_of(
+    path: Path, name: str, found: Segmentation, options: Namespace, plane: Plane | None = None
+) -> Picture:
+    """Return the Picture of a Segmentation, corrected as the user wants it."""
+    size = options.pixel_size or pixel_size_in(path, stack_of(path))
+    if size is None:
         raise ImageError(
             f"{path}: does not give the size of a pixel, as OME-TIFF and ImageJ files do; give the "
             "length of its side, for example --pixel-size '0.95 um'"
         )
-    return found
-
-
-def masked(path, name, options):
-    limits = {key: options.segmentation[key] for key in ("min_radius", "max_radius")}
-    pictures = []
-    for inner, mask in read_masks(path, options.memory):
-        announce(name + inner[len(path.name) :], mask.shape)
-        found = segment_mask(mask, **limits)
-        size = known_size(path, options)
-        pictures.append(chosen(path, name + inner[len(path.name) :], found, options, size))
-    return pictures
-
-
-def chosen(path, name, found, options, pixel_size, plane=None):
-    """A Picture of a Segmentation, corrected as the user wants it."""
     found = corrected(name, found, options.correction)
-    if options.holes:
+    if options.holes and found.holes is not None:
         opened = tuple(with_holes(each, found.holes) for each in found.regions)
         found = attrs.evolve(found, regions=opened)
     found = attrs.evolve(found, holes=None)
     measures = {region.label: mask_measures(region.mask) for region in found.regions}
     regions = largest(found.regions, options.max_flocs)
-    return Picture(path, name, found, regions, measures, pixel_size, plane)
+    return Picture(path, name, found, regions, measures, size, plane)
 
 
-def largest(regions, count):
-    """The `count` largest regions, in their old order; all for None."""
+def largest(regions: Sequence[Region], count: int | None) -> tuple[Region, ...]:
+    """Return the `count` largest regions, in their old order; all for None."""
     by_size = sorted(regions, key=lambda region: (-region.area, region.label))[:count]
     return tuple(sorted(by_size, key=lambda region: region.label))
 
 
-def fit_region(task):
-    """The Fits of each mask in (name, masks, Options); ShapeError, with the name, for none."""
+def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
+    """Return the Fits of each mask in (name, masks, options); ShapeError where there is none."""
     name, masks, options = task
+
+    def fit(mask: np.ndarray, radius: float, count: int) -> Fit:
+        # A circle of a radius above r_eq is larger than the floc already.
+        keep = options.preserve_area and np.pi * radius**2 < mask.sum()
+        return fit_mask(
+            mask, vertices=count, radius=radius, method=options.method, preserve_area=keep,
+            inscribed=options.inscribed, holes=options.holes,
+        )  # fmt: skip
+
     with warnings.catch_warnings():
-        # Said once a picture, by warn_of_coarse, not once a floc and N.
+        # Printed once a picture, by warn_of_coarse, not once a floc and N.
         warnings.simplefilter("ignore", UserWarning)
         try:
             return [
-                {
-                    radius: {
-                        count: fit_mask(
-                            mask, vertices=count, radius=radius, method=options.method,
-                            # A circle of a radius above r_eq is larger than the floc already.
-                            preserve_area=options.preserve_area and np.pi * radius**2 < mask.sum(),
-                            inscribed=options.inscribed, holes=options.holes,
-                        )
-                        for count in options.vertices
-                    }
-                    for radius in options.radii
-                }
+                {r: {n: fit(mask, r, n) for n in options.vertices} for r in options.radii}
                 for mask in masks
-            ]  # fmt: skip
+            ]
         except ShapeError as error:
             raise ShapeError(
                 f"{name}: {error}, or leave out small flocs with --min-radius"
@@ -289,21 +246,22 @@ def fit_region(task):
 
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:
-    """The files' paths, folders replaced by the pictures in them; each path once."""
+    """Return the files' paths, folders replaced by the pictures in them; each path once."""
     suffixes = MASK_SUFFIXES if masks else SUFFIXES
-    paths = []
+    paths: list[Path] = []
     for path in map(Path, names):
-        inside = sorted(path.iterdir()) if path.is_dir() else [path]
-        found = [p for p in inside if not path.is_dir() or p.suffix.lower() in suffixes]
+        found = [path]
+        if path.is_dir():
+            found = sorted(p for p in path.iterdir() if p.suffix.lower() in suffixes)
         if not found:
-            report(ImageError(f"{path}: the folder holds no pictures ({', '.join(suffixes)})"))
+            report(f"{path}: the folder holds no pictures ({', '.join(suffixes)})")
         paths += found
     return list(dict.fromkeys(paths))
 
 
-def find_background(paths, options):
-    """The median of the frames, or None where a surface is fitted to each."""
-    if options.background == "surface" or options.masks:
+def find_background(paths: Sequence[Path], options: Namespace) -> np.ndarray | None:
+    """Return the median of the frames, or None where a surface is fitted to each."""
+    if options.background != "median" or options.masks:
         return None
     frames = []
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
@@ -323,41 +281,36 @@ def find_background(paths, options):
     return np.median(np.stack(frames), axis=0)
 
 
-def pictures_beneath(name, paths, drawn):
-    """{path of a mask: its picture in the folder of that name, None for none}.
-
-    ``drawn``: whether overlays of masks are drawn at all. UsageError where it cannot be used.
-    """
-    if name is None:
+def pictures_beneath(folder: str | None, paths: Sequence[Path]) -> dict[Path, Path]:
+    """Return {path of a mask: the picture of its name in a folder}; UsageError for several."""
+    if folder is None:
         return {}
-    if not drawn:
-        raise UsageError("--pictures is for overlays of masks: give --masks and --overlay too")
-    folder = Path(name)
-    if not folder.is_dir():
-        raise UsageError(f"--pictures takes a folder, found {name!r}")
-    named: dict[str, list[Path]] = {}
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in SUFFIXES:
-            named.setdefault(path.stem, []).append(path)
-    found = {path: named[path.stem] for path in paths if path.stem in named}
-    for mask, several in found.items():
-        if len(several) > 1:
+    if not Path(folder).is_dir():
+        raise UsageError(f"--pictures takes a folder, found {folder!r}")
+    found: dict[Path, Path] = {}
+    pictures = [path for path in sorted(Path(folder).iterdir()) if path.suffix.lower() in SUFFIXES]
+    for mask in paths:
+        named = [path for path in pictures if path.stem == mask.stem]
+        if len(named) > 1:
             raise UsageError(
-                f"--pictures {name} has {several[0].name} and {several[1].name}, so the picture of "
+                f"--pictures {folder} has {named[0].name} and {named[1].name}, so the picture of "
                 f"{mask.name} is ambiguous; move one of them away"
             )
+        if named:
+            found[mask] = named[0]
     missing = [path.name for path in paths if path not in found]
     if missing:
         report(
-            f"warning: --pictures {name} has no picture of {some_of(missing)}; drawn over the mask"
+            f"warning: --pictures {folder} has no picture of {', '.join(missing)}; drawn over the "
+            "mask"
         )
-    return {mask: several[0] for mask, several in found.items()}
+    return found
 
 
-def grey_beneath(picture, beneath, options):
-    """What the overlay of a picture is drawn over."""
+def grey_beneath(picture: Picture, beneath: Mapping[Path, Path], options: Namespace) -> np.ndarray:
+    """Return what the overlay of a picture is drawn over."""
     if not options.masks:
-        return read_grey(picture.path, picture.plane, options.memory)
+        return read_grey(picture.path, picture.plane or Plane(), options.memory)
     mask = picture.found.foreground
     if picture.path not in beneath:
         return mask
@@ -372,51 +325,39 @@ def grey_beneath(picture, beneath, options):
     return mask
 
 
-def overlay_paths(overlay, names, several):
-    """A path for the overlay of each of the pictures that have these (name, path of the file)."""
+def overlay_paths(overlay: str, names: Sequence[str], several: bool) -> list[Path]:
+    """Return a path for the overlay of each of the pictures with these names."""
+    path = Path(overlay)
     if not several:
-        return [overlay] * len(names)
-    stems = [stem_of(name, [file.suffix.lower()]) for name, file in names]
-    made = distinct((f"{overlay.stem}-{stem}" for stem in stems), overlay.suffix)
-    return [overlay.with_name(name) for name in made]
+        return [path] * len(names)
+    stems = [file_stem(name, MASK_SUFFIXES) for name in names]
+    made = different([f"{path.stem}-{stem}{path.suffix}" for stem in stems])
+    return [path.with_name(name) for name in made]
 
 
-def stem_of(name, suffixes):
-    """The name of a picture in names of files, without one of these endings."""
-    plain = Path(name.replace(":", "-").replace("/", "-"))
-    return plain.stem if plain.suffix.lower() in suffixes else plain.name
-
-
-def expected_overlays(overlay, paths):
-    """The overlays that will be drawn, as far as it can be known before files are read."""
-    names = list(zip(titles_of(paths), paths, strict=True))
-    return overlay_paths(Path(overlay), names, len(paths) > 1) or [Path(overlay)]
-
-
-def draw_fits(folder, pictures, options, rule):
+def draw_fits(folder: str, pictures: Sequence[Picture], rule: Rule) -> None:
     """Write a picture of every fit at the largest N and the smallest spheroradius."""
     for picture in pictures:
         for region in picture.regions:
-            fit = finest(picture, region, options)
-            figure = single_fit(region.mask, fit, f"{picture.name}#{region.label}")
-            save(figure, Path(folder, f"{stem_of(picture.name, ())}-{region.label}.png"), rule)
+            name = f"{picture.name}#{region.label}"
+            figure = single_fit(region.mask, picture.finest(region), name)
+            path = Path(folder, f"{file_stem(picture.name, ())}-{region.label}.png")
+            save(figure, path, rule)
 
 
-def finest(picture, region, options):
-    """The fit of a region at the largest N and the smallest spheroradius."""
-    return picture.fits[region.label][0][options.radii[0]][options.vertices[-1]]
-
-
-def draw(overlay, pictures, options, rule, several, beneath):
+def draw_overlays(
+    pictures: Sequence[Picture], options: Namespace, rule: Rule, several: bool,
+    beneath: Mapping[Path, Path],
+) -> list[str]:  # fmt: skip
     """Write each picture with the outlines at the largest N and the smallest spheroradius.
 
     Returns what could not be drawn because its picture cannot be read any more.
     """
-    most, radius = options.vertices[-1], options.radii[0]
-    names = [(each.name, each.path) for each in pictures]
-    paths, lost = overlay_paths(overlay, names, several or len(pictures) > 1), []
+    most, radius, lost = options.vertices[-1], options.radii[0], []
+    names = [each.name for each in pictures]
+    paths = overlay_paths(options.overlay, names, several or len(pictures) > 1)
     for picture, path in zip(pictures, paths, strict=True):
-        flocs = [(region, finest(picture, region, options)) for region in picture.regions]
+        flocs = [(region, picture.finest(region)) for region in picture.regions]
         title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
         try:
             grey = grey_beneath(picture, beneath, options)
@@ -424,6 +365,5 @@ def draw(overlay, pictures, options, rule, several, beneath):
             report(str(error) or f"{picture.name}: not enough memory to draw its overlay")
             lost.append(str(path))
             continue
-        figure = draw_overlay(grey, flocs, title, picture.found.rejected)
-        save(figure, path, rule)
+        save(draw_overlay(grey, flocs, title, picture.found.rejected), path, rule)
     return lost

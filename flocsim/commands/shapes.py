@@ -3,18 +3,21 @@ what other commands show of one."""
 
 import argparse
 import fnmatch
+import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
 
 import attrs
 
-from flocsim.commands.fit import number
+from flocsim import commands
+from flocsim.commands import add_overwrite
 from flocsim.ensembles.contents import Contents, Summary
-from flocsim.errors import UsageError, visible
+from flocsim.errors import UsageError
 from flocsim.hydrodynamics import prism_drag
+from flocsim.io.arguments import document, number
 from flocsim.io.fit_report import (
     coarse_line,
     errors_of,
@@ -24,7 +27,7 @@ from flocsim.io.fit_report import (
     population_lines,
 )
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import Figure
 from flocsim.io.shape_library import (
@@ -36,42 +39,65 @@ from flocsim.io.shape_library import (
 )
 from flocsim.io.terminal import aligned
 
-DESCRIPTION = """\
-  flocsim shapes list shapes.h5
-  flocsim shapes select shapes.h5 --min-radius 8e-6 --picture '02*.png' -o large.h5
-  flocsim shapes select shapes.h5 --drop 023.png#7,025.png#1 -o good.h5
-  flocsim shapes merge monday.h5 tuesday.h5 -o mud.h5
-
-r_eq is that of the floc as it was measured: its pixels times the size of a pixel.  list also prints
-the perimeter, the largest and least Feret diameter, aspect ratio, circularity 4 pi A/P^2 and
-solidity of every floc, D10, D50 and D90 of the diameters 2 r_eq by number and by volume, and the
-perimeter-based fractal dimension."""
-
 MICRO = 1e6
-MEASURES = ("perim um", "Feret um", "least um", "aspect", "circular", "solidity")
+
+MEASURES = {
+    "perim um": ("perimeter", MICRO, ".4g"),
+    "Feret um": ("feret_max", MICRO, ".4g"),
+    "least um": ("feret_min", MICRO, ".4g"),
+    "aspect": ("aspect_ratio", 1.0, ".3f"),
+    "circular": ("circularity", 1.0, ".3f"),
+    "solidity": ("solidity", 1.0, ".3f"),
+}
+"""{head of a column: (name of a ShapeMeasures' number, its factor, its form)}."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    """List, select and merge the flocs of shape libraries.
+
+      flocsim shapes list shapes.h5
+      flocsim shapes select shapes.h5 --min-radius 8e-6 --picture '02*.png' -o large.h5
+      flocsim shapes select shapes.h5 --drop 023.png#7,025.png#1 -o good.h5
+      flocsim shapes merge monday.h5 tuesday.h5 -o mud.h5
+
+    r_eq is that of the floc as it was measured: its pixels times the size of a pixel.  list
+    also prints the perimeter, the largest and least Feret diameter, aspect ratio, circularity
+    4 pi A/P^2 and solidity of every floc, D10, D50 and D90 of the diameters 2 r_eq by number
+    and by volume, and the perimeter-based fractal dimension.
+    """
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    listed = actions.add_parser("list", help="print sizes, shape measures and errors of every floc")
-    chosen = actions.add_parser("select", help="write the selected flocs to a library")
-    merged = actions.add_parser("merge", help="merge several libraries into one")
-    for action in (listed, chosen, merged):
-        action.add_argument("libraries", nargs="+", metavar="LIBRARY",
-            help="shape library written by flocsim fit")  # fmt: skip
-    for action in (listed, chosen):
-        add = action.add_argument
-        add("--keep", metavar="LIST", help="these flocs only, by name, separated by commas")
-        add("--drop", metavar="LIST", help="all but these flocs")
-        add("--picture", metavar="NAME",
-            help="flocs of this picture only; * stands for any characters")  # fmt: skip
-        add("--min-radius", metavar="METRES", help="flocs of at least this r_eq")
-        add("--max-radius", metavar="METRES", help="flocs of at most this r_eq")
-    for action in (chosen, merged):
-        add = action.add_argument
-        add("-o", "--output", required=True, metavar="FILE", help="shape library to write")
-        add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    for name, summary in (
+        ("list", "print sizes, shape measures and errors of every floc"),
+        ("select", "write the selected flocs to a library"),
+        ("merge", "merge several libraries into one"),
+    ):
+        action = actions.add_parser(name, help=summary)
+        add_libraries(action, selects=name != "merge", writes=name != "list")
+        document(action, summary, add_libraries.__doc__, commands.__doc__)
+
+
+def add_libraries(parser: argparse.ArgumentParser, selects: bool, writes: bool) -> None:
+    """Add the arguments of an action.
+
+    libraries LIBRARY: shape library written by flocsim fit
+    --keep LIST: these flocs only, by name, separated by commas
+    --drop LIST: all but these flocs
+    --picture NAME: flocs of this picture only; * stands for any characters
+    --min-radius METRES: flocs of at least this r_eq
+    --max-radius METRES: flocs of at most this r_eq
+    --output FILE: shape library to write
+    """
+    add = parser.add_argument
+    add("libraries", nargs="+")
+    if selects:
+        radius = number("a radius in metres, a number above 0", 5e-324, 1.0)
+        for name in ("--keep", "--drop", "--picture"):
+            add(name)
+        add("--min-radius", type=radius, default=0.0)
+        add("--max-radius", type=radius, default=math.inf)
+    if writes:
+        add("-o", "--output", required=True)
+        add_overwrite(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -84,17 +110,15 @@ def run_list(args: argparse.Namespace) -> int:
     for library in args.libraries:
         entries = selected(read_library(library), args, library)
         counts = [count for count in entries[0].fits if count > 1] if entries else []
-        rows = [["name", "r_eq um", "pixel um", "r px", *MEASURES,
-                 *(f"RE% N={count}" for count in counts)]]  # fmt: skip
+        heads = ["name", "r_eq um", "pixel um", "r px", *MEASURES]
+        rows = [[*heads, *(f"RE% N={count}" for count in counts)]]
         for each in entries:
             found = measures_in(each)
-            lengths = (each.measured_radius, each.pixel_size)
-            sizes = (found.perimeter, found.feret_max, found.feret_min)
-            shares = (found.aspect_ratio, found.circularity, found.solidity)
             rows.append([
-                visible(each.floc_id, keep=""), *(f"{MICRO * length:.4g}" for length in lengths),
-                f"{each.spheroradius:g}", *(f"{MICRO * length:.4g}" for length in sizes),
-                *(f"{share:.3f}" for share in shares),
+                each.floc_id, f"{MICRO * each.measured_radius:.4g}",
+                f"{MICRO * each.pixel_size:.4g}", f"{each.spheroradius:g}",
+                *(f"{factor * getattr(found, name):{form}}"
+                  for name, factor, form in MEASURES.values()),
                 *(f"{each.fits[count].relative_error:.2f}" for count in counts),
             ])  # fmt: skip
         print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
@@ -109,113 +133,90 @@ def run_list(args: argparse.Namespace) -> int:
 
 def run_write(args: argparse.Namespace) -> int:
     """Write the flocs of all libraries to one, or those of them that meet all that is asked."""
-    rule = data_rule(args.overwrite)
+    rule, source = data_rule(args.overwrite), ", ".join(args.libraries)
     check_outputs([Output(args.output, rule)], args.libraries)
-    libraries, settings = read_all(args.libraries)
+    libraries = {path: read_library(path) for path in args.libraries}
     every = merged_entries(libraries)
-    selects = args.action == "select"
-    entries = selected(every, args, ", ".join(args.libraries)) if selects else every
+    entries = selected(every, args, source) if args.action == "select" else every
     if not entries:
         raise UsageError(
-            f"{', '.join(args.libraries)}: none of {plural(len(every), 'floc')} matches, nothing "
-            "was written; flocsim shapes list names them"
+            f"{source}: none of {plural(len(every), 'floc')} matches, nothing was written; flocsim "
+            "shapes list names them"
         )
-    write_library(args.output, entries, settings, rule)
-    of = len(every) if selects else f"{len(libraries)} libraries"
+    write_library(args.output, entries, merged_settings(args.libraries), rule)
+    of = len(every) if args.action == "select" else f"{len(libraries)} libraries"
     print(f"{args.output}: {plural(len(entries), 'floc')} of {of}")
     return 0
 
 
-def read_all(paths):
-    """[(path, entries)] of libraries, and their settings, all values where they do not agree."""
-    libraries = [(path, read_library(path)) for path in paths]
-    first = tuple(libraries[0][1][0].fits)
-    for path, entries in libraries:
-        if tuple(entries[0].fits) != first:
-            here, there = (", ".join(map(str, counts)) for counts in (entries[0].fits, first))
-            raise UsageError(
-                f"{path} has fits at N = {here}, {paths[0]} at N = {there}: fit both at the same "
-                "--vertices"
-            )
+def merged_settings(paths: Sequence[str]) -> dict[str, Any]:
+    """Return the settings of libraries, all values where they do not agree."""
     settings = [read_settings(path) for path in paths]
-    keys = dict.fromkeys(key for each in settings for key in each)
-    found = {
-        key: list(dict.fromkeys(each.get(key, "unknown") for each in settings)) for key in keys
-    }
-    return libraries, {
-        key: each[0] if len(each) == 1 else ", ".join(map(str, each)) for key, each in found.items()
-    }
+    found = {}
+    for key in dict.fromkeys(key for each in settings for key in each):
+        values = list(dict.fromkeys(each.get(key, "unknown") for each in settings))
+        found[key] = values[0] if len(values) == 1 else ", ".join(map(str, values))
+    return found
 
 
-def merged_entries(libraries):
-    """The entries of [(path, entries)]; a name that has come before gets its library's in front.
+def merged_entries(libraries: dict[str, list[ShapeEntry]]) -> list[ShapeEntry]:
+    """Return all entries; a name that has come before gets its library's in front.
 
-    So does its picture's, or flocs of two pictures of one name would count as of one.
+    So does its picture's, or flocs of two pictures of one name would count as of one. UsageError
+    for libraries with fits at different numbers of vertices.
     """
-    taken: set[str] = set()
     merged: list[ShapeEntry] = []
-    for path, entries in libraries:
-        front = ""
+    for path, entries in libraries.items():
+        taken, front = {each.floc_id for each in merged}, ""
         while any(front + each.floc_id in taken for each in entries):
             front += f"{Path(path).stem}/"
         for each in entries:
-            merged.append(
-                attrs.evolve(each, floc_id=front + each.floc_id, image=front + each.image)
+            floc_id, image = front + each.floc_id, front + each.image
+            merged.append(attrs.evolve(each, floc_id=floc_id, image=image))
+        here, there = (", ".join(map(str, each.fits)) for each in (merged[-1], merged[0]))
+        if here != there:
+            raise UsageError(
+                f"{path} has fits at N = {here}, {next(iter(libraries))} at N = {there}: fit both "
+                "at the same --vertices"
             )
-            taken.add(front + each.floc_id)
     return merged
 
 
-def selected(entries, args, source):
-    """The entries that --keep, --drop, --picture and the limits of r_eq let through."""
-    least, most = (
-        float(unset) if text is None
-        else number(option, text, "a radius in metres, a number above 0", 5e-324, 1.0)
-        for option, text, unset in (
-            ("--min-radius", args.min_radius, 0), ("--max-radius", args.max_radius, "inf"),
-        )
-    )  # fmt: skip
-    keep, drop = (named(option, getattr(args, option), entries, source)
-                  for option in ("keep", "drop"))  # fmt: skip
+def selected(entries: list[ShapeEntry], args: argparse.Namespace, source: str) -> list[ShapeEntry]:
+    """Return the entries that --keep, --drop, --picture and the limits of r_eq let through."""
+    known = set().union(*map(names_of, entries))
+    keep, drop = (named(f"--{name}: {source}", getattr(args, name), known)
+                  for name in ("keep", "drop"))  # fmt: skip
     return [
         each
         for each in entries
-        if (keep is None or keep & names_of(each))
-        and not (drop and drop & names_of(each))
-        and (args.picture is None or fnmatch.fnmatchcase(each.image, args.picture))
-        and least <= each.measured_radius <= most
+        if (args.keep is None or keep & names_of(each))
+        and not drop & names_of(each)
+        and fnmatch.fnmatchcase(each.image, args.picture or "*")
+        and args.min_radius <= each.measured_radius <= args.max_radius
     ]
 
 
-def named(option, text, entries, source):
-    """The names in a list, all of which flocs have; None for no list.
+def named(source: str, text: str | None, known: set[str]) -> set[str]:
+    """Return the names in a list, all of which flocs have; a comma may be part of a name.
 
     A name may stand for a floc at all of its spheroradii: 023.png#7 for "023.png#7 r=2".
     """
-    if text is None:
-        return None
-    known = set().union(*(names_of(each) for each in entries))
-    names, begun = set(), ""
-    for piece in text.split(","):
-        begun += piece
-        if begun.strip() in known:
-            names.add(begun.strip())
-            begun = ""
-        else:
-            begun += ","  # a name with a comma in it
-    if begun:
+    rest, names = f",{text or ''},", set()
+    for name in sorted(known, key=len, reverse=True):
+        if f",{name}," in rest:
+            names.add(name)
+            rest = rest.replace(f",{name},", ",,")
+    if rest.strip(","):
         raise UsageError(
-            f"--{option}: {source} has no floc {begun.rstrip(',')!r}; flocsim shapes list names "
-            "them"
+            f"{source} has no floc {rest.strip(',')!r}; flocsim shapes list names them"
         )
     return names
 
 
-def names_of(entry):
+def names_of(entry: ShapeEntry) -> set[str]:
+    """Return the names of a floc, with its spheroradius and without."""
     return {entry.floc_id, entry.floc_id.removesuffix(f" r={entry.spheroradius:g}")}
-
-
-INDICES = {"flocs": ("floc",)}
 
 
 @attrs.frozen(eq=False)
@@ -224,49 +225,42 @@ class Library(Tables):
 
     entries: list[ShapeEntry]
     settings: dict[str, Any]
-    indices = INDICES
+    indices = {"flocs": ("floc",)}  # noqa: RUF012 (of the class, as Tables wants it)
 
     def labelled(self, group: str = "flocs") -> Labelled:
-        """The flocs, without their fits; UsageError for another group."""
+        """Return the flocs, without their fits; UsageError for another group."""
         self.known(group)
         return labelled_flocs(self.entries)
 
 
 def read(path: str | os.PathLike) -> Library:
-    """All that a library holds."""
+    """Return all that a library holds."""
     return Library(read_library(path), read_settings(path))
 
 
 def summary(found: Library) -> Summary:
-    """How many flocs of how many pictures, their sizes, and how they were fitted."""
-    images = sorted({entry.image for entry in found.entries})
-    sizes = [1e6 * entry.measured_radius for entry in found.entries]
-    facts = [
+    """Return how many flocs of how many pictures, their sizes, and how they were fitted."""
+    images = {entry.image for entry in found.entries}
+    sizes = [MICRO * entry.measured_radius for entry in found.entries]
+    banded = all(entry.is_banded for entry in found.entries)
+    return Summary([
         ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
         ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
-        *(
-            [("outlines", "as cut, and at both ends of their bands (--band)")]
-            if all(entry.is_banded for entry in found.entries)
-            else []
-        ),
+        *([("outlines", "as cut, and at both ends of their bands (--band)")] if banded else []),
         *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
-    ]
-    return Summary(facts)
+    ])  # fmt: skip
 
 
 def water(path: str | os.PathLike, allowed: object = None) -> list[str]:
-    """What slow flow makes of the flocs of a library."""
-    entries = read_library(path)
-    rows: list[tuple[str, ...]] = [("floc", "sinks", "at least", "turns", "B", "+- %")]
-    for entry in entries:
-        count = max(entry.fits)
-        drag = prism_drag(entry.fits[count].shape.outline())
-        rows.append((
-            visible(entry.floc_id, ""), *(f"{each:.3f}" for each in drag.mobility),
-            f"{drag.turning:.3f}", f"{drag.elongation:.3f}", f"{100.0 * drag.error:.1f}",
-        ))  # fmt: skip
+    """Return lines on what slow flow makes of the flocs of a library."""
+    rows = [["floc", "sinks", "at least", "turns", "B", "+- %"]]
+    for entry in read_library(path):
+        drag = prism_drag(entry.fits[max(entry.fits)].shape.outline())
+        numbers = (*drag.mobility, drag.turning, drag.elongation)
+        words = [*(f"{each:.3f}" for each in numbers), f"{100.0 * drag.error:.1f}"]
+        rows.append([entry.floc_id, *words])
     heading = (
-        f"prisms of {len(entries)} outlines, 4/3 r_eq deep: largest and least settling speed, and "
+        f"prisms of {len(rows) - 1} outlines, 4/3 r_eq deep: largest and least settling speed, and "
         "rate of turning, over those of the equivalent spheres; B, the response to strain, over "
         "that of a line"
     )
@@ -274,7 +268,7 @@ def water(path: str | os.PathLike, allowed: object = None) -> list[str]:
 
 
 def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
-    """A figure of flocs as one of a Library."""
+    """Return a figure of flocs as one of a Library."""
     return wraps(draw)(lambda found: draw(found.entries))
 
 

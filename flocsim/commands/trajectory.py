@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from flocsim.commands import add_overwrite, add_settings
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.errors import UsageError
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
@@ -29,49 +30,38 @@ STRIP_FRAMES = 7
 
 
 def add_arguments(parser: ArgumentParser) -> None:
+    """Run one replicate of a config and draw it as a strip of frames.
+
+    --seed: seed, overriding the config's
+    --frames K: default: %(default)s
+    --output FILE: strip of frames: .png, .pdf or .svg, or several files (default: a .png named
+        after the config and the replicate)
+    --distance FILE: also draw the centre distance against time
+    --forces FILE: also draw the forces against time
+    --animation FILE.gif: also write an animation
+    --save FILE.h5: also write the motion to HDF5
+    """
     add_replicate(parser)
     add = parser.add_argument
-    add("--scene", metavar="TYPE,N,F",
-        help="collision type, vertices and displacement in one word")  # fmt: skip
-    add("--seed", type=int, help="seed, overriding the config's")
-    add("--frames", type=int, default=6, metavar="K", help="default: 6")
-    add("-o", "--output", nargs="+", default=[], metavar="FILE",
-        help="strip of frames: .png, .pdf or .svg, or several files (default: a .png named after "
-        "the config and the replicate)")  # fmt: skip
-    add("--distance", nargs="+", default=[], metavar="FILE",
-        help="also draw the centre distance against time")  # fmt: skip
-    add("--forces", nargs="+", default=[], metavar="FILE",
-        help="also draw the forces against time")  # fmt: skip
-    add("--animation", metavar="FILE.gif", help="also write an animation")
-    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="override any value of the config, as in flocsim ensemble; may be "
-        "repeated")  # fmt: skip
-    add("--save", metavar="FILE.h5", help="also write the motion to HDF5")
-    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    add("--seed", type=int)
+    add("--frames", type=int, default=6)
+    add("-o", "--output", nargs="+", default=[])
+    for figure in ("--distance", "--forces"):
+        add(figure, nargs="+", default=[])
+    add("--animation")
+    add_settings(parser)
+    add("--save")
+    add_overwrite(parser)
 
 
 def add_replicate(parser: ArgumentParser) -> None:
-    """The arguments that name a replicate of a config; `select` finds it."""
-    parser.add_argument("config", help="config file (TOML)")
-    parser.add_argument("--replicate", type=int, default=0, metavar="K", help="default: 0")
-    parser.add_argument("--type", metavar="NAME", help="collision type (default: the first)")
-    parser.add_argument(
-        "--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)"
-    )
-    parser.add_argument("--delta", type=float, metavar="F", help="default: the first")
-
-
-def take_scene(args):
-    """Split --scene into the three options that it stands for."""
-    if args.scene is None:
-        return
-    if (args.type, args.vertices, args.delta) != (None, None, None):
-        raise UsageError("--scene replaces --type, --vertices and --delta: leave those out")
-    try:
-        args.type, vertices, delta = args.scene.rsplit(",", 2)
-        args.vertices, args.delta = int(vertices), float(delta)
-    except ValueError:
-        raise UsageError(f"--scene must be TYPE,N,F such as I,16,0.5, found {args.scene}") from None
+    """Add the arguments that name a replicate of a config; `select` finds it."""
+    add = parser.add_argument
+    add("config", help="config file (TOML)")
+    add("--replicate", type=int, default=0, metavar="K", help="default: 0")
+    add("--type", metavar="NAME", help="collision type (default: the first)")
+    add("--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)")
+    add("--delta", type=float, metavar="F", help="default: the first")
 
 
 def select(config: Config, args: Namespace) -> tuple[int, int, float]:
@@ -97,57 +87,45 @@ def outcome_line(config, place, replicate, row):
     )
 
 
-def draw(args, trajectory, title, source):
-    """Draw and save what was asked for; the paths written."""
-    rule, written = data_rule(args.overwrite), []
-    asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
-    for figure, names in asked.items():
-        made = drawn(trajectory, figure, args.frames, title) if names else None
-        for path in map(Path, names):
-            save(made, path, rule, source)
-            written.append(path)
-    if args.animation:
-        animated(trajectory, Path(args.animation), ANIMATION_FRAMES, title, rule)
-        written.append(Path(args.animation))
-    return written
-
-
 def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
     over = nested(map(parse_setting, args.settings))
     config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
-    take_scene(args)
     place = select(config, args)
     check_study(config)
     name, vertices, share = config.scene.names[place[0]], *place[1:]
     shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
     args.output = args.output or [f"{Path(args.config).stem}-{shows}.png"]
-    figures = [*args.output, *args.distance, *args.forces]
-    # What could not be written is said now, not after the run.
+    asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
+    figures = [path for paths in asked.values() for path in paths]
+    # What could not be written is reported now, not after the run.
     for path in figures:
         checked_format(path)
     if args.animation and Path(args.animation).suffix.lower() != ".gif":
         raise UsageError(f"--animation {args.animation} must end in .gif")
-    drawn = [*figures, *filter(None, [args.animation])]
-    outputs = [Output(path, data_rule(args.overwrite)) for path in drawn]
-    motion = [Output(path, data_rule(args.overwrite)) for path in filter(None, [args.save])]
-    check_outputs([*outputs, *motion], inputs_of(config, args.config))
+    rule = data_rule(args.overwrite)
+    outputs = [*figures, *filter(None, [args.animation, args.save])]
+    check_outputs([Output(path, rule) for path in outputs], inputs_of(config, args.config))
     study = one_count_study(config, place[1])
     found = replicate_of(args.replicate, place, study)
     assert found.row is not None, "a replicate of a study"
     title = outcome_line(config, place, args.replicate, found.row)
+    source, head = source_line(study.source), title.split(";")[0]
     print(title)
-    print(source_line(study.source))
-    for path in draw(args, found, title.split(";")[0], source_line(study.source)):
-        print(path)
+    print(source)
+    for figure, paths in asked.items():
+        made = drawn(found, figure, args.frames, head) if paths else None
+        for path in paths:
+            save(made, path, rule, source)
+    if args.animation:
+        animated(found, Path(args.animation), ANIMATION_FRAMES, head, rule)
     if args.save:
         facts = {"config": config.text, "replicate": args.replicate} | study.source
         facts["zone_distance"] = found.row["D_0"]
         write_trajectory(
-            args.save, found.t, found.position, found.velocity, found.shapes, facts,
-            data_rule(args.overwrite),
-        )  # fmt: skip
-        print(args.save)
+            args.save, found.t, found.position, found.velocity, found.shapes, facts, rule
+        )
+    print("\n".join(map(str, outputs)))
     return 0
 
 

@@ -5,12 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flocsim.errors import FlocsimError, visible
+from flocsim.errors import FlocsimError
 from flocsim.io.confidence import efficiency, wilson
 from flocsim.io.results.events import HOOK, MOST_UNKNOWN
 from flocsim.io.results.kernel_group import ESTIMATES, Kernel
 from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
+from flocsim.io.terminal import aligned
 from flocsim.process import WITHHELD
 
 ENDS = {
@@ -44,7 +45,7 @@ EFFICIENCY = "aggregations per approach over delta, in the plane and axially [95
 
 
 def format_table(results: Results) -> str:
-    """Counts and probabilities with their errors, one row per condition, a block per type.
+    """Return counts and probabilities with their errors, one row per condition, a block per type.
 
     Pr +- sampling error (longer side of the 95 % interval) +- numerical error (95 % bound); of a
     study whose outlines were cut closer and wider as well, between what Pr[A] would change by that
@@ -57,20 +58,21 @@ def format_table(results: Results) -> str:
     """
     conditions = list(np.ndindex(results.shape))
     ends = [n for n in ENDS if n != "n_held" or np.any(results.probabilities[n])]
-    rows = [condition_row(results, place, ends) for place in conditions]
     header = list(HEADER)
     if results.outlines:
         header.insert(SHAPE_COLUMN, ("of Pr[A]", "shape"))
-    upper, lower = zip(*header, *(ENDS[name] for name in ends), strict=True)
-    widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
-    if sum(widths) + 2 * len(widths) <= WIDTH:
-        widths = [width + 1 for width in widths]
-    lines = [align(upper, widths), align(lower, widths)]
-    for place, row in zip(conditions, rows, strict=True):
-        if place[1:] == (0, 0):
-            lines.append(f"type {results.types[place[0]]}")
-        lines.append(align(row, widths))
-    return "\n".join([*lines, *graze_lines(results.delta)])
+    header += [ENDS[name] for name in ends]
+    rows = [
+        *zip(*header, strict=True),
+        *(condition_row(results, each, ends) for each in conditions),
+    ]
+    lines = aligned(rows)
+    if len(max(lines, key=len)) > WIDTH:
+        lines = aligned(rows, gap=" ")
+    found = lines[:2]
+    for (t, *first), line in zip(conditions, lines[2:], strict=True):
+        found += [line] if any(first) else [f"type {results.types[t]}", line]
+    return "\n".join([*found, *graze_lines(results.delta)])
 
 
 GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
@@ -81,28 +83,27 @@ def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
     return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
-def efficiency_rows(results: Results) -> list[tuple[str, int, str, str]]:
-    """(type, N, in the plane, axially) of efficiencies with their 95 % intervals: the aggregations
-    per approach integrated over delta; none where delta does not reach from 0 to 1."""
-    planar, axial = (
-        efficiency(results.probabilities, results.delta, each) for each in (False, True)
-    )
+def efficiency_rows(results: Results) -> list[tuple[object, ...]]:
+    """Return (type, N, in the plane, axially) of efficiencies with their 95 % intervals: the
+    aggregations per approach integrated over delta; none where it does not reach from 0 to 1."""
+    table, delta = results.probabilities, results.delta
+    planar, axial = efficiency(table, delta, False), efficiency(table, delta, True)
     if planar is None or axial is None:
         return []
     rows = []
-    for t, name in enumerate(results.types):
-        for v, count in enumerate(results.vertices):
-            if np.isfinite(planar[0][t, v]):
-                first, second = (f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]"
-                                 for e, lo, hi in (planar, axial))  # fmt: skip
-                rows.append((str(name), int(count), first, second))
+    for t, v in np.ndindex(results.shape[:2]):
+        if np.isfinite(planar[0][t, v]):
+            words = [
+                f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]" for e, lo, hi in (planar, axial)
+            ]
+            rows.append((str(results.types[t]), int(results.vertices[v]), *words))
     return rows
 
 
 def efficiency_lines(results: Results) -> list[str]:
-    """The efficiency_rows as a table of text."""
+    """Return the efficiency_rows as a table of text."""
     lines = [
-        f"type {visible(name, '')}, N = {count}: {planar}   {axial}"
+        f"type {name}, N = {count}: {planar}   {axial}"
         for name, count, planar, axial in efficiency_rows(results)
     ]
     return [f"efficiency: {EFFICIENCY}", *lines] if lines else []
@@ -125,22 +126,17 @@ KERNEL_HEADER = (
 
 
 def kernel_lines(kernel: Kernel) -> list[str]:
-    """The rates of a kernel study as tables of text: one for each mechanism and N."""
+    """Return the rates of a kernel study as tables of text: one for each mechanism and N."""
     lines = [f"capture widths and kernels, {RECTILINEAR}", IN_WATER]
     if kernel.water:
         lines = ["capture widths and kernels, with hydrodynamic interaction"]
+    pairs = list(itertools.combinations_with_replacement(range(len(kernel.labels)), 2))
     for m, mechanism in enumerate(kernel.mechanisms):
         for v, count in enumerate(kernel.vertices):
-            rows = [
-                kernel_row(kernel, (m, v, i, j))
-                for i, j in itertools.combinations_with_replacement(range(len(kernel.labels)), 2)
-                if kernel.arrays["checked"][m, v, i, j] >= 0.0
-            ]
-            rows = [row for row in rows if row]
-            upper, lower = zip(*KERNEL_HEADER, strict=True)
-            widths = [max(map(len, column)) for column in zip(upper, lower, *rows, strict=True)]
-            lines += ["", f"{mechanism}, N = {count}", align(upper, widths), align(lower, widths)]
-            lines += [align(row, widths) for row in rows]
+            met = (kernel.arrays["checked"][m, v] >= 0.0) & (kernel.arrays["width_c"][m, v] != 0.0)
+            rows = [kernel_row(kernel, (m, v, i, j)) for i, j in pairs if met[i, j]]
+            table = aligned([*zip(*KERNEL_HEADER, strict=True), *rows], gap=" ")
+            lines += ["", f"{mechanism}, N = {count}", *table]
     edge = np.nanmax(kernel.arrays["edge"], initial=0.0)
     if edge > 0.0:
         lines.append(
@@ -151,51 +147,52 @@ def kernel_lines(kernel: Kernel) -> list[str]:
 
 
 def kernel_row(kernel, place):
-    """One pair of size classes; nothing for bodies that do not meet."""
+    """Return the cells of one pair of size classes."""
     found = {name: float(values[place]) for name, values in kernel.arrays.items()}
-    if found["width_c"] == 0.0:
-        return ()
 
-    def told(name, form, scale=1.0, spread=None):
-        """An estimate with its error by a function ``spread``; where it is not known, its ends."""
-        value, low, high = (scale * found[name + end] for end in ("", "_low", "_high"))
-        if np.isnan(value):
-            return "-" if np.isnan(high) else f"[{form(low)}, {form(high)}]"
-        return form(value) + (f" +-{spread(max(value - low, high - value))}" if spread else "")
+    def cell(name, form, scale=1.0, spread=None):
+        ends = (scale * found[name + end] for end in ("", "_low", "_high"))
+        return with_spread(*ends, form, spread)
 
     few, (least, most) = "{:.3g}".format, (found[f"alpha_change{end}"] for end in ("_low", "_high"))
-    added = "" if np.isnan(found["alpha"]) else (
-        " -" if np.isnan(least) else f" {signed(least)} {signed(most)}"
-    )  # fmt: skip
+    added = " -" if np.isnan(least) else f" {signed(least)} {signed(most)}"
     return (
-        visible(kernel.labels[place[2]], ""), visible(kernel.labels[place[3]], ""),
-        told("width_c", "{:.2f}".format, 1e6), told("width_a", "{:.2f}".format, 1e6),
-        told("alpha", share, spread=share) + added, told("beta2", few),
-        told("beta3", few, spread="{:.1g}".format), told("efficiency3", "{:.3f}".format),
+        kernel.labels[place[2]], kernel.labels[place[3]],
+        cell("width_c", "{:.2f}".format, 1e6), cell("width_a", "{:.2f}".format, 1e6),
+        cell("alpha", share, spread=share) + ("" if np.isnan(found["alpha"]) else added),
+        cell("beta2", few), cell("beta3", few, spread="{:.1g}".format),
+        cell("efficiency3", "{:.3f}".format),
     )  # fmt: skip
+
+
+def with_spread(value, low, high, form, spread=None):
+    """Return an estimate, with its error by a function ``spread``; its ends where it is not known,
+    "-" where neither is."""
+    if np.isnan(value):
+        return "-" if np.isnan(high) else f"[{form(low)}, {form(high)}]"
+    return form(value) + (f" +-{spread(max(value - low, high - value))}" if spread else "")
 
 
 def signed(change):
-    """ "-.040" or "+.040"."""
+    """Return "-.040" or "+.040"."""
     return f"{'-' if change < 0.0 else '+'}{share(abs(change))}"
 
 
 def touch_lines(results: Results) -> list[str]:
-    """What share of the decided pairs of a brownian study touched before they escaped, for each
-    type and N; none of other studies. Those that are held apart did not."""
+    """Return what share of the decided pairs of a brownian study touched before they escaped, for
+    each type and N; none of other studies. Those that are held apart did not."""
     if not stored(results.run, "equivalent_spheres"):
         return []
     table, lines = results.probabilities, []
-    for t, v in itertools.product(range(len(results.types)), range(len(results.vertices))):
-        touched, missed, held = (
-            int(table[name][t, v].sum()) for name in ("n_collided", "n_missed", "n_held")
-        )
-        decided = touched + missed + held
-        where = f"type {visible(results.types[t], '')}, N = {results.vertices[v]}"
-        if decided:
+    for t, v in np.ndindex(results.shape[:2]):
+        names = ("n_collided", "n_missed", "n_held")
+        touched, *others = (int(table[name][t, v].sum()) for name in names)
+        if decided := touched + sum(others):
             low, high = (float(end) for end in wilson(touched, decided))
-            told = f"{touched / decided:.4f} [{low:.4f}, {high:.4f}]"
-            lines.append(f"{where}: {told} touched before they escaped")
+            lines.append(
+                f"type {results.types[t]}, N = {results.vertices[v]}: {touched / decided:.4f} "
+                f"[{low:.4f}, {high:.4f}] touched before they escaped"
+            )
     return lines
 
 
@@ -234,33 +231,30 @@ def too_many_undecided(results: Results) -> bool:
 
 
 def undecided_line(results: Results) -> str:
-    """What to say where replicates are undecided or have failed: of pairs where there are more of
-    them than may be, of rates where there are any; "" else."""
-    table = results.probabilities
+    """Return what to say where replicates are undecided or have failed: of pairs where there are
+    more of them than may be, of rates where there are any; "" else."""
+    table, rates = results.probabilities, results.kernel is not None
     total, failed, undecided = (
         int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
     )
     too_many = too_many_undecided(results)
-    if not failed + undecided or not (too_many or results.kernel is not None):
+    if not failed + undecided or not (too_many or rates):
         return ""
-    notes = stored(results.run, "failed")
-    first = f"; the first: {describe_note(notes[0])}" if notes else ""
-    advice = (
-        ": raise integrator.max_steps or scene.time_limit, for another output" if undecided else ""
+    notes, noun = stored(results.run, "failed"), "points" if rates else "replicates"
+    largest = 100.0 * np.nanmax(shares_undecided(results), initial=0.0)
+    line = (
+        f"of {total} {noun} {failed} failed and {undecided} are undecided, up to {largest:.2g} % "
+        f"of {'a pair' if rates else 'a condition'}"
     )
-    ends = f"{failed} failed and {undecided} are undecided"
     if failed + undecided == total:
-        return f"no replicate has reached an outcome, {ends}{advice}{first}"
-    share = np.nanmax(shares_undecided(results), initial=0.0)
-    what, of_what = ("points", "a pair's encounters") if results.kernel is not None else (
-        "replicates", "those of a condition"
-    )  # fmt: skip
-    limit = f", more than stop.undecided = {most_undecided(results):g} allows" if too_many else ""
-    open_ = ", so that rates have no estimate" if too_many and results.kernel is not None else ""
-    return (
-        f"of {total} {what} {ends}, up to {100.0 * share:.2g} % of {of_what}{limit}: intervals "
-        f"include every outcome that they could have had{open_}{advice}{first}"
-    )
+        line = f"no replicate has reached an outcome, {failed} failed and {undecided} are undecided"
+    elif too_many:
+        line += f", more than stop.undecided = {most_undecided(results):g} allows"
+    if too_many and rates:
+        line += ", so that rates have no estimate"
+    if undecided:
+        line += ": raise integrator.max_steps or scene.time_limit, for another output"
+    return line + (f"; the first: {describe_note(notes[0])}" if notes else "")
 
 
 def verdict(found: Results) -> tuple[int, str]:
@@ -309,49 +303,48 @@ def change_lines(results: Results) -> list[str]:
 
 
 def worst_changes(results, group, name):
-    """The lowest and the highest change in a group of tables, where they are; "" for none."""
+    """Return the lowest and the highest change in a group of tables; "" for none."""
     if not group or not np.isfinite(group[f"{name}_low"]).any():
         return ""
-    low, high = group[f"{name}_low"], group[f"{name}_high"]
-    told = []
-    for values, worst in ((low, np.nanargmin(low)), (high, np.nanargmax(high))):
-        t, v, d = np.unravel_index(worst, values.shape)
-        told.append(
-            f"{values[t, v, d]:+.3f} (type {visible(results.types[t], '')}, "
-            f"N = {results.vertices[v]}, delta {results.delta[d]:g})"
+    words = []
+    for end, worst_of in (("_low", np.nanargmin), ("_high", np.nanargmax)):
+        values = group[name + end]
+        t, v, d = np.unravel_index(worst_of(values), values.shape)
+        words.append(
+            f"{values[t, v, d]:+.3f} (type {results.types[t]}, N = {results.vertices[v]}, "
+            f"delta {results.delta[d]:g})"
         )
-    return f"{told[0]} to {told[1]}"
+    return " to ".join(words)
 
 
 def condition_row(results, place, ends):
+    """Return the cells of one condition."""
     (_, v, d), table, outlines = place, results.probabilities, results.outlines
-    counts = ("n_total", "n_collided", "n_inside")
+    hanging = table["pr_bond"][place][HOOK - 1]
     return (
         str(results.vertices[v]),
         f"{results.delta[d]:g}",
-        *(str(table[name][place]) for name in counts),
+        *(str(table[name][place]) for name in ("n_total", "n_collided", "n_inside")),
         with_errors(table, "pr_inside", place),
         with_errors(table, "pr_a", place),
         *([shape_error(outlines, place)] if outlines else []),
-        hanging(table, place),
+        "-" if np.isnan(hanging) else share(hanging),
         *(str(number) for number in table["n_class"][place]),
         *(str(table[name][place]) for name in ends),
     )
 
 
 def with_errors(table, name, place):
-    """A probability +- sampling error +- numerical error, e.g. ".600 +-.031 +-.004".
+    """Return a probability +- sampling error +- numerical error, e.g. ".600 +-.031 +-.004".
 
     The longer side of the 95 % interval; "-" for a numerical error of which nothing is known, and
     the interval alone where the value is not.
     """
-    value, low, high, numerical = (
-        table[name + end][place] for end in ("", "_low", "_high", "_numerical")
-    )
-    if np.isnan(value):
-        return "-" if np.isnan(high) else f"[{share(low)}, {share(high)}]"
-    added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
-    return f"{share(value)} +-{share(max(value - low, high - value))} {added:>6}"
+    *known, numerical = (table[name + end][place] for end in ("", "_low", "_high", "_numerical"))
+    cell = with_spread(*known, share, share)
+    if np.isnan(known[0]):
+        return cell
+    return f"{cell} {'-' if np.isnan(numerical) else f'+-{share(numerical)}':>6}"
 
 
 def shape_error(outlines, place):
@@ -360,17 +353,7 @@ def shape_error(outlines, place):
     return "-" if np.isnan(low) else f"-{share(-low)} +{share(high)}"
 
 
-def hanging(table, place):
-    """The share of aggregations that hang by a hook."""
-    value = table["pr_bond"][place][HOOK - 1]
-    return "-" if np.isnan(value) else share(value)
-
-
 def share(value):
     """Three decimals in four characters: ".345", "1.00"."""
     text = f"{value:.3f}"
     return text[1:] if text.startswith("0") else text[:4]
-
-
-def align(cells, widths):
-    return " ".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()

@@ -7,10 +7,8 @@ costs what would be printed and nothing else.
 
 import contextlib
 import errno
-import io
 import os
 import sys
-import threading
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -30,7 +28,7 @@ WIDTH = 78
 
 
 def duration(seconds: float) -> str:
-    """Seconds in words: 42 s, 3 min 10 s, 2 h 05 min."""
+    """Return seconds in words: 42 s, 3 min 10 s, 2 h 05 min."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     if seconds < 6000:
@@ -38,46 +36,28 @@ def duration(seconds: float) -> str:
     return f"{int(seconds) // 3600} h {int(seconds) % 3600 // 60:02d} min"
 
 
-def aligned(rows: Sequence[Sequence[str]], left: int = 0) -> list[str]:
-    """Lines of a table, each column as wide as its widest word and set to the right, but for the
-    first ``left`` columns."""
+def aligned(rows: Sequence[Sequence[str]], left: int = 0, gap: str = "  ") -> list[str]:
+    """Return lines of a table, each column as wide as its widest word and set to the right, but for
+    the first ``left`` columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     sides = "<" * left + ">" * (len(widths) - left)
     forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
-    return ["  ".join(map(format, row, forms)) for row in rows]
+    return [gap.join(map(format, row, forms)).rstrip() for row in rows]
 
 
-@contextlib.contextmanager
-def counting_seconds(text: str) -> Iterator[None]:
-    """A line on stderr while something works that cannot tell how far it is; on a terminal it
-    counts the seconds."""
-    if not sys.stderr.isatty():
-        tell(f"flocsim: {text}", sys.stderr)
-        yield
-        return
-    began, over = time.monotonic(), threading.Event()
+def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as text without a newline at its end; cells are shown by ``str``.
 
-    def show(end=""):
-        renew(f"{text}: {time.monotonic() - began:.0f} s", sys.stderr, end)
-
-    def count():
-        while not over.wait(BAR_SECONDS):
-            show()
-
-    counter = threading.Thread(target=count, daemon=True)
-    counter.start()
-    try:
-        yield
-    finally:
-        over.set()
-        counter.join()
-        show("\n")
+    A bar inside a cell does not end it.
+    """
+    lines: list[Sequence[object]] = [heads, ["---"] * len(heads), *rows]
+    cells = ([str(cell).replace("|", "\\|") for cell in line] for line in lines)
+    return "\n".join("| " + " | ".join(line) + " |" for line in cells)
 
 
 def plain_warnings(silent: bool = False) -> None:
-    """From now on a warning is one line on stderr, without the place in the code, and so is what is
-    compiled; or both are nothing."""
-    units.show_by(units.silent if silent else counting_seconds)
+    """Show warnings, and what is compiled, as one line on stderr from now on, or not at all."""
+    units.show_by(units.silent if silent else units.one_line)
 
     def show(message, category, filename, lineno, file=None, line=None):
         if not silent:
@@ -86,48 +66,39 @@ def plain_warnings(silent: bool = False) -> None:
     warnings.showwarning = show
 
 
-class PlainStream(io.TextIOBase):
+class PlainStream:
     """Standard output or error: what is written to it is made visible, and may be lost.
 
-    ``problem``: the OSError by which something was lost, if it was; ``is_closed``: all will be.
+    ``problem``: the OSError by which something was lost, if it was.
     """
 
-    def __init__(self, stream: Any, is_closed: bool = False) -> None:
-        self.stream, self.is_closed = stream, is_closed
-        self.problem: OSError | None = None
+    def __init__(self, stream: Any) -> None:
+        self.problem = None if stream else OSError(errno.EBADF, "it is closed")
+        self.stream = stream or open(os.devnull, "w")  # noqa: SIM115 (as long as the process)
+        if hasattr(stream, "reconfigure"):
+            # A letter that a terminal does not know must not end a command.
+            stream.reconfigure(errors="replace")
 
     def write(self, text: str) -> int:
-        self.put(visible(text))
+        """Write a text; a carriage return begins the line anew, as `Progress` does."""
+        self.attempt(self.stream.write, visible(text, "\n\t\r"))
         return len(text)
 
-    def put(self, text: str) -> None:
-        """Write a text as it is."""
-        if self.is_closed:
-            self.problem = OSError(errno.EBADF, "it is closed")
-        self.guard(lambda: self.stream.write(text))
-
     def flush(self) -> None:
-        self.guard(lambda: self.stream.flush())
+        """Hand over what is in the buffer."""
+        self.attempt(self.stream.flush)
 
-    def guard(self, work):
+    def attempt(self, work: Any, *words: str) -> None:
+        """Do it, unless something was lost already."""
         if self.problem is not None:
             return
         try:
-            work()
+            work(*words)
         except (OSError, ValueError) as error:
             self.problem = error if isinstance(error, OSError) else OSError(str(error))
             # What is in the buffer goes nowhere, without another word at the end of the process.
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.stream.fileno())
-
-    def fileno(self) -> int:
-        return self.stream.fileno()
-
-    def isatty(self) -> bool:
-        return not self.stream.closed and self.stream.isatty()
-
-    def writable(self) -> bool:
-        return True
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
@@ -135,11 +106,11 @@ class PlainStream(io.TextIOBase):
 
 @contextlib.contextmanager
 def plain_streams() -> Iterator[None]:
-    """Standard output and error as PlainStreams, also where they were closed; as before after."""
+    """Make standard output and error PlainStreams, also where they were closed; as before after."""
     before = sys.stdout, sys.stderr
     fill_descriptors()
     if not isinstance(sys.stdout, PlainStream):
-        sys.stdout, sys.stderr = plain(sys.stdout), plain(sys.stderr)
+        sys.stdout, sys.stderr = PlainStream(sys.stdout), PlainStream(sys.stderr)
     try:
         yield
     finally:
@@ -159,17 +130,8 @@ def fill_descriptors() -> None:
         os.close(number)
 
 
-def plain(stream):
-    if stream is None:
-        return PlainStream(open(os.devnull, "w"), is_closed=True)
-    if hasattr(stream, "reconfigure"):
-        # A letter that a terminal does not know must not end a command.
-        stream.reconfigure(errors="replace")
-    return PlainStream(stream)
-
-
 def output_problem() -> str:
-    """Why standard output was lost, in words; "" where it was not, or its reader has just gone."""
+    """Return why standard output was lost; "" where it was not, or its reader has just gone."""
     sys.stdout.flush()
     problem = getattr(sys.stdout, "problem", None)
     if problem is None or isinstance(problem, BrokenPipeError):
@@ -177,24 +139,16 @@ def output_problem() -> str:
     return f"standard output could not be written: {problem.strerror or problem}"
 
 
-def tell(text: str, stream: TextIO | None = None) -> None:
+def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
     """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
 
     What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
     """
     stream = sys.stdout if stream is None else stream
     try:
-        print(text, file=stream, flush=True)
+        print(text, end=end, file=stream, flush=True)
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def renew(text: str, stream: Any, end: str = "") -> None:
-    """Write a line over the last one of a terminal."""
-    write = stream.put if isinstance(stream, PlainStream) else stream.write
-    with contextlib.suppress(OSError):
-        write(f"\r{visible(text, keep='')[:WIDTH]:<{WIDTH}}{end}")
-        stream.flush()
 
 
 class Progress:
@@ -204,15 +158,13 @@ class Progress:
         self, total: int, quiet: bool, stream: TextIO | None = None, noun: str = "replicates"
     ) -> None:
         """``total`` replicates, or what the noun says; nothing is printed where ``quiet``."""
-        self.total = self.todo = total
-        self.quiet = quiet
-        self.noun = noun
+        self.total, self.quiet, self.noun = total, quiet, noun
         self.stream = sys.stdout if stream is None else stream
         self.tty = self.stream.isatty()
-        self.began = time.monotonic()
-        self.printed = self.began
+        self.start(total)
 
     def say(self, text: str) -> None:
+        """Print a line, unless quiet."""
         if not self.quiet:
             tell(text, self.stream)
 
@@ -221,38 +173,32 @@ class Progress:
         tell(f"flocsim: {visible(text, keep='')}", sys.stderr)
 
     def start(self, todo: int) -> None:
-        """The work begins now, and is so much of the total."""
+        """Begin with so much of the total to do."""
         self.todo = todo
         self.began = self.printed = time.monotonic()
 
     def report(self, missing: int, going: str = "") -> None:
-        """So much is missing; ``going``: how far what runs now is."""
-        share = (self.todo - missing) / self.todo if self.todo else 1.0
+        """Print how much is missing; ``going``: how far what runs now is."""
         now = time.monotonic()
         if self.quiet or now - self.printed < (BAR_SECONDS if self.tty else LINE_SECONDS):
             return
         self.printed = now
-        left = (now - self.began) * (1.0 - share) / share if share > 0.0 else 0.0
+        share = (self.todo - missing) / self.todo if self.todo else 1.0
         text = f"{share:4.0%}  {self.total - missing} of {self.total} {self.noun}"
-        text += f", {duration(left)} left" if share > 0.0 else ""
+        if share > 0.0:
+            text += f", {duration((now - self.began) * (1.0 - share) / share)} left"
         text += f"; {going}" if going else ""
         if self.tty:
-            renew(text, self.stream)
+            self.renew(text)
         else:
             tell(text, self.stream)
 
+    def renew(self, text: str, end: str = "") -> None:
+        """Write a line over the last one of a terminal."""
+        tell(f"\r{text[:WIDTH]:<{WIDTH}}", self.stream, end)
+
     def finish(self) -> float:
-        """End the line that renews itself; the seconds since the start."""
+        """End the line that renews itself; return the seconds since the start."""
         if self.tty and not self.quiet:
-            renew("", self.stream, end="\r")
+            self.renew("", end="\r")
         return time.monotonic() - self.began
-
-
-def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table as text without a newline at its end; cells are shown by ``str``.
-
-    A bar inside a cell does not end it.
-    """
-    lines: list[Sequence[object]] = [heads, ["---"] * len(heads), *rows]
-    cells = ([str(cell).replace("|", "\\|") for cell in line] for line in lines)
-    return "\n".join("| " + " | ".join(line) + " |" for line in cells)

@@ -22,6 +22,14 @@ def run(*arguments):
     return args.run(args)
 
 
+def code_of(*arguments):
+    """The exit code of the command `flocsim fit`, also where its words are refused."""
+    try:
+        return main(["fit", *map(str, arguments)])
+    except SystemExit as end:
+        return end.code
+
+
 @pytest.fixture
 def frame(tmp_path):
     """A folder with one picture of three dark flocs, a larger and two smaller ones."""
@@ -60,9 +68,6 @@ def test_a_pixel_size_with_its_unit(tmp_path, frame):
 
 def test_a_doubtful_pixel_size_is_told_and_kept(tmp_path, frame, capsys):
     options = ("--vertices", "4", "--max-flocs", "1", "-o", tmp_path / "s.h5")
-    with pytest.raises(UsageError, match=r"reaches .* m, "):
-        run(frame, "--pixel-size", "8.6", *options)
-    capsys.readouterr()
     assert run(frame, "--pixel-size", "8.6 mm", *options) == 0
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith(
@@ -267,7 +272,7 @@ def test_regions_are_dropped_kept_and_added_by_their_numbers(tmp_path, frame, ca
     assert rows["b.png", "3"] == "too small"
     for words, told in {
         "--drop 1": "there are 2 pictures", "--keep c.png#1": "no picture is called 'c.png'",
-        "--add a.png#9": "no such region; its last is 3", "--drop a.png": "takes numbers or names",
+        "--add a.png#9": "no such region; its last is 3",
     }.items():  # fmt: skip
         with pytest.raises(UsageError, match=told):
             run(frame, *QUICK, *words.split(), "--overwrite", "-o", tmp_path / "s.h5")
@@ -393,6 +398,11 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--vertices", "2.5"),
         ("--max-flocs", "0"),
         ("--overlay", "picture.gif"),
+        ("--crop", "1,2,3"),
+        ("--crop", "0,0,0,5"),
+        ("--page", "x"),
+        ("--page", "1,"),
+        ("--page", "0"),
         ("--radius", "1,,2"),
         ("--jobs", "0"),
         ("--neck", "1.5"),
@@ -403,11 +413,10 @@ def test_a_spheroradius_above_the_flocs_is_told_once(tmp_path, frame, capsys):
         ("--drop", "a"),
     ],
 )
-def test_wrong_numbers_are_named(frame, option, value):
-    arguments = ["--pixel-size=1e-6", f"{option}={value}"]
-    with pytest.raises(UsageError, match=option) as caught:
-        run(frame, *arguments)
-    assert caught.value.exit_code == 2
+def test_wrong_values_are_named(frame, capsys, option, value):
+    assert code_of(frame, "--pixel-size=1e-6", f"{option}={value}") == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert option in line
 
 
 def test_the_pixel_size_is_needed(frame):
@@ -535,9 +544,6 @@ def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, caps
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--crop", "1,2,3"), "--crop takes X,Y,WIDTH,HEIGHT in pixels"),
-        (("--crop", "0,0,0,5"), "--crop takes a width and a height above 0"),
-        (("--page", "x"), "--page takes numbers from 1"),
         (("--masks", "--page", "1"), "--page, --channel and --crop apply to pictures"),
     ],
 )
@@ -605,11 +611,11 @@ def test_both_finders_find_the_same_flocs_on_even_light(tmp_path, capsys, finder
     ("words", "said"),
     [(["--finder", "paper", "--threshold", "0.2"], "--threshold does not apply"),
      (["--finder", "paper", "--noise-scale", "2"], "--noise-scale does not apply"),
-     (["--finder", "paper", "--cutoff", "0.7"], "--cutoff takes"),
+     (["--finder", "paper", "--cutoff", "0.7"], "--cutoff: takes"),
      (["--cutoff", "0.1"], "--finder paper only")],
 )  # fmt: skip
 def test_options_of_the_other_finder_are_refused(tmp_path, capsys, words, said):
-    assert main(["fit", str(tmp_path / "p.png"), "--pixel-size", "1e-6", *words]) == 2
+    assert code_of(tmp_path / "p.png", "--pixel-size", "1e-6", *words) == 2
     assert said in capsys.readouterr().err
 
 

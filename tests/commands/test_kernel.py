@@ -170,7 +170,16 @@ def test_a_dry_run_says_what_would_be_run(folder, capsys):
 @pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
-    words = ["trajectory", "kernel.toml", "--scene", "shear:10um-20um,1,1", "--replicate", "3"]
+    words = [
+        "trajectory",
+        "kernel.toml",
+        "--type",
+        "shear:10um-20um",
+        "--delta",
+        "1",
+        "--replicate",
+        "3",
+    ]
     assert main([*words, "-o", "a.png"]) == 0
     row = read_results("kernel.h5").replicates["outcome"][1, 0, 0, 3]
     told = capsys.readouterr().out

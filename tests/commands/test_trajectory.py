@@ -94,16 +94,6 @@ def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
         ]
 
 
-def test_a_scene_in_one_word_is_the_three_options(folder, capsys):
-    one = call(capsys, "small.toml", "--scene", "III,4,1.0", "-o", "a.png")
-    words = ["--type", "III", "--vertices", 4, "--delta", 1, "-o", "a.png"]
-    assert one == call(capsys, "small.toml", *words, "--overwrite")
-    assert one[0] == 0
-    for wrong in (["--scene", "III,4"], ["--scene", "III,x,1"], ["--scene", "I,4,1", "--delta", 1]):
-        code, _, [line] = call(capsys, "small.toml", *wrong)
-        assert (code, "--scene" in line) == (2, True)
-
-
 @pytest.mark.slow
 def test_the_same_command_makes_the_same_picture(folder, capsys):
     for name in ("a.png", "b.png"):

@@ -1,20 +1,10 @@
 """What is said while something is compiled."""
 
-import io
-import sys
-
 import pytest
 
 from flocsim.compiler import units
 from flocsim.compiler.composer import compose
 from flocsim.io import terminal
-
-
-class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self):
-        return True
 
 
 def halved(x):
@@ -54,19 +44,6 @@ def test_short_work_is_not_worth_a_line(capsys, monkeypatch):
     with units.compiling("it", 40):
         pass
     assert capsys.readouterr() == ("", "")
-
-
-def test_a_terminal_counts_the_seconds_and_ends_with_a_whole_line(monkeypatch):
-    screen = Terminal()
-    monkeypatch.setattr(sys, "stderr", screen)
-    monkeypatch.setattr(terminal, "BAR_SECONDS", 1e-3)
-    with pytest.raises(ValueError), terminal.counting_seconds("compiling it"):
-        while screen.getvalue().count("\r") < 2:
-            pass
-        raise ValueError
-    lines = screen.getvalue().split("\r")
-    assert all(line.startswith("compiling it: 0 s") for line in lines[1:])
-    assert screen.getvalue().endswith("\n") and screen.getvalue().count("\n") == 1
 
 
 def test_quiet_commands_and_other_ranks_say_nothing(cold, capsys):

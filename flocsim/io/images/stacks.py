@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import attrs
 
-from flocsim.errors import ImageError, UsageError
+from flocsim.errors import ImageError
 from flocsim.fields import read_number
 
 LONGEST_TEXT = 2**22
@@ -154,13 +154,13 @@ def pair_of(sides):
 
 
 def planes_of(
-    path: Path, stack: Stack, pages: str | None, channel: str | None,
+    path: Path, stack: Stack, pages: list[int] | None, channel: str | None,
     crop: tuple[int, int, int, int] | None = None,
 ) -> list[tuple[str, Plane]]:  # fmt: skip
     """[(what is put behind the file's name, Plane)] of the pictures that are asked for.
 
-    ``pages``: "all", or numbers with commas; ``channel``: a number, or a name that the file gives.
-    ImageError where the file has several and none is asked for, or has not that one.
+    ``pages``: numbers from 1, none of them for all; ``channel``: a number, or a name that the file
+    gives. ImageError where the file has several and none is asked for, or has not that one.
     """
     channels = stack.channel_count
     count = stack.frame_count // channels
@@ -172,7 +172,7 @@ def planes_of(
         named = [f"{k} {name}".strip() for k, name in enumerate(stack.channels, 1)]
         words = f" ({', '.join(named)})" if any(stack.channels) else ""
         raise ImageError(f"{path}: has {channels} channels{words}; choose with --channel 1")
-    wanted = range(count) if pages in (None, "all") else page_numbers(pages)
+    wanted = [page - 1 for page in dict.fromkeys(pages or range(1, count + 1))]
     if max(wanted) >= count:
         raise ImageError(f"{path}: has no page {max(wanted) + 1}, only {count}")
     chosen = 0 if channel is None else channel_place(path, stack, channel)
@@ -182,14 +182,6 @@ def planes_of(
         (f":{page + 1}" if count > 1 else "", Plane(stack.frame(page, place), sample, crop))
         for page in wanted
     ]
-
-
-def page_numbers(text):
-    """Pages, from 0, of a list of numbers from 1; UsageError for anything else."""
-    numbers = [each.strip() for each in text.split(",")]
-    if not all(each.isdecimal() and each.isascii() and int(each) > 0 for each in numbers):
-        raise UsageError(f"--page takes numbers from 1 with commas between them, or all: {text!r}")
-    return [int(each) - 1 for each in dict.fromkeys(numbers)]
 
 
 def channel_place(path, stack, text):

@@ -118,8 +118,8 @@ def describe_note(note: dict) -> str:
     """A failed replicate for messages, with the words that run it again."""
     why = re.sub("^too deep", "overlap exceeded half the summed spheroradii", note["why"])
     return (
-        f"{why} (flocsim trajectory CONFIG --scene "
-        f"{note['type']},{note['vertices']},{note['delta']!r} --replicate {note['replicate']})"
+        f"{why} (flocsim trajectory CONFIG --type {note['type']} --vertices {note['vertices']} "
+        f"--delta {note['delta']!r} --replicate {note['replicate']})"
     )
 
 

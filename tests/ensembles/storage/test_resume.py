@@ -326,7 +326,9 @@ def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path,
     with pytest.raises(SharedError, match="ZeroDivisionError") as caught:
         go_on(tmp_path, NEW)
     assert isinstance(caught.value.args[0], TooManyFailures)
-    assert "flocsim trajectory CONFIG --scene I,1,0.0 --replicate 3" in str(caught.value)
+    assert "flocsim trajectory CONFIG --type I --vertices 1 --delta 0.0 --replicate 3" in str(
+        caught.value
+    )
     assert caught.value.args[0].exit_code == 70
     # What was computed is still there, and a larger share may be allowed.
     monkeypatch.undo()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flocsim import __main__ as program
-from flocsim.commands import show
+from flocsim.commands import plot
 from flocsim.ensembles.strength import survey as module
 from flocsim.ensembles.strength.opening import Opening
 from flocsim.ensembles.strength.survey import Bound, Survey, bound_doublets, gathered, in_words
@@ -162,7 +162,7 @@ def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
     write_strengths(tmp_path / "s.h5", mixed(complete=False))
     back = read_strengths(tmp_path / "s.h5")
     assert not back.complete and mixed().complete
-    assert show.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 doublets"
+    assert plot.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 doublets"
     words = ["plot", str(tmp_path / "s.h5"), "--output-dir", str(tmp_path)]
     assert program.main(words) == 0
     assert (tmp_path / "s-strength.png").exists()
@@ -223,7 +223,7 @@ def test_the_command_writes_one_file_and_a_figure_and_replaces_none(
     names = {path.name for path in tmp_path.iterdir()}
     assert names >= {"study-strength.h5", "study-strength.png"} and len(names) == 4
     assert read_strengths("study-strength.h5").about["flow"] == "shear"
-    kind, found, *_ = show.read_content("study-strength.h5")
+    kind, found, *_ = plot.read_content("study-strength.h5")
     assert kind.figures(found).keys() == {"strength"}
     before = (tmp_path / "study-strength.h5").read_bytes()
     fake.asked.clear()

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 import tifffile
 
-from flocsim.errors import ImageError, UsageError
+from flocsim.errors import ImageError
 from flocsim.io.images.reading import read_grey, read_pixels
-from flocsim.io.images.stacks import Plane, Stack, page_numbers, pixel_size_in, planes_of, stack_of
+from flocsim.io.images.stacks import Plane, Stack, pixel_size_in, planes_of, stack_of
 
+ALL: list[int] = []
 RNG = np.random.default_rng(4)
 
 
@@ -36,15 +37,15 @@ def test_every_page_is_that_of_the_file(tmp_path, count, kind):
         chosen(path)
     with pytest.raises(ImageError, match=f"holds {count} pictures; choose with --page"):
         read_pixels(path)
-    found = chosen(path, "all")
+    found = chosen(path, ALL)
     assert [name for name, _ in found] == [f":{k + 1}" for k in range(count)]
     for (_, plane), page in zip(found, data, strict=True):
         np.testing.assert_array_equal(read_pixels(path, plane), page)
-    [(name, plane)] = chosen(path, str(count), crop=(3, 2, 10, 5))
+    [(name, plane)] = chosen(path, [count], crop=(3, 2, 10, 5))
     assert name == f":{count}"
     np.testing.assert_array_equal(read_pixels(path, plane), data[-1][2:7, 3:13])
     with pytest.raises(ImageError, match=f"has no page {count + 1}, only {count}"):
-        chosen(path, str(count + 1))
+        chosen(path, [count + 1])
 
 
 def nothing():
@@ -60,14 +61,14 @@ def test_channels_are_told_from_pages(tmp_path, kind):
     about = {"axes": "TCYX"} | ({"Channel": {"Name": ["DAPI", "b", "c"]}} if kind == "ome" else {})
     tifffile.imwrite(path, data, imagej=kind == "imagej", metadata=about)
     with pytest.raises(ImageError, match=r"has 3 channels.*choose with --channel 1"):
-        chosen(path, "all")
+        chosen(path, ALL)
     for channel in (1, 2, 3):
-        for (_, plane), page in zip(chosen(path, "all", str(channel)), data, strict=True):
+        for (_, plane), page in zip(chosen(path, ALL, str(channel)), data, strict=True):
             np.testing.assert_array_equal(read_pixels(path, plane), page[channel - 1])
     if kind == "ome":
-        assert chosen(path, "1", "DAPI") == chosen(path, "1", "1")
+        assert chosen(path, [1], "DAPI") == chosen(path, [1], "1")
     with pytest.raises(ImageError, match="has no channel 4"):
-        chosen(path, "1", "4")
+        chosen(path, [1], "4")
 
 
 def test_a_colour_is_a_channel(tmp_path):
@@ -117,13 +118,6 @@ def test_crops_stay_inside(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", planes())
     with pytest.raises(ImageError, match="--crop 15,0,6,3 reaches beyond its 20 × 12 pixels"):
         read_pixels(tmp_path / "a.tif", Plane(crop=(15, 0, 6, 3)))
-
-
-def test_what_is_no_list_of_pages_is_refused():
-    assert page_numbers("3, 1,3") == [2, 0]
-    for text in ("", "0", "-1", "a", "1;2", "1,"):
-        with pytest.raises(UsageError, match="--page takes numbers from 1"):
-            page_numbers(text)
 
 
 def test_what_a_file_says_falsely_is_not_believed(tmp_path):

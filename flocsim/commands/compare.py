@@ -1,0 +1,36 @@
+"""`flocsim compare`: what one study has more of than another."""
+
+import argparse
+
+from flocsim.ensembles.contents import compare, file_kind, studies
+from flocsim.io.seals import held
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Print the differences between two results files, at every condition, or time, that both
+    have, with 95 % intervals: of paired replicates where both have drawn the same ones (the
+    same seed), otherwise of independent samples. What the studies differ in is printed first.
+
+    first: results file written by flocsim ensemble
+    second: results file to compare with it
+    """
+    known = [
+        f"of {kind.title} {', '.join(f'{name} ({words})' for name, words in kind.compared.items())}"
+        for kind in studies()
+        if kind.compared
+    ]
+    words = f"what to compare: {'; '.join(known)} (default: the first)"
+    parser.add_argument("first")
+    parser.add_argument("second")
+    parser.add_argument("--quantity", metavar="NAME", help=words.replace("%", "%%"))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the comparison; returns the exit code."""
+    both = []
+    for path in (args.first, args.second):
+        kind = file_kind(source := held(path), "compare")
+        both.append(kind.opened(source))
+        print(f"{path}: {kind.source(both[-1]) or 'its source is not stated'}")
+    print(compare(*both).table(*filter(None, [args.quantity])))
+    return 0

@@ -1,0 +1,68 @@
+"""`flocsim info`: what is in a file, for a person to read."""
+
+import argparse
+import sys
+from typing import Any
+
+from flocsim.commands import add_allowed, allowed_by
+from flocsim.ensembles.config.sources import read_sources
+from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
+from flocsim.errors import FileError
+from flocsim.io.journal import journal_of
+from flocsim.io.seals import held
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Print the contents of a file: conditions, counts, probabilities with 95 % intervals,
+    and its origin; of a study that is running or was interrupted, the replicates so far,
+    without touching it.
+
+    results: file written, or being written, by flocsim
+    --config: print only the config that it was run with
+    --modules: print only the user's modules that it was run with
+    --water: print only how often the equivalent spheres of a study of pairs or rates touch, with
+        and without the water that they push at each other (a second or two for each pair); of a
+        shape library, how fast its flocs settle and turn
+    """
+    parser.add_argument("results")
+    for name in ("--config", "--modules", "--water"):
+        parser.add_argument(name, action="store_true")
+    add_allowed(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what was asked for; returns the exit code."""
+    journal = journal_of(args.results)
+    if journal is not None:
+        if args.config or args.modules or args.water:
+            raise FileError(f"{journal} has no config: it belongs to a run that has not ended")
+        # All kinds of studies, and the engine with them, are wanted here alone.
+        from flocsim.ensembles.storage.unfinished import read_unfinished
+
+        print(unfinished_text(read_unfinished(journal)))
+    elif args.water:
+        source = held(args.results)
+        print("\n".join(file_kind(source, "water").water(source, allowed_by(args))))
+    elif args.config or args.modules:
+        kind = file_kind(source := held(args.results), "run")
+        print_inputs(args, kind.run(kind.read(source)))
+    else:
+        print(text_of(args.results))
+    return 0
+
+
+def print_inputs(args: argparse.Namespace, run: dict[str, Any]) -> None:
+    """Print the config, the modules, or both, that a file stores; FileError where it has none."""
+    if args.config:
+        if not run.get("config"):
+            raise FileError(f"{args.results} has no config: it was not written by flocsim ensemble")
+        sys.stdout.write(str(run["config"]))
+    if args.modules:
+        try:
+            modules = read_sources(run)
+        except ValueError as error:
+            raise FileError(f"{args.results} has no readable results: {error}") from error
+        if not modules:
+            raise FileError(f"{args.results} has no modules: its study used none")
+        for place, each in modules.items():
+            sys.stdout.write(f"# {place}\n{each['source'].rstrip()}\n")

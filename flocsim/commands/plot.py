@@ -1,0 +1,112 @@
+"""`flocsim plot`: the figures of a file."""
+
+import argparse
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from flocsim.commands import add_overwrite
+from flocsim.ensembles.config import FILES, contents_of
+from flocsim.ensembles.contents import Contents, file_kind, studies
+from flocsim.errors import UsageError
+from flocsim.io.files import make_folder
+from flocsim.io.journal import journal_of
+from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.plots.results import MOST_ROWS
+from flocsim.io.plots.style import FORMATS, mark_figure, save
+from flocsim.io.seals import held
+
+
+def listed(figures: Mapping[str, Any]) -> str:
+    """Return a line for every figure: its name and the first line of its docstring."""
+    first = {name: (draw.__doc__ or "").partition("\n")[0] for name, draw in figures.items()}
+    return "\n".join(f"  {name:<8}  {text.removesuffix('.')}" for name, text in first.items())
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """results: file written by flocsim ensemble or flocsim fit
+    --output-dir DIR: folder for the figures, created if missing (default: the current one)
+    --format: default: %(default)s
+    --figures LIST: figures, separated by commas (default: all that the file has)
+    --animation FILE.gif: for a swarm study: also write its first swarm as an animation
+    """
+    drawn = {words: figures for name in FILES for words, figures in contents_of(name).drawn.items()}
+    parser.description = "\n".join([
+        "Draw the figures of a file, each to its own file.",
+        *(f"Of {words}:\n{listed(figures)}" for words, figures in drawn.items()),
+        "Of a running study, the figures of the replicates so far are drawn, marked as unfinished.",
+        "Figures are numbered as in Tang et al. (2014).",
+    ])  # fmt: skip
+    add = parser.add_argument
+    add("results")
+    add("--output-dir", default=".")
+    add("--format", default="png", choices=FORMATS)
+    add("--figures")
+    add("--animation")
+    add_overwrite(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw the figures asked for, print the path of each; returns the exit code."""
+    source = held(args.results)
+    kind, content, remark, foot = read_content(source)
+    figures = kind.figures(content)
+    names = list(figures)
+    if args.figures is not None:
+        names = list(dict.fromkeys(map(str.strip, args.figures.split(","))))
+    foreign = [name for name in names if name not in figures]
+    if foreign:
+        raise UsageError(f"{args.results} has no figure {foreign[0]!r}, only {', '.join(figures)}")
+    folder, rule = Path(args.output_dir), data_rule(args.overwrite)
+    make_folder(folder, "--output-dir ")
+    paths = {
+        name: folder / f"{Path(args.results).stem}-{label(name)}.{args.format}" for name in names
+    }
+    animation = animation_of(args, kind)
+    check_outputs([Output(path, rule) for path in (*paths.values(), *animation)], [args.results])
+    if kind.rows_drawn & paths.keys() and not remark:
+        most = MOST_ROWS if args.figures is None else math.inf
+        content = kind.with_rows(source, content, most)
+    for name, path in paths.items():
+        figure = figures[name](content)
+        if remark:
+            mark_figure(figure, remark)
+        save(figure, path, rule, foot)
+        print(path)
+    for path in animation:
+        kind.animate(path, content, rule=rule)
+        print(path)
+    return 0
+
+
+def animation_of(args: argparse.Namespace, kind: Contents) -> list[Path]:
+    """Return [path of the animation asked for]; UsageError where there can be none."""
+    if not args.animation:
+        return []
+    if kind.animate is None:
+        able = " or ".join(each.title for each in studies() if each.animate)
+        raise UsageError(
+            f"--animation is for {able}; for one collision use flocsim trajectory --animation"
+        )
+    if Path(args.animation).suffix.lower() != ".gif":
+        raise UsageError(f"--animation {args.animation} must end in .gif")
+    return [Path(args.animation)]
+
+
+def label(name: str) -> str:
+    """Return a figure's name in names of files."""
+    return f"figure-{name}" if name.isdigit() else name
+
+
+def read_content(path: Any) -> tuple[Contents, Any, str, str]:
+    """Return (Contents, what a file holds, what each figure of it has to say, and its source)."""
+    if (journal := journal_of(path)) is not None:
+        from flocsim.ensembles.storage.unfinished import read_unfinished
+
+        begun = read_unfinished(journal)
+        last = begun.sessions[-1]
+        return contents_of(begun.kind), begun.results, begun.progress, str(last.get("source", ""))
+    kind = file_kind(path)
+    found = kind.read(path)
+    return kind, found, kind.mark(found), kind.source(found)
