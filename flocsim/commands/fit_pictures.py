@@ -240,9 +240,8 @@ def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
                 for mask in masks
             ]
         except ShapeError as error:
-            raise ShapeError(
-                f"{name}: {error}, or leave out small flocs with --min-radius"
-            ) from None
+            message = f"{name}: {error}, or leave out small flocs with --min-radius"
+            raise ShapeError(message) from None
 
 
 def list_pictures(names: Sequence[str], masks: bool) -> list[Path]:
@@ -282,46 +281,32 @@ def find_background(paths: Sequence[Path], options: Namespace) -> np.ndarray | N
 
 
 def pictures_beneath(folder: str | None, paths: Sequence[Path]) -> dict[Path, Path]:
-    """Return {path of a mask: the picture of its name in a folder}; UsageError for several."""
+    """Return {path of a mask: the picture of its name in a folder}."""
     if folder is None:
         return {}
     if not Path(folder).is_dir():
         raise UsageError(f"--pictures takes a folder, found {folder!r}")
-    found: dict[Path, Path] = {}
-    pictures = [path for path in sorted(Path(folder).iterdir()) if path.suffix.lower() in SUFFIXES]
-    for mask in paths:
-        named = [path for path in pictures if path.stem == mask.stem]
-        if len(named) > 1:
-            raise UsageError(
-                f"--pictures {folder} has {named[0].name} and {named[1].name}, so the picture of "
-                f"{mask.name} is ambiguous; move one of them away"
-            )
-        if named:
-            found[mask] = named[0]
-    missing = [path.name for path in paths if path not in found]
+    pictures = {
+        path.stem: path
+        for path in sorted(Path(folder).iterdir())
+        if path.suffix.lower() in SUFFIXES
+    }
+    missing = [path.name for path in paths if path.stem not in pictures]
     if missing:
-        report(
-            f"warning: --pictures {folder} has no picture of {', '.join(missing)}; drawn over the "
-            "mask"
-        )
-    return found
+        report(f"warning: --pictures {folder} has no picture of {', '.join(missing)}")
+    return {path: pictures[path.stem] for path in paths if path.stem in pictures}
 
 
 def grey_beneath(picture: Picture, beneath: Mapping[Path, Path], options: Namespace) -> np.ndarray:
-    """Return what the overlay of a picture is drawn over."""
+    """Return what the overlay of a picture is drawn over: of a mask its picture, or itself."""
     if not options.masks:
         return read_grey(picture.path, picture.plane or Plane(), options.memory)
     mask = picture.found.foreground
-    if picture.path not in beneath:
-        return mask
-    grey = read_grey(beneath[picture.path], memory=options.memory)
-    if grey.shape == mask.shape:
-        return grey
-    sizes = [f"{width} × {height}" for height, width in (grey.shape, mask.shape)]
-    report(
-        f"warning: {beneath[picture.path]} has {sizes[0]} pixels and its mask {sizes[1]}; drawn "
-        "over the mask"
-    )
+    if picture.path in beneath:
+        grey = read_grey(beneath[picture.path], memory=options.memory)
+        if grey.shape == mask.shape:
+            return grey
+        report(f"warning: {beneath[picture.path]} is not of the size of its mask, and not drawn")
     return mask
 
 

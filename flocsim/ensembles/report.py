@@ -1,7 +1,7 @@
 """The table of a study for the terminal."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,29 +13,6 @@ from flocsim.io.results.run_group import describe_note, stored
 from flocsim.io.results.schema import CLASSES, Results
 from flocsim.io.terminal import aligned
 from flocsim.process import WITHHELD
-
-ENDS = {
-    "n_missed": ("mis-", "sed"),
-    "n_held": ("", "held"),
-    "n_undecided": ("unde-", "cided"),
-    "n_failed": ("fail-", "ed"),
-}
-"""Columns of replicates that did not collide or have no class; those held only where there are any,
-as they take colloids that repel each other."""
-
-HEADER = (
-    ("", "N"),
-    ("del-", "ta"),
-    ("", "n"),
-    ("col-", "lided"),
-    ("in-", "side"),
-    ("Pr[inside]", "95 %  num."),
-    ("Pr[A]", "95 %  num."),
-    ("of A", "hang"),
-    *(("", name) for name in CLASSES),
-)
-SHAPE_COLUMN = 7
-"""Where the error by the shape stands, behind Pr[A]."""
 
 WIDTH = 110
 """Columns of a wide terminal; the table is set more openly where this leaves room."""
@@ -57,15 +34,9 @@ def format_table(results: Results) -> str:
     without a final line end.
     """
     conditions = list(np.ndindex(results.shape))
-    ends = [n for n in ENDS if n != "n_held" or np.any(results.probabilities[n])]
-    header = list(HEADER)
-    if results.outlines:
-        header.insert(SHAPE_COLUMN, ("of Pr[A]", "shape"))
-    header += [ENDS[name] for name in ends]
-    rows = [
-        *zip(*header, strict=True),
-        *(condition_row(results, each, ends) for each in conditions),
-    ]
+    columns = columns_of(results)
+    cells = [[column(place) for column in columns.values()] for place in conditions]
+    rows = [*zip(*(head.split("/") for head in columns), strict=True), *cells]
     lines = aligned(rows)
     if len(max(lines, key=len)) > WIDTH:
         lines = aligned(rows, gap=" ")
@@ -73,6 +44,36 @@ def format_table(results: Results) -> str:
     for (t, *first), line in zip(conditions, lines[2:], strict=True):
         found += [line] if any(first) else [f"type {results.types[t]}", line]
     return "\n".join([*found, *graze_lines(results.delta)])
+
+
+def columns_of(results: Results) -> dict[str, Callable[[tuple[int, ...]], str]]:
+    """Return {head of a column, in two lines: (place of a condition) → its cell}."""
+    table, outlines = results.probabilities, results.outlines
+
+    def count(name: str, *place_of_class: int) -> Callable[[tuple[int, ...]], str]:
+        return lambda place: str(table[name][(*place, *place_of_class)])
+
+    def hanging(place: tuple[int, ...]) -> str:
+        value = table["pr_bond"][(*place, HOOK - 1)]
+        return "-" if np.isnan(value) else share(value)
+
+    found = {
+        "/N": lambda place: str(results.vertices[place[1]]),
+        "del-/ta": lambda place: f"{results.delta[place[2]]:g}",
+        "/n": count("n_total"),
+        "col-/lided": count("n_collided"),
+        "in-/side": count("n_inside"),
+        "Pr[inside]/95 %  num.": lambda place: with_errors(table, "pr_inside", place),
+        "Pr[A]/95 %  num.": lambda place: with_errors(table, "pr_a", place),
+    }
+    if outlines:
+        found["of Pr[A]/shape"] = lambda place: shape_error(outlines, place)
+    found["of A/hang"] = hanging
+    found |= {f"/{name}": count("n_class", place) for place, name in enumerate(CLASSES)}
+    found["mis-/sed"] = count("n_missed")
+    if np.any(table["n_held"]):  # it takes colloids that repel each other
+        found["/held"] = count("n_held")
+    return found | {"unde-/cided": count("n_undecided"), "fail-/ed": count("n_failed")}
 
 
 GRAZE = "delta 1: by construction the outlines just graze, or miss; it says little about collisions"
@@ -119,10 +120,9 @@ IN_WATER = "for the effect of the water on equivalent spheres: flocsim info FILE
 """Where that is to be had."""
 
 KERNEL_HEADER = (
-    ("class", "i"), ("", "j"), ("width [um]", "touched"), ("", "aggregated"),
-    ("alpha", "95 %    num."), ("beta2", "[m2/s]"), ("beta3 [m3/s]", "+- 95 %"),
-    ("over ref.", "sphere"),
-)  # fmt: skip
+    ("class", "", "width [um]", "", "alpha", "beta2", "beta3 [m3/s]", "over ref."),
+    ("i", "j", "touched", "aggregated", "95 %    num.", "[m2/s]", "+- 95 %", "sphere"),
+)
 
 
 def kernel_lines(kernel: Kernel) -> list[str]:
@@ -135,7 +135,7 @@ def kernel_lines(kernel: Kernel) -> list[str]:
         for v, count in enumerate(kernel.vertices):
             met = (kernel.arrays["checked"][m, v] >= 0.0) & (kernel.arrays["width_c"][m, v] != 0.0)
             rows = [kernel_row(kernel, (m, v, i, j)) for i, j in pairs if met[i, j]]
-            table = aligned([*zip(*KERNEL_HEADER, strict=True), *rows], gap=" ")
+            table = aligned([*KERNEL_HEADER, *rows], gap=" ")
             lines += ["", f"{mechanism}, N = {count}", *table]
     edge = np.nanmax(kernel.arrays["edge"], initial=0.0)
     if edge > 0.0:
@@ -315,23 +315,6 @@ def worst_changes(results, group, name):
             f"delta {results.delta[d]:g})"
         )
     return " to ".join(words)
-
-
-def condition_row(results, place, ends):
-    """Return the cells of one condition."""
-    (_, v, d), table, outlines = place, results.probabilities, results.outlines
-    hanging = table["pr_bond"][place][HOOK - 1]
-    return (
-        str(results.vertices[v]),
-        f"{results.delta[d]:g}",
-        *(str(table[name][place]) for name in ("n_total", "n_collided", "n_inside")),
-        with_errors(table, "pr_inside", place),
-        with_errors(table, "pr_a", place),
-        *([shape_error(outlines, place)] if outlines else []),
-        "-" if np.isnan(hanging) else share(hanging),
-        *(str(number) for number in table["n_class"][place]),
-        *(str(table[name][place]) for name in ends),
-    )
 
 
 def with_errors(table, name, place):

@@ -128,18 +128,14 @@ HALVINGS = 40
 
 
 def checked_counts(successes: ArrayLike, trials: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """Both counts as float arrays, after a check that they can be counts."""
+    """Return both counts as float arrays of one shape; UsageError for what cannot be counts."""
     try:
-        successes, trials = np.broadcast_arrays(
-            np.asarray(successes, dtype=float), np.asarray(trials, dtype=float)
-        )
+        s, m = np.broadcast_arrays(np.asarray(successes, float), np.asarray(trials, float))
     except (TypeError, ValueError) as error:
         raise UsageError(f"successes and trials must be matching counts: {error}") from error
-    possible = (successes >= 0) & (successes <= trials) & np.isfinite(trials)
-    whole = (successes == np.floor(successes)) & (trials == np.floor(trials))
-    if not np.all(possible & whole):
+    if not np.all((s >= 0) & (s <= m) & np.isfinite(m) & (s == np.floor(s)) & (m == np.floor(m))):
         raise UsageError("successes and trials must be whole with 0 <= successes <= trials")
-    return successes, trials
+    return s, m
 
 
 def cluster_sums(successes: np.ndarray, trials: np.ndarray) -> np.ndarray:
@@ -375,8 +371,8 @@ NEGLIGIBLE = 1e-6
 
 
 def explained_share(groups: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
-    """(share, low, high) of the variance of ``values`` (n,) that lies between groups, of which
-    ``groups`` (n,) has the numbers.
+    """Return (share, low, high) of the variance of ``values`` (n,) that lies between groups, of
+    which ``groups`` (n,) has the numbers.
 
     ε² = (SS_between − (k − 1) s²)/SS_total, s² the variance within groups: 0 on average where they
     do not matter. 95 % interval by the noncentral F distribution.
@@ -401,7 +397,7 @@ def explained_share(groups: np.ndarray, values: np.ndarray) -> tuple[float, floa
     ratio = between / (k - 1) / within
 
     def noncentrality(quantile):
-        """That at which so many ratios would lie below the one found; 0 where none is as small."""
+        """Return that at which so many ratios lie below this one; 0 where none is as small."""
         if f.cdf(ratio, k - 1, n - k) <= quantile:
             return 0.0
         most = 1.0 + n
@@ -410,5 +406,4 @@ def explained_share(groups: np.ndarray, values: np.ndarray) -> tuple[float, floa
         return float(brentq(lambda c: ncf.cdf(ratio, k - 1, n - k, c) - quantile, 0.0, most))
 
     low, high = (noncentrality(quantile) for quantile in (0.975, 0.025))
-    share = max((between - (k - 1) * within) / total, 0.0)
-    return share, low / (low + n), high / (high + n)
+    return max((between - (k - 1) * within) / total, 0.0), low / (low + n), high / (high + n)

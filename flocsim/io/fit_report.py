@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from flocsim.errors import visible
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
@@ -25,9 +24,6 @@ CLASS_LIMIT = 5.0
 MOST_ERROR = 5.0
 """RE [%] above which the form of a floc is lost on its outline of so few vertices."""
 
-LEAST_FALL, MOST_FALL = 1.0, 2.0
-"""Powers of N by which RE falls at least and at most: of ragged and of smooth outlines."""
-
 COLUMNS = (
     "picture", "floc", "left_out_because", "x_px", "y_px", "area_px", "r_eq_px", "r_eq_m",
     "blur_px", "level", "r_eq_low_px", "r_eq_high_px", "parted", "weight",
@@ -37,6 +33,7 @@ COLUMNS = (
 SHARES = (0.1, 0.5, 0.9)
 """Of the flocs, or of their volume, that are smaller than D10, D50 and D90."""
 
+NAN = math.nan
 FEWEST = 3
 """Flocs of different sizes from which on a slope has an error."""
 
@@ -68,7 +65,7 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     if found.threshold == found.threshold:
         about += f", threshold {found.threshold:.4g}"
     alarms = "".join(f"; CHECK THE OVERLAY: {alarm}" for alarm in found.alarms)
-    return f"{visible(name, keep='')}: {', '.join(parts)}; {about}{alarms}"
+    return f"{name}: {', '.join(parts)}; {about}{alarms}"
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
@@ -77,7 +74,7 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
         coarse = sum(region.equivalent_radius <= radius for region in regions)
         if coarse:
             print(
-                f"flocsim: {visible(name, keep='')}: the spheroradius of {radius:g} px is not "
+                f"flocsim: {name}: the spheroradius of {radius:g} px is not "
                 f"below r_eq of {plural(coarse, 'floc')}, whose outline the fit cannot follow; use "
                 "a smaller --radius",
                 file=sys.stderr,
@@ -85,31 +82,18 @@ def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float])
 
 
 def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
-    """What to say where the largest N is too small for flocs; "" where it is not.
+    """Return what to say where the largest N is too small for flocs; "" where it is not.
 
-    errors: {floc: {N: RE [%]}}. The N that would do follows from how RE fell from the N before.
+    errors: {floc: {N: RE [%]}}.
     """
-    worst, needed, over = "", 0.0, 0
     most = max((n for found in errors.values() for n in found), default=1)
-    for name, found in errors.items():
-        if most == 1 or found[most] <= MOST_ERROR:
-            continue
-        over += 1
-        before = max((n for n in found if 1 < n < most), default=0)
-        fall = LEAST_FALL
-        if before:
-            fall = math.log(max(found[before] / found[most], 1.0)) / math.log(most / before)
-        fall = min(max(fall, LEAST_FALL), MOST_FALL)
-        wanted = most * (found[most] / MOST_ERROR) ** (1.0 / fall)
-        if wanted > needed:
-            worst, needed = name, wanted
-    if not over:
+    coarse = {name: found[most] for name, found in errors.items() if found[most] > MOST_ERROR}
+    if most == 1 or not coarse:
         return ""
-    of = "the floc" if len(errors) == 1 else f"{over} of {len(errors)} flocs"
+    worst = max(coarse, key=lambda name: coarse[name])
     return (
-        f"N = {most} is too small for {of}: RE is above {MOST_ERROR:g} %, and "
-        f"{errors[worst][most]:.3g} % for {visible(worst, keep='')}, which needs about "
-        f"{math.ceil(needed)} vertices"
+        f"N = {most} is too small for {len(coarse)} of {plural(len(errors), 'floc')}: RE is above "
+        f"{MOST_ERROR:g} %, and {coarse[worst]:.3g} % for {worst}; more vertices lower it"
     )
 
 
@@ -145,8 +129,8 @@ def format_errors(entries: Sequence[ShapeEntry]) -> str:
 
 
 def summary_text(pictures: Sequence[Any]) -> str:
-    """The table of all regions as CSV: flocs with their shape measures and RE [%] for every r [px]
-    and N, others with why.
+    """Return the table of all regions as CSV: flocs with their shape measures and RE [%] for every
+    r [px] and N, others with why.
 
     pictures: with name, pixel_size [m], found (Segmentation), measures {label: ShapeMeasures} of
     found.regions, and fits {label: [{r: {N: Fit}}, …]} of those of them that are fitted.
@@ -157,29 +141,30 @@ def summary_text(pictures: Sequence[Any]) -> str:
     table = csv.writer(text, lineterminator="\n")
     table.writerow([*COLUMNS, *(f"re_percent_r{r:g}_N{n}" for r, n in pairs)])
     for picture in pictures:
-        for region in picture.found.regions:
-            fits = picture.fits.get(region.label)
-            why = "" if fits else "not among the largest"
-            found = picture.measures[region.label]
-            row = [picture.name, region.label, why, *_facts(region, picture.pixel_size),
-                   *(f"{getattr(found, name):.5g}" for name in MEASURE_COLUMNS)]  # fmt: skip
-            errors = [f"{fits[0][r][n].relative_error:.4f}" if fits else "" for r, n in pairs]
-            table.writerow([*row, *errors])
-        for region in picture.found.rejected:
-            row = [picture.name, region.label, region.reason, *_facts(region, picture.pixel_size)]
-            table.writerow([*row, *[""] * (len(MEASURE_COLUMNS) + len(pairs))])
+        for region in (*picture.found.regions, *picture.found.rejected):
+            fits = None if region.reason else picture.fits.get(region.label)
+            why = region.reason or ("" if fits else "not among the largest")
+            measures = None if region.reason else picture.measures[region.label]
+            radius, band = (
+                region.equivalent_radius,
+                region.radius_band if region.band else (NAN, NAN),
+            )
+            table.writerow([
+                picture.name, region.label, why,
+                *(f"{each:.2f}" for each in region.centroid),
+                region.area, f"{radius:.3f}", f"{radius * picture.pixel_size:.4g}",
+                cell(region.blur, ".3g"), cell(region.level, ".4g"),
+                *(cell(each, ".3f") for each in band),
+                cell(region.parted, ".2f"), f"{region.weight:.4g}",
+                *(cell(getattr(measures, name, NAN), ".5g") for name in MEASURE_COLUMNS),
+                *(cell(fits[0][r][n].relative_error if fits else NAN, ".4f") for r, n in pairs),
+            ])  # fmt: skip
     return text.getvalue()
 
 
-def _facts(region, pixel_size):
-    x, y = region.centroid
-    radius = region.equivalent_radius
-    low, high = ("", "") if region.band is None else (f"{r:.3f}" for r in region.radius_band)
-    told = ("" if value != value else f"{value:.{digits}g}"
-            for value, digits in ((region.blur, 3), (region.level, 4)))  # fmt: skip
-    parted = "" if region.parted != region.parted else f"{region.parted:.2f}"
-    size = region.area, f"{radius:.3f}", f"{radius * pixel_size:.4g}"
-    return f"{x:.2f}", f"{y:.2f}", *size, *told, low, high, parted, f"{region.weight:.4g}"
+def cell(value: float, form: str) -> str:
+    """Return a number as text; nothing for NaN."""
+    return "" if math.isnan(value) else f"{value:{form}}"
 
 
 class Slope(NamedTuple):
@@ -227,14 +212,12 @@ def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | No
     ragged. Source: B. B. Mandelbrot, The Fractal Geometry of Nature (1982), ch. 12.
     """
     from scipy.special import stdtrit
+    from scipy.stats import linregress
 
-    x, y = np.log(areas), np.log(perimeters)
-    if len(np.unique(x)) < FEWEST:
+    if len(np.unique(areas)) < FEWEST:
         return None
-    x, y, free = x - x.mean(), y - y.mean(), len(x) - 2
-    slope = np.sum(x * y) / np.sum(x * x)
-    error = np.sqrt(np.sum((y - slope * x) ** 2) / (free * np.sum(x * x)))
-    return Slope(2.0 * float(slope), 2.0 * float(stdtrit(free, 0.975) * error))
+    line = linregress(np.log(areas), np.log(perimeters))
+    return Slope(2.0 * line.slope, 2.0 * float(stdtrit(len(areas) - 2, 0.975)) * line.stderr)
 
 
 def population_lines(entries: Sequence[ShapeEntry]) -> list[str]:

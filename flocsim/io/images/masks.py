@@ -4,7 +4,6 @@ Whether a file is a photograph or a mask is told by its values: in labels, neigh
 nearly always agree.
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -65,26 +64,32 @@ def read_masks(path: str | Path, memory: float = reading.MEMORY) -> list[tuple[s
 
 
 def _arrays(path, memory):
-    """[(key, array)] of an .npy or .npz file."""
+    """Return [(key, array)] of an .npy or .npz file."""
     reading.check_file(path, "file of masks")
     try:
         if path.suffix.lower() == ".npy":
-            with open(path, "rb") as file:
-                return [("", reading.read_array(file, path.stat().st_size, str(path), memory))]
-        arrays, left = {}, memory
-        with zipfile.ZipFile(path) as archive:
-            reading.check_entries(path, archive.infolist())
-            for entry in sorted(archive.infolist(), key=lambda entry: entry.filename):
-                left -= entry.file_size
-                if left < 0:
-                    raise ImageError(
-                        f"{path}: would be more than {memory:.3g} bytes after decompression; give "
-                        "--memory"
-                    )
-                key = entry.filename.removesuffix(".npy")
-                with archive.open(entry) as file:
-                    arrays[key] = reading.read_array(file, entry.file_size, f"{path} {key}", memory)
-        return _unpacked(path, arrays, memory) if "shapes" in arrays else list(arrays.items())
+            array = np.load(path, mmap_mode="r")  # not read before its size is known
+            reading.check_memory(path, array.nbytes, array.shape, memory=memory)
+            return [("", np.array(array))]
+        with np.load(path) as archive:
+            if sum(entry.file_size for entry in archive.zip.infolist()) > memory:
+                raise ImageError(
+                    f"{path}: would be more than {memory:.3g} bytes after decompression; give "
+                    "--memory"
+                )
+            arrays = {key: archive[key] for key in sorted(archive.files)}
+        if "shapes" not in arrays:
+            for key, array in arrays.items():
+                reading.check_memory(f"{path} {key}", array.nbytes, array.shape, memory=memory)
+            return list(arrays.items())
+        # Stored as bits. A byte a pixel, and four of the labels made of it, are kept of all.
+        shapes = np.array(arrays.pop("shapes"), int).reshape(-1, 2)
+        sizes = shapes.astype(float).prod(axis=1)
+        reading.check_memory(path, int(5 * sizes.sum()), (int(sizes.max()),), memory=memory)
+        return [
+            (key, np.unpackbits(bits)[: height * width].reshape(height, width))
+            for (key, bits), (height, width) in zip(arrays.items(), shapes.tolist(), strict=True)
+        ]
     except ImageError:
         raise
     except Exception as problem:
@@ -92,31 +97,7 @@ def _arrays(path, memory):
         raise ImageError(f"{path}: cannot be read as NumPy arrays ({reason})") from problem
 
 
-def _unpacked(path, arrays, memory):
-    """[(key, array)] of masks that are stored as bits."""
-    shapes = arrays.pop("shapes")
-    if shapes.dtype.kind not in "iu" or shapes.shape != (len(arrays), 2):
-        raise ImageError(
-            f"{path}: its shapes must be whole numbers ({len(arrays)}, 2), one row for each array, "
-            f"found {shapes.shape} of type {shapes.dtype}"
-        )
-    # A byte a pixel, and four of the labels that are made of it, are kept of all.
-    sizes = shapes.astype(float).prod(axis=1) if len(arrays) else np.zeros(1)
-    reading.check_memory(path, 5 * float(sizes.sum()), (float(sizes.max()),), memory=memory)
-    masks = []
-    for (key, bits), (height, width) in zip(arrays.items(), shapes.tolist(), strict=True):
-        size = height * width
-        if bits.dtype != np.uint8 or bits.ndim != 1 or not 0 < size <= 8 * bits.size:
-            raise ImageError(f"{path} {key}: not the bits of {height} × {width} pixels")
-        if min(height, width) < 1:
-            raise ImageError(f"{path} {key}: {height} × {width} is not a possible size of a mask")
-        masks.append((key, np.unpackbits(bits)[:size].reshape(height, width)))
-    return masks
-
-
 def _mask(array, name):
-    from scipy.ndimage import find_objects
-
     if array.ndim != 2 or array.size == 0:
         raise ImageError(f"{name}: a mask is an (h, w) array, found shape {array.shape}")
     reading.check_array(name, array)
@@ -142,7 +123,6 @@ def _mask(array, name):
             f"{name}: is a photograph, not a mask: {len(values)} grey levels, and only "
             f"{100 * share:.0f} % of neighbouring pixels agree; {WAY}"
         )
-    reading.check_spread(name, array.shape, find_objects(labels))
     return labels if values[-1] > LARGEST_KEPT else array.astype(np.int32)
 
 

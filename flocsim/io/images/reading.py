@@ -9,10 +9,8 @@ import math
 import os
 import tempfile
 import warnings
-import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -42,20 +40,11 @@ LUMINANCE = np.array([0.2125, 0.7154, 0.0721])
 MEMORY = 1.3e9
 """Bytes that a picture may take unless --memory gives another number: 25 Mpixel of grey fit."""
 
-ANNOUNCED = 0.85e9
-"""Bytes above which it is said beforehand: with the libraries 1 GiB."""
-
 BYTES_PER_PIXEL = 48
 """Peak of reading, finding flocs and measuring them where one island covers most of the picture,
 which is the worst case; 25 where all flocs are small."""
 
 LARGEST_FILE = 2**32
-MOST_SPREAD = 20
-"""Times the picture's pixels that the boxes around all labels may cover."""
-
-MOST_ARRAYS = 10_000
-LONGEST_NAME = 200
-
 
 for _name in ("tifffile", "PIL"):
     # Their warnings about odd metadata do not concern the pixels, and would reach the terminal.
@@ -249,7 +238,6 @@ def _decode_tiff(path, frame, crop, memory):
                 if wide and (swapped or page.photometric == WHITE_IS_ZERO):
                     raise ImageError(f"{path}: {reason}; save it uncompressed, or as PNG")
                 return page.dtype, reason
-            check_segments(path, tiff, page)
             pixels = np.asarray(page.asarray())
             if page.axes == "SYX":
                 pixels = np.moveaxis(pixels, 0, -1)
@@ -279,18 +267,6 @@ def left_to_pillow(page):
     orientation = page.tags.get("Orientation")
     turned = orientation is not None and orientation.value != 1
     return "it is stored turned" if turned else ""
-
-
-def check_segments(path, tiff, page):
-    """ImageError for a strip or tile of a deflated page that unpacks to more than its pixels."""
-    if page.compression not in DEFLATED:
-        return
-    wanted = 4 * int(np.prod(page.chunks)) * page.dtype.itemsize
-    for offset, length in zip(page.dataoffsets, page.databytecounts, strict=True):
-        tiff.filehandle.seek(offset)
-        packed = tiff.filehandle.read(length)
-        if len(zlib.decompressobj().decompress(packed, wanted + 1)) > wanted:
-            raise ImageError(f"{path}: a part of it decompresses to more than {wanted} bytes")
 
 
 def inverted(pixels, path):
@@ -352,52 +328,3 @@ def check_array(name: object, array: np.ndarray) -> None:
         raise ImageError(f"{name}: holds values of type {array.dtype!s:.40}, not numbers or flags")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise ImageError(f"{name}: holds values that are not finite numbers")
-
-
-def read_array(file: BinaryIO, size: int, name: str, memory: float = MEMORY) -> np.ndarray:
-    """The array of an open .npy file of ``size`` bytes; its head is checked before its values.
-
-    Raises ImageError for what is none, is too large, or promises more than the file has.
-    """
-    form = np.lib.format
-    version = form.read_magic(file)
-    if version not in ((1, 0), (2, 0), (3, 0)):
-        raise ImageError(f"{name}: has an unknown version of NumPy's format")
-    read = form.read_array_header_1_0 if version == (1, 0) else form.read_array_header_2_0
-    shape, by_columns, dtype = read(file)
-    # Python objects would be code of whoever wrote the file.
-    if dtype.hasobject or dtype.kind not in "buif" or any(each < 0 for each in shape):
-        raise ImageError(f"{name}: holds values of type {dtype!s:.40}, not numbers or flags")
-    length = math.prod(shape) * dtype.itemsize
-    check_memory(name, length, shape, memory=memory)
-    if length > size:
-        raise ImageError(f"{name}: claims {length} bytes of values but has fewer")
-    data = file.read(length)
-    if len(data) < length:
-        raise ImageError(f"{name}: is truncated")
-    return np.frombuffer(data, dtype).reshape(shape, order="F" if by_columns else "C")
-
-
-def check_entries(path: Path, entries: Iterable[Any]) -> None:
-    """ImageError for entries of a zip archive (ZipInfo) that no .npz file has."""
-    entries = list(entries)
-    if len(entries) > MOST_ARRAYS:
-        raise ImageError(f"{path}: holds more than {MOST_ARRAYS} arrays")
-    names = [entry.filename for entry in entries]
-    if len({name.removesuffix(".npy") for name in names}) < len(names):
-        raise ImageError(f"{path}: has two arrays of the same name")
-    for entry in entries:
-        name = entry.filename
-        if not name.isprintable() or len(name) > LONGEST_NAME or entry.is_dir():
-            raise ImageError(f"{path}: has an array with an impossible name: {name[:60]!r}")
-
-
-def check_spread(name: object, shape: Sequence[int], boxes: Iterable[Any]) -> None:
-    """ImageError for labels in boxes, pairs of slices, so large that sorting them would take for
-    ever."""
-    sizes = [math.prod(side.stop - side.start for side in box) for box in boxes if box is not None]
-    if sum(sizes) > MOST_SPREAD * math.prod(shape) + 2**20:
-        raise ImageError(
-            f"{name}: its {len(sizes)} labels are scattered over the image; give each floc its own "
-            "label"
-        )
