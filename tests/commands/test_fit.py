@@ -271,8 +271,8 @@ def test_regions_are_dropped_kept_and_added_by_their_numbers(tmp_path, frame, ca
     assert rows["a.png", "1"] == "dropped" and rows["a.png", "3"] == ""
     assert rows["b.png", "3"] == "too small"
     for words, told in {
-        "--drop 1": "there are 2 pictures", "--keep c.png#1": "no picture is called 'c.png'",
-        "--add a.png#9": "no such region; its last is 3",
+        "--drop 1": "--drop 1: there is no such region; write picture#number",
+        "--keep c.png#1": "--keep c.png#1: there is no", "--add a.png#9": "--add a.png#9: there is",
     }.items():  # fmt: skip
         with pytest.raises(UsageError, match=told):
             run(frame, *QUICK, *words.split(), "--overwrite", "-o", tmp_path / "s.h5")

@@ -294,25 +294,18 @@ def read_names(text: str) -> Names:
 
 def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]]) -> None:
     """UsageError for a name that none of the (picture's name, Segmentation) has, or several."""
-    known = dict(found)
+    known = {
+        (name, region.label) for name, each in found for region in (*each.regions, *each.rejected)
+    }
+    if len(found) == 1:
+        known |= {(None, label) for _, label in known}
     for option, names in correction.items():
         for picture, number in names:
-            if picture is None and len(known) != 1:
+            if (picture, number) not in known:
+                name = number if picture is None else f"{picture}#{number}"
                 raise UsageError(
-                    f"--{option} {number}: there are {len(known)} pictures; name the picture too, "
-                    f"for example {next(iter(known), 'a.png')}#{number}"
-                )
-            name = next(iter(known)) if picture is None else picture
-            if name not in known:
-                raise UsageError(
-                    f"--{option} {name}#{number}: no picture is called {name!r}; the first is "
-                    f"{next(iter(known), 'missing')!r}"
-                )
-            numbers = {each.label for each in (*known[name].regions, *known[name].rejected)}
-            if number not in numbers:
-                raise UsageError(
-                    f"--{option} {name}#{number}: the picture has no such region; its last is "
-                    f"{max(numbers, default=0)}; the table of all regions and the overlay name them"
+                    f"--{option} {name}: there is no such region; write picture#number, as the "
+                    "table of all regions and the overlay have them"
                 )
 
 
