@@ -144,8 +144,8 @@ def draw_trajectory(path, replicate, changes):
     strip, distance, forces = (paths_of(f"{path}{which}") for which in ("", "-distance", "-forces"))
     flocsim(
         path.parent, path.stem, "trajectory", STUDY, *settings(changes),
-        "--type", "I", "--vertices", 64, "--delta", 0, "--replicate", replicate, "--output", *strip, "--distance", *distance,
-        "--forces", *forces, "--animation", path.with_suffix(".gif"), "--overwrite",
+        "--type", "I", "--vertices", 64, "--delta", 0, "--replicate", replicate,
+        "--output", *strip, "--distance", *distance, "--forces", *forces, "--animation", path.with_suffix(".gif"), "--overwrite",
     )  # fmt: skip
 
 
