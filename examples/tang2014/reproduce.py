@@ -145,7 +145,8 @@ def draw_trajectory(path, replicate, changes):
     flocsim(
         path.parent, path.stem, "trajectory", STUDY, *settings(changes),
         "--type", "I", "--vertices", 64, "--delta", 0, "--replicate", replicate,
-        "--output", *strip, "--distance", *distance, "--forces", *forces, "--animation", path.with_suffix(".gif"), "--overwrite",
+        "--output", *strip, "--distance", *distance, "--forces", *forces,
+        "--animation", path.with_suffix(".gif"), "--overwrite",
     )  # fmt: skip
 
 
