@@ -15,7 +15,7 @@ if STUDIES.intersection(sys.argv[1:2]):
 if is_limited():
     check_memory()
 
-from flocsim.ensembles.cli import parse_on_all_ranks, silent_unless_first
+from flocsim.ensembles.cli import silent_unless_first
 from flocsim.ensembles.parallel.processes import launched_rank, launched_size
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
@@ -44,11 +44,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         plain_warnings()
         forget_left_over_launch()
         words = sys.argv[1:] if argv is None else argv
-        if STUDIES.intersection(words[:1]):
-            arguments = parse_on_all_ranks(make_parser(words), argv)
-        else:
-            with silent_unless_first():
-                arguments = make_parser(words).parse_args(argv)
+        with silent_unless_first():
+            arguments = make_parser(words).parse_args(argv)
+        if arguments.command not in STUDIES:
             if launched_rank() > 0:
                 return 0  # what is no study is one rank's work
             if (launched_size() or 0) > 1:

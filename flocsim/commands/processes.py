@@ -10,8 +10,9 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
 from typing import Any
 
 import attrs
@@ -19,7 +20,7 @@ import attrs
 from flocsim.errors import FlocsimError
 from flocsim.process import end_with_parent
 
-AHEAD = 2
+AHEAD = 3
 """Tasks for each process that are handed out before there are results: none has to wait."""
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
@@ -34,7 +35,7 @@ class Lost:
 
 @contextlib.contextmanager
 def workers(jobs: int, prepare: Callable[[], object]) -> Iterator[Map]:
-    """A map over tasks, in order, as results come in; by ``jobs`` processes if more than one.
+    """Give a map over tasks, in order, as results come in; by ``jobs`` processes if more than one.
 
     ``prepare`` is called first if there are to be several: what it compiles, all of them have.
     """
@@ -42,18 +43,21 @@ def workers(jobs: int, prepare: Callable[[], object]) -> Iterator[Map]:
         yield lambda function, tasks: map(functools.partial(attempt, function), tasks)
         return
     prepare()
-    pool = Processes(jobs)
+    begun: list[Any] = []
+
+    def start(function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
+        begun.append(in_processes(jobs, function, tasks))
+        return begun[-1]
+
     try:
-        yield pool.map
-    except BaseException:
-        pool.kill()
-        raise
+        yield start
     finally:
-        pool.end()
+        for each in begun:
+            each.close()
 
 
 def attempt(function, task):
-    """The function's result, or a Lost; a FlocsimError is for the user to read, and is raised."""
+    """Return the function's result, or a Lost; a FlocsimError is for the user to read."""
     try:
         return function(task)
     except FlocsimError:
@@ -64,86 +68,77 @@ def attempt(function, task):
         return Lost(f"internal error, please report it: {type(error).__name__}: {error}")
 
 
-class Processes:
-    """A pool of processes that is made anew when one of them dies.
+def in_processes(jobs: int, function: Callable, tasks: Iterable[Any]) -> Iterator[Any]:
+    """Yield the results of tasks in order, from a pool that is made anew when a process dies.
 
-    Nothing tells which task a dead process was at, so all that were handed out are then tried
-    again one by one. One whose process dies while it is alone is lost.
+    Nothing tells which task a dead process was at: all that were handed out and have no result are
+    tried again, each in a process of its own. One whose process dies then is lost.
     """
-
-    def __init__(self, jobs: int) -> None:
-        self.jobs = jobs
-        self.others = set(multiprocessing.active_children())
-        self.pool: ProcessPoolExecutor | None = None
-
-    def map(self, function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
-        """The results in the order of the tasks, as soon as they are there."""
-        waiting = deque(enumerate(tasks))
-        suspects: deque = deque()
-        results: dict[int, Any] = {}
-        running: dict[Any, tuple[int, Any]] = {}
-        shown = 0
-        while waiting or suspects or running:
-            alone = bool(suspects)
-            source, most = (suspects, 1) if alone else (waiting, AHEAD * self.jobs)
-            while source and len(running) < most:
-                number, task = source.popleft()
-                try:
-                    running[self.started().submit(attempt, function, task)] = number, task
-                except BrokenProcessPool:  # a process has just died; the task was not handed out
-                    source.appendleft((number, task))
+    remaining = iter(tasks)
+    while True:
+        with new_pool(jobs) as pool:
+            running: deque[tuple[Any, Future]] = deque()
+            while True:
+                for task in islice(remaining, AHEAD * jobs - len(running)):
+                    running.append((task, submitted(pool, function, task)))
+                if not running:
+                    return
+                task, future = running[0]
+                if (result := result_of(future)) is BROKEN:
                     break
-            finished = wait(running, return_when=FIRST_COMPLETED).done
-            broken = not running
-            for future in finished:
-                try:
-                    results[running[future][0]] = result_of(future)
-                except BrokenProcessPool:
-                    broken = True
-                    continue
-                del running[future]
-            if broken:
-                self.end()
-                for future, (number, task) in sorted(running.items(), key=lambda each: each[1][0]):
-                    if future.done() and not future.cancelled() and not future.exception():
-                        results[number] = future.result()
-                    elif alone:
-                        results[number] = Lost("its process was killed, perhaps for lack of memory")
-                    else:
-                        suspects.append((number, task))
-                running.clear()
-            while shown in results:
-                yield results.pop(shown)
-                shown += 1
+                running.popleft()
+                yield result
+        for task, future in running:
+            result = result_of(future) if future.done() else BROKEN
+            yield alone(function, task) if result is BROKEN else result
 
-    def started(self):
-        if self.pool is None:
-            # Linux processes inherit what is compiled and loaded; elsewhere forking is not safe.
-            method = "fork" if sys.platform == "linux" else "spawn"
-            context = multiprocessing.get_context(method)
-            self.pool = ProcessPoolExecutor(self.jobs, context, initializer=begin_process)
-        return self.pool
 
-    def kill(self) -> None:
-        """End the processes at once, whatever they are at."""
-        for process in set(multiprocessing.active_children()) - self.others:
-            process.kill()
+BROKEN = Lost("its process was killed, perhaps for lack of memory")
 
-    def end(self) -> None:
-        """Wait for what the processes are at, and end them."""
-        if self.pool is not None:
-            self.pool.shutdown(cancel_futures=True)
-            self.pool = None
+
+def alone(function, task):
+    """Return the result of a task in a process of its own."""
+    with new_pool(1) as pool:
+        return result_of(pool.submit(attempt, function, task))
 
 
 def result_of(future):
-    """A future's result, or a Lost where it could not even be handed over."""
+    """Return a future's result; a Lost where it could not even be handed over."""
     try:
         return future.result()
-    except (FlocsimError, BrokenProcessPool):
+    except BrokenProcessPool:
+        return BROKEN
+    except FlocsimError:
         raise
     except Exception as error:
         return Lost(f"its result could not be passed on: {type(error).__name__}: {error}")
+
+
+def submitted(pool, function, task):
+    """Return the future of a task; where a process of the pool has just died, one that says so."""
+    try:
+        return pool.submit(attempt, function, task)
+    except BrokenProcessPool as error:
+        future: Future = Future()
+        future.set_exception(error)
+        return future
+
+
+@contextlib.contextmanager
+def new_pool(jobs):
+    """Give a pool of processes, which end at once, whatever they are at, after an error."""
+    # Linux processes inherit what is compiled and loaded; elsewhere forking is not safe.
+    context = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
+    others = set(multiprocessing.active_children())
+    pool = ProcessPoolExecutor(jobs, context, initializer=begin_process)
+    try:
+        yield pool
+    except BaseException:
+        for process in set(multiprocessing.active_children()) - others:
+            process.kill()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def begin_process():

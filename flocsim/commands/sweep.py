@@ -1,6 +1,5 @@
 """`flocsim sweep s.toml --over KEY=1,2,3`: one study at several values of its keys, in one file."""
 
-import os
 import re
 import signal
 import sys
@@ -67,38 +66,27 @@ def run(args: Namespace) -> int:
 
 def run_study(args: Namespace) -> int:
     """Do what the arguments ask for; return the exit code."""
-    from flocsim.ensembles.script_study import Study
+    from flocsim.ensembles.script_study import Study, settings_of
     from flocsim.ensembles.storage.resume import WAYS
-
-    if not args.over:
-        raise UsageError("sweep needs --over KEY=VALUE,VALUE")
-    study = Study(args.config)
-    if args.settings:
-        study = study.with_(nested(map(parse_setting, args.settings)))
-    how = {
-        "jobs": args.jobs, "mode": "resume" if args.resume else "new",
-        "overwrite": args.overwrite, "tell": tell, "ways": WAYS,
-    }  # fmt: skip
-    return run_sweep(args, study, how)
-
-
-def run_sweep(args, study, how):
-    """Run what is missing and join it, or say what there is to run."""
-    from flocsim.ensembles.script_study import settings_of
     from flocsim.ensembles.sweep import planned, sweep
 
     pairs = [values_of(text) for text in args.over]
     over = dict(pairs)
+    if not pairs:
+        raise UsageError("sweep needs --over KEY=VALUE,VALUE")
     if len(over) < len(pairs):
         raise UsageError("--over names the same key twice: give all its values at once")
+    study = Study(args.config).with_(nested(map(parse_setting, args.settings)))
     output = args.output or f"{Path(args.config).stem}-sweep.h5"
     if args.dry_run:
         for path, part in planned(study, over, Path(output)).items():
             words = " ".join(f"--set {quote(f'{k}={v}')}" for k, v in settings_of(part.overrides))
             tell(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
-    sweep(study, over, output, **how)
-    tell(os.fspath(output))
+    mode = "resume" if args.resume else "new"
+    sweep(study, over, output, jobs=args.jobs, mode=mode, overwrite=args.overwrite, tell=tell,
+          ways=WAYS)  # fmt: skip
+    tell(output)
     return 0
 
 

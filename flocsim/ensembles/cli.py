@@ -13,17 +13,55 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
+
 from flocsim.compiler import units
-from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
-from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
-from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
+from flocsim.ensembles.parallel.communicator import Communicator, RankZeroFailed, StopRequested
+from flocsim.ensembles.parallel.processes import (
+    find_communicator,
+    launched_rank,
+    start_processes,
+)
+from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.arguments import Parser
 from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
-UNSHARED = ("quiet", "run", "read", "command")
-"""Arguments in which ranks may differ: the others say what is run."""
+
+@attrs.frozen
+class Options:
+    """What the command line asks for. All ranks have to be given the same, but for ``quiet``."""
+
+    config: str
+    settings: list[str]
+    seed: int | None
+    replicates: int | None
+    output: str | None
+    mode: str
+    overwrite: bool
+    jobs: int
+    dry_run: bool
+    pilot: bool
+    command: str
+    quiet: bool = attrs.field(eq=False)
+
+    @classmethod
+    def of(cls, arguments: argparse.Namespace) -> "Options":
+        """Return the options that parsed arguments stand for."""
+        values: Any = (getattr(arguments, each.name, "") for each in attrs.fields(cls))
+        return cls(*values)
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """The command line's values as a nested dict over the config's."""
+        from flocsim.ensembles.config.loader import nested, parse_setting
+
+        file = None if self.output is None else {"file": self.output}
+        given = {"seed": self.seed, "replicates": self.replicates, "output": file}
+        return nested(map(parse_setting, self.settings)) | {
+            name: value for name, value in given.items() if value is not None
+        }
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,110 +103,86 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the study and the size of its file, and to find which forces matter",
     )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
-    parser.set_defaults(read=read_config)
-    # What Study.run says to its own process: with whom it is to end, and of which sweep it is.
+    # What Study.run says to its own process: with whom it is to end.
     parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
-    parser.add_argument("--plan", help=argparse.SUPPRESS)
 
 
-def overrides(arguments: argparse.Namespace) -> dict:
-    """The command line's values as a nested dict over the config's."""
-    from flocsim.ensembles.config.loader import nested, parse_setting
-
-    given = nested(map(parse_setting, arguments.settings))
-    if arguments.seed is not None:
-        given["seed"] = arguments.seed
-    if arguments.replicates is not None:
-        given["replicates"] = arguments.replicates
-    if arguments.output is not None:
-        given["output"] = {"file": arguments.output}
-    return given
-
-
-def read_config(arguments, sources, first):
-    """The config of a study; on the ``first`` rank found to make one whose results can be written
-    where they should go."""
+def read_config(options: Options, sources: Any, first: bool) -> Any:
+    """Return the config of a study; UsageError or FileError on the ``first`` rank where its results
+    could not be written where they should go."""
     from flocsim.ensembles.config.loader import load_any_config
     from flocsim.ensembles.diagnose.preflight import inputs_of
     from flocsim.ensembles.kind import kind_of
-
-    config = load_any_config(arguments.config, overrides(arguments), sources)
-    if not first:
-        return config
-    if getattr(arguments, "command", "") == "kernel" and not config.is_kernel:
-        raise UsageError(
-            f'{arguments.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
-            'kind = "kernel" with sizes, as in examples/kernel.toml'
-        )
-    kind_of(config).check(config)
-    if not arguments.dry_run:
-        check_outputs([results_of(config, arguments)], inputs_of(config, arguments.config))
-    return config
-
-
-def results_of(config, arguments):
-    """The results file as an Output; what is to be extended is looked at when the run begins."""
     from flocsim.ensembles.storage.resume import RESUME, WAYS
     from flocsim.io.journal import SUFFIX
 
-    rule = data_rule(arguments.overwrite or arguments.mode == RESUME)
-    return Output(config.output.file, rule, SUFFIX, WAYS)
+    config = load_any_config(options.config, options.overrides, sources)
+    if not first:
+        return config
+    if options.command == "kernel" and not config.is_kernel:
+        raise UsageError(
+            f'{options.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
+            'kind = "kernel" with sizes, as in examples/kernel.toml'
+        )
+    kind_of(config).check(config)
+    if not options.dry_run:
+        # What is to be extended is looked at when the run begins.
+        rule = data_rule(options.overwrite or options.mode == RESUME)
+        results = Output(config.output.file, rule, SUFFIX, WAYS)
+        check_outputs([results], inputs_of(config, options.config))
+    return config
 
 
-def agree(comm, arguments):
-    """(config, 0) on every rank, made of what rank 0 has read; (None, exit code) on every rank
-    where one of them was started with other words or cannot make it."""
-    config, problem = None, None
+def agree(comm: Communicator, options: Options) -> tuple[Any, int]:
+    """Return (config, 0) on every rank, made of the text and the modules that rank 0 has read: an
+    edited file is read before or after the edit, by all.
+
+    (None, exit code) on every rank where one of them was given other options or cannot make it.
+    """
+    from flocsim.ensembles.config.sources import Sources
+
+    config, problem, sources = None, None, Sources()
     try:
-        config = own_config(comm, arguments)
+        if comm.rank == 0:
+            refuse_options(options, comm)
+            config = read_config(options, sources, True)
     except FlocsimError as error:
-        problem = (str(error), error.exit_code)
+        problem = str(error), error.exit_code
+    shared = comm.broadcast(None if problem else (options, sources))
+    try:
+        if comm.rank > 0 and shared is not None:
+            if shared[0] != options:
+                raise UsageError("it was given other arguments than rank 0: nothing was run")
+            config = read_config(options, shared[1], False)
+    except FlocsimError as error:
+        problem = f"rank {comm.rank}: {error}", error.exit_code
     problems = [each for each in comm.gather(problem) or [] if each is not None]
     code = comm.broadcast(problems[0][1] if problems else 0)
     if problems:
-        tell(problems[0][0], sys.stderr)
+        tell(f"flocsim: {problems[0][0]}", sys.stderr)
     return (None, code) if code else (config, 0)
 
 
-def own_config(comm, arguments):
-    """This rank's config, of the text and the modules that rank 0 has read; None where it has not.
-
-    So an edited file is read before or after the edit, by all.
-    """
-    from flocsim.ensembles.config.sources import Sources
-    from flocsim.ensembles.parallel.agreement import Launch, refuse_other_words
-
-    words = {name: value for name, value in vars(arguments).items() if name not in UNSHARED}
-    if comm.rank == 0:
-        launch, sources = None, Sources()
-        try:
-            config = arguments.read(arguments, sources, True)
-            launch = Launch(words, sources)
-        finally:
-            comm.broadcast(launch)
-        return config
-    from flocsim.ensembles import runner  # noqa: F401 (takes its time, while rank 0 reads)
-
-    launch = comm.broadcast(None)
-    if launch is None:
-        return None
-    refuse_other_words(comm.rank, launch, words)
-    try:
-        return arguments.read(arguments, launch.sources, False)
-    except ConfigError as error:
-        raise ConfigError(f"rank {comm.rank}: {error}") from error
+def refuse_options(options: Options, comm: Communicator) -> None:
+    """UsageError for options that do not go together."""
+    if options.jobs < 1:
+        raise UsageError(f"--jobs must be at least 1, found {options.jobs}")
+    if options.pilot and not options.dry_run:
+        raise UsageError("--pilot is for --dry-run: leave it out")
+    if options.jobs > 1 and comm.is_launched and not options.dry_run:
+        raise UsageError("--jobs is for runs without an MPI launcher: leave out one or the other")
 
 
-def study(config, comm, arguments):
+def study(config: Any, comm: Communicator, options: Options) -> int:
     """Run the study and write its results; the exit code."""
     from flocsim.ensembles.config import contents_of
     from flocsim.ensembles.kind import kind_of
-    from flocsim.ensembles.runner import RankZeroFailed, SharedError, run_to_file
+    from flocsim.ensembles.runner import SharedError, run_to_file
 
     output = config.output.file
     try:
-        ended = run_to_file(config, comm, output, arguments.mode, arguments.quiet,
-                            arguments.overwrite, arguments.plan)  # fmt: skip
+        ended = run_to_file(config, comm, output, options.mode, options.quiet,
+                            options.overwrite)  # fmt: skip
     except RankZeroFailed as error:
         return error.args[0]
     except SharedError as error:
@@ -182,7 +196,7 @@ def study(config, comm, arguments):
         return 0
     shown = contents_of(kind_of(config).format)
     found, seconds = ended.results, ended.wall_time
-    if not arguments.quiet:
+    if not options.quiet:
         tell((shown.told or shown.table)(found))
         tell(shown.source(found))
         tell(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
@@ -202,18 +216,18 @@ def end_all(comm: Communicator, text: str, code: int) -> int:
     return code
 
 
-def guarded(comm, arguments):
+def guarded(comm: Communicator, options: Options) -> int:
     """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
     try:
-        config, code = agree(comm, arguments)
-        if config is not None and not arguments.dry_run:
-            code = study(config, comm, arguments)
+        config, code = agree(comm, options)
+        if config is not None and not options.dry_run:
+            code = study(config, comm, options)
         elif config is not None and comm.rank == 0:
             from flocsim.ensembles.config import contents_of
             from flocsim.ensembles.kind import kind_of
 
             shown = contents_of(kind_of(config).format)
-            text = shown.dry_run(config, max(comm.size, arguments.jobs), arguments.pilot)
+            text = shown.dry_run(config, max(comm.size, options.jobs), options.pilot)
             if stop_requested():
                 raise StopRequested(f"stopped by {INTERRUPTION.name}")
             tell(text)
@@ -230,55 +244,39 @@ def guarded(comm, arguments):
     except KeyboardInterrupt:
         return end_all(comm, "interrupted; continue with --resume", INTERRUPTED)
     except MemoryError:
-        return end_all(
-            comm, "out of memory: use fewer ranks on each machine", FlocsimError.exit_code
-        )
+        text = "out of memory: use fewer ranks on each machine"
+        return end_all(comm, text, FlocsimError.exit_code)
     except Exception:
         text = f"internal error, please report it:\n{traceback.format_exc()}"
         return end_all(comm, text, FlocsimError.exit_code)
 
 
-def what_is_wrong(arguments, comm):
-    """Return what is wrong with --jobs or --pilot here; "" where nothing is."""
-    if arguments.jobs < 1:
-        return f"--jobs must be at least 1, found {arguments.jobs}"
-    if arguments.pilot and not arguments.dry_run:
-        return "--pilot is for --dry-run: leave it out"
-    if arguments.jobs > 1 and comm.size > 1 and not arguments.dry_run:
-        return "--jobs is for runs without an MPI launcher: leave out one or the other"
-    return ""
-
-
-def on_process(comm, arguments):
+def on_process(comm: Communicator, options: Options) -> int:
+    """Do what a process does that rank 0 has started."""
     plain_warnings(silent=True)
-    return guarded(comm, arguments)
+    return guarded(comm, options)
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Run what the command line asks for, on all ranks of the job; return the exit code."""
     if arguments.parent is not None:
         end_with_parent(arguments.parent)
-    comm: Communicator = Communicator()
+    comm = Communicator()
     try:
+        options = Options.of(arguments)
         comm = find_communicator()
-        wrong = what_is_wrong(arguments, comm)
-        code = refused_anywhere(comm, UsageError.exit_code if wrong else None)
-        if code is not None:
-            if wrong and comm.rank == 0:
-                tell(f"flocsim: {wrong}", sys.stderr)
-            return code
-        if arguments.jobs > 1 and not arguments.dry_run:
-            from flocsim.ensembles.parallel.processes import start_processes
-
-            comm = start_processes(arguments.jobs, on_process, arguments)
+        ranks = comm.size
+        if options.jobs > 1 and comm.size == 1 and not options.dry_run:
+            comm, ranks = start_processes(options.jobs, on_process, options), 0
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
     INTERRUPTION.kept = lambda: "nothing more was finished"
-    if arguments.parent is None and not arguments.dry_run:  # a parent says how it goes on
-        INTERRUPTION.command = continuing(0 if arguments.jobs > 1 else comm.size)
-    if arguments.quiet:
+    if arguments.parent is None and not options.dry_run:  # a parent says how it goes on
+        INTERRUPTION.command = continuing(ranks)
+    if options.quiet:
         units.show_by(units.silent)
-    return guarded(comm, arguments)
+    return guarded(comm, options)
 
 
 ANEW = re.compile("--(resu|rest|overw)[a-z]*")
@@ -303,42 +301,6 @@ def on_path(program: str | os.PathLike) -> str:
     return path.name if shutil.which(path.name) == str(path) else os.fspath(program)
 
 
-def refused_anywhere(comm: Communicator, code: int | None) -> int | None:
-    """The exit code where the arguments of a rank were refused, as the others would wait for it.
-
-    ``code``: that of this rank, None where it can go on; 0 where it printed a help.
-    """
-    codes = comm.gather(code) or []
-    which = [rank for rank, each in enumerate(codes) if each is not None]
-    if which and len(which) < len(codes):
-        tell(
-            f"flocsim: rank {which[0]} was started with invalid arguments: start all ranks with "
-            "the same ones",
-            sys.stderr,
-        )
-        return comm.broadcast(UsageError.exit_code)
-    return comm.broadcast(codes[0] if which else None)
-
-
-def parse_on_all_ranks(parser: argparse.ArgumentParser, words: Sequence[str] | None) -> Any:
-    """The arguments; where they are refused, or are for a help, all ranks end together.
-
-    One rank says why. SystemExit as from argparse.
-    """
-    with silent_unless_first():
-        try:
-            return parser.parse_args(words)
-        except SystemExit as end:
-            if launched_size() in (0, 1):
-                raise
-            code = end.code if isinstance(end.code, int) else UsageError.exit_code
-    try:
-        ended = refused_anywhere(find_communicator(), code)
-    except FlocsimError:
-        ended = code
-    raise SystemExit(ended)
-
-
 @contextlib.contextmanager
 def silent_unless_first():
     """Let one rank alone print the help, or what is wrong with the arguments."""
@@ -357,7 +319,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     add_arguments(parser)
     with plain_streams():
-        arguments = parse_on_all_ranks(parser, argv)
+        with silent_unless_first():
+            arguments = parser.parse_args(argv)
         code = run(arguments)
         problem = output_problem() if code == 0 else ""
         if problem:

@@ -6,6 +6,7 @@ others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks 
 
 import contextlib
 import json
+import platform
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -15,7 +16,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.compiler.processor import cpu_kind
+from flocsim.compiler.processor import cpu_kind, versions
 from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
@@ -23,16 +24,13 @@ from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.diagnose.preflight import IMPLIED
 from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import (
-    MOST_ROWS,
     StudyKind,
     flocs_of,
     study_of,
-    total,
 )
-from flocsim.ensembles.parallel.agreement import Facts, disagreement
 from flocsim.ensembles.parallel.communicator import (
     Communicator,
-    ExitCode,
+    Failed,
 )
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
 from flocsim.ensembles.parallel.processes import in_copies
@@ -40,12 +38,10 @@ from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.storage.unfinished import refuse_other_part
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.journal import Journal
 from flocsim.io.results.run_group import (
     distinct,
-    mixture_warnings,
     provenance,
     source_line,
     storable,
@@ -73,10 +69,6 @@ class SharedError(Exception):
     """An error of rank 0, the argument, of which the other ranks have the exit code."""
 
 
-class RankZeroFailed(Exception):
-    """What the other ranks have of it: rank 0 says why; the argument is the exit code."""
-
-
 def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Any:
     """Run a config's study in memory; its results on rank 0, None on the others.
 
@@ -89,23 +81,24 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
         if comm.rank > 0:
             return follow(study, comm).results
         store = RowStore(Journal(), study.conditions, study.row)
-        start = Beginning(store, identity, cpus_now=cpus)
-        return lead(study, start, comm, progress_of(study, quiet)).results
+        start = Beginning(store, identity, cpus)
+        return lead(
+            study, start, comm, Progress(study.size * study.pieces, quiet, noun=study.noun)
+        ).results
     except SharedError as error:
         raise error.args[0] from None
 
 
 def run_to_file(
     config: Config, comm: Communicator, output: str | Path, mode: str, quiet: bool = True,
-    overwrite: bool = False, plan: str | None = None,
+    overwrite: bool = False,
 ) -> Ended:  # fmt: skip
     """Run a config's study into the results file ``output``: how it Ended.
 
     ``mode`` says what to do about an unfinished run (flocsim.ensembles.storage.resume). What is
     finished goes into a journal beside the file, and from there into the file when all is. Rank 0
     locks it before it does anything else, and to the end. ``overwrite``: what lies at ``output``
-    and is not to be extended is kept under another name. ``plan``: that of a sweep, which says what
-    study this has to be.
+    and is not to be extended is kept under another name.
     """
     if comm.rank > 0:
         return follow(join(config, comm)[0], comm)
@@ -114,10 +107,8 @@ def run_to_file(
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
         study, identity, cpus = join(config, comm)
-        progress = progress_of(study, quiet)
+        progress = Progress(study.size * study.pieces, quiet, noun=study.noun)
         with sharing_errors(comm):
-            if plan is not None:
-                refuse_other_part(plan, str(output), identity)
             start = begin(
                 study, identity, output, mode, journal, contents_of(study.format).old_rows, cpus,
                 overwrite,
@@ -128,7 +119,7 @@ def run_to_file(
         for remark in [*remarks, *start.remarks, *said]:
             progress.warn(remark)
         ended = lead(study, start, comm, progress, output)
-        if ended.code == 0 and (start.unasked or start.farthest > ended.count):
+        if ended.code == 0 and start.has_more(ended.count):
             progress.warn(
                 f"{journal.path} has more rows than were asked for, and is kept: --resume uses "
                 "them when more are asked for"
@@ -139,7 +130,7 @@ def run_to_file(
 
 
 def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict]]:
-    """Make the Study on every rank, and check that all would compute the same rows.
+    """Make the study on every rank, and check that all would compute the same rows.
 
     Return (study, identity, the kinds of CPU of all ranks); the kinds are known on rank 0 alone.
     Rank 0 grows or reads the flocs for all. Where any rank would compute something else, or has
@@ -147,50 +138,50 @@ def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict
     """
     with sharing_errors(comm):
         flocs = flocs_of(config) if comm.rank == 0 else None
-    study: Any = study_of(config, hear(comm, flocs))
-    own, line = own_facts(study, comm)
-    leader = hear(comm, own)
-    if own is not None:
-        line = disagreement(comm.rank, leader, own)
-    answers = comm.gather((line, cpu_kind()))
+    study: Any = study_of(config, comm.broadcast(flocs))
+    facts, line = None, ""
     with sharing_errors(comm):
-        unlike = [line for line, _ in answers or [] if line]
-        if unlike:
-            more = f" ({len(unlike)} ranks differ)" if len(unlike) > 1 else ""
-            raise UsageError(unlike[0] + more)
-    cpus = distinct([kind for _, kind in answers or []])
+        try:
+            facts = versions() | identity_of(study)
+        except FlocsimError as error:
+            if comm.rank == 0:
+                raise
+            line = f"rank {comm.rank}: {error}"
+    leader = comm.broadcast(facts)
+    if facts is not None:
+        line = first_difference(comm.rank, leader, facts)
+    answers = comm.gather((line, cpu_kind())) or []
+    with sharing_errors(comm):
+        if unlike := [line for line, _ in answers if line]:
+            raise UsageError(unlike[0])
+    cpus = distinct([kind for _, kind in answers])
     with sharing_errors(comm):
         study.prepare()
-    return study, leader.identity, cpus
+    return study, {name: leader[name] for name in leader if name not in versions()}, cpus
 
 
-def own_facts(study: StudyKind, comm: Communicator) -> tuple[Facts | None, str]:
-    """(Facts of this rank, ""), or (None, why there are none); rank 0 speaks for itself."""
-    try:
-        with sharing_errors(comm) if comm.rank == 0 else contextlib.nullcontext():
-            return Facts(identity_of(study)), ""
-    except FlocsimError as error:
-        return None, f"rank {comm.rank}: {error}"
+def first_difference(rank: int, leader: dict, own: dict) -> str:
+    """Return in what a rank would compute something else than rank 0, in one line; "" for nothing.
 
-
-def hear(comm: Communicator, value: Any) -> Any:
-    """Rank 0's value on all ranks; RankZeroFailed where it has none, and says why itself."""
-    value = comm.broadcast(value)
-    if isinstance(value, ExitCode):
-        raise RankZeroFailed(value.code)
-    return value
+    Other versions come first: they are why code is another.
+    """
+    for name in [*versions(), *sorted(leader.keys() | own.keys())]:
+        if (there := leader.get(name)) != (here := own.get(name)):
+            return (
+                f"rank {rank} on {platform.node()} differs from rank 0 in {name} ({here!r:.60}, on "
+                f"rank 0 {there!r:.60}): nothing was run; start all ranks with the same arguments, "
+                "files and installation, on one kind of processor"
+            )
+    return ""
 
 
 def follow(study: StudyKind, comm: Communicator) -> Ended:
     """What every rank but 0 does: run chunks for rank 0 until there are no more."""
-    if hear(comm, None):
+    if comm.broadcast(None):
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
     run_chunks(study, RemoteCoordinator(comm))
-    code = comm.receive(0, heed_signals=False).code
-    if code not in (0, STOPPED):
-        raise RankZeroFailed(code)
-    return Ended(code)
+    return Ended(comm.receive(0, heed_signals=False))
 
 
 def lead(
@@ -212,8 +203,6 @@ def lead(
         progress.say(study.remark)
     comm.broadcast(remaining)
     if remaining:
-        for line in mixture_warnings(output, start.cpus_found, start.cpus_now):
-            progress.warn(line)
         compile_in_turn(study, comm)
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
@@ -229,13 +218,13 @@ def lead(
         ended.wall_time = time.monotonic() - began
         if ended.code == 0:
             ended.results = make_results(study, start, state, ended, comm.size, output)
-    comm.broadcast(ExitCode(ended.code))
+    comm.broadcast(ended.code)
     return ended
 
 
 def kept_words(start: Beginning, state: StudyState) -> str:
     """Say what the journal has of a study that is stopped."""
-    count, begun = sum(map(total, start.store.computed)), len(state.begun)
+    count, begun = start.store.computed, len(state.begun)
     if not count and not begun:
         return "no replicate was finished"
     others = f" and the states of {begun} others" if begun else ""
@@ -253,7 +242,7 @@ def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -
     except FlocsimError as error:
         if coordinator is not None and not coordinator.give_up():
             raise
-        comm.broadcast(ExitCode(error.exit_code))
+        comm.broadcast(Failed(error.exit_code))
         raise SharedError(error) from error
 
 
@@ -269,27 +258,17 @@ def compile_in_turn(study, comm):
 def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     """The StudyState of what is missing, for so many ranks."""
     replicates, stop = study.config.replicates, study.config.stop
-    found, failed = start.found(replicates), 0
-    for place, intervals in enumerate(found):
-        for first, stop_at in intervals:
-            for low in range(first, stop_at, MOST_ROWS):
-                rows = start.store.rows(place, low, min(low + MOST_ROWS, stop_at))
-                failed += int(np.sum(study.has_failed(rows.__getitem__)))
+    found, store = start.found(replicates), start.store
+    failed = sum(
+        int(np.sum(study.has_failed(rows.__getitem__)))
+        for place in range(len(study.conditions)) for rows in store.all_rows(place)
+    )  # fmt: skip
     # Where the rule looks, and nowhere below what the results file has of each condition.
     looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
-    state = StudyState(
-        Schedule.of(found, looks, ranks, study.most_rows),
-        start.store,
-        contents_of(study.format).stop_rule(study, start.store),
-        allowed=study.allowed,
-        failed=failed,
-        notes=start.notes,
-        pieces=study.pieces,
-        left_of=study.left_of,
-        counts_part=study.counts_part,
-        about=start.about,
-    )
-    for task, parts in start.store.parts.items():
+    is_enough = contents_of(study.format).stop_rule(study, store)
+    schedule = Schedule.of(found, looks, ranks, study.most_rows)
+    state = StudyState(schedule, store, study, is_enough, failed)
+    for task, parts in store.parts.items():
         place, replicate = task
         there = any(first <= replicate < end for first, end in found[place])
         if replicate < replicates and not there:
@@ -307,11 +286,11 @@ def make_results(
         if (tuple(old.conditions), old.count) == (study.conditions, count):
             return file_kind(output).read(output)  # as it is: nothing has been added
         output = None  # it has more than was asked for, and keeps it
-    run = facts(study, start, state.notes, ended, ranks)
+    run = facts(study, start, ended, ranks)
     return contents_of(study.format).results(study, start, count, run, output, in_memory)
 
 
-def facts(study, start, notes, ended, ranks):
+def facts(study, start, ended, ranks):
     config, identity = study.config, start.identity
     more = contents_of(study.format).facts(study)
     added = start.cpus_now if ended.computed else []
@@ -322,7 +301,7 @@ def facts(study, start, notes, ended, ranks):
     return found | {
         "overrides": storable(json.dumps(config.overrides)),
         "identity": storable(json.dumps(identity, sort_keys=True)),
-        "failed": storable(json.dumps(notes)),
+        "failed": storable(json.dumps(start.store.notes)),
         "ranks": ranks,
         "cpus": storable(json.dumps(distinct([*start.cpus_found, *added]))),
         "sessions": 1 + len(start.history),
@@ -333,11 +312,6 @@ def facts(study, start, notes, ended, ranks):
         "warnings": storable(json.dumps(study.doubts())),
         **{k: storable(v) if isinstance(v, str) else v for k, v in more.items()},
     }
-
-
-def progress_of(study: StudyKind, quiet: bool) -> Progress:
-    """What tells how far a study is."""
-    return Progress(study.size * study.pieces, quiet, noun=study.noun)
 
 
 def announcement(study: StudyKind, ranks: int, existing: int = 0) -> str:

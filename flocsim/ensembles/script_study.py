@@ -177,7 +177,7 @@ class Study:
 
     def run(
         self, jobs: int = 1, *, output: str | os.PathLike | None = None, mode: str = "new",
-        overwrite: bool = False, quiet: bool = True, plan: str | os.PathLike | None = None,
+        overwrite: bool = False, quiet: bool = True,
     ) -> Any:  # fmt: skip
         """Run all replicates that are missing and return the results, as `flocsim ensemble` does.
 
@@ -186,9 +186,8 @@ class Study:
         alone, and nothing is kept of a run that is interrupted; ``mode``: "new", "resume" (go on,
         extend, or take finished results as they are) or "restart"; ``overwrite``: keep a file that
         is in the way under another name; ``quiet=False`` prints what the command prints. What is
-        finished is kept when it is interrupted: go on with ``mode="resume"``. ``plan``: of a sweep
-        of which this is a part, and has to be what it says. UsageError for a file in the way,
-        FileError where it cannot be written.
+        finished is kept when it is interrupted: go on with ``mode="resume"``. UsageError
+        for a file in the way, FileError where it cannot be written.
         """
         if not is_whole(jobs) or jobs < 1:
             raise UsageError(f"jobs must be a whole number of at least 1, found {jobs!r}")
@@ -207,7 +206,6 @@ class Study:
             words += [f"--{mode}"] if mode != "new" else []
             words += ["--overwrite"] if overwrite else []
             words += ["--quiet"] if quiet else []
-            words += ["--plan", os.path.abspath(plan)] if plan is not None else []
             for key, value in settings_of(self.overrides):
                 words += ["--set", f"{key}={value}"]
             run_command(words, self.text, self.path.parent, quiet)

@@ -1,9 +1,9 @@
 """One study at several values of its keys, joined in one file with the swept keys as dimensions.
 
-Every value is a part: a study with a results file of its own in a folder beside the joined one,
-NAME.parts. What each of them is, is fixed before the first is run (`storage.unfinished`), and what
-is found, made or joined is held against that. So a sweep that was stopped goes on there, and a
-cluster may fill it by `flocsim ensemble`.
+Every value is a part: a study with a results file and an identity of its own, in a folder beside
+the joined file, NAME.parts. The identities are known before the first part is run, and a part is
+joined only if its file has just this one. So a sweep that was stopped goes on there, and a cluster
+may fill it by `flocsim ensemble`.
 """
 
 import itertools
@@ -19,7 +19,6 @@ from flocsim.ensembles.config import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
 from flocsim.ensembles.contents import (
     Contents,
-    Figures,
     Joined,
     Summary,
     in_words,
@@ -27,20 +26,11 @@ from flocsim.ensembles.contents import (
     stored_in,
     studies,
 )
-from flocsim.ensembles.kind import flocs_of, study_of
+from flocsim.ensembles.kind import ORDER, flocs_of, study_of
 from flocsim.ensembles.script_study import WAYS, Study
-from flocsim.ensembles.storage.identity import identity_of, machine_facts
-from flocsim.ensembles.storage.unfinished import (
-    NAME,
-    Facts,
-    Plan,
-    apart,
-    hold,
-    listed,
-    plan_of,
-    plan_text,
-    read_plan,
-    write_plan,
+from flocsim.ensembles.storage.identity import (
+    differences,
+    identity_of,
 )
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
@@ -52,6 +42,8 @@ from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import GROUPS
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.terminal import aligned
+
+Facts = dict[str, Any]
 
 MOST_PARTS = 10_000
 FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
@@ -75,41 +67,68 @@ def sweep(
     output = Path(output)
     parts = planned(study, over, output)
     swept = swept_keys(over, [part.config for part in parts.values()])
-    folder, goes_on = parts_folder(output), mode == "resume" and not overwrite
-    before = read_plan(folder / NAME) if goes_on else {}
+    wanted = wanted_of(parts)
     rule = data_rule(overwrite)
     if mode == "resume" and output.exists():
-        joined_before = read_joined(output)  # what is replaced has to be a sweep
+        refuse_other_sweep(read_joined(output), swept)
         rule = extension_rule(output)
-        if joined_before.plan and goes_on:
-            before = plan_of(joined_before.plan, output) | before
     check_outputs([Output(output, rule, ways=ways)], [study.path])
     for path in parts if mode == "new" and not overwrite else ():
         for name in filter(os.path.lexists, (path, journal_path(path))):
             raise in_the_way(name, ways)
-    plan = fixed(parts)
-    hold(before, plan, folder)
-    there = {
-        path: fitting(path, part, plan[path.name])
-        for path, part in parts.items()
-        if goes_on and os.path.lexists(path)
-    }
-    make_folder(folder)
-    write_plan(folder, plan)
+    make_folder(parts_folder(output))
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):
         tell(f"{number} of {len(parts)}: {path}")
-        facts = plan[path.name]
-        if path not in there or apart(facts_in(there[path]), facts, whole=True):
-            part.run(jobs, output=path, mode=mode, overwrite=overwrite, quiet=quiet,
-                     plan=folder / NAME)  # fmt: skip
-            there[path] = fitting(path, part, facts, part.config.stop.half_width is None)
-        found.append(there[path])
+        there = open_any(path) if mode == "resume" and os.path.lexists(path) else None
+        if there is None or unlike(there, *wanted[path]):
+            part.run(jobs, output=path, mode=mode, overwrite=overwrite, quiet=quiet)
+            there = open_any(path)
+            ends_early = part.config.stop.half_width is not None
+            if line := unlike(there, *wanted[path], ends_early):
+                raise UsageError(
+                    f"{path} is not the study that the sweep began with: {line}; undo that, and "
+                    "resume with --overwrite, which keeps it under another name"
+                )
+        found.append(there)
     shared = {name: {str(each.run.get(name, "")) for each in found} for name in SOURCE}
     source = {name: words.pop() for name, words in shared.items() if len(words) == 1}
-    results = SweepResults(output, swept, joined(swept, found), plan_text(plan), source)
+    results = SweepResults(output, swept, joined(swept, found), source)
     write_sweep(results, rule)
     return results
+
+
+def unlike(results: Any, identity: Facts, asked: Facts, ends_early: bool = False) -> str:
+    """Return what keeps results from being a whole part of this identity, with what was asked for;
+    "" for nothing. A rule may have ended it early, with fewer replicates."""
+    if (kind := joined_of(results)) is None:
+        return "it is of another kind"
+    if lines := differences(stored_in(results), identity):
+        return lines[0]
+    has = kind.asked(results)
+    for name in (*ORDER, "replicates"):
+        there, here = has[name], asked[name]
+        if there != here and not (ends_early and name == "replicates" and there < here):
+            return f"{name} are {listed(there)} in the file, {listed(here)} now"
+    return ""
+
+
+def listed(values):
+    return ", ".join(
+        f"{v:g}" if isinstance(v, float) else f"{v}" for v in np.ravel(values).tolist()
+    )
+
+
+def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None:
+    """UsageError where a joined file has values that a new one in its place would not have."""
+    lost = [
+        each.key for name, each in before.swept.items()
+        if name not in swept or not set(each.values) <= set(swept[name].values)
+    ]  # fmt: skip
+    if lost:
+        raise UsageError(
+            f"{before.path} has other values of {lost[0]}: ask for these too, or name another file"
+        )
 
 
 def parts_folder(output: Path) -> Path:
@@ -134,55 +153,28 @@ def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Pa
     }
 
 
-def fixed(parts: Mapping[Path, Study]) -> Plan:
-    """The plan of all parts; UsageError where they could not be joined, as they differ in an axis.
+def wanted_of(parts: Mapping[Path, Study]) -> dict[Path, tuple[Facts, Facts]]:
+    """Return (identity, what was asked for) of each part; UsageError where they differ in an axis
+    and could not be joined.
 
     All of the study's modules and libraries were read once, for all parts (`Study.with_`).
     """
-    plan: Plan = {}
-    machine: dict = {}
+    found: dict[Path, tuple[Facts, Facts]] = {}
+    first: Facts = {}
     drawn: tuple[Any, list] = None, []
     for path, part in parts.items():
         config = part.config
         if drawn[0] != (config.shapes, config.seed):
             drawn = (config.shapes, config.seed), flocs_of(config)
         study = study_of(config, drawn[1])
-        machine = machine or machine_facts(study.code)
-        facts = identity_of(study, machine) | {"asked": json.loads(json.dumps(study.asked()))}
-        plan[path.name] = facts
-        first = next(iter(plan.values()))["asked"]
+        asked = json.loads(json.dumps(study.asked()))
+        found[path], first = (identity_of(study), asked), first or asked
         for axis in study.in_common:
-            if (there := first[axis]) != (here := facts["asked"][axis]):
+            if (there := first[axis]) != (here := asked[axis]):
                 raise UsageError(
                     f"the parts of a sweep cannot be joined: {axis} are {listed(there)} in the "
                     f"first, {listed(here)} in {path}; run them one by one"
                 )
-    return plan
-
-
-def fitting(path: Path, study: Study, planned: Facts, whole: bool = False) -> Any:
-    """The results at a part's path; UsageError where they are not what was planned, or cannot
-    become so by more rows (``whole``: where they have less)."""
-    found = open_any(path)
-    if joined_of(found) is None:
-        raise UsageError(f"{path} is not a part of a sweep: name another output")
-    if wrong := apart(facts_in(found), planned, whole):
-        raise UsageError(
-            f"{path} is not a part of this sweep: {wrong}; ask for what it has, or name another "
-            "output"
-        )
-    return found
-
-
-def facts_in(results: Any) -> Facts:
-    """What a results file of a part says that it is."""
-    return stored_in(results) | {"asked": needed(results).asked(results)}
-
-
-def needed(results: Any) -> Joined:
-    """What is joined of results that are a part."""
-    found = joined_of(results)
-    assert found is not None, "results of a kind that sweeps can run"
     return found
 
 
@@ -229,7 +221,8 @@ def value_of(config: Config, key: str) -> tuple[Any, str]:
 
 def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]:
     """The groups of all parts with the swept keys as first axes."""
-    kind = needed(parts[0])
+    kind = joined_of(parts[0])
+    assert kind is not None, "results of a kind that sweeps can run"
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
@@ -288,14 +281,9 @@ def table(found: SweepResults) -> str:
     return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
 
 
-def figures(found: SweepResults) -> Figures:
-    """The figures of what was joined."""
-    return joined_in(found).figures
-
-
 CONTENTS = Contents(
     title="a sweep", read=read_joined, summary=summary, table=table,
-    figures=figures,
+    figures=lambda found: joined_in(found).figures,
     drawn={"the joined file of flocsim sweep":
            {name: draw for each in kinds_joined() for name, draw in each.figures.items()}},
     opened=lambda path, allowed=None: read_joined(path),

@@ -15,13 +15,13 @@ from flocsim.ensembles.storage import resume
 from tests.helpers import interleavings
 from tests.helpers.interleavings import STEPS, Asked, Child, Truths, World, Wrong, write
 
-COUNT = int(os.environ.get("FLOCSIM_INTERLEAVINGS", "250"))
+COUNT = int(os.environ.get("FLOCSIM_INTERLEAVINGS", "25"))
 """Interleavings of each kind of study."""
 
 LENGTH = 8
 
 
-@pytest.fixture(scope="module", params=["pairs", "swarms"])
+@pytest.fixture(scope="module", params=["pairs", "rates", "swarms"])
 def truths(request, tmp_path_factory):
     """The rows of fresh runs of a kind of study."""
     return Truths(request.param, tmp_path_factory.mktemp(f"truths-{request.param}"))
@@ -32,7 +32,9 @@ def interleaved(truths, number, folder):
     folder.mkdir()
     rng = random.Random(f"{truths.kind} {number}")
     try:
-        World(truths.kind, folder, truths, rng).go(rng.choices(STEPS, k=LENGTH))
+        # Other ranks are processes that start anew, which takes seconds: once in a while.
+        steps = rng.choices([*STEPS, World.resume_on_other_ranks], [3] * len(STEPS) + [1], k=LENGTH)
+        World(truths.kind, folder, truths, rng).go(steps)
     except Wrong as error:
         return f"{number}: {error}"
     return ""

@@ -16,11 +16,10 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.io.journal import CHUNK
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers import parts_here
-from tests.helpers.journals import records_in
+from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.small_study import mpirun
 from tests.helpers.swarm_study import SWARM
@@ -132,9 +131,7 @@ def killed(cell):
     with subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True) as running:
         until = time.monotonic() + PATIENCE
         while running.poll() is None and time.monotonic() < until:
-            found = records_in(Path("new.h5.journal")) if os.path.exists("new.h5.journal") else []
-            # Rows, or of a swarm bodies and their first snapshot.
-            if any(each.kind == CHUNK for each in found) or len(found) > 3:
+            if has_begun(Path("new.h5.journal")):
                 break
             time.sleep(0.002)
         running.send_signal(signal.SIGKILL)

@@ -16,11 +16,8 @@ from PIL import Image
 
 from flocsim import Sphere
 from flocsim.ensembles.contents import open_any
-from flocsim.ensembles.kind import Condition, layout
-from flocsim.ensembles.storage.row_store import key_of
 from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
-from flocsim.io.journal import CHUNK, SESSION
 from flocsim.io.results.schema import POOLED, blank
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
@@ -29,7 +26,6 @@ from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from flocsim.io.trajectory import write_trajectory
 from tests.helpers.compound_shapes import beads, cross, framed
-from tests.helpers.journals import write_records
 from tests.helpers.results_files import write_results
 from tests.helpers.sealed import read_sealed
 from tests.helpers.small_rates import mixed, some_kernel
@@ -144,7 +140,7 @@ def valid_sweep(folder):
     parts = [open_any(folder / "part.h5")] * 2
     swept = {"potential": Swept("forces.double_layer.potential", [-0.02, -0.03], "V")}
     path = folder / "valid-sweep.h5"
-    write_sweep(SweepResults(path, swept, joined(swept, parts), "{}"))
+    write_sweep(SweepResults(path, swept, joined(swept, parts)))
     return read_sealed(path)
 
 
@@ -164,6 +160,22 @@ def valid_trajectory(folder):
 def odd_text(rng):
     """Return a text that HDF5 can hold."""
     return rng.choice(ODD_TEXTS).encode("utf-8", "replace").decode()
+
+
+def change_json(rng, value):
+    """Return a JSON value with something odd somewhere in it."""
+    if isinstance(value, dict) and value and rng.random() < 0.85:
+        key = rng.choice(list(value))
+        changed = dict(value)
+        if rng.random() < 0.15:
+            del changed[key]
+        else:
+            changed[key] = change_json(rng, value[key])
+        return changed
+    if isinstance(value, list) and value and rng.random() < 0.7:
+        place = rng.randrange(len(value))
+        return [*value[:place], change_json(rng, value[place]), *value[place + 1 :]]
+    return rng.choice(ODD_VALUES)
 
 
 def change_values(rng, file, path):
@@ -249,61 +261,6 @@ def hdf5_file(valid):
         return written(folder, "bad.h5", seal(data))
 
     return make
-
-
-# Journals --------------------------------------------------------------------------------------
-
-
-def journal_parts(identity, key, rows):
-    """[(kind, condition, first, description, data)] of a valid journal."""
-    session = {
-        "identity": identity, "short": key, "layout": layout(), "date": "2020", "command": "x",
-        "cpus": [{"cpu": "a", "compiled_for": "a", "features": [], "numpy": [], "libm": []}],
-    }  # fmt: skip
-    note = {"type": "I", "vertices": 1, "delta": 0.0, "replicate": 1, "why": "odd"}
-    about = {"identity": key, "session": 1, "notes": [note]}
-    return [
-        (SESSION, "", 0, session, b""),
-        *((CHUNK, key_of(Condition(name, 1, 0.0)), 0, about, rows.tobytes())
-          for name in ("I", "III")),
-    ]  # fmt: skip
-
-
-def change_json(rng, value):
-    """Return a JSON value with something odd somewhere in it."""
-    if isinstance(value, dict) and value and rng.random() < 0.85:
-        key = rng.choice(list(value))
-        changed = dict(value)
-        if rng.random() < 0.15:
-            del changed[key]
-        else:
-            changed[key] = change_json(rng, value[key])
-        return changed
-    if isinstance(value, list) and value and rng.random() < 0.7:
-        place = rng.randrange(len(value))
-        return [*value[:place], change_json(rng, value[place]), *value[place + 1 :]]
-    return rng.choice(ODD_VALUES)
-
-
-def journal_file(rng, folder, parts):
-    """A hostile journal of the ``parts`` of a valid one."""
-    records = []
-    for kind, condition, first, description, data in parts:
-        if rng.random() < 0.5:
-            description = change_json(rng, description)
-        words = json.dumps(description).encode()
-        if rng.random() < 0.1:
-            words = rng.choice(ODD_TEXTS).encode("utf-8", "replace")
-        if rng.random() < 0.3 and data:
-            data = flip(rng, data)
-        if rng.random() < 0.1:
-            condition = json.dumps(change_json(rng, json.loads(condition or "[]")))
-            first = rng.choice([first, -1, 1, 2**40, 2**62])
-        records.append((kind, condition, first, words, data))
-    path = write_records(folder / "j.h5.journal", records)
-    if rng.random() < 0.3:
-        path.write_bytes(flip(rng, path.read_bytes()))
-    return path
 
 
 # Pictures and masks ----------------------------------------------------------------------------

@@ -8,8 +8,7 @@ import warnings
 
 import numpy as np
 
-from flocsim.ensembles.storage.identity import short
-from flocsim.errors import ConfigError, FileError, FlocsimError
+from flocsim.errors import ConfigError, FlocsimError
 from tests.helpers import hostile_files
 from tests.helpers.hostile_files import hdf5_file
 
@@ -118,112 +117,6 @@ def read_trajectory_file(path):
     assert np.isfinite(found.position).all() and len(found.shapes) == found.position.shape[1]
 
 
-class SwarmJournalReader:
-    """Makes journals of one study of swarms, and takes what they hold as a resumed run does."""
-
-    def __init__(self, folder):
-        from flocsim.ensembles.storage.row_store import key_of
-        from flocsim.ensembles.swarms.study import SwarmStudy
-        from flocsim.io.journal import CHUNK, PART
-        from tests.helpers.swarm_study import swarm_config
-
-        self.study, self.identity, self.parts = SwarmStudy(swarm_config(folder)), {"seed": 1}, []
-        [condition], known = self.study.conditions, {"identity": short(self.identity)}
-        for replicate in range(2):
-            key, records = (key_of(condition), replicate), []
-
-            def keep(name, about, data, key=key, records=records):
-                records.append((PART, *key, known | about | {"name": name}, data))
-
-            row, _ = self.study.run_task(condition, replicate, lambda: False, None, keep)
-            rows = np.array([tuple(row[name] for name in self.study.row.names)], self.study.row)
-            self.parts += [*records, (CHUNK, *key, known, rows.tobytes())]
-
-    def make(self, rng, folder):
-        """A hostile journal."""
-        return hostile_files.journal_file(rng, folder, self.parts)
-
-    def read(self, path):
-        """Take what it has, and make results of it where all is there."""
-        from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
-        from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.ensembles.swarms.results import results
-        from flocsim.io.journal import Journal
-        from flocsim.io.results.swarm_file import table_of
-
-        journal = Journal(path)
-        try:
-            if journal.problem:
-                raise FileError(journal.problem)  # as a run that begins says
-            store = RowStore(journal, self.study.conditions, self.study.row)
-            start = Beginning(store, self.identity)
-            refuse_other_sessions(start, self.study)
-            take_journal(start, self.study)
-            assert all(remark.isprintable() for remark in start.remarks), start.remarks
-            for parts in store.parts.values():
-                left = self.study.left_of(parts)
-                assert left is None or np.isfinite(left["motion"]).all()
-            if store.intervals(0) == [(0, 2)]:
-                table_of(results(self.study, start, 2, {}, None, True))
-            if start.remarks:
-                raise FileError(start.remarks[0])  # a part of it was refused
-        finally:
-            journal.release()
-
-
-class JournalReader:
-    """Makes journals of one study, and takes what they hold as a resumed run does."""
-
-    def __init__(self, folder):
-        from flocsim.ensembles.config.loader import load_config
-        from flocsim.ensembles.study import Study
-        from tests.helpers.small_study import write_small
-
-        path = write_small(folder, vertices="[1]")
-        self.study = Study(load_config(path), flocs=[])
-        self.identity = {"seed": 1, "kernels.spheres": "x"}
-        self.parts = hostile_files.journal_parts(self.identity, short(self.identity), self.rows())
-
-    def rows(self):
-        """Two good rows."""
-        from flocsim.ensembles.kind import ROW
-        from flocsim.io.results.schema import FURTHER_RUNS, SHAPE_COLUMNS
-
-        rows = np.zeros(2, ROW)
-        rows["inside"], rows["bond"], rows["floc_i"], rows["floc_j"] = 1, 1, -1, -1
-        rows["r_i"], rows["r_j"], rows["D_0"] = 1e-5, 2e-5, 4e-5
-        for name in SHAPE_COLUMNS:
-            rows[name] = 1.0
-        for run in FURTHER_RUNS:
-            for name in ("outcome", "inside", "bond"):
-                rows[f"{run}_{name}"] = rows[name][0], 255
-        return rows
-
-    def make(self, rng, folder):
-        """A hostile journal."""
-        return hostile_files.journal_file(rng, folder, self.parts)
-
-    def read(self, path):
-        """Take its rows and look at them."""
-        from flocsim.ensembles.storage.resume import Beginning, refuse_other_sessions, take_journal
-        from flocsim.ensembles.storage.row_store import RowStore
-        from flocsim.io.journal import Journal
-
-        journal = Journal(path)
-        try:
-            if journal.problem:
-                raise FileError(journal.problem)
-            start = Beginning(RowStore(journal, self.study.conditions), self.identity)
-            refuse_other_sessions(start, self.study)
-            take_journal(start, self.study)
-            for place in range(len(self.study.conditions)):
-                for first, stop in start.store.intervals(place):
-                    start.store.rows(place, first, stop)
-            assert all(remark.isprintable() for remark in start.remarks), start.remarks
-        finally:
-            journal.release()
-
-
 MAKERS = {
     "results": (hdf5_file(hostile_files.valid_results), read_results_file),
     "kernels": (hdf5_file(hostile_files.valid_kernel), read_kernel_file),
@@ -236,15 +129,11 @@ MAKERS = {
     "pictures": (hostile_files.picture_file, read_picture_file),
     "masks": (hostile_files.masks_file, read_masks_file),
 }
-JOURNALS = {"journals": JournalReader, "swarm_journals": SwarmJournalReader}
-KINDS = (*MAKERS, *JOURNALS)
+KINDS = tuple(MAKERS)
 
 
 def reader(name, folder):
     """Return (maker of hostile files, function that reads one) of a kind."""
-    if name in JOURNALS:
-        journals = JOURNALS[name](folder)
-        return journals.make, journals.read
     return MAKERS[name]
 
 

@@ -1,5 +1,6 @@
 """One output file, and all that may happen to it in any order: runs, kills, signals, edits, second
-jobs, other files in its place. After every step all rows are held against those of fresh runs.
+jobs, full disks, other files in its place, moves of its folder. After every step all rows are
+compared with those of fresh runs, the same for every kind of study.
 
 Every run is a child of this process, so that a kill is a real one and nothing has to be imported;
 replicates take some time more than they do, so that kills come in between.
@@ -9,12 +10,13 @@ import contextlib
 import json
 import os
 import random
-import re
+import resource
 import shutil
 import signal
 import sys
 import time
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 
 import attrs
@@ -25,16 +27,14 @@ from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.config.sources import digest_of
 from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.storage.identity import short
-from flocsim.ensembles.storage.row_store import condition_of
 from flocsim.ensembles.study import Study
-from flocsim.ensembles.swarms.study import ROW as SWARM_ROW
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
-from flocsim.io.journal import CHUNK, PART, SESSION
+from flocsim.io.journal import PART
 from flocsim.io.results.file import read_results
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.process import install
-from tests.helpers.journals import records_in, rows_in
+from tests.helpers.journals import computed_in, records_in, rows_in
 from tests.helpers.small_study import write_star_library
 
 PAIRS = """\
@@ -44,6 +44,26 @@ replicates = {replicates}
 [scene]
 pairs = "measured"
 delta = {delta}
+[shapes]
+source = "library"
+file = "stars.h5"
+vertices = [1]
+[fluid]
+viscosity = "{viscosity} mPa s"
+[forces.mine]
+class = "own_pull:Pull"
+[output]
+file = "out.h5"
+"""
+RATES = """\
+preset = "si"
+seed = {seed}
+replicates = {replicates}
+[scene]
+kind = "kernel"
+meeting = ["settling"]
+sizes = ["5 um", "12 um"]
+scrambles = 2
 [shapes]
 source = "library"
 file = "stars.h5"
@@ -95,10 +115,10 @@ class Pull(SurfaceForce):
     def kernel(pair, reach):
         return FACTOR * 1e-9 * (1.0 - pair.gap / reach)
 """
-TEXTS = {"pairs": PAIRS, "swarms": SWARMS}
+TEXTS = {"pairs": PAIRS, "rates": RATES, "swarms": SWARMS}
 DELTAS = ((0.0,), (0.5,), (0.0, 0.5))
-MOST = {"pairs": 16, "swarms": 4}
-"""Replicates that a config asks for at most."""
+REPLICATES = {"pairs": range(1, 17), "rates": (2, 4, 8, 16), "swarms": range(1, 5)}
+"""How many replicates a config may ask for."""
 
 CHOICES = {
     "seed": (1, 2), "viscosity": (0.8, 1.0), "factor": ("-1e-3", "-2e-3"),
@@ -132,7 +152,7 @@ class Physics:
 class Asked:
     """What the config asks for besides."""
 
-    replicates: int = 3
+    replicates: int = 2
     delta: tuple = (0.0,)
 
 
@@ -158,7 +178,7 @@ class Truths:
         if physics not in self.known:
             home = self.folder / f"truth-{len(self.known)}"
             home.mkdir(exist_ok=True)
-            write(home, self.kind, physics, Asked(MOST[self.kind], DELTAS[-1]))
+            write(home, self.kind, physics, Asked(REPLICATES[self.kind][-1], DELTAS[-1]))
             if not self.known:
                 self.load(home)
             child = Child(home, ["ensemble", "study.toml", "--quiet"], slower=0.0)
@@ -201,7 +221,7 @@ class Found:
 
     run: dict
     rows: dict
-    """{(displacement, replicate): bytes of all columns}."""
+    """{(condition, replicate): bytes of all columns}."""
 
     @classmethod
     def at(cls, path, kind):
@@ -213,22 +233,34 @@ class Found:
                 for _, values in sorted(found.groups[name].items())
             ]  # fmt: skip
             numbers = found.scales["replicate"].tolist()
-            rows = {(0.0, k): b"".join(np.ascontiguousarray(each[place]).tobytes()
+            condition = name_of("swarm", int(found.run["vertices"]), 0.0)
+            rows = {(condition, k): b"".join(np.ascontiguousarray(each[place]).tobytes()
                                        for each in columns)
                     for place, k in enumerate(numbers)}  # fmt: skip
             return cls(found.run, rows)
         results = read_results(path)
-        rows = {}
-        for place, share in enumerate(results.delta.tolist()):
-            for k in range(results.count):
-                rows[share, k] = row_bytes(
-                    {name: each[0, 0, place, k] for name, each in results.replicates.items()}
-                )
+        axes = results.types, results.vertices.tolist(), results.delta.tolist()
+        rows = {
+            (name_of(*condition), k): row_bytes(
+                {name: each[(*place, k)] for name, each in results.replicates.items()}
+            )
+            for condition, place in zip(product(*axes), product(*map(indices, axes)), strict=True)
+            for k in range(results.count)
+        }
         return cls(results.run, rows)
 
     @cached_property
     def key(self):
         return short(json.loads(self.run["identity"]))
+
+
+def name_of(*condition):
+    """A condition as the journal names it."""
+    return json.dumps(condition)
+
+
+def indices(axis):
+    return range(len(axis))
 
 
 def row_bytes(row):
@@ -240,7 +272,7 @@ def row_bytes(row):
 class Child:
     """A command in a process group of its own."""
 
-    def __init__(self, folder, words, slower=SLOWER):
+    def __init__(self, folder, words, slower=SLOWER, disk=None):
         self.folder, self.words = folder, words
         self.out = folder / f"said-{time.monotonic_ns()}"
         # A signal that comes before it is ready waits until then.
@@ -261,6 +293,8 @@ class Child:
                 for name in ("own_pull", "neighbour"):
                     sys.modules.pop(name, None)
                 slow_down(slower)
+                if disk is not None:  # no file may be longer, as though the disk were full then
+                    resource.setrlimit(resource.RLIMIT_FSIZE, (disk, disk))
                 install()
                 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
                 code = main(words)
@@ -360,10 +394,10 @@ class World:
     # What is there ----------------------------------------------------------------------------
 
     def tasks(self):
-        """{(identity, displacement, replicate)} of all that any file has, which has to be right."""
+        """{(identity, condition, replicate)} of all that any file has, which has to be right."""
         found = set()
         for path in self.folder.iterdir():
-            if re.search(r"\.journal(\.\d+)?$", path.name):
+            if path.suffix == ".journal":
                 found |= self.tasks_of_journal(path)
             elif path.name.startswith("out") and path.suffix == ".h5":
                 found |= self.tasks_of_results(path)
@@ -393,27 +427,18 @@ class World:
                f"{path.name} keeps the source of another module")  # fmt: skip
         return {(found.key, *task) for task in found.rows}
 
-    @property
-    def row(self):
-        return ROW if self.kind == "pairs" else SWARM_ROW
-
     def tasks_of_journal(self, path):
-        records, found = records_in(path), set()
-        keys = {each.about.get("short") for each in records if each.kind == SESSION}
-        for each in records:
-            if each.kind != CHUNK:
-                continue
-            key, first, share = each.about["identity"], each.first, condition_of(each.condition)[2]
-            count = len(each.data) // self.row.itemsize
-            demand(key in keys, f"{path.name} has a chunk of no session")
-            found |= {(key, share, first + k) for k in range(count)}
+        found = set()
+        for each in computed_in(path):
+            key, first = each["identity"], each["first"]
+            found |= {(key, each["condition"], first + k) for k in range(each["count"])}
             physics = self.truths.by_identity(key)
             demand(physics is not None, f"{path.name} is of no physics that there was")
-            if self.kind == "pairs":
-                rows = np.frombuffer(each.data, ROW)
+            if self.kind != "swarms":
+                rows = np.frombuffer(each["data"], ROW)
                 truth = self.truths.of(physics)
-                for k in range(count):
-                    known = truth.rows.get((share, first + k))
+                for k in range(each["count"]):
+                    known = truth.rows.get((each["condition"], first + k))
                     demand(known == row_bytes(rows[k]), f"{path.name} has a row of other physics")
         return found
 
@@ -423,9 +448,8 @@ class World:
         modes = [[], ["--resume"], ["--resume"], ["--resume"], ["--restart"], ["--overwrite"],
                  ["--resume", "--overwrite"]]  # fmt: skip
         mode = self.rng.choice(modes) if mode is None else mode
-        jobs = ["--jobs", "2"] if self.rng.random() < 0.03 else []
-        self.steps[-1] += [*mode, *jobs]
-        return ["ensemble", "study.toml", "--quiet", *mode, *jobs]
+        self.steps[-1] += mode
+        return ["ensemble", "study.toml", "--quiet", *mode]
 
     def must_work(self, words):
         """Whether the command has no reason to refuse: all that is there is of this study."""
@@ -449,13 +473,13 @@ class World:
         finished tasks are."""
         if not self.journal.exists():
             return False
-        records = records_in(self.journal)
-        sessions = {each.about.get("short") for each in records if each.kind == SESSION}
-        return sessions != {key} and any(each.kind == PART for each in records)
+        return any(each["identity"] != key for each in records_in(self.journal, PART))
 
     def wanted(self):
-        delta = self.asked.delta if self.kind == "pairs" else (0.0,)
-        return {(share, k) for share in delta for k in range(self.asked.replicates)}
+        every = {condition for condition, _ in self.truths.of(self.physics).rows}
+        if self.kind == "pairs":
+            every = {each for each in every if json.loads(each)[2] in self.asked.delta}
+        return {(condition, k) for condition in every for k in range(self.asked.replicates)}
 
     def judge(self, child, code, possible, must=False):
         """Hold what a command that ran with one of the ``possible`` Physics has left."""
@@ -464,7 +488,7 @@ class World:
         demand(code in ALLOWED, f"exit code {code}: {said}")
         lines = [each for each in said.splitlines()
                  if not each.startswith("flocsim: warning: ") and each]  # fmt: skip
-        demand(code == 0 or len(lines) <= 3, f"exit code {code} in many lines: {said}")
+        demand(code == 0 or len(lines) <= 4, f"exit code {code} in many lines: {said}")
         demand(not must or code in DONE, f"refused without a reason: {said}")
         if code in DONE:
             found = Found.at(self.output, self.kind)
@@ -495,15 +519,21 @@ class World:
         child = Child(self.folder, words)
         self.judge(child, child.end(), {self.physics}, must)
 
+    def resume_on_other_ranks(self):
+        words = [*self.words(["--resume"]), "--jobs", "2"]
+        must = self.must_work(words)
+        child = Child(self.folder, words)
+        self.judge(child, child.end(), {self.physics}, must)
+
     def extend(self):
-        self.asked.replicates = min(self.asked.replicates + self.rng.randint(1, 4),
-                                    MOST[self.kind])  # fmt: skip
+        more = [each for each in REPLICATES[self.kind] if each > self.asked.replicates]
+        self.asked.replicates = self.rng.choice(more[:4] or [self.asked.replicates])
         write(self.folder, self.kind, self.physics, self.asked)
         self.resume()
 
     def ask(self):
         """Edit what the config asks for, and nothing that rows follow from."""
-        self.asked.replicates = self.rng.randint(1, MOST[self.kind])
+        self.asked.replicates = self.rng.choice(REPLICATES[self.kind])
         self.asked.delta = self.rng.choice(DELTAS)
         write(self.folder, self.kind, self.physics, self.asked)
 
@@ -541,7 +571,7 @@ class World:
 
     def has_kept(self):
         with contextlib.suppress(OSError):
-            return rows_in(self.journal, self.row) > 0
+            return rows_in(self.journal) > 0
         return False
 
     def kill(self):
@@ -551,9 +581,44 @@ class World:
         demand(code in (-signal.SIGKILL, *ALLOWED), f"exit code {code}: {child.said()}")
 
     def interrupt(self):
+        self.stopped_by(signal.SIGINT)
+
+    def terminate(self):
+        self.stopped_by(signal.SIGTERM)
+
+    def stopped_by(self, number):
         child = self.begun()
-        child.signal(signal.SIGINT)
+        child.signal(number)
+        code = child.end()
+        # A signal that comes before flocsim listens ends it as it ends any program.
+        self.judge(child, 75 if code == -number else code, {self.physics})
+
+    def suspend_and_continue(self):
+        child = self.begun()
+        child.signal(signal.SIGSTOP)
+        time.sleep(self.rng.random())
+        child.signal(signal.SIGCONT)
         self.judge(child, child.end(), {self.physics})
+
+    def full_disk(self):
+        sizes = [each.stat().st_size for each in self.folder.glob("out.h5*")]
+        disk = max([30_000, *sizes]) + self.rng.randrange(60_000)
+        child = Child(self.folder, self.words(["--resume"]), disk=disk)
+        self.judge(child, child.end(), {self.physics})
+
+    def move(self):
+        """Rename the folder, as often as not under a run."""
+        child = self.begun() if self.rng.random() < 0.5 else None
+        while child is not None and not child.out.exists() and child_runs(child):
+            time.sleep(0.002)  # until it is in the folder
+        moved = self.folder.with_name(f"{self.folder.name}-moved")
+        self.folder.rename(moved)
+        if child is not None:
+            child.folder, child.out = moved, moved / child.out.name
+            code, said = child.end(), child.said()
+            demand("Traceback" not in said and "internal error" not in said, said)
+            demand(code in ALLOWED, f"exit code {code}: {said}")
+        self.folder = moved
 
     def edit_while_it_runs(self):
         child, before = self.begun(), self.physics
@@ -619,6 +684,7 @@ def child_runs(child):
 STEPS = [
     World.run, World.run, World.resume, World.resume, World.extend, World.ask,
     World.ask_and_resume, World.edit_config, World.edit_module, World.edit_library, World.kill,
-    World.kill, World.interrupt, World.edit_while_it_runs, World.second_job, World.replace,
-    World.replace_while_it_runs,
+    World.kill, World.interrupt, World.terminate, World.suspend_and_continue,
+    World.edit_while_it_runs, World.second_job, World.replace, World.replace_while_it_runs,
+    World.full_disk, World.move,
 ]  # fmt: skip

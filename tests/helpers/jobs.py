@@ -12,12 +12,11 @@ from pathlib import Path
 import attrs
 
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.kind import ROW
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.runner import run_to_file
-from flocsim.io.journal import CHUNK, journal_path
+from flocsim.io.journal import journal_path
 from flocsim.io.results.file import read_results
-from tests.helpers.journals import records_in
+from tests.helpers.journals import computed_in, records_in
 from tests.helpers.results_files import same_data
 
 BESIDE_PYTHON = Path(sys.executable).parent
@@ -173,10 +172,8 @@ def whole_rows(folder):
 def finished_in(path):
     """{(condition, replicate)} of the chunks in a journal."""
     done = set()
-    for each in records_in(path):
-        if each.kind == CHUNK:
-            count = len(each.data) // ROW.itemsize
-            done |= {(each.condition, each.first + k) for k in range(count)}
+    for each in computed_in(path):
+        done |= {(each["condition"], each["first"] + k) for k in range(each["count"])}
     return done
 
 

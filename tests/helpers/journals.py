@@ -1,53 +1,52 @@
-"""Journals for tests: what one has, and one made of any records."""
+"""Journals for tests: what one has, and how one is changed."""
 
-from flocsim.ensembles.kind import ROW
+import contextlib
+
 from flocsim.errors import FileError
 from flocsim.io.journal import (
-    CHUNK,
     INDEX_SUFFIX,
     LOCK_SUFFIX,
     PART,
+    ROWS,
     WAL_SUFFIX,
     connect,
     digest_over,
-    make_tables,
     read_journal,
 )
 
 
-def records_in(path):
-    """The records of a journal, also of one that is being written; none where it just begins."""
+def records_in(path, table=ROWS):
+    """The records of a journal's table, also of one that is being written; none where it just
+    begins."""
     try:
         with read_journal(path) as journal:
-            return list(journal.records())
+            return [dict(record) for record in journal.records(table)]
     except FileError:
         return []
 
 
+def computed_in(path):
+    """The records of rows that a journal's runs have computed."""
+    return [each for each in records_in(path) if each["session"] is not None]
+
+
+def rows_in(path):
+    """How many rows a journal's runs have computed."""
+    return sum(each["count"] for each in computed_in(path))
+
+
 def has_begun(path):
     """Return True once something was computed for a journal."""
-    return path.exists() and any(each.kind in (CHUNK, PART) for each in records_in(path))
+    return path.exists() and bool(computed_in(path) or records_in(path, PART))
 
 
-def rows_in(path, row=ROW):
-    """How many rows a journal's runs have computed."""
-    found = [each for each in records_in(path) if each.kind == CHUNK]
-    return sum(len(each.data) // row.itemsize for each in found)
-
-
-def write_records(path, parts):
-    """Write a journal of records (kind, condition, first, about as bytes, data), their checksums
-    right."""
-    remove(path)
-    db = connect(path)
-    make_tables(db)
-    db.execute("BEGIN")
-    for part in parts:
-        row = *part, digest_over(*part)
-        db.execute("INSERT INTO record VALUES (NULL, ?, ?, ?, ?, ?, ?)", row)
-    db.execute("COMMIT")
-    db.close()
-    return path
+def change(path, table, id, **values):
+    """Change columns of a record of a journal that nobody writes, its checksum right."""
+    with contextlib.closing(connect(str(path))) as db:
+        record = dict(db.execute(f"SELECT * FROM {table} WHERE id=?", (id,)).fetchone()) | values
+        record["digest"] = digest_over(tuple(record.values())[1:-1])
+        marks = ", ".join("?" * len(record))
+        db.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", tuple(record.values()))
 
 
 def remove(path):

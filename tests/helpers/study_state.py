@@ -1,5 +1,7 @@
 """The state of a made-up study of one condition, and results of its chunks."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from flocsim.ensembles.kind import ROW, Condition
@@ -15,7 +17,10 @@ NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate":
 def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
     """The state of a study of one condition on one rank, none of it done."""
     schedule = Schedule.of([[]], list(borders), 1)
-    return StudyState(schedule, RowStore(Journal(), (CONDITION,)), is_enough, allowed)
+    study = SimpleNamespace(
+        allowed=allowed, pieces=1, left_of=lambda parts: None, counts_part=lambda name: False
+    )
+    return StudyState(schedule, RowStore(Journal(), (CONDITION,)), study, is_enough)
 
 
 def result_of(chunk, count=None, failed=0):

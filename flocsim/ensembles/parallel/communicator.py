@@ -4,12 +4,12 @@ to each other while a study runs.
 All ranks talk to rank 0 only. Nobody waits inside a library: a rank that waits looks for a message,
 then sleeps a little, so that it takes no processor from those who compute, and hears signals.
 
-rank 0 → another rank         the flocs and the identity of its study (or ExitCode, if it fails)
+rank 0 → another rank         the flocs and the identity of its study (or Failed)
 every other rank → rank 0     Request, again and again: a chunk's result, and a wish for another
-rank 0 → another rank         how many replicates are to be run (or ExitCode)
+rank 0 → another rank         how many replicates are to be run (or Failed)
                               a Chunk in answer to a Request, None where there is no more
                               Halt, while it works, when its chunk is of no use any more
-                              ExitCode, after the last answer, when all is written
+                              the exit code, after the last answer, when all is written (or Failed)
 every other rank → rank 0     Kept and Going, while it works, where replicates take long
 
 Rank 0 counts for how long each rank that owes it a message has been silent (`Silence`), and ends
@@ -125,8 +125,14 @@ class Halt:
 
 
 @attrs.frozen
-class ExitCode:
+class Failed:
+    """An error has ended rank 0's study, and now ends the other ranks with its exit code."""
+
     code: int
+
+
+class RankZeroFailed(Exception):
+    """What the other ranks have of an error of rank 0, which says why; the argument is the code."""
 
 
 class Communicator:
@@ -135,12 +141,14 @@ class Communicator:
 
     A subclass has ``rank``, ``size``, ``send(to, message)``, ``abort(code)``, which ends the whole
     job, and ``arrived()``, which yields (source, message) of all that has come in. ``threads`` says
-    whether a thread of rank 0 may send and receive while the main one computes.
+    whether a thread of rank 0 may send and receive while the main one computes, ``is_launched``
+    whether an MPI launcher has started the ranks.
     """
 
     rank = 0
     size = 1
     threads = True
+    is_launched = False
 
     def __init__(self) -> None:
         self.inbox: dict[int, collections.deque] = collections.defaultdict(collections.deque)
@@ -167,8 +175,10 @@ class Communicator:
                 yield source, self.inbox[source].popleft()
 
     def receive(self, source: int, heed_signals: bool = True) -> Any:
-        """Return the next message of a rank; on rank 0, StopRequested where a signal comes first,
-        and SilentRank where none comes for too long.
+        """Return the next message of a rank; RankZeroFailed where rank 0 sends that instead.
+
+        On rank 0, StopRequested where a signal comes first, and SilentRank where nothing comes for
+        too long.
 
         The other ranks wait for rank 0 to end the job, which says why: one that ended it first
         would cut that short. Where rank 0 does not, flocsim.process does.
@@ -182,7 +192,10 @@ class Communicator:
                 raise StopRequested(f"stopped by {INTERRUPTION.name}")
             silence.look()
             time.sleep(SLEEP)
-        return self.inbox[source].popleft()
+        message = self.inbox[source].popleft()
+        if isinstance(message, Failed):
+            raise RankZeroFailed(message.code)
+        return message
 
     def gather(self, value: Any, heed_signals: bool = True) -> list | None:
         """The values of all ranks, on rank 0."""

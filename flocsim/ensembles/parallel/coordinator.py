@@ -8,6 +8,7 @@ others from a RemoteCoordinator, which sends messages to rank 0's.
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import attrs
 import numpy as np
@@ -54,7 +55,7 @@ class Coordinator:
     silence: Silence = attrs.field(init=False)
     computing: set[int] = attrs.Factory(set)
     waiting: list[int] = attrs.Factory(list)
-    lock: threading.Lock = attrs.Factory(threading.Lock)
+    lock: Any = attrs.Factory(threading.RLock)
     thread: threading.Thread | None = None
     error: BaseException | None = None
 
@@ -67,6 +68,7 @@ class Coordinator:
         return len(self.silence.seconds) + len(self.waiting)
 
     def start(self) -> None:
+        """Begin to serve the other ranks."""
         self.state.look_at_stages()
         if self.comm.size > 1 and self.comm.threads:
             self.thread = threading.Thread(target=self.serve_on, daemon=True)
@@ -96,9 +98,12 @@ class Coordinator:
         """Hand in what rank 0 has done, None at first; its next Chunk, None at the end."""
         self.raise_error()
         self.take_in(result, stop_requested())
-        while (chunk := self.next_chunk()) is None and self.state.is_running:
+        while True:
+            with self.lock:
+                chunk = self.state.next_chunk()
+            if chunk is not None or not self.state.is_running:
+                return chunk
             self.wait_a_little()
-        return chunk
 
     def is_halted(self) -> bool:
         """Return True if rank 0 is to give up the replicate at hand; serves where no thread does.
@@ -130,7 +135,8 @@ class Coordinator:
         if self.thread is not None or not self.serve():
             time.sleep(SLEEP)
 
-    def take_in(self, result, interrupted):
+    def take_in(self, result: ChunkResult | None, interrupted: bool) -> None:
+        """Take in what a rank has done, and whether a signal has come to it."""
         with self.lock:
             if interrupted:
                 self.state.interrupt()
@@ -145,10 +151,6 @@ class Coordinator:
                 self.state.keep(message)
             self.report(self.state.missing, message.words if isinstance(message, Going) else "")
 
-    def next_chunk(self):
-        with self.lock:
-            return self.state.next_chunk()
-
     def serve_on(self):
         try:
             while self.present and self.state.phase is not Phase.GIVEN_UP:
@@ -160,37 +162,30 @@ class Coordinator:
             self.error = error
 
     def serve(self):
-        """Take in what has come from the other ranks and answer them; whether anything has."""
-        before = len(self.waiting)
-        for rank, request in self.comm.messages():
-            if isinstance(request, Kept | Going):
-                with self.lock:
-                    self.silence.seconds[rank] = 0.0
-                self.tell(request)
-                continue
-            self.computing.discard(rank)
-            with self.lock:
-                self.waiting.append(rank)
-                self.silence.seconds.pop(rank, None)
-            self.take_in(request.result, request.interrupted)
-        busy = len(self.waiting) > before
-        for rank in list(self.waiting):
-            self.answer(rank)
-        while self.computing and not self.state.is_running:
-            self.comm.send(self.computing.pop(), Halt())
-        return busy
-
-    def answer(self, rank):
-        """Send a rank its next chunk, or home at the end; nothing where there is neither yet."""
-        chunk = self.next_chunk()
-        if chunk is None and self.state.is_running:
-            return
+        """Take in what has come from the other ranks and answer them; True if anything has."""
+        messages = list(self.comm.messages())
         with self.lock:
-            self.waiting.remove(rank)
-            if chunk is not None:
-                self.computing.add(rank)
+            for rank, message in messages:
                 self.silence.seconds[rank] = 0.0
-        self.comm.send(rank, chunk)
+                if isinstance(message, Kept | Going):
+                    self.tell(message)
+                    continue
+                del self.silence.seconds[rank]
+                self.computing.discard(rank)
+                self.waiting.append(rank)
+                self.take_in(message.result, message.interrupted)
+            while self.waiting:
+                chunk = self.state.next_chunk()
+                if chunk is None and self.state.is_running:
+                    break  # there may be more later
+                rank = self.waiting.pop(0)
+                if chunk is not None:
+                    self.computing.add(rank)
+                    self.silence.seconds[rank] = 0.0
+                self.comm.send(rank, chunk)  # None: home
+            while self.computing and not self.state.is_running:
+                self.comm.send(self.computing.pop(), Halt())
+        return bool(messages)
 
 
 @attrs.define(eq=False)

@@ -76,6 +76,8 @@ def load_mpi() -> Any:
 class MpiCommunicator(Communicator):
     """The ranks of MPI's world."""
 
+    is_launched = True
+
     def __init__(self, launched: int | None) -> None:
         """Join the world; UsageError where its size is not what the launcher started."""
         super().__init__()
@@ -198,23 +200,17 @@ def start_processes(
 
 
 def in_copies(works: Sequence[Callable[[], object]]) -> None:
-    """Do some works in copies of this process, for what they leave on the disk: side by side where
-    there are processors enough, and what they take of memory is given back. Nothing is done where
-    processes cannot be copied, and nothing is told: who needs what a work leaves does it again.
+    """Do some works side by side in copies of this process, for what they leave on the disk: what
+    they take of memory is given back. Nothing is done where processes cannot be copied, and nothing
+    fails: who needs what a work leaves does it again.
     """
     if sys.platform != "linux":
         return
     context = multiprocessing.get_context("fork")
-    copies = [
-        context.Process(target=as_copy, args=(work, place > 0), daemon=True)
-        for place, work in enumerate(works)
-    ]
-    together = len(os.sched_getaffinity(0)) >= len(copies)
+    copies = [context.Process(target=as_copy, args=(work,), daemon=True) for work in works]
     try:
         for copy in copies:
             copy.start()
-            if not together:
-                copy.join()
         for copy in copies:
             copy.join()
     finally:
@@ -223,17 +219,11 @@ def in_copies(works: Sequence[Callable[[], object]]) -> None:
                 copy.kill()
 
 
-def as_copy(work, silent):
-    """Work in a copied process, which dies with the first one and by any signal; unless it is
-    ``silent`` it says what the first one would."""
+def as_copy(work):
+    """Work in a copied process, which dies with the first one and by any signal."""
     handle(signal.SIG_DFL)
     end_with_parent()
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(contextlib.suppress(Exception))
-        if silent:
-            nowhere = stack.enter_context(open(os.devnull, "w"))
-            stack.enter_context(contextlib.redirect_stdout(nowhere))
-            stack.enter_context(contextlib.redirect_stderr(nowhere))
+    with contextlib.suppress(Exception):
         work()
 
 

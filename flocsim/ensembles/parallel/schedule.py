@@ -11,11 +11,10 @@ Nothing here sends a message or waits: the same calls give the same state.
 import enum
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
 
 import attrs
 
-from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, missing, total
+from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, StudyKind, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError
@@ -118,10 +117,6 @@ class Schedule:
         self.final, self.stages, self.remaining = final, [], 0
 
 
-MOST_NOTES = 1000
-"""Notes on failed replicates that are kept."""
-
-
 class TooManyFailures(FlocsimError):
     """More replicates have failed than the config allows."""
 
@@ -140,31 +135,23 @@ class StudyState:
     """The state of a study while it runs.
 
     ``is_enough(replicates)``: whether the study may end with so many of each condition;
-    ``allowed``: how many may fail; ``failed``, ``notes``: how many have, and what is known of
-    them; ``computed``: how many this run has taken in. ``pieces`` of a replicate are what progress
-    counts, ``begun`` has how many are there of unfinished ones, of parts that ``counts_part``;
-    ``left_of(parts)``: where a replicate goes on of which these were saved. ``about``: what the
-    journal says of each chunk.
+    ``failed``: how many replicates have; ``computed``: how many this run has taken in; ``begun``:
+    of unfinished replicates how many pieces are there, which progress counts.
     """
 
     schedule: Schedule
     store: RowStore
+    study: StudyKind
     is_enough: Callable[[int], bool]
-    allowed: float
     failed: int = 0
-    notes: list[dict] = attrs.Factory(list)
     computed: int = 0
     phase: Phase = Phase.RUNNING
-    pieces: int = 1
     begun: Counter[tuple[int, int]] = attrs.Factory(Counter)
-    left_of: Callable[[Any], Any] = lambda parts: None
-    counts_part: Callable[[str], bool] = lambda name: False
-    about: dict[str, Any] = attrs.Factory(dict)
 
     @property
     def missing(self) -> int:
         """How many pieces are."""
-        return self.schedule.remaining * self.pieces - self.begun.total()
+        return self.schedule.remaining * self.study.pieces - self.begun.total()
 
     @property
     def is_running(self) -> bool:
@@ -174,7 +161,7 @@ class StudyState:
         chunk = self.schedule.take() if self.is_running else None
         if chunk is None or not (parts := self.store.parts.get(chunk[:2])):
             return chunk
-        return chunk._replace(left=self.left_of(parts))
+        return chunk._replace(left=self.study.left_of(parts))
 
     def keep(self, kept: Kept) -> None:
         """Write down what was kept of an unfinished replicate."""
@@ -182,8 +169,8 @@ class StudyState:
             return
         task = kept.condition, kept.replicate
         is_new = kept.name not in self.store.parts[task]
-        self.store.add_part(*task, kept.name, self.about | kept.about, kept.data)
-        self.begun[task] += is_new and self.counts_part(kept.name)
+        self.store.add_part(*task, kept.name, kept.about, kept.data)
+        self.begun[task] += is_new and self.study.counts_part(kept.name)
 
     def take_in(self, result: ChunkResult) -> None:
         """Write a ChunkResult down, and see whether that is enough.
@@ -194,19 +181,18 @@ class StudyState:
             return
         count, (condition, first) = len(result.rows), result.chunk[:2]
         if count:
-            about = self.about | ({"notes": list(result.notes)} if result.notes else {})
-            self.store.add(condition, first, result.rows, about)
+            self.store.add(condition, first, result.rows, result.notes)
             for replicate in range(first, first + count) if self.begun else ():
                 self.begun.pop((condition, replicate), None)
         self.computed += count
         self.schedule.give_back(result.chunk, count)
         self.failed += result.failed
-        self.notes += result.notes[: MOST_NOTES - len(self.notes)]
-        if self.failed > self.allowed:
+        if self.failed > self.study.allowed:
+            notes = self.store.notes
             raise TooManyFailures(
                 f"{self.failed} replicate{'s' if self.failed > 1 else ''} failed, more than "
                 "stop.failed allows; the first: "
-                f"{describe_note(self.notes[0]) if self.notes else 'see the journal'}"
+                f"{describe_note(notes[0]) if notes else 'see the journal'}"
             )
         self.look_at_stages()
 

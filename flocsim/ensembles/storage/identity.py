@@ -6,19 +6,16 @@ numpy) and of the modules that prepare a replicate. How many replicates, which t
 are is not part of it, as no row depends on the others.
 """
 
-import ast
 import functools
 import hashlib
 import json
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import attrs
 import numpy as np
 
-from flocsim.compiler.disk_cache import kept
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import PHYSICS, StudyKind
 from flocsim.geometry.contact.compounds import outlines_of, point_columns
@@ -37,19 +34,11 @@ PARTIAL = ("flocs.", "types.", "numbers.", "kernels.")
 PACKAGE = Path(__file__).parents[2]
 
 
-def machine_facts(names: Sequence[str] = PHYSICS) -> dict:
-    """What all studies of this process follow from: flocsim's code, and how the machine rounds."""
-    return {"code": physics_digest(names=names), "arithmetic": arithmetic_digest()}
-
-
-def identity_of(study: StudyKind, machine: dict | None = None) -> dict:
-    """Return {name: text or number} of all that the rows of a study follow from.
-
-    ``machine``: the machine_facts, where they are known.
-    """
+def identity_of(study: StudyKind) -> dict:
+    """Return {name: text or number} of all that the rows of a study follow from."""
     tables = ("scene", "shapes", "bodies", "fluid", "zone")
     facts = config_facts(study.config, [each for each in tables if each not in study.scene.without])
-    facts |= machine or machine_facts(study.code)
+    facts |= {"code": physics_digest(names=study.code), "arithmetic": arithmetic_digest()}
     facts |= floc_facts(study.flocs)
     facts |= {name: comparable(value) for name, value in study.identity_facts().items()}
     return json.loads(json.dumps(facts))
@@ -154,19 +143,18 @@ def arithmetic_digest():
     """
     rng = np.random.Generator(np.random.Philox(1))
     x, y, z = rng.uniform(0.0, 20.0, SAMPLES), rng.uniform(0.01, 3.0, SAMPLES), rng.random(SAMPLES)
-    found = [each(x) for each in (np.sin, np.cos, np.tan, np.exp, np.expm1)]
-    found += [np.log(y), np.arccos(z), np.hypot(x, y), np.arctan2(x, y), np.power(y, x)]
     pairs = list(zip(x.tolist(), y.tolist(), strict=True))
-    for one in (math.sin, math.cos, math.tan, math.exp, math.expm1, math.atan):
-        found.append(np.array([one(a) for a, _ in pairs]))
-    found.append(np.array([math.log(b) for _, b in pairs]))
-    for two in (math.hypot, math.atan2):
-        found.append(np.array([two(a, b) for a, b in pairs]))
-    found.append(np.array([math.pow(b, a) for a, b in pairs]))
-    found += [np.linalg.solve(m, [1.0, 0.3]) for m in y[:400].reshape(-1, 2, 2)]
-    found += [np.einsum("ij,ij->i", x.reshape(-1, 2), z.reshape(-1, 2))]
-    for points in (3, 16, 64):
-        found.append(star_numbers(points))
+    one = (math.sin, math.cos, math.tan, math.exp, math.expm1, math.atan)
+    two = (math.hypot, math.atan2, math.pow, lambda a, b: math.log(b))
+    found = [
+        *(each(x) for each in (np.sin, np.cos, np.tan, np.exp, np.expm1)),
+        np.log(y), np.arccos(z), np.hypot(x, y), np.arctan2(x, y), np.power(y, x),
+        *(np.array([each(a) for a, _ in pairs]) for each in one),
+        *(np.array([each(a, b) for a, b in pairs]) for each in two),
+        *(np.linalg.solve(m, [1.0, 0.3]) for m in y[:400].reshape(-1, 2, 2)),
+        np.einsum("ij,ij->i", x.reshape(-1, 2), z.reshape(-1, 2)),
+        *map(star_numbers, (3, 16, 64)),
+    ]  # fmt: skip
     return digest(np.concatenate(found))
 
 
@@ -184,22 +172,11 @@ def star_numbers(points):
 
 
 def physics_digest(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> str:
-    """A hash of the modules that decide what is in a row: of what they do, not how they look.
-
-    It is kept by a hash of their text, as it takes half a second to look behind that.
-    """
-    sources = [path.read_bytes() for path in physics_files(root, names)]
-    text = hashlib.blake2b(digest_size=16)
-    for source in sources:
-        text.update(b"%d\n" % len(source) + source)
-
-    def looked_at() -> bytes:
-        found = hashlib.blake2b(digest_size=16)
-        for source in sources:
-            found.update(essence(source.decode()).encode())
-        return found.hexdigest().encode()
-
-    return kept("flocsim_physics", f"{text.hexdigest()} {sys.version}", looked_at).decode()
+    """Return a hash of the modules that decide what is in a row."""
+    found = hashlib.blake2b(digest_size=16)
+    for path in physics_files(root, names):
+        found.update(hashlib.blake2b(path.read_bytes()).digest())
+    return found.hexdigest()
 
 
 def physics_files(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> Iterator[Path]:
@@ -207,20 +184,6 @@ def physics_files(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> Itera
     for name in names:
         place = root / name
         yield from sorted(place.rglob("*.py")) if place.is_dir() else [place]
-
-
-def essence(source):
-    """A module's syntax tree as text, without comments, layout and docstrings."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            node.body = [
-                each
-                for each in body
-                if not (isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant))
-            ]
-    return ast.dump(tree)
 
 
 def digest(array):

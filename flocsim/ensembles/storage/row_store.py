@@ -6,7 +6,8 @@ their checksums whenever they are needed.
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from sqlite3 import Row
 from typing import Any
 
 import attrs
@@ -23,12 +24,28 @@ from flocsim.ensembles.kind import (
     total,
 )
 from flocsim.errors import FileError
-from flocsim.io.journal import CHUNK, OLD, PART, Journal, JournalReader, Record
-from flocsim.io.json_text import matches, read_json
-from flocsim.io.results.run_group import NOTE
+from flocsim.io.journal import (
+    DAMAGED,
+    PART,
+    ROWS,
+    SESSION,
+    Journal,
+    JournalReader,
+    as_text,
+)
+from flocsim.io.json_text import read_json
+from flocsim.io.results.run_group import NOTE, is_session
 
-Check = Callable[[np.ndarray], object]
-"""Raises ValueError for rows that no run can have given."""
+
+def sessions_of(journal: JournalReader) -> dict[int, dict]:
+    """Return {id: description} of the runs that wrote a journal; FileError for what is none."""
+    try:
+        found = {row["id"]: read_json(row["about"], {}) for row in journal.records(SESSION)}
+    except ValueError as error:
+        raise FileError(f"{journal.path} {DAMAGED} ({error})") from error
+    if not all(map(is_session, found.values())):
+        raise FileError(f"{journal.path} {DAMAGED} (it was not begun by flocsim)")
+    return found
 
 
 def key_of(condition: Condition) -> str:
@@ -36,12 +53,8 @@ def key_of(condition: Condition) -> str:
     return json.dumps(condition)
 
 
-def condition_of(key: str) -> Condition:
-    """Return the condition with this name in a journal; ValueError where it is none."""
-    found = read_json(key, [object])
-    if len(found) != 3 or not all(map(matches, found, (str, int, float))):
-        raise ValueError("its condition is unknown")
-    return Condition(*found)
+MOST_NOTES = 1000
+"""Notes on failed replicates that are kept."""
 
 
 @attrs.frozen
@@ -56,9 +69,9 @@ class Parts:
 
     def read(self, name: str) -> tuple[dict[str, Any], bytes]:
         """Return (description, data) of a part; FileError where it is damaged by now."""
-        if (record := self.journal.record(self.ids[name])) is None:
-            raise FileError(f"{self.journal.path} is damaged: run it again with --resume")
-        return record.about, record.data
+        for record in self.journal.records(PART, "id=?", self.ids[name]):
+            return read_json(record["about"], {}), record["data"]
+        raise FileError(f"{self.journal.path} is damaged: run it again with --resume")
 
 
 @attrs.define(eq=False)
@@ -66,23 +79,30 @@ class RowStore:
     """The rows of a study's ``conditions`` in a journal, and its ``parts`` {(index of the
     condition, replicate): Parts}.
 
-    ``runs``: of each condition the replicates that are there, and ``computed`` those that this
-    journal's own runs computed, not read from an older file.
+    ``identity`` is a digest of what new rows follow from, and ``session`` the run that computes
+    them; rows with an identity among ``known`` agree with it. ``runs``: of each condition the
+    replicates that are there; ``computed``: how many this journal's own runs have computed, not
+    copied from older results; ``notes``: on replicates that failed; ``refused``: (table, id) of
+    records that are damaged, or that no run of this study can have written.
     """
 
     journal: JournalReader
     conditions: tuple[Condition, ...]
     row: np.dtype = ROW
+    identity: str = ""
+    known: set[str] = attrs.Factory(set)
+    session: int = 0
+    computed: int = 0
+    notes: list[dict] = attrs.Factory(list)
+    refused: set[tuple[str, int]] = attrs.Factory(set)
     parts: dict[tuple[int, int], Parts] = attrs.field(init=False)
     indices: dict[str, int] = attrs.field(init=False)
     runs: list[list[Interval]] = attrs.field(init=False)
-    computed: list[list[Interval]] = attrs.field(init=False)
 
     def __attrs_post_init__(self):
         self.parts = defaultdict(lambda: Parts(self.journal))
         self.indices = {key_of(condition): k for k, condition in enumerate(self.conditions)}
         self.runs = [[] for _ in self.conditions]
-        self.computed = [[] for _ in self.conditions]
 
     @property
     def writer(self) -> Journal:
@@ -90,59 +110,82 @@ class RowStore:
         assert isinstance(self.journal, Journal), "opened to be written"
         return self.journal
 
-    def add(self, place: int, first: int, rows: np.ndarray, about: Mapping[str, Any]) -> None:
-        """Write down the rows of replicates from the ``first`` on."""
-        key = key_of(self.conditions[place])
-        data = np.ascontiguousarray(rows, self.row).tobytes()
-        self.writer.add(CHUNK, key, first, dict(about), data)
-        self.note(place, first, first + len(rows))
+    def add(self, place: int, first: int, rows: np.ndarray, notes: Sequence[dict] = ()) -> None:
+        """Write down the rows of replicates from the ``first`` on, and notes on failed ones."""
+        self.write(key_of(self.conditions[place]), first, rows, notes, self.session)
+        self.note(place, first, len(rows), notes)
+        self.computed += len(rows)
 
     def copy(self, condition: Condition, first: int, rows: np.ndarray) -> None:
-        """Write down rows of an older results file, which `take` notes later."""
+        """Write down rows of an older results file, which `load` notes later."""
         for start in range(0, len(rows), MOST_ROWS):
-            data = np.ascontiguousarray(rows[start : start + MOST_ROWS], self.row).tobytes()
-            self.writer.add(OLD, key_of(condition), first + start, {}, data)
+            self.write(key_of(condition), first + start, rows[start : start + MOST_ROWS], (), None)
+
+    def write(
+        self, key: str, first: int, rows: np.ndarray, notes: Sequence[dict], session: int | None
+    ) -> None:
+        data = np.ascontiguousarray(rows, self.row).tobytes()
+        self.writer.add(
+            ROWS, self.identity, session, key, first, len(rows), as_text(list(notes)), data
+        )
 
     def add_part(
         self, place: int, replicate: int, name: str, about: Mapping[str, Any], data: bytes
     ) -> None:
         """Write down what is saved of a replicate, in the place of an earlier part of that name."""
-        ids, key = self.parts[place, replicate].ids, key_of(self.conditions[place])
-        ids[name] = self.writer.add(
-            PART, key, replicate, {**about, "name": name}, data, ids.get(name)
+        key = key_of(self.conditions[place])
+        self.parts[place, replicate].ids[name] = self.writer.add(
+            PART, self.identity, self.session, key, replicate, name, as_text(dict(about)), data
         )
 
-    def note(self, place: int, first: int, stop: int, kind: str = CHUNK) -> None:
-        """Note that replicates of a condition are there."""
-        for runs in (self.runs,) if kind == OLD else (self.runs, self.computed):
-            runs[place] = merged([*runs[place], (first, stop)])
+    def note(self, place: int, first: int, count: int, notes: Sequence[dict]) -> None:
+        """Note that replicates of a condition are there, with notes on those that failed."""
+        self.runs[place] = merged([*self.runs[place], (first, first + count)])
+        self.notes += notes[: MOST_NOTES - len(self.notes)]
 
-    def take(self, record: Record, check: Check) -> int | None:
-        """Note the rows or the part of a record that was found; the index of its condition, None
-        where it is of none of these. ValueError where it is nothing that a run can have left."""
-        condition_of(record.condition)
-        place = self.indices.get(record.condition)
-        if record.kind == PART:
-            name = record.about.get("name")
-            if not isinstance(name, str) or not 0 <= record.first < LARGEST_REPLICATE:
-                raise ValueError("what was saved of a replicate has an unknown form")
-            if place is not None:
-                self.parts[place, record.first].ids[name] = record.id
-        else:
-            rows = self.rows_of(record)
-            if place is not None:
-                check(rows)
-                self.note(place, record.first, record.first + len(rows), record.kind)
-        return place
+    def load(
+        self,
+        check_whole: Callable[[np.ndarray, Any], object] = lambda rows, parts: None,
+        trusts_copies: bool = False,
+    ) -> None:
+        """Take the parts and rows that the journal has, and note those that are ``refused``.
 
-    def rows_of(self, record: Record) -> np.ndarray:
-        """Return the rows of a record; ValueError where it has none."""
-        count, rest = divmod(len(record.data), self.row.itemsize)
-        in_range = 0 <= record.first < record.first + count <= LARGEST_REPLICATE
-        notes = matches(record.about.get("notes", []), [NOTE])
-        if rest or count > MOST_ROWS or not in_range or not notes:
-            raise ValueError("its form is unknown")
-        return np.frombuffer(record.data, self.row)
+        ``check_whole(rows, parts)`` raises ValueError where what is saved of a finished replicate
+        is not all there. Copies of rows have no parts, but those in the older results that lie
+        beside the journal (``trusts_copies``).
+        """
+        for record in self.journal.records(PART):
+            place = self.indices.get(record["condition"])
+            try:
+                self.check_record(record)
+            except (ValueError, TypeError):
+                self.refused.add((PART, record["id"]))
+                continue
+            if place is not None:
+                self.parts[place, record["first"]].ids[record["name"]] = record["id"]
+        for record in self.journal.records(ROWS):
+            place, is_copy = self.indices.get(record["condition"]), record["session"] is None
+            try:
+                self.check_record(record)
+                rows = np.frombuffer(record["data"], self.row)
+                notes = read_json(record["notes"], [NOTE])
+                if len(rows) != record["count"] or len(rows) > MOST_ROWS:
+                    raise ValueError("a record has other rows than it says")
+                if place is not None and not (is_copy and trusts_copies):
+                    check_whole(rows, self.parts.get((place, record["first"]), ()))
+            except (ValueError, TypeError):
+                self.refused.add((ROWS, record["id"]))
+                continue
+            self.computed += 0 if is_copy else len(rows)
+            if place is not None:
+                self.note(place, record["first"], len(rows), notes)
+        self.refused |= self.journal.damaged
+
+    def check_record(self, record: Row) -> None:
+        """ValueError for a record of another study, or of no replicate."""
+        known = {self.identity, *self.known}
+        if record["identity"] not in known or not 0 <= record["first"] < LARGEST_REPLICATE:
+            raise ValueError("a record is of no run of this study")
 
     def intervals(self, place: int) -> list[Interval]:
         """Return the replicates of a condition that exist."""
@@ -157,18 +200,22 @@ class RowStore:
 
         FileError where one is missing, or is not what was written.
         """
-        found = np.zeros(stop - first, self.row)
-        reached = []
-        key = key_of(self.conditions[place])
-        for record in self.journal.chunks(key, first - MOST_ROWS, stop):
-            rows = np.frombuffer(record.data, self.row)
-            low, high = max(record.first, first), min(record.first + len(rows), stop)
+        found, reached = np.zeros(stop - first, self.row), []
+        for record in self.journal.records(
+            ROWS, "condition=? AND first>? AND first<?",
+            key_of(self.conditions[place]), first - MOST_ROWS, stop,
+        ):  # fmt: skip
+            if (ROWS, record["id"]) in self.refused:
+                continue
+            rows, at = np.frombuffer(record["data"], self.row), record["first"]
+            low, high = max(at, first), min(at + len(rows), stop)
             if low < high:
-                found[low - first : high - first] = rows[low - record.first : high - record.first]
+                found[low - first : high - first] = rows[low - at : high - at]
                 reached.append((low, high))
         if missing(merged(reached), first, stop):
             raise FileError(
-                f"{self.journal.path} does not have all rows: run it again with --resume"
+                f"{self.journal.path} does not have all rows, or was damaged after they were "
+                "written: run it again with --resume, which computes what is missing"
             )
         return found
 

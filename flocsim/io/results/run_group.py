@@ -14,7 +14,7 @@ import platform
 import re
 import shlex
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
@@ -24,7 +24,7 @@ NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": s
 """What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
 CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm": [str]}
-SESSION = {"identity": {}, "short": str, "layout": str, "date": str, "command": str}
+SESSION = {"identity": {}, "layout": str, "date": str, "command": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
 SETTLED = {
@@ -94,24 +94,6 @@ def describe_kind(kind: dict, others: Sequence[dict] = ()) -> str:
             more = ", …" if len(own) > MOST_FEATURES else ""
             words.append(f"{title}{', '.join(own[:MOST_FEATURES])}{more}")
     return words[0] if len(words) == 1 else f"{words[0]} ({'; '.join(words[1:])})"
-
-
-def mixture_warnings(path: object, found: Sequence[dict], now: Sequence[dict]) -> Iterator[str]:
-    """Lines that warn of rows of several kinds in one file.
-
-    ``found``: kinds of the rows that the file at ``path`` has already; ``now``: those of the ranks
-    that add to them.
-    """
-    kinds = distinct([*found, *now])
-    names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
-    end = "the file will have rows of both kinds, which may differ in their last digits"
-    if len(now) > 1:
-        here = " and ".join(names[kinds.index(kind)] for kind in now)
-        yield f"the ranks run on different kinds of CPU, {here}: {end}"
-    elif any(kind not in found for kind in now) and found:
-        there = " and ".join(names[kinds.index(kind)] for kind in found)
-        here = names[kinds.index(now[0])]
-        yield f"{path} has rows of another kind of CPU, {there}, and this is {here}: {end}"
 
 
 def describe_note(note: dict) -> str:

@@ -1,8 +1,7 @@
 """The joined file of a sweep: tables of a study's probabilities, the swept keys first.
 
 HDF5 as the results file is: groups `probabilities` and `pooled` with dimension scales, units and
-meanings, a checksum behind; the attribute `swept` (JSON) names the keys, and `run/plan` (JSON) has
-what the rows of each part follow from.
+meanings, a checksum behind; the attribute `swept` (JSON) names the keys.
 """
 
 import json
@@ -46,12 +45,11 @@ class Swept:
 @attrs.frozen(eq=False)
 class SweepResults(Tables):
     """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
-    ``plan`` (JSON) says what each of its parts is, ``run`` what `source_line` tells of all."""
+    ``run`` has what `source_line` tells of all parts."""
 
     path: Path
     swept: dict[str, Swept]
     groups: dict[str, Labelled]
-    plan: str = ""
     run: dict[str, Any] = attrs.Factory(dict)
 
     @property
@@ -71,8 +69,7 @@ class SweepResults(Tables):
 def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
     about = {name: {"key": each.key, "unit": each.unit} for name, each in results.swept.items()}
-    run = {"plan": results.plan} | results.run
-    SWEEP.write(results.path, results.groups, run, {"swept": json.dumps(about)}, rule)
+    SWEEP.write(results.path, results.groups, results.run, {"swept": json.dumps(about)}, rule)
 
 
 def read_sweep(
@@ -98,11 +95,8 @@ def read_sweep(
             name: Swept(each["key"], first[name].tolist(), each["unit"])
             for name, each in about.items()
         }
-        run = dict(stored.run)
-        plan = str(run.pop("plan", ""))
-        return SweepResults(
-            Path(path), swept, {name: stored.labelled(name) for name in groups}, plan, run
-        )
+        tables = {name: stored.labelled(name) for name in groups}
+        return SweepResults(Path(path), swept, tables, dict(stored.run))
 
 
 def joined_group(one: Group, name: str, about: Mapping[str, dict], file: File) -> Group:

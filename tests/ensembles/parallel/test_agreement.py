@@ -6,19 +6,12 @@ import sys
 
 import pytest
 
+from flocsim.compiler.processor import versions
 from flocsim.ensembles import runner
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.sources import Sources
-from flocsim.ensembles.parallel import agreement
-from flocsim.ensembles.parallel.agreement import (
-    Facts,
-    Launch,
-    disagreement,
-    refuse_other_words,
-)
 from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.runner import SharedError, run_to_file
-from flocsim.errors import KernelError, UsageError
+from flocsim.ensembles.runner import SharedError, first_difference, run_to_file
+from flocsim.errors import KernelError
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import write_own
 from tests.helpers.results_files import same_data
@@ -35,40 +28,26 @@ from tests.helpers.small_study import (
 from tests.helpers.tiers import rest_slow
 from tests.helpers.waiting import PATIENCE
 
-HERE = Facts({"seed": 1, "kernels.spheres": "ab", "code": "cd"}, {"version of numpy": "2.0"}, "n0")
+HERE = versions() | {"seed": 1, "kernels.spheres": "ab", "code": "cd"}
 
 
 @pytest.mark.parametrize(
-    ("identity", "versions", "said"),
+    ("changed", "said"),
     [
-        ({"seed": 2}, {}, "seed 2 where rank 0 has 1"),
-        ({"kernels.spheres": "xy"}, {}, "other compiled code (spheres)"),
-        ({"code": "xy"}, {}, "other flocsim's own code"),
-        ({"flocs.4": "xy"}, {}, "other flocs (4)"),
-        ({"code": "xy", "seed": 2}, {}, "seed 2 where rank 0 has 1, other flocsim's own code"),
-        ({"code": "xy"}, {"version of numpy": "2.1"}, "version of numpy '2.1' where rank 0 has"),
-        ({}, {"version of numba": "0.6"}, "version of numba '0.6' where rank 0 has nothing"),
+        ({"seed": 2}, "in seed (2, on rank 0 1)"),
+        ({"kernels.spheres": "xy"}, "in kernels.spheres ('xy', on rank 0 'ab')"),
+        ({"code": "xy", "version of numpy": "2.1"}, "in version of numpy ('2.1', on rank 0"),
+        ({"more": "xy"}, "in more ('xy', on rank 0 None)"),
     ],
 )
-def test_a_rank_that_would_compute_something_else_is_named(identity, versions, said):
-    other = Facts(HERE.identity | identity, HERE.versions | versions, "n1")
-    line = disagreement(3, HERE, other)
-    assert line.startswith(f"rank 3 on {agreement.platform.node()} has ")
-    assert said in line
-    assert "unlike rank 0 on n0" in line
-    assert "\n" not in line
-    assert disagreement(3, HERE, HERE) == ""
-
-
-def test_other_words_are_refused():
-    launch = Launch({"config": "a.toml", "seed": None}, Sources(), "n0")
-    refuse_other_words(1, launch, {"config": "a.toml", "seed": None})
-    with pytest.raises(UsageError, match=r"config 'b.toml' where rank 0 has 'a.toml', unlike"):
-        refuse_other_words(1, launch, {"config": "b.toml", "seed": None})
+def test_a_rank_that_would_compute_something_else_is_named(changed, said):
+    line = first_difference(3, HERE, HERE | changed)
+    assert line.startswith("rank 3 on ") and said in line and "\n" not in line
+    assert first_difference(3, HERE, HERE) == ""
 
 
 def test_the_versions_of_all_that_computes_are_compared():
-    found = agreement.versions()
+    found = versions()
     assert {"version of numpy", "version of numba", "version of flocsim"} < found.keys()
     assert sys.version == found["version of Python"]
 
@@ -126,8 +105,7 @@ def test_ranks_with_two_configs_are_refused(tmp_path):
     done = mixed(tmp_path, ["a.toml"], ["b.toml"])
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
-    assert "rank 1 on " in line
-    assert "has config 'b.toml' where rank 0 has 'a.toml'" in line
+    assert "rank 1: it was given other arguments than rank 0" in line
     assert not list(tmp_path.glob("small.h5*"))
 
 
@@ -135,8 +113,6 @@ OTHERS = [
     ["--seed", "5"],
     ["--set", "scene.delta=[0.5]"],
     ["--resume"],
-    ["--bogus"],  # ends before it has joined the others
-    ["--help"],
     ["--jobs", "2"],
 ]
 
@@ -147,7 +123,7 @@ def test_ranks_with_other_words_are_refused(tmp_path, other):
     done = mixed(tmp_path, ["small.toml"], ["small.toml", *other])
     assert (done.returncode, done.stdout) == (2, "")
     [line] = done.stderr.splitlines()
-    assert "rank 1 " in line
+    assert "rank 1: it was given other arguments" in line
     assert not list(tmp_path.glob("small.h5*"))
 
 
@@ -199,10 +175,10 @@ def test_files_that_are_edited_during_the_start_are_read_once(tmp_path, ranks):
 DIFFERS = """\
 import os
 if "1" in map(os.environ.get, ("PMI_RANK", "OMPI_COMM_WORLD_RANK")):
-    from flocsim.ensembles.parallel import agreement
+    from flocsim.ensembles import runner
 
-    found = agreement.versions()
-    agreement.versions = lambda: found | {"version of numpy": "0.9"}
+    found = runner.versions()
+    runner.versions = lambda: found | {"version of numpy": "0.9"}
 """
 
 
@@ -215,7 +191,7 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
-    assert "has version of numpy '0.9' where rank 0 has" in line
+    assert "differs from rank 0 in version of numpy ('0.9', on rank 0" in line
     assert not list(tmp_path.glob("small.h5*"))
 
 
@@ -234,7 +210,7 @@ def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
     assert done.returncode == 2
     [line] = done.stderr.splitlines()
     assert "rank 1 on " in line
-    assert "other compiled code (spheres)" in line
+    assert "differs from rank 0 in kernels.spheres" in line
     assert not list(tmp_path.glob("small.h5*"))
 
 

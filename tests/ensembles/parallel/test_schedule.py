@@ -115,7 +115,7 @@ def test_a_study_may_end_at_an_earlier_stage():
 
 
 def test_with_nothing_missing_it_ends_at_the_first_look():
-    state = StudyState(Schedule.of([[(0, 4)]], [4], 1), None, None, 0)
+    state = StudyState(Schedule.of([[(0, 4)]], [4], 1), None, None, None)
     state.look_at_stages()
     assert state.phase is Phase.FINISHED
 
@@ -161,4 +161,4 @@ def test_too_many_failures_end_the_study_after_what_came_was_written():
     state.take_in(result_of(state.next_chunk(), failed=1))
     with pytest.raises(TooManyFailures, match=r"2 replicates failed, .* stalled"):
         state.take_in(result_of(state.next_chunk(), failed=1))
-    assert (state.computed, len(state.notes)) == (2, 2)
+    assert (state.computed, len(state.store.notes)) == (2, 2)

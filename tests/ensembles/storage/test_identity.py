@@ -87,12 +87,6 @@ def copy(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def parsed_once(monkeypatch):
-    """A file that has not been edited need not be parsed again."""
-    monkeypatch.setattr(identity, "essence", functools.cache(identity.essence))
-
-
 def is_exempt(name):
     """Whether a file stands in NOT_PHYSICS, by itself or by its folder."""
     return any(name == each or (each[-1] == "/" and name.startswith(each)) for each in NOT_PHYSICS)
@@ -109,7 +103,7 @@ def test_all_that_rows_depend_on_is_looked_at():
 
 
 @pytest.mark.parametrize("every", rest_slow([12, 1], lambda every: every > 1))
-def test_an_edit_in_any_file_that_rows_depend_on_changes_the_identity(copy, parsed_once, every):
+def test_an_edit_in_any_file_that_rows_depend_on_changes_the_identity(copy, every):
     names = looked_at()
     assert len(names) > 50
     before, unseen = physics_digest(copy), []
@@ -128,7 +122,7 @@ ROOMS = [name for name in identity.PHYSICS if not name.endswith(".py")]
 
 
 @pytest.mark.parametrize("folder", rest_slow(ROOMS, lambda folder: folder == ROOMS[0]))
-def test_a_new_file_in_a_new_room_changes_the_identity(copy, parsed_once, folder):
+def test_a_new_file_in_a_new_room_changes_the_identity(copy, folder):
     before = physics_digest(copy)
     room = copy / folder / "new_room"
     room.mkdir()

@@ -171,7 +171,7 @@ def test_what_was_computed_beyond_the_end_of_the_same_rule_goes_with_the_journal
 def test_a_journal_beside_results_of_another_study_replaces_them_not(stopped, whole):
     go_on(stopped.parent / stopped.name, RESTART, seed=9)
     others = (stopped / "r.h5").read_bytes()
-    (stopped / "r.h5.journal.1").rename(stopped / "r.h5.journal")
+    (stopped / "r.h5.1.journal").rename(stopped / "r.h5.journal")
     with pytest.raises(SharedError, match=r"r.h5 belongs to another study: seed is 9"):
         go_on(stopped)
     assert (stopped / "r.h5").read_bytes() == others
@@ -218,50 +218,6 @@ def test_what_is_promised_counts_the_journal_and_not_the_results(finished, monke
     assert rows_in(journal) == 5
 
 
-def test_a_journal_that_is_deleted_meanwhile_is_there_when_it_is_promised(
-    tmp_path, monkeypatch, whole
-):
-    seen = []
-
-    def add(journal, *words, original=Journal.add):
-        seen.append(journal)
-        if len(seen) == 20:
-            journal.path.unlink()
-        return original(journal, *words)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Journal, "add", add)
-        stop_after(patch, 30)
-        ended = go_on(tmp_path, NEW)
-    journal = tmp_path / "r.h5.journal"
-    kept = f"30 finished replicates are in {journal}"
-    assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
-    assert rows_in(journal) == 30
-    assert go_on(tmp_path).computed == 50
-    assert same_data(tmp_path / "r.h5", whole) == []
-
-
-def test_a_journal_that_another_file_has_replaced_is_kept_under_another_name(tmp_path, monkeypatch):
-    path, seen = tmp_path / "r.h5.journal", []
-
-    def add(journal, *words, original=Journal.add):
-        seen.append(journal)
-        if len(seen) == 20:
-            path.unlink()
-            path.write_text("of another job")
-        return original(journal, *words)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Journal, "add", add)
-        stop_after(patch, 30)
-        with pytest.raises(SharedError, match="was replaced by another file") as caught:
-            go_on(tmp_path, NEW)
-    assert caught.value.args[0].exit_code == 74
-    assert path.read_text() == "of another job"
-    assert rows_in(tmp_path / "r.h5.journal.1") == 30
-    assert not (tmp_path / "r.h5").exists()
-
-
 @pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
 def test_a_job_that_waited_for_another_looks_at_its_results_anew(
     finished, whole, monkeypatch, mode
@@ -298,7 +254,6 @@ def test_a_running_job_is_not_disturbed(stopped, monkeypatch, mode):
     running = Journal(path)
     with pytest.raises(SharedError, match="is being written by another job"):
         go_on(stopped, mode)
-    assert running.is_in_place()
     running.release()
     assert records_in(path) == before
 
@@ -313,7 +268,7 @@ def test_the_lock_is_held_before_anything_is_grown_and_to_the_end(tmp_path, monk
         busy.append(True)
         return original(*words)
 
-    for name in ("flocs_of", "own_facts", "make_results"):
+    for name in ("flocs_of", "identity_of", "make_results"):
         original = getattr(runner, name)
         monkeypatch.setattr(runner, name, lambda *words, o=original: probe(*words, original=o))
     go_on(tmp_path, NEW)

@@ -18,6 +18,7 @@ from flocsim.ensembles.swarms.results import decoded
 from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError, UsageError
 from flocsim.io import terminal
+from flocsim.io.journal import PART
 from flocsim.io.results import swarm_file
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.swarms import runner
@@ -194,7 +195,7 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
         until = time.monotonic() + PATIENCE
         journal = tmp_path / "swarm.h5.journal"
         while time.monotonic() < until and process.poll() is None:
-            if any(each.about.get("name") == "state" for each in records_in(journal)):
+            if any(each["name"] == "state" for each in records_in(journal, PART)):
                 process.send_signal(number)
                 break
             time.sleep(0.002)
