@@ -175,7 +175,7 @@ def test_other_flocs_are_refused(tmp_path, monkeypatch):
         return [attrs.evolve(first, ratio=first.ratio * 1.01), *others]
 
     monkeypatch.setattr(runner, "flocs_of", grown)
-    with pytest.raises(SharedError, match="the flocs with .* have changed"):
+    with pytest.raises(SharedError, match=r"the flocs with .* have changed"):
         run_to_file(config, Communicator(), tmp_path / "r.h5", RESUME)
 
 
