@@ -202,14 +202,14 @@ def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
 
 def test_intervals_are_students_of_the_scrambles():
     values = np.array([1.0, 2.0, 3.0, 4.0])
-    mean, low, high = mean_of(values, (False, 0.0))
+    mean, low, high = mean_of(values, None)
     half = 3.18244630528371 * values.std(ddof=1) / 2.0
     assert (mean, high) == pytest.approx((2.5, 2.5 + half))
     assert low == pytest.approx(2.5 - half)
     # Four scrambles that agree up to a point do not know the mean to better than that.
-    assert mean_of(np.ones(4), (False, 0.0), 0.1)[2] == pytest.approx(1.0 + 1.591223 * 0.05)
-    assert mean_of(np.zeros(4), (True, 0.3)) == (0.0, 0.0, 0.3)
-    assert mean_of(np.ones(4), (True, 0.3)) == (1.0, 0.7, 1.0)
+    assert mean_of(np.ones(4), None, 0.1)[2] == pytest.approx(1.0 + 1.591223 * 0.05)
+    assert mean_of(np.zeros(4), 0.3) == (0.0, 0.0, 0.3)
+    assert mean_of(np.ones(4), 0.3) == (1.0, 0.7, 1.0)
     assert ratio_of(values, 2.0 * values) == pytest.approx((0.5, 0.5, 0.5))
     assert np.isnan(ratio_of(values, 0.0 * values)).all()
     low, high = widened((1.0, 1.0, 1.0), 100, 100)
