@@ -114,9 +114,8 @@ def summary(results: Overview) -> Summary:
     """What a results file says of its study; ValueError where that cannot be read."""
     run = results.run
     facts = conditions(results) + sizes(results) + outcomes(results)
-    facts += [
-        ("numerical error", report.checked_line(results) or "unknown: no replicate was run again")
-    ]
+    checked = report.checked_line(results) or "unknown: no replicate was run again"
+    facts.append(("numerical error", checked))
     facts += [("", line) for line in report.change_lines(results)]
     warnings = [str(line) for line in stored(run, "warnings")]
     warnings += filter(None, [report.undecided_line(results)])
@@ -126,34 +125,24 @@ def summary(results: Overview) -> Summary:
     return Summary(facts, origin(run, SAID_APART), warnings, failed)
 
 
-def table(results: schema.Results) -> str:
-    """Counts and probabilities, behind the efficiencies if there are any; or the rates."""
+def counts_of(results: schema.Results) -> list[str]:
+    """Return lines of the counts and probabilities, or of the rates."""
     if results.kernel is not None:
-        return "\n".join(report.kernel_lines(results.kernel))
-    efficiencies = report.efficiency_lines(results)
-    counts = report.format_table(results)
-    return "\n".join([*efficiencies, *([""] if efficiencies else []), counts])
+        return report.kernel_lines(results.kernel)
+    return [report.format_table(results)]
+
+
+def table(results: schema.Results) -> str:
+    """Return the counts and probabilities, after the efficiencies if there are any; or the
+    rates."""
+    before = report.efficiency_lines(results) if results.kernel is None else []
+    return "\n".join([*before, *[""] * bool(before), *counts_of(results)])
 
 
 def told(found: schema.Results) -> str:
-    """What is printed of a study that has been run."""
-    if found.kernel is not None:
-        lines = report.kernel_lines(found.kernel)
-    else:
-        lines = [report.format_table(found)]
-    return "\n".join(
-        [
-            *lines,
-            *filter(
-                None,
-                [
-                    *report.touch_lines(found),
-                    report.checked_line(found),
-                    *report.change_lines(found),
-                ],
-            ),
-        ]
-    )
+    """Return what is printed of a study that has been run."""
+    errors = report.checked_line(found), *report.change_lines(found)
+    return "\n".join([*counts_of(found), *report.touch_lines(found), *filter(None, errors)])
 
 
 def conditions(results: schema.Results) -> Facts:
@@ -177,13 +166,8 @@ def axes_of(results: schema.Results) -> Facts:
 
 def sizes(results: Overview) -> Facts:
     """[(name, value)] of the radii of the types, and between which values the replicates were."""
-    known = [
-        f"{name}: {1e6 * i:.4g}, {1e6 * j:.4g}"
-        for name, i, j in zip(
-            results.types, results.radii["r_i"], results.radii["r_j"], strict=True
-        )
-        if i > 0.0 and j > 0.0
-    ]
+    radii = zip(results.types, *results.radii.values(), strict=True)
+    known = [f"{name}: {1e6 * i:.4g}, {1e6 * j:.4g}" for name, i, j in radii if i > 0.0 and j > 0.0]
     facts = [("r_i, r_j [um]", "; ".join(known))] if known else []
     if classes := run_group.class_words(stored(results.run, "size_classes")):
         facts.insert(0, ("size classes", classes.partition(": ")[2]))
@@ -201,11 +185,8 @@ def outcomes(results: Overview) -> Facts:
     totals = results.totals
     found = zip(schema.OUTCOMES, totals.outcomes, strict=True)
     rows = [("outcomes", ", ".join(f"{n} {word}" for word, n in found))]
-    bonds = zip(
-        schema.BONDS,
-        results.probabilities["n_bond"].reshape(-1, len(schema.BONDS)).sum(axis=0),
-        strict=True,
-    )
+    numbers = results.probabilities["n_bond"].sum(axis=(0, 1, 2))
+    bonds = zip(schema.BONDS, numbers, strict=True)
     rows.append(("bonds", ", ".join(f"{n} {word}" for word, n in bonds)))
     named = list(zip(results.failures, totals.failures, strict=True))[1:]
     if any(number for _, number in named):
