@@ -32,8 +32,6 @@ from flocsim.io.results.schema import (
     AGGREGATED,
     BLANKS,
     FAILED,
-    FURTHER_RUNS,
-    NOT_APPLICABLE,
     OUTCOMES,
     REPLICATES,
     SHAPE_COLUMNS,
@@ -81,6 +79,9 @@ DRAWN = ("r_i", "r_j", "D_0", "floc_i", "floc_j", *SHAPE_COLUMNS)
 
 NO_FLOC = -1
 """In ``floc_i`` and ``floc_j``: a sphere."""
+
+BLANK = {name: BLANKS[kind] for name, (kind, *_) in REPLICATES.items()}
+"""A row of which nothing is known."""
 
 LONGEST_REASON = 300
 """Letters of an exception's words in a note."""
@@ -140,35 +141,6 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
     return OUTCOMES.index(name), FAILURES.index(reason)
 
 
-def replicate_row(status, angles, run):
-    """What the table of replicates holds of a Run that has ended."""
-    observed = run.observed
-    outcome, failure = outcome_of(status, run.code, observed)
-    touched = bool(observed[outcomes.COLLIDED] == 1.0)
-    zone = observed[outcomes.ZONE]
-    return {
-        "angle_i": angles[0],
-        "angle_j": angles[1],
-        "r_i": run.scene.bodies[outcomes.BODY_I, at.EQUIVALENT_RADIUS],
-        "r_j": run.scene.bodies[outcomes.BODY_J, at.EQUIVALENT_RADIUS],
-        "D_0": zone,
-        "outcome": outcome,
-        "inside": int(observed[outcomes.INSIDE]) if touched else NOT_APPLICABLE,
-        "crossed_zone": int(observed[outcomes.CROSSED]) if touched else NOT_APPLICABLE,
-        "bond": int(observed[outcomes.BOND]) if OUTCOMES[outcome] in AGGREGATED else NOT_APPLICABLE,
-        "d_c_collision": observed[outcomes.D_COLLISION] if touched else np.nan,
-        "d_c_over_D_0": observed[outcomes.D_COLLISION] / zone if touched else np.nan,
-        "d_c_max": observed[outcomes.D_MAX] if touched else np.nan,
-        "d_c_last": observed[outcomes.D_LAST],
-        "t_collision": observed[outcomes.T_COLLISION] if touched else np.nan,
-        "t_end": run.time,
-        "steps": run.steps,
-        "rejected": run.rejected,
-        "error": run.error,
-        "failure": failure,
-    }
-
-
 def run_safely(
     study: Any, condition: Any, replicate: int, halted: Callable[[], bool] | None = None
 ) -> tuple[dict | None, dict | None]:
@@ -198,9 +170,9 @@ def run_safely(
 
 
 def failed_row(reason, angles):
-    blank = {name: BLANKS[kind] for name, (kind, _, _) in REPLICATES.items()}
+    """Return the row of a replicate that has failed before anything else is known of it."""
     told = {"outcome": FAILED, "failure": FAILURES.index(reason)}
-    return blank | {"angle_i": angles[0], "angle_j": angles[1]} | told
+    return BLANK | {"angle_i": angles[0], "angle_j": angles[1]} | told
 
 
 def columns_of(run: str) -> dict[str, str]:
@@ -209,8 +181,6 @@ def columns_of(run: str) -> dict[str, str]:
 
 
 CHECKED, THIRD = map(columns_of, ("checked", "third"))
-FURTHER = tuple(name for run in FURTHER_RUNS for name in columns_of(run))
-"""The columns of all further runs."""
 
 
 @attrs.frozen(eq=False)
@@ -260,9 +230,36 @@ class Draw:
         return row
 
     def row(self, run: Run, status: Status) -> dict:
-        """The row of a Run that has ended so; failed where a force gives no number."""
-        row = replicate_row(status, self.angles, run) | dict.fromkeys(FURTHER, NOT_APPLICABLE)
-        row |= dict(zip(("floc_i", "floc_j"), self.flocs, strict=True))
+        """Return the row of a Run that has ended so; failed where a force gives no number."""
+        observed, bodies = run.observed, run.scene.bodies
+        outcome, failure = outcome_of(status, run.code, observed)
+        row = BLANK | {
+            "angle_i": self.angles[0],
+            "angle_j": self.angles[1],
+            "r_i": bodies[outcomes.BODY_I, at.EQUIVALENT_RADIUS],
+            "r_j": bodies[outcomes.BODY_J, at.EQUIVALENT_RADIUS],
+            "D_0": observed[outcomes.ZONE],
+            "outcome": outcome,
+            "d_c_last": observed[outcomes.D_LAST],
+            "t_end": run.time,
+            "steps": run.steps,
+            "rejected": run.rejected,
+            "error": run.error,
+            "failure": failure,
+            "floc_i": self.flocs[0],
+            "floc_j": self.flocs[1],
+        }
+        if observed[outcomes.COLLIDED] == 1.0:
+            row |= {
+                "inside": int(observed[outcomes.INSIDE]),
+                "crossed_zone": int(observed[outcomes.CROSSED]),
+                "d_c_collision": observed[outcomes.D_COLLISION],
+                "d_c_over_D_0": observed[outcomes.D_COLLISION] / observed[outcomes.ZONE],
+                "d_c_max": observed[outcomes.D_MAX],
+                "t_collision": observed[outcomes.T_COLLISION],
+            }
+        if OUTCOMES[outcome] in AGGREGATED:
+            row["bond"] = int(observed[outcomes.BOND])
         row |= self.encounter.measures
         if status in UNABLE and (why := force_to_blame(self.encounter.system, run)):
             row |= {"outcome": FAILED, "failure": FAILURES.index("not finite"), WHY: why}
