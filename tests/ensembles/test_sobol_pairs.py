@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import qmc
 
 from flocsim.ensembles.collision.draw import points_of
-from flocsim.ensembles.estimates.statistics import OF_SCRAMBLES, scrambled_sums
+from flocsim.ensembles.estimates.statistics import scrambled_sums
 from flocsim.ensembles.estimates.summary import added
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import identity_of
@@ -66,9 +66,7 @@ def test_sums_of_scrambles_add_up_whatever_the_blocks():
     for name, sums in whole.items():
         np.testing.assert_array_equal(sums, parts[name])
     aggregated = np.isin(codes[0], (0, 2))
-    np.testing.assert_array_equal(
-        whole["pr_a" + OF_SCRAMBLES][1, ..., 3], aggregated[..., 3::16].sum(axis=-1)
-    )
+    np.testing.assert_array_equal(whole["pr_a"][1, ..., 3], aggregated[..., 3::16].sum(axis=-1))
 
 
 def test_the_interval_is_students_of_the_scrambles_and_wilsons_where_all_agree():
@@ -97,7 +95,7 @@ def test_a_study_has_intervals_of_its_scrambles(tmp_path):
     found = run(small_config(tmp_path, SOBOL))
     rows = found.replicates
     sums = scrambled_sums(tuple(rows[name] for name in ("outcome", "inside", "bond")), 0, 16)
-    trials, successes, unknown = sums["pr_a" + OF_SCRAMBLES]
+    trials, successes, unknown = sums["pr_a"]
     low, high, _ = scrambled_proportion(successes, trials, unknown)
     np.testing.assert_array_equal(found.probabilities["pr_a_low"], low)
     np.testing.assert_array_equal(found.probabilities["pr_a_high"], high)

@@ -113,14 +113,10 @@ def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray
     return table
 
 
-OF_SCRAMBLES = " of scrambles"
-"""Behind the name of a probability: what is summed of it for every scramble."""
-
-
 def scrambled_sums(
     codes: Sequence[np.ndarray], first: int, scrambles: int
 ) -> dict[str, np.ndarray]:
-    """{"pr_a of scrambles": whole numbers (3, type, …, scramble)} of trials, successes and unknown.
+    """{probability: whole numbers (3, type, …, scramble)} of trials, successes and unknown.
 
     ``codes``: outcome, inside, bond of replicates from the ``first`` on, replicate k of scramble k
     mod ``scrambles``; nothing for none.
@@ -128,7 +124,7 @@ def scrambled_sums(
     if not scrambles:
         return {}
     return {
-        name + OF_SCRAMBLES: sums_of_scrambles(np.stack(each), first, scrambles)
+        name: sums_of_scrambles(np.stack(each), first, scrambles)
         for name, each in events(*codes).items()
     }
 
@@ -140,8 +136,7 @@ def scrambled_probabilities(
     the place of those for independent ones; also n_effective where all displacements are
     ``pooled``."""
     table: dict[str, np.ndarray] = {}
-    for key, each in sums.items():
-        name = key.removesuffix(OF_SCRAMBLES)
+    for name, each in sums.items():
         if pooled and name not in schema.POOLED_PROBABILITIES:
             continue
         trials, successes, unknown = each.sum(axis=3) if pooled else each

@@ -20,14 +20,11 @@ from flocsim.io.results import schema
 from flocsim.io.results.events import Events, events
 from flocsim.io.results.kernel_group import Kernel
 
-OF_OUTLINES = " of outlines"
-"""Behind the name of a probability: what is summed of it for either end."""
-
 
 def outline_sums(
     first: Sequence[np.ndarray], ends: Sequence[Sequence[np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """{"pr_a of outlines": whole numbers (end, 3, type, …, 4)}, bounded_cells of replicates with
+    """{probability: whole numbers (end, 3, type, …, 4)}, bounded_cells of replicates with
     outlines cut otherwise, and as they were cut; nothing where none was run so.
 
     ``first``, ``ends``: outcome, inside and bond, codes (type, vertices, delta, replicate).
@@ -45,7 +42,7 @@ def outline_sums(
             ]
             cells = statistics.bounded_cells(both[0], both[1])
             found[name].append(cells)
-    return {name + OF_OUTLINES: np.stack(cells) for name, cells in found.items()}
+    return {name: np.stack(cells) for name, cells in found.items()}
 
 
 def outline_changes(
@@ -56,8 +53,7 @@ def outline_changes(
     ``table``: the probabilities as cut, which no change takes beyond 0 and 1.
     """
     found: dict[str, np.ndarray] = {}
-    for key, cells in sums.items():
-        name = key.removesuffix(OF_OUTLINES)
+    for name, cells in sums.items():
         differences, lows, highs = zip(
             *(statistics.bounded_difference(each, scrambled=False) for each in cells), strict=True
         )
@@ -68,9 +64,6 @@ def outline_changes(
         found[f"{name}_shape_high"] = np.clip(high, 0.0, 1.0 - table[name])
     return found
 
-
-JOINT = "joint"
-"""Name of the joint_counts among Sums."""
 
 BLOCK_ROWS = 262_144
 """Rows, of all conditions together, that are looked at together."""
@@ -117,8 +110,9 @@ class Reader:
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]
 """Gives COUNTED of replicates [first, stop), each (type, vertices, delta, replicate)."""
 
-Sums = dict[str, np.ndarray]
-"""Whole numbers by name, that of some replicates and of others being added up."""
+Sums = dict[tuple[str, str], np.ndarray]
+"""Whole numbers by part (counted, pooled, joint, scrambles, outlines) and name, those of some
+replicates and of others being added up."""
 
 
 def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int = 0) -> Sums:
@@ -127,14 +121,14 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
         own, again, third, *ends = statistics.by_runs(codes(start, min(start + step, stop)))
-        found = {
-            **statistics.count(*own),
-            **numerical.count_changes(own, again, third),
-            **statistics.pooled_sums(*own),
-            JOINT: statistics.joint_counts(own[0], own[1], start, scrambles),
-            **statistics.scrambled_sums(own, start, scrambles),
-            **outline_sums(own, ends),
+        parts = {
+            "counted": statistics.count(*own) | numerical.count_changes(own, again, third),
+            "pooled": statistics.pooled_sums(*own),
+            "joint": {"": statistics.joint_counts(own[0], own[1], start, scrambles)},
+            "scrambles": statistics.scrambled_sums(own, start, scrambles),
+            "outlines": outline_sums(own, ends),
         }
+        found = {(part, k): each for part, some in parts.items() for k, each in some.items()}
         sums = added(sums, found)
     return sums
 
@@ -145,36 +139,32 @@ def added(sums: Sums, more: Sums) -> Sums:
     return {name: both.get(name, values) for name, values in {**more, **sums}.items()}
 
 
-POOLED_NAMES = frozenset(schema.POOLED_PROBABILITIES)
+def part_of(sums: Sums, part: str) -> dict[str, np.ndarray]:
+    """Return {name: whole numbers} of one part of Sums."""
+    return {name: each for (of, name), each in sums.items() if of == part}
 
 
 def tables_of(sums: Sums) -> dict[str, Any]:
     """The arrays of the groups of a results file that follow from the Sums of a whole study."""
-    pooled = {name: values for name, values in sums.items() if name in POOLED_NAMES}
-    of_scrambles = {
-        name: values for name, values in sums.items() if name.endswith(statistics.OF_SCRAMBLES)
-    }
-    of_outlines = {name: values for name, values in sums.items() if name.endswith(OF_OUTLINES)}
-    apart = {JOINT, *pooled, *of_scrambles, *of_outlines}
-    counted = {name: values for name, values in sums.items() if name not in apart}
+    counted, of_scrambles = part_of(sums, "counted"), part_of(sums, "scrambles")
     over_delta = {name: values.sum(axis=2) for name, values in counted.items()}
     together = numerical.numerical_of(numerical.change_intervals(over_delta))
     changes = numerical.change_intervals(counted)
     table = table_from(counted, changes) | statistics.scrambled_probabilities(of_scrambles)
-    pooled_table = statistics.pooled_probabilities(pooled) | statistics.scrambled_probabilities(
-        of_scrambles, pooled=True
-    )
+    pooled = statistics.pooled_probabilities(part_of(sums, "pooled"))
+    pooled |= statistics.scrambled_probabilities(of_scrambles, pooled=True)
     return {
         "probabilities": table,
-        "pooled": pooled_table | {k: each for k, each in together.items() if k in schema.POOLED},
-        "differences": statistics.paired_differences(sums[JOINT], bool(of_scrambles)),
+        "pooled": pooled | {k: each for k, each in together.items() if k in schema.POOLED},
+        "differences": statistics.paired_differences(sums["joint", ""], bool(of_scrambles)),
         "numerics": numerical.change_columns(changes),
-        "outlines": outline_changes(of_outlines, table),
+        "outlines": outline_changes(part_of(sums, "outlines"), table),
     }
 
 
 def table_from(
-    counted: Sums, changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None
+    counted: Mapping[str, np.ndarray],
+    changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None,
 ) -> dict[str, np.ndarray]:
     """The table of probabilities from what is counted of conditions; ``changes``: its
     change_intervals, where they are there."""
@@ -188,9 +178,7 @@ def results_of(
     kernel: Kernel | None = None,
 ) -> schema.Results:  # fmt: skip
     """The Results of so many replicates of each condition from their Sums."""
-    config, tables = study.config, tables_of(sums)
-    if study.is_banded and not tables["outlines"]:  # a draft without any replicate has its place
-        tables["outlines"] = schema.blank(schema.OUTLINES, study.shape[:3])
+    config = study.config
     return schema.Results(
         types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
@@ -202,5 +190,5 @@ def results_of(
         count=count,
         radii=study.radii,
         kernel=kernel,
-        **tables,
+        **tables_of(sums),
     )

@@ -113,8 +113,4 @@ def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
     for rows in store.all_rows(place):
         codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
         sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
-    return {
-        name: values for name, values in sums.items()
-        if name not in (*summary.POOLED_NAMES, summary.JOINT)
-        and not name.endswith(summary.OF_OUTLINES)
-    }  # fmt: skip
+    return summary.part_of(sums, "counted")

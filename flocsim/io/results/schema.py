@@ -267,16 +267,6 @@ All that may differ between two runs of one config is in the group ``run``.
 """
 
 
-def blank(
-    schema: Mapping[str, tuple[str, str, str]], shape: tuple[int, ...]
-) -> dict[str, np.ndarray]:
-    """Return tables of a results file without any number in them."""
-    return {
-        name: np.zeros((*shape, *(len(LAST_AXES[axis]) for axis in last_axis(name))), kind)
-        for name, (kind, _, _) in schema.items()
-    }
-
-
 def as_words(words: Iterable) -> tuple[str, ...]:
     """Return words without blanks, as flag_meanings needs them."""
     return tuple("_".join(str(word).split()) for word in words)
