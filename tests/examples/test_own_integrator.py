@@ -35,13 +35,6 @@ def test_it_converges_to_the_truth_with_order_one():
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.4)
 
 
-@pytest.mark.slow
-def test_compiled_and_uncompiled_agree():
-    # The last bits of two code paths differ.
-    compiled, plain = (end(SemiImplicitEuler(4e-8), jit) for jit in (True, False))
-    assert np.abs(compiled - plain).max() < 1e-14
-
-
 def test_it_is_no_longer_than_forty_lines_and_imports_nothing_private():
     from pathlib import Path
 

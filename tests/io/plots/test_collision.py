@@ -60,10 +60,6 @@ def test_frames_share_one_scale_and_hold_their_bodies():
             assert limits[0] < points[:, column].min() < points[:, column].max() < limits[1]
 
 
-def test_distance_without_a_zone_has_one_line():
-    assert len(draw_distance([0.0, 1.0], [1e-5, 2e-5]).axes[0].lines) == 1
-
-
 @pytest.mark.parametrize("zone", [1e-6, 1.5e-5, 9e-5])
 def test_distance_always_shows_the_zone(zone):
     axes = draw_distance([0.0, 1.0], [1e-5, 2e-5], zone).axes[0]
