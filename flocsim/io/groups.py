@@ -258,38 +258,30 @@ class FileFormat:
         FileError
             If the file cannot be written.
         """
-        with unfinished(path, rule) as (_, file):
+        import h5py
+
+        fill = fill or {}
+        with unfinished(path, rule) as (_, target):
             # HDF5 can crash where a write fails, as on a full disk: the error is raised afterwards.
-            steady = Unfailing(file)
+            steady = Unfailing(target)
             try:
-                self.write_data(steady, groups, run, attributes, fill)
+                with h5py.File(steady, "w") as file:
+                    file.attrs.update({self.attribute: self.name, "schema_version": self.version})
+                    file.attrs.update(attributes or {})
+                    for name, labelled in groups.items():
+                        write_labelled(file.require_group(name or "/"), labelled, name in fill)
+                    for name, write_columns in fill.items():
+                        write_columns(file[name])
+                    # Last, so that its length moves no byte of the groups before it.
+                    for name, value in (run or {}).items():
+                        # A bool would become an HDF5 enumeration, which few readers know.
+                        file[f"run/{name}"] = int(value) if isinstance(value, bool) else value
             except Exception:
                 if steady.error is None:
                     raise
             if steady.error is not None:
                 raise steady.error
-            seal_file(file)
-
-    def write_data(
-        self, target: BinaryIO, groups: Mapping[str, Labelled],
-        run: Mapping[str, Any] | None = None, attributes: Mapping[str, Any] | None = None,
-        fill: Mapping[str, Callable[[Any], None]] | None = None,
-    ) -> None:  # fmt: skip
-        """Write the HDF5 data of a file into an open one, without a checksum."""
-        import h5py
-
-        fill = fill or {}
-        with h5py.File(target, "w") as file:
-            file.attrs.update({self.attribute: self.name, "schema_version": self.version})
-            file.attrs.update(attributes or {})
-            for name, labelled in groups.items():
-                write_labelled(file.require_group(name or "/"), labelled, empty=name in fill)
-            for name, write_columns in fill.items():
-                write_columns(file[name])
-            # Last, so that its length moves no byte of the groups before it.
-            for name, value in (run or {}).items():
-                # A bool would become an HDF5 enumeration, which few readers know.
-                file[f"run/{name}"] = int(value) if isinstance(value, bool) else value
+            seal_file(target)
 
     @contextlib.contextmanager
     def opened(self, path: str | os.PathLike) -> Iterator[File]:
@@ -320,18 +312,15 @@ class FileFormat:
         if text_of(file, self.attribute) != self.name:
             other = text_of(file, "format") or text_of(file, "kind") or "file of another kind"
             raise FileError(f"{path} holds a {other}: name a file with {self.title}")
-        found, oldest = file.attributes.get("schema_version"), self.oldest or self.version
-        if not isinstance(found, int) or found < 1:
+        found = file.attributes.get("schema_version")
+        if not isinstance(found, int):
             raise Unfit("it does not record a schema version")
-        if found < oldest:
+        if not (self.oldest or self.version) <= found <= self.version:
+            what = "read it with the version that wrote it"
+            if found < self.version:
+                what = f"it is of a flocsim that was never released; {self.remedy}"
             raise FileError(
-                f"{path} has schema version {found}, written by a flocsim before 0.3 that was "
-                f"never released: {self.remedy}"
-            )
-        if found > self.version:
-            raise FileError(
-                f"{path} has schema version {found}, and this flocsim reads up to {self.version}: "
-                "read it with the version that wrote it"
+                f"{path} has schema version {found}, and this flocsim reads {self.version}: {what}"
             )
 
     def check(self, file: File) -> dict[str, int]:
@@ -346,21 +335,20 @@ class FileFormat:
         }  # fmt: skip
         datasets = {path for path, node in file.items() if node.type is not None}
         scalars = {path for path in datasets if path.startswith("run/") and not file[path].shape}
-        for path in sorted(wanted.keys() - datasets):
-            raise Unfit(f"{path} is missing")
-        for path in sorted(datasets - scalars - wanted.keys()):
-            raise Unfit(f"there is an unknown dataset {path}")
+        for path in sorted(wanted.keys() ^ (datasets - scalars)):
+            raise Unfit(f"{path} is {'missing' if path in wanted else 'unknown'}")
         for path, each in wanted.items():
             node = file[path]
-            if node.type != each.type or len(node.shape) != len(each.axes):
+            axes = zip(each.axes, node.shape, strict=False)
+            shape = tuple(
+                axis if isinstance(axis, int) else lengths.setdefault(axis, length)
+                for axis, length in axes
+            )
+            if len(node.shape) != len(each.axes) or (node.type, node.shape) != (each.type, shape):
                 raise Unfit(
-                    f"{path} holds {node.type} of {len(node.shape)} dimensions, expected "
-                    f"{each.type} of {len(each.axes)}"
+                    f"{path} holds {node.type} of shape {node.shape}, expected {each.type} along "
+                    f"{', '.join(map(str, each.axes))}"
                 )
-            for axis, length in zip(each.axes, node.shape, strict=True):
-                wide = axis if isinstance(axis, int) else lengths.setdefault(axis, length)
-                if length != wide:
-                    raise Unfit(f"{path} has {length} values along {axis}, expected {wide}")
         return lengths
 
     def contents(self, file: File, without: Collection[str] = ()) -> Stored:
@@ -440,15 +428,6 @@ class Unfailing(io.FileIO):
         except OSError as error:
             self.error = error
         return len(data)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Set the length of the file, unless an error came before."""
-        try:
-            if self.error is None:
-                return super().truncate(size)
-        except OSError as error:
-            self.error = error
-        return size or 0
 
 
 def text_of(file: File, name: str) -> str:

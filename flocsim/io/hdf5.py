@@ -27,7 +27,7 @@ MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
 
 
 LONGEST = 300
-"""Letters of what the HDF5 library says."""
+"""Characters of what the HDF5 library says."""
 
 
 class Unfit(ValueError):
@@ -47,25 +47,19 @@ class Node:
     text: list[str] | None
     data: BinaryIO
 
-    @property
-    def dtype(self) -> np.dtype:
-        return np.dtype(f"<{self.type}")
-
     def __getitem__(self, at: tuple) -> np.ndarray:
-        """All values for (); for (numbers along all axes but the last, slice) only these are read
-        of an array of numbers. Text are objects."""
+        """Return all values for (), or some numbers for (indices along all axes but the last,
+        slice); texts are objects."""
         if self.text is not None:
-            words = np.array(self.text, object).reshape(self.shape)
-            return words[at] if at else words
-        first, shape = 0, self.shape
+            return np.array(self.text, object).reshape(self.shape)
+        first, shape, dtype = 0, self.shape, np.dtype(f"<{self.type}")
         if at:
             *place, part = at
             start, stop, _ = part.indices(shape[-1])
             row = int(np.ravel_multi_index((*place, 0), (*shape[:-1], 1)))
             first, shape = row * shape[-1] + start, (stop - start,)
-        self.data.seek((self.offset or 0) + first * self.dtype.itemsize)
-        values = np.fromfile(self.data, self.dtype, math.prod(shape))
-        return values.reshape(shape)  # ValueError where the file ends before them
+        self.data.seek((self.offset or 0) + first * dtype.itemsize)
+        return np.fromfile(self.data, dtype, math.prod(shape)).reshape(shape)
 
 
 class File(dict[str, Node]):
@@ -73,22 +67,22 @@ class File(dict[str, Node]):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Those of the root."""
+        """The attributes of the root."""
         return self[""].attributes
 
     def names(self, group: str) -> list[str]:
-        """The names of what is in a group."""
+        """Return the names of what is in a group."""
         parts = (path.rpartition("/") for path in self if path)
         return [name for above, _, name in parts if above == group]
 
     def node(self, path: str) -> Node:
-        """A dataset; Unfit where there is none."""
+        """Return a dataset; Unfit where there is none."""
         if path not in self or self[path].type is None:
             raise Unfit(f"{path} is missing")
         return self[path]
 
     def read(self, path: str, at: tuple = ()) -> np.ndarray:
-        """The values of a dataset, or some of them (see Node); Unfit where there is none."""
+        """Return the values of a dataset, or some of them (see Node); Unfit where there is none."""
         return self.node(path)[at]
 
 
@@ -98,15 +92,15 @@ def open_hdf5(path: object, data: BinaryIO) -> File:
     ``path``: its name in messages. Raises Unfit for all that flocsim does not write, and FileError
     for a file that the HDF5 library fails on.
     """
-    describe = describe_forked if can_fork() else describe_spawned
-    said, status = describe(data)
-    # The other process may have moved the place in the file that both have, which a buffer does not
+    # The other process may move the place in the file that both have, which a buffer does not
     # notice unless it is sought from the end.
     seconds = hdf5_child.cpu_seconds(data.seek(0, os.SEEK_END))
+    text, status = describe_forked(data) if can_fork() else describe_spawned(data, seconds)
+    data.seek(0, os.SEEK_END)
     try:
-        found = json.loads(said.rpartition(b"\n")[2])  # behind what others print as Python starts
+        found = json.loads(text.rpartition(b"\n")[2])  # behind what others print as Python starts
     except ValueError:
-        late = status in (1, -getattr(signal, "SIGXCPU", 1), -getattr(signal, "SIGALRM", 1))
+        late = status in (-getattr(signal, "SIGXCPU", 1), -getattr(signal, "SIGALRM", 1))
         what = f"took more than {seconds} s" if late else f"crashed ({status})"
         raise FileError(
             f"{path} is damaged or hostile: the HDF5 library {what}; use a copy or run it again"
@@ -114,8 +108,8 @@ def open_hdf5(path: object, data: BinaryIO) -> File:
     if "refused" in found:
         raise Unfit(visible(found["refused"][:LONGEST], ""))
     return File(
-        (name, Node(kind, tuple(shape), offset, attributes, text, data))
-        for name, (kind, shape, offset, attributes, text) in found["nodes"].items()
+        (name, Node(kind, tuple(shape), offset, attributes, words, data))
+        for name, (kind, shape, offset, attributes, words) in found["nodes"].items()
     )
 
 
@@ -135,7 +129,7 @@ def can_fork() -> bool:
 
 
 def describe_forked(data: BinaryIO) -> tuple[bytes, int]:
-    """(what a forked process writes, its status: −n where signal n ended it)."""
+    """Return what a forked process writes, and its status: −n where signal n ended it."""
     import h5py  # noqa: F401 (so that the process has it)
 
     reading, writing = os.pipe()
@@ -146,47 +140,47 @@ def describe_forked(data: BinaryIO) -> tuple[bytes, int]:
         warnings.simplefilter("ignore", DeprecationWarning)
         child = os.fork()
     if child == 0:
-        run_forked(data.fileno(), writing, mask)
+        run_forked(data.fileno(), writing)
     os.close(writing)
     signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     with open(reading, "rb") as pipe:
         try:
-            said = pipe.read()
+            text = pipe.read()
         except BaseException:
             os.kill(child, signal.SIGKILL)
             raise
         finally:
             _, status = os.waitpid(child, 0)
-    return said, os.waitstatus_to_exitcode(status)
+    return text, os.waitstatus_to_exitcode(status)
 
 
-def run_forked(file: int, writing: int, mask: Any) -> None:
+def run_forked(file: int, writing: int) -> None:
     """Describe the file; never returns. All else that this process has open belongs to another."""
     try:
         signal.set_wakeup_fd(-1)
-        # Signals of a terminal are the parent's business; the limit of CPU time is this process's.
-        for number in SIGNALS:
-            own_limit = number == getattr(signal, "SIGXCPU", None)
-            signal.signal(number, signal.SIG_DFL if own_limit else signal.SIG_IGN)
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        # All stay blocked, but for the one that ends it when its CPU time is up.
+        signal.signal(signal.SIGXCPU, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGXCPU])
         own = os.dup(file), os.dup(writing), os.open(os.devnull, os.O_WRONLY)
         for place, each in enumerate(own):
             os.dup2(each, place)
-        for number in map(int, os.listdir("/proc/self/fd")):
-            os.closerange(max(number, 3), number + 1)
+        os.closerange(3, max(map(int, os.listdir("/proc/self/fd"))) + 1)
         hdf5_child.main()
     finally:
         os._exit(2)
 
 
-def describe_spawned(data: BinaryIO) -> tuple[bytes, int]:
-    """(what a new process writes, its exit code: −n where signal n ended it)."""
+def describe_spawned(data: BinaryIO, seconds: int) -> tuple[bytes, int]:
+    """Return what a new process writes, and its exit code: −n where signal n ended it."""
     variables = {
         name: value for name, value in os.environ.items() if not name.startswith(MPI_VARIABLES)
     } | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), BLAS_THREADS: "1"}  # fmt: skip
-    done = subprocess.run(
-        [sys.executable, "-P", hdf5_child.__file__],
-        stdin=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=variables,
-        start_new_session=True, check=False,
-    )  # fmt: skip
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", hdf5_child.__file__],
+            stdin=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=variables,
+            start_new_session=True, check=False, timeout=hdf5_child.PATIENCE * seconds,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return b"", -getattr(signal, "SIGALRM", 1)
     return done.stdout, done.returncode

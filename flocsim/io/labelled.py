@@ -31,7 +31,7 @@ class Column:
 
 
 def about_of(schema: Sequence[str]) -> dict[str, Any]:
-    """Units and long name, the last two of what a schema says of a column, as attributes."""
+    """Return units and long name, the last two of what a schema says of a column, as attributes."""
     *_, units, text = schema
     return {"units": units, "long_name": text}
 
@@ -54,7 +54,7 @@ class Labelled:
                 and all(name in column.axes for column in self.columns.values())]  # fmt: skip
 
     def to_xarray(self) -> Dataset:
-        """A Dataset with units and meanings; UsageError where xarray is not installed."""
+        """Return a Dataset with units and meanings; UsageError where xarray is not installed."""
         xarray = needed("xarray")
         return xarray.Dataset(
             {name: (each.axes, each.values, each.about) for name, each in self.columns.items()},
@@ -63,19 +63,20 @@ class Labelled:
         )
 
     def to_pandas(self, index: Sequence[str]) -> DataFrame:
-        """A DataFrame with a row for each place along ``index``, and codes as their words.
+        """Return a DataFrame with a row for each place along ``index``, codes as categories.
 
         A column for each word of any further axis. UsageError where pandas is not installed.
         """
         pandas = needed("pandas")
         labels = [self.axes[name].values for name in index]
         rows = pandas.MultiIndex.from_product(labels, names=list(index))
-        found = {}
-        further = {name: each for name, each in self.axes.items() if each.axes != (name,)}
-        for name, column in (further | self.columns).items():
-            for label, values in self.spread(name, column, index):
-                found[label] = worded(pandas, column, values)
-        return pandas.DataFrame(found, index=rows)
+        beside = [name for name, each in self.axes.items() if each.axes != (name,)]
+        columns = {
+            label: pandas.Categorical.from_codes(values, words) if words else values
+            for name in (*beside, *self.columns)
+            for label, values, words in self.spread(name, index)
+        }
+        return pandas.DataFrame(columns, index=rows)
 
     def write_csv(self, file: TextIO, index: Sequence[str]) -> None:
         """Write a header of plain names, then a row for each place along ``index``.
@@ -83,15 +84,12 @@ class Labelled:
         Numbers have all their digits, codes are written as their words, NaN as an empty cell; there
         is a column for each word of any further axis.
         """
-        columns = {}
-        beside = {n: a for n, a in self.axes.items() if n not in index and a.axes != (n,)}
-        named = {name: self.axes[name] for name in index}
-        for name, column in (named | beside | self.columns).items():
-            for label, values in self.spread(name, column, index):
-                if "flag_values" in column.about:
-                    words = np.array(column.about["flag_meanings"].split(), object)
-                    values = words[np.searchsorted(column.about["flag_values"], values)]
-                columns[label] = values
+        beside = [n for n, a in self.axes.items() if n not in index and a.axes != (n,)]
+        columns = {
+            label: np.array(words, object)[values] if words else values
+            for name in (*index, *beside, *self.columns)
+            for label, values, words in self.spread(name, index)
+        }
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         # Row by row: as lists, a table would take several times the memory of its arrays.
@@ -99,21 +97,26 @@ class Labelled:
             writer.writerow(["" if cell != cell else cell for cell in row])
 
     def spread(
-        self, name: str, column: Column, index: Sequence[str]
-    ) -> Iterable[tuple[str, np.ndarray]]:
-        """(label, values along the index) of a column, one for each place of its further axes."""
+        self, name: str, index: Sequence[str]
+    ) -> Iterable[tuple[str, np.ndarray, list[str]]]:
+        """Yield (label, values along the index, words) of an array, for each place of its further
+        axes; where it holds codes the values are places among the words."""
+        column = (self.axes | self.columns)[name]
+        values, words = column.values, []
+        if "flag_values" in column.about:
+            words = column.about["flag_meanings"].split()
+            values = np.searchsorted(column.about["flag_values"], values)
         further = [axis for axis in column.axes if axis not in index]
-        words = [self.axes[axis].values for axis in further]
+        labels = [self.axes[axis].values for axis in further]
         lengths = [len(self.axes[axis].values) for axis in index]
-        places = [column.axes.index(axis) for axis in further]
-        values = np.moveaxis(column.values, places, range(-len(places), 0))
-        # A column that does not lie along an axis of the index is the same all along it.
-        own = iter(values.shape)
-        shape = [next(own) if axis in column.axes else 1 for axis in index]
-        values = np.broadcast_to(values.reshape(*shape, *own), (*lengths, *map(len, words)))
-        for place in np.ndindex(*map(len, words)):
-            parts = [str(labels[at]) for labels, at in zip(words, place, strict=True)]
-            yield "_".join([name, *parts]), values[(..., *place)].reshape(lengths).ravel()
+        # Axes of the index first, in its order; one that the column lacks is of length 1.
+        values = values.transpose([column.axes.index(axis) for axis in (*index, *further)
+                                   if axis in column.axes])  # fmt: skip
+        values = values[tuple(slice(None) if axis in column.axes else None for axis in index)]
+        for place in np.ndindex(*map(len, labels)):
+            parts = [str(words_of[at]) for words_of, at in zip(labels, place, strict=True)]
+            own = np.broadcast_to(values[(..., *place)], lengths)
+            yield "_".join([name, *parts]), own.ravel(), words
 
 
 class Tables:
@@ -129,11 +132,11 @@ class Tables:
     word = "group"
 
     def labelled(self, group: str) -> Labelled:
-        """The arrays of a group with their axes; UsageError for an unknown one."""
+        """Return the arrays of a group with their axes; UsageError for an unknown one."""
         raise NotImplementedError
 
     def known(self, group: str | None) -> str:
-        """The name of a group; UsageError for an unknown one."""
+        """Return the name of a group; UsageError for an unknown one."""
         name = next(iter(self.indices)) if group is None else group
         if name not in self.indices:
             known = ", ".join(self.indices)
@@ -141,14 +144,14 @@ class Tables:
         return name
 
     def to_xarray(self, group: str | None = None) -> Dataset:
-        """A group as an xarray Dataset, with units, meanings and flags.
+        """Return a group as an xarray Dataset, with units, meanings and flags.
 
         UsageError where xarray is not installed (``pip install 'flocsim[tables]'``).
         """
         return self.labelled(self.known(group)).to_xarray()
 
     def to_pandas(self, group: str | None = None) -> DataFrame:
-        """A group as a pandas DataFrame, a row for each place along its axes, codes as words.
+        """Return a group as a pandas DataFrame: a row for each place along its axes, codes in words.
 
         UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
         """
@@ -156,16 +159,8 @@ class Tables:
         return self.labelled(name).to_pandas(self.indices[name])
 
 
-def worded(pandas, column, values):
-    """Codes as a categorical of their words; all else as it is."""
-    if "flag_values" not in column.about:
-        return values
-    codes = np.searchsorted(column.about["flag_values"], values)
-    return pandas.Categorical.from_codes(codes, column.about["flag_meanings"].split())
-
-
 def needed(library: str) -> Any:
-    """A library of the extra `tables`; UsageError with the command that installs it."""
+    """Return a library of the extra `tables`; UsageError with the command that installs it."""
     try:
         return importlib.import_module(library)
     except ImportError:

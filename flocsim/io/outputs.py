@@ -80,7 +80,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]
             seen[mark] = output
         if os.path.lexists(target) and output.rule(target) is Old.KEPT:
             raise in_the_way(output.path, output.ways)
-        check_writable(output.path, output.suffix)
+        check_writable(output.path)
 
 
 def in_the_way(path: str | os.PathLike, ways: str = WAYS) -> UsageError:

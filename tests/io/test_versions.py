@@ -44,10 +44,10 @@ def line_of(path, name, capsys):
 @pytest.mark.parametrize("name", ["results", "kernels", "strengths", "swarms", "trajectories"])
 def test_an_older_file_was_never_released(tmp_path, name, capsys):
     line = line_of(of_version(tmp_path, name, lambda version: version - 1), name, capsys)
-    assert "written by a flocsim before 0.3 that was never released: " in line
+    assert "it is of a flocsim that was never released; " in line
 
 
 @pytest.mark.parametrize("name", rest_slow(list(PLAIN), lambda name: name in ("results", "sweeps")))
 def test_a_newer_file_needs_the_flocsim_that_wrote_it(tmp_path, name, capsys):
     line = line_of(of_version(tmp_path, name, lambda version: version + 10), name, capsys)
-    assert "and this flocsim reads up to" in line
+    assert "read it with the version that wrote it" in line

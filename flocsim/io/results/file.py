@@ -137,14 +137,14 @@ SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
 @attrs.define
 class Totals:
     """How many replicates had each outcome and each reason, what steps they took, and between
-    which values (NaN: none) the columns of SPANNED lie."""
+    which values the columns of SPANNED lie, where these are known."""
 
     outcomes: np.ndarray
     failures: np.ndarray
-    count: int = 0
-    steps: int = 0
-    most_steps: int = 0
-    rejected: int = 0
+    count: int
+    steps: int
+    most_steps: int
+    rejected: int
     spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
 
 
@@ -158,37 +158,26 @@ class Overview(Results):
 def read_overview(path: str | os.PathLike) -> Overview:
     """Return the Results in a file without its table of replicates, but with its Totals.
 
-    For files larger than the memory; FileError as `read_results`.
+    A column is in memory at a time; FileError as `read_results`.
     """
     with opened(path) as file:
+
+        def column(name: str) -> np.ndarray:
+            return file.read(f"replicates/{name}").ravel()
+
         results = results_in(file, replicates=False)
-        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
-        return Overview(**known, totals=totals_in(file, results))
-
-
-def totals_in(file: File, results: Results) -> Totals:
-    """Return the Totals of the replicates of an open file, a condition at a time."""
-    reasons = len(results.failures)
-    totals = Totals(np.zeros(len(OUTCOMES), int), np.zeros(reasons, int))
-    names = ("outcome", "failure", "steps", "rejected")
-    for place in np.ndindex(*results.shape):
-        at = (*place, slice(None))
-        columns = [file.read(f"replicates/{name}", at) for name in names]
-        for name, column in zip(names, columns, strict=True):
-            ROWS[name].check(f"replicates/{name}", column, {})
-        outcome, failure, steps, rejected = columns
-        totals.outcomes += np.bincount(outcome, minlength=len(OUTCOMES))
-        totals.failures += np.bincount(failure, minlength=reasons)
-        totals.count += outcome.size
-        totals.steps += int(steps.sum())
-        totals.most_steps = max(totals.most_steps, int(steps.max(initial=0)))
-        totals.rejected += int(rejected.sum())
+        steps = column("steps")
+        totals = Totals(
+            np.bincount(column("outcome"), minlength=len(OUTCOMES)),
+            np.bincount(column("failure"), minlength=len(results.failures)),
+            steps.size, int(steps.sum()), int(steps.max(initial=0)), int(column("rejected").sum()),
+        )  # fmt: skip
         for name in SPANNED:
-            values = file.read(f"replicates/{name}", at)
-            known = np.append(values[np.isfinite(values)], totals.spans.get(name, ()))
-            if known.size:
-                totals.spans[name] = float(known.min()), float(known.max())
-    return totals
+            values = column(name)
+            if (finite := values[np.isfinite(values)]).size:
+                totals.spans[name] = float(finite.min()), float(finite.max())
+        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
+        return Overview(**known, totals=totals)
 
 
 def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
@@ -197,14 +186,12 @@ def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int
     Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
     """
     with opened(path) as file:
-        order = np.argsort(-file.read("replicates/vertices"), kind="stable").tolist()
-        types, _, deltas, _ = file.node("replicates/outcome").shape
-        found: dict[str, tuple[int, int, int, int]] = {}
-        for v, t, d in ((v, t, d) for v in order for t in range(types) for d in range(deltas)):
-            codes = file.read("replicates/outcome", (t, v, d, slice(None)))
-            for code, row in zip(*np.unique(codes, return_index=True), strict=True):
-                if code < len(OUTCOMES):
-                    found.setdefault(OUTCOMES[code], (t, v, d, int(row)))
+        order = np.argsort(-file.read("replicates/vertices"), kind="stable")
+        codes = np.moveaxis(file.read("replicates/outcome")[:, order], 1, 0)
+        found = {}
+        for code, first in zip(*np.unique(codes, return_index=True), strict=True):
+            v, t, d, row = map(int, np.unravel_index(first, codes.shape))
+            found[OUTCOMES[code]] = (t, int(order[v]), d, row)
         return found
 
 

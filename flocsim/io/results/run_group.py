@@ -27,50 +27,27 @@ CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm
 SESSION = {"identity": {}, "layout": str, "date": str, "command": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
-SETTLED = {
-    "type": str, "body": str, "radius": float, "speed": float, "reynolds": float, "stokes": float,
+DEFAULTS: dict[str, Any] = {
+    "identity": {}, "failed": [], "history": [], "cpus": [], "overrides": {}, "warnings": [],
+    "settling": [], "size_classes": [], "equivalent_spheres": [],
 }  # fmt: skip
-"""A body at its terminal speed: flocsim.forces.settling.Settled."""
-
-SPHERES = {
-    "type": str, "release": float, "escape": float, "diffusion": float,
-}  # fmt: skip
-"""Of a brownian study: `flocsim.ensembles.diagnose.spheres.sphere_facts`; three numbers more,
-each of which may be none."""
-
-SIZE_CLASS = {"label": str, "low": float, "high": float, "flocs": int}
-"""A size class of measured flocs: `flocsim.ensembles.collision.pairings.class_facts`."""
-
-FORMS: dict[str, tuple[Any, Any]] = {
-    # name in the group ``run``: (pattern, what it is where there is none)
-    "identity": ({}, {}),
-    "failed": ([NOTE], []),
-    "history": ([{}], []),
-    "cpus": ([CPU], []),
-    "overrides": ({}, {}),
-    "warnings": ([str], []),
-    "settling": ([SETTLED], []),
-    "size_classes": ([SIZE_CLASS], []),
-    "equivalent_spheres": ([SPHERES], []),
-}
+"""Names in the group ``run`` of what it has as JSON, and what that is where there is none."""
 
 
 def stored(run: Mapping[str, Any], name: str) -> Any:
-    """The value that the group ``run`` of a results file has as JSON under a name of FORMS.
+    """Return what the group ``run`` of a results file has as JSON under a name of DEFAULTS.
 
-    Its default where there is none. Raises ValueError, naming it, for a text that no flocsim wrote.
+    Raises ValueError, naming it, for a text that no flocsim wrote.
     """
-    pattern, default = FORMS[name]
-    if name not in run:
-        return default
+    default = DEFAULTS[name]
     try:
-        return read_json(run[name], pattern)
+        return read_json(run[name], type(default)) if name in run else default
     except ValueError as error:
         raise ValueError(f"run/{name} cannot be read: {error}") from error
 
 
 def is_session(description: dict) -> bool:
-    """Whether a record's description, whoever wrote it, can be that of a session."""
+    """Return True if a description, whoever wrote it, can be that of a session of a journal."""
     return matches(description, SESSION) and matches(description.get("cpus", []), [CPU])
 
 
@@ -79,25 +56,21 @@ MOST_FEATURES = 4
 
 
 def distinct(kinds: Sequence[dict]) -> list[dict]:
-    """Each kind once, in the order in which they come."""
+    """Return each kind once, in the order in which they come."""
     return [kind for place, kind in enumerate(kinds) if kind not in kinds[:place]]
 
 
 def describe_kind(kind: dict, others: Sequence[dict] = ()) -> str:
-    """A kind in words: its name, and what it has that one of the others has not."""
-    words = [kind["cpu"]]
-    if kind["compiled_for"] != kind["cpu"]:
-        words.append(f"compiled for {kind['compiled_for']}")
-    for name, title in (("features", ""), ("numpy", "numpy with "), ("libm", "")):
+    """Return a kind of CPU in words: its name, and what it has that one of the others has not."""
+    more = [] if kind["compiled_for"] == kind["cpu"] else [f"compiled for {kind['compiled_for']}"]
+    for name in ("features", "numpy", "libm"):
         own = [each for each in kind[name] if any(each not in other[name] for other in others)]
-        if own:
-            more = ", …" if len(own) > MOST_FEATURES else ""
-            words.append(f"{title}{', '.join(own[:MOST_FEATURES])}{more}")
-    return words[0] if len(words) == 1 else f"{words[0]} ({'; '.join(words[1:])})"
+        more += own[:MOST_FEATURES]
+    return f"{kind['cpu']} ({', '.join(more)})" if more else str(kind["cpu"])
 
 
 def describe_note(note: dict) -> str:
-    """A failed replicate for messages, with the words that run it again."""
+    """Return a failed replicate for messages, with the words that run it again."""
     why = re.sub("^too deep", "overlap exceeded half the summed spheroradii", note["why"])
     return (
         f"{why} (flocsim trajectory CONFIG --type {note['type']} --vertices {note['vertices']} "
@@ -106,7 +79,7 @@ def describe_note(note: dict) -> str:
 
 
 def class_words(facts: Sequence[dict]) -> str:
-    """Size classes in a line; "" where there is one at most."""
+    """Return size classes in a line; "" where there is one at most."""
     told = (
         f"{each['label']} {1e6 * each['low']:.4g} to {1e6 * each['high']:.4g} um "
         f"({each['flocs']} flocs)"
@@ -116,7 +89,7 @@ def class_words(facts: Sequence[dict]) -> str:
 
 
 def sphere_words(facts: dict) -> str:
-    """The facts of one collision type in a line."""
+    """Return the facts of one collision type in a line."""
     free, touch, stability = (
         "no number" if facts[name] is None else f"{facts[name]:.4g}"
         for name in ("free", "touch", "stability")
@@ -129,7 +102,7 @@ def sphere_words(facts: dict) -> str:
 
 
 def water_words(facts: dict) -> str:
-    """The facts of one collision type in a line."""
+    """Return the facts of one collision type in a line."""
     return (
         f"{facts['type']}: equivalent spheres touch {facts['water']:.4g} times as often as on "
         f"undisturbed paths with the water between them, {facts['alone']:.4g} times without it"
@@ -154,7 +127,7 @@ PACKAGES = ("flocsim", "numpy", "numba", "h5py")
 
 
 def provenance(config_text: str, seed: int, kernel_fingerprint: str = "") -> dict[str, str | int]:
-    """Scalars for the group ``run`` of a results file.
+    """Return the scalars of the group ``run`` of a results file.
 
     ``config_text`` is the config file as the user wrote it, ``seed`` the whole number that keys
     all random draws, ``kernel_fingerprint`` the hash of the compiled kernels' source. Returns a
@@ -178,12 +151,12 @@ def provenance(config_text: str, seed: int, kernel_fingerprint: str = "") -> dic
 
 
 def now() -> str:
-    """Date and time [UTC, ISO 8601]."""
+    """Return date and time [UTC, ISO 8601]."""
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
 def package_version(name: str) -> str:
-    """The installed version; for a package run from its folder, what it says of itself."""
+    """Return the installed version; for a package run from its folder, what it says of itself."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -191,7 +164,7 @@ def package_version(name: str) -> str:
 
 
 def processor() -> str:
-    """The processor's name, as far as the system gives it."""
+    """Return the processor's name, as far as the system gives it."""
     with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8") as file:
         for line in file:
             if line.startswith("model name"):
@@ -200,7 +173,7 @@ def processor() -> str:
 
 
 def storable(value: Any) -> Any:
-    """Text without the lone surrogates and zero characters that HDF5 cannot hold."""
+    """Return text without the lone surrogates and zero characters that HDF5 cannot hold."""
     if not isinstance(value, str):
         return value
     return value.encode("utf-8", "replace").decode().replace("\0", "?")

@@ -24,6 +24,7 @@ from flocsim.io.groups import FileFormat, Group, declared
 from flocsim.io.json_text import read_json
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
+from flocsim.io.terminal import aligned
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
 """Words of the codes of ``status``: between two rates; at the lowest rate already; at none; a run
@@ -111,18 +112,6 @@ class Strengths(Tables):
         return self.conditions.columns[name].values
 
 
-def labelled_doublets(columns: dict[str, np.ndarray]) -> Labelled:
-    """The group ``doublets`` of plain columns (k,)."""
-    count = len(next(iter(columns.values())))
-    return GROUPS["doublets"].labelled({"doublet": np.arange(count), **columns})
-
-
-def labelled_conditions(axes: tuple, columns: dict[str, np.ndarray]) -> Labelled:
-    """The group ``conditions`` of plain arrays; ``axes``: types, numbers of vertices, δ."""
-    scales = dict(zip(AXES, axes, strict=True))
-    return GROUPS["conditions"].labelled({**scales, "quantile": QUANTILES, **columns})
-
-
 def write_strengths(path: str | Path, found: Strengths, rule: Rule = keep) -> None:
     """Write the file, whole or not at all; FileError if that is impossible."""
     groups = {"doublets": found.doublets, "conditions": found.conditions}
@@ -159,7 +148,7 @@ def strengths_of(
     ``axes``: types, N and δ of the study; ``bound``: how many it found bound of each condition;
     ``columns`` (k,): all of DOUBLETS.
     """
-    status, opens = columns["status"], columns["opens"]
+    status, opens = np.asarray(columns["status"]), np.asarray(columns["opens"])
     places = np.column_stack([columns[name] for name in AXES])
     shape = bound.shape
     counts = {name: np.zeros(shape, dtype=np.int64)
@@ -173,21 +162,22 @@ def strengths_of(
         counts["n_holding"][place] = holding
         counts["n_failed"][place] = np.sum(rows & (status == FAILED))
         rate[place] = quantiles_of(opens[opened], holding)
-    conditions = labelled_conditions(axes, {"n_bound": bound, **counts, "rate": rate})
-    return Strengths(about, labelled_doublets(columns), conditions)
+    scales = dict(zip(AXES, axes, strict=True)) | {"quantile": QUANTILES}
+    return Strengths(
+        about, GROUPS["doublets"].labelled({"doublet": np.arange(len(status)), **columns}),
+        GROUPS["conditions"].labelled({**scales, "n_bound": bound, **counts, "rate": rate}),
+    )  # fmt: skip
 
 
 def table_of(found: Strengths) -> str:
-    """Counts and quantiles of every condition that has a bound doublet, as text."""
-    heads = "".join(f"{f'G {100.0 * each:g} %':>12}" for each in QUANTILES)
-    lines = [f"{'type':<10}{'N':>5}{'delta':>7}{'bound':>7}{'tested':>8}{'opened':>8}{heads}"]
+    """Return counts and quantiles of every condition that has a bound doublet, as text."""
+    counts = ("n_bound", "n_tested", "n_opened")
+    heads = ["type", "N", "delta", *(name.removeprefix("n_") for name in counts)]
+    rows = [heads + [f"G {100.0 * each:g} %" for each in QUANTILES]]
     axes = [found.conditions.axes[name].values.tolist() for name in AXES]
-    for place in np.ndindex(found.table("n_bound").shape):
-        if not found.table("n_bound")[place]:
-            continue
+    for place in map(tuple, np.argwhere(found.table("n_bound"))):
         name, n, delta = (values[each] for values, each in zip(axes, place, strict=True))
-        counts = (int(found.table(f"n_{word}")[place]) for word in ("bound", "tested", "opened"))
-        bound, tested, opened = counts
-        rates = "".join(f"{each:>12.4g}" for each in found.table("rate")[place])
-        lines.append(f"{name:<10}{n:>5}{delta:>7g}{bound:>7}{tested:>8}{opened:>8}{rates}")
-    return "\n".join(lines)
+        rates = [f"{each:.4g}" for each in found.table("rate")[place]]
+        rows.append([name, str(n), f"{delta:g}", *(str(found.table(c)[place]) for c in counts),
+                     *rates])  # fmt: skip
+    return "\n".join(aligned(rows, left=1))

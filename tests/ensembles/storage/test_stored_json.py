@@ -68,7 +68,7 @@ def test_what_numpy_does_not_use_makes_another_kind():
 
 def test_words_name_what_tells_two_kinds_apart():
     assert describe_kind(HERE) == "znver4"
-    assert describe_kind(HERE, [OTHER]) == "znver4 (avx512f; numpy with X86_V4)"
+    assert describe_kind(HERE, [OTHER]) == "znver4 (avx512f, X86_V4)"
     assert describe_kind(OTHER, [HERE]) == "znver2"
     generic = HERE | {"compiled_for": "generic", "features": []}
     assert describe_kind(generic, [HERE]) == "znver4 (compiled for generic)"
