@@ -151,7 +151,7 @@ class Tables:
         return self.labelled(self.known(group)).to_xarray()
 
     def to_pandas(self, group: str | None = None) -> DataFrame:
-        """Return a group as a pandas DataFrame: a row for each place along its axes, codes in words.
+        """Return a group as a pandas DataFrame: a row per place along its axes, codes in words.
 
         UsageError where pandas is not installed (``pip install 'flocsim[tables]'``).
         """
