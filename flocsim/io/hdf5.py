@@ -37,8 +37,8 @@ class Unfit(ValueError):
 @attrs.frozen(eq=False)
 class Node:
     """A group (``type`` None) or a dataset: its type ("f8", "i8", "i4", "u1" or "text"), its shape,
-    where its numbers lie in the open file ``data``, its attributes {name: value} (None for units
-    and the like, which are known from the schema), and its text in one list."""
+    where its numbers lie in the open file ``data``, its attributes {name: value} (but for units and
+    the like, which are known from the schema), and its text in one list."""
 
     type: str | None
     shape: tuple[int, ...]
@@ -100,7 +100,7 @@ def open_hdf5(path: object, data: BinaryIO) -> File:
     try:
         found = json.loads(text.rpartition(b"\n")[2])  # behind what others print as Python starts
     except ValueError:
-        late = status in (-getattr(signal, "SIGXCPU", 1), -getattr(signal, "SIGALRM", 1))
+        late = status == -getattr(signal, "SIGXCPU", 1)
         what = f"took more than {seconds} s" if late else f"crashed ({status})"
         raise FileError(
             f"{path} is damaged or hostile: the HDF5 library {what}; use a copy or run it again"
@@ -182,5 +182,5 @@ def describe_spawned(data: BinaryIO, seconds: int) -> tuple[bytes, int]:
             start_new_session=True, check=False, timeout=hdf5_child.PATIENCE * seconds,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return b"", -getattr(signal, "SIGALRM", 1)
+        return b"", -getattr(signal, "SIGXCPU", 1)
     return done.stdout, done.returncode

@@ -11,9 +11,7 @@ its path, and imports nothing of flocsim, so that such a process starts quickly.
 """
 
 import json
-import math
 import os
-import signal
 import time
 from typing import Any
 
@@ -44,8 +42,7 @@ def main() -> None:
         import h5py
 
         set_limits()
-        found: dict[str, Any] = {"nodes": described(h5py)}
-        text = json.dumps(found, default=plain, ensure_ascii=False).encode()
+        text = json.dumps({"nodes": described(h5py)}, default=plain, ensure_ascii=False).encode()
     except MemoryError:
         text = json.dumps({"refused": "it takes more than 768 MiB of memory"}).encode()
     except Exception as error:
@@ -69,10 +66,7 @@ def set_limits() -> None:
         return  # whoever started it waits so long at most
     import resource
 
-    seconds = cpu_seconds(os.fstat(0).st_size)
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
-    signal.alarm(PATIENCE * seconds)
-    limits = {"CPU": seconds + int(time.process_time())}
+    limits = {"CPU": cpu_seconds(os.fstat(0).st_size) + int(time.process_time())}
     if os.path.exists("/proc/self/statm"):
         with open("/proc/self/statm") as file:
             limits["AS"] = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE") + MEMORY
@@ -87,29 +81,26 @@ def described(h5py: Any) -> dict[str, tuple]:
     None, and datasets; "" is the root."""
     # Not by its name, under which another file may lie by now.
     with open(0, "rb", 0, closefd=False) as source, h5py.File(source, "r") as file:
-        root = h5py.h5o.open(file.id, b"/")
-        nodes = {"": (None, (), None, attributes(h5py, root), None)}
-        walk(h5py, root, "", nodes)
+        nodes = {"": (None, (), None, attributes(file), None)}
+        walk(h5py, file, "", nodes)
     return nodes
 
 
 def walk(h5py: Any, group: Any, above: str, nodes: dict[str, tuple]) -> None:
     """Add all that is in a group to the nodes."""
-    names: list[bytes] = []
-    group.links.iterate(names.append)
-    for name in names:
-        path = above + name.decode()
+    for name in group:
+        path = above + name
         if not path.isprintable():
             raise Refused("it has unprintable names")
         if path.count("/") > MOST_LEVELS:
             raise Refused("its groups are nested too deep")
-        if group.links.get_info(name).type != h5py.h5l.TYPE_HARD:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise Refused(f"{path} is a link, which flocsim never writes")
-        each = h5py.h5o.open(group, name)
-        if isinstance(each, h5py.h5g.GroupID):
-            nodes[path] = (None, (), None, attributes(h5py, each), None)
+        each = group[name]
+        if isinstance(each, h5py.Group):
+            nodes[path] = (None, (), None, attributes(each), None)
             walk(h5py, each, f"{path}/", nodes)
-        elif isinstance(each, h5py.h5d.DatasetID):
+        elif isinstance(each, h5py.Dataset):
             nodes[path] = dataset(h5py, path, each)
         else:
             raise Refused(f"{path} is neither a group nor a dataset")
@@ -117,35 +108,28 @@ def walk(h5py: Any, group: Any, above: str, nodes: dict[str, tuple]) -> None:
 
 def dataset(h5py: Any, path: str, each: Any) -> tuple:
     """Return the node of a dataset whose values lie in the file in one piece."""
-    dtype, shape = each.dtype, each.shape
-    words = h5py.check_string_dtype(dtype)
-    kind = "text" if words and words.length is None else TYPES.get(dtype.str)
-    if kind is None or each.get_space().get_simple_extent_type() == h5py.h5s.NULL:
+    words = h5py.check_string_dtype(each.dtype)
+    kind = "text" if words and words.length is None else TYPES.get(each.dtype.str)
+    if kind is None or each.shape is None:
         raise Refused(f"{path} has a type or a shape that flocsim does not write")
-    plan = each.get_create_plist()
+    plan = each.id.get_create_plist()
     whole = plan.get_layout() == h5py.h5d.CONTIGUOUS and not plan.get_nfilters()
     if not whole or plan.get_external_count():
         raise Refused(f"the values of {path} are packed, in pieces, or in another file or dataset")
-    size = math.prod(shape) * (16 if words else dtype.itemsize)
-    offset, text = each.get_offset(), None
+    size, offset = each.size * each.dtype.itemsize, each.id.get_offset()
     end = os.fstat(0).st_size
-    if size and (offset is None or each.get_storage_size() != size or offset + size > end):
+    if size and (not each.id.get_storage_size() or (offset or end) + size > end):
         raise Refused(f"the values of {path} are missing")
+    text = None
     if words:
-        values = h5py.Dataset(each).asstr(errors="strict")[()]
-        text = values.ravel().tolist() if shape else [values]
-    return kind, shape, offset, attributes(h5py, each), text
+        values = each.asstr(errors="strict")[()]
+        text = values.ravel().tolist() if each.shape else [values]
+    return kind, each.shape, offset, attributes(each), text
 
 
-def attributes(h5py: Any, owner: Any) -> dict[str, Any]:
-    """Return {name: value} of all attributes; None for those of UNREAD."""
-    names: list[bytes] = []
-    h5py.h5a.iterate(owner, names.append)
-    found: dict[str, Any] = dict.fromkeys(name.decode() for name in names)
-    if wanted := found.keys() - UNREAD:
-        kind = h5py.Group if isinstance(owner, h5py.h5g.GroupID) else h5py.Dataset
-        found |= {name: kind(owner).attrs[name] for name in wanted}
-    return found
+def attributes(owner: Any) -> dict[str, Any]:
+    """Return {name: value} of all attributes but those of UNREAD."""
+    return {name: owner.attrs[name] for name in owner.attrs if name not in UNREAD}
 
 
 def plain(value: Any) -> Any:

@@ -4,8 +4,9 @@
                          several spheroradii each has a row, e.g. "023.png#7 r=2"
 - ``fits/N``             for every N, so that between conditions nothing changes but N
                          (FIT_COLUMNS); in version 2, of holes or several parts, POINT_COLUMNS too
-- ``measures``           of flocs that have been measured (MEASURE_COLUMNS); NaN for one without
-- ``population``         of flocs from pictures (POPULATION_COLUMNS)
+- ``measures``           of their masks (MEASURE_COLUMNS); NaN for one without; earlier files may
+                         lack the group
+- ``population``         what the picture leaves open (POPULATION_COLUMNS); the same
 - ``closer/N, wider/N``  as ``fits/N``, of the outlines cut closer and wider, about the centroid of
                          the floc as it was cut, where these were fitted as well
 
@@ -211,11 +212,11 @@ def make_entry(
     picture: Any, region: Any, fits: "Sequence[Mapping[float, Mapping[int, Fit]]]",
     spheroradius: float, name_radius: bool = False,
 ) -> ShapeEntry:  # fmt: skip
-    """The ShapeEntry of a Region (flocsim.io.images) of a picture, which has a name, pixel_size [m]
-    and measures {label: ShapeMeasures}.
+    """Return the ShapeEntry of a Region (flocsim.io.images) of a picture.
 
-    fits: {r: {N: Fit}} [px] of its mask, and of the two masks of its band, where they were made;
-    name_radius: its id names the spheroradius, for libraries with several of one floc.
+    picture: it has a name, pixel_size [m] and measures {label: ShapeMeasures}; fits: {r: {N: Fit}}
+    [px] of its mask, and of the two masks of its band, where they were made; name_radius: its id
+    names the spheroradius, for libraries with several of one floc.
     """
     top, left = region.bbox[:2]
 
@@ -244,7 +245,7 @@ def make_entry(
 
 
 def stored_fit(fit: "Fit", centroid: np.ndarray, pixel_size: float) -> StoredFit:
-    """The StoredFit of a Fit in a mask where the floc's centroid lies at ``centroid`` [px]."""
+    """Return the StoredFit of a Fit in a mask with the floc's centroid at ``centroid`` [px]."""
     vertices, radius = (fit.vertices - centroid) * pixel_size, fit.radius * pixel_size
     table = None
     if fit.hole_sizes:
@@ -285,14 +286,8 @@ def write_library(
 
     compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
     kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
-    declared_as = groups_of(kinds, sorted(entries[0].fits), compound)
-    # Of a library of nothing but outlines these say nothing.
-    if not any(entry.measures is not None for entry in entries):
-        del declared_as["measures"]
-    if not any(each.radius_low < each.radius_high or each.weight != 1.0 for each in entries):
-        del declared_as["population"]
     groups = {}
-    for name, group in declared_as.items():
+    for name, group in groups_of(kinds, sorted(entries[0].fits), compound).items():
         kind, _, count = name.partition("/")
         owners: list[Any] = entries
         if count:

@@ -100,7 +100,7 @@ def test_every_dataset_says_its_units(tmp_path, entries):
         assert file["fits/6/vertices"].shape == (2, 6, 2)
         datasets = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "dtype") else None)
-        assert len(datasets) == 7 + 3 * 3
+        assert len(datasets) == 7 + 3 * 3 + 6 + 3
         assert all("units" in item.attrs and "long_name" in item.attrs for item in datasets)
 
 

@@ -96,15 +96,10 @@ ABOUT_SPHERES = [
 """Lines for whoever gets numbers with that factor in them."""
 
 
-def number(value: float) -> str:
-    """A number with all its digits; nothing where it is not known."""
-    return "" if math.isnan(value) else repr(float(value))
-
-
 def efficiency_for(
     kernel: Kernel, mechanism: str, vertices: int, model: str, quantity: str = "efficiency"
 ) -> np.ndarray:
-    """What a model's kernel of a mechanism is to be multiplied by (i, j), or an end of its
+    """Return what a model's kernel of a mechanism is to be multiplied by (i, j), or an end of its
     interval; UsageError for a model that has none. 0 for bodies of one size that do not meet."""
     known = REFERENCES.get(mechanism, {})
     if model not in known:
@@ -117,79 +112,70 @@ def efficiency_for(
     return np.where(kernel.arrays["beta3_reference"][m, v] == 0.0, 0.0, values)
 
 
-def weights_of(kernel: Kernel) -> list[str]:
-    """What a model is to take for the weight of flocs, where that goes by their size."""
-    if kernel.fractal is None:
-        return []
-    primary, dimension, solid = kernel.fractal
-    return [
-        f"flocs of n_f = {dimension:g}, D_p = {primary:g} m, solid of {solid:g} kg/m3: "
-        "drho = (rho_p - rho_w) (D_p/D)^(3 - n_f), as the model is to have it"
-    ]
-
-
 def kernel_matrix(
     kernel: Kernel, mechanism: str, vertices: int, quantity: str = "efficiency",
     model: str = "spheres", curvilinear: str | None = None, factors: np.ndarray | None = None,
 ) -> str:  # fmt: skip
-    """A square matrix as CSV, radii [m] in its first row and column, behind lines that start with #
-    and say what it holds and what it multiplies. ``curvilinear``: the name of a factor that
-    efficiencies are multiplied by, element by element; ``factors`` (i, j): those of "spheres"."""
+    """Return a square matrix as CSV, radii [m] in its first row and column.
+
+    Lines that start with # come first and say what it holds and what it multiplies.
+    ``curvilinear``: the name of a factor that efficiencies are multiplied by, element by element;
+    ``factors`` (i, j): those of "spheres".
+    """
     m, v = kernel.place_of(mechanism, vertices)
-    bound = ["without hydrodynamic interaction: an upper bound"]
-    if kernel.water:
-        bound = ["with hydrodynamic interaction, of the outlines in the plane"]
-    if kernel.water and (curvilinear is not None or factors is not None):
+    corrected = curvilinear is not None or factors is not None
+    if corrected and kernel.water:
         raise UsageError(
             "the study already includes the water between the bodies ([forces.hydrodynamics]): a "
             "curvilinear factor would count it twice; leave it out"
         )
-    if (curvilinear is not None or factors is not None) and quantity not in OF_MODELS:
+    if corrected and quantity not in OF_MODELS:
         raise UsageError(
             f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: use "
             "efficiency, or leave it out"
         )
+    bound = ["without hydrodynamic interaction: an upper bound"]
+    if kernel.water:
+        bound = ["with hydrodynamic interaction, of the outlines in the plane"]
     if quantity in OF_MODELS:
         values = efficiency_for(kernel, mechanism, vertices, model, quantity)
-        held = quantity.replace("_low", ", lower 95 % bound,").replace(
-            "_high", ", upper 95 % bound,"
-        )
+        title = quantity.replace("_low", ", lower 95 % bound,")
+        title = title.replace("_high", ", upper 95 % bound,")
+        if corrected:
+            title += " times curvilinear factor"
         if factors is not None:
-            held, bound = f"{held} times curvilinear factor", ABOUT_SPHERES
-            values = values * factors
+            values, bound = values * factors, ABOUT_SPHERES
         elif curvilinear is not None:
             rows = kernel.radii[:, np.newaxis]
             values = values * curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
-            held += " times curvilinear factor"
             bound = about_factor(curvilinear, mechanism)
-        what = [
-            f"{held} in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
+        lines = [
+            f"{title} in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
             "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
         ]
-    elif quantity in QUANTITIES:
-        values = kernel.arrays[quantity][m, v]
-        what = [f"{quantity} [{KERNEL[quantity][1]}] in {mechanism}: {KERNEL[quantity][2]}"]
     else:
-        raise UsageError(f"a matrix holds one of {', '.join(QUANTITIES)}, found {quantity}")
+        values = kernel.arrays[quantity][m, v]
+        lines = [f"{quantity} [{KERNEL[quantity][1]}] in {mechanism}: {KERNEL[quantity][2]}"]
     if np.isnan(values).any():
-        what.append("an empty cell is unknown, for example because points are undecided")
+        lines.append("an empty cell is unknown, for example because points are undecided")
     if unknown := np.nanmax(kernel.arrays["undecided"][m, v], initial=0.0):
-        what.append(
+        lines.append(
             f"up to {100.0 * unknown:.2g} % of a pair's encounters are undecided or failed: the "
             "bounds (_low, _high) include every outcome that they could have had"
         )
-    lines = [
-        *what,
-        f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]",
-        *weights_of(kernel),
-        *bound,
-    ]
+    lines.append(f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]")
+    if kernel.fractal is not None:
+        primary, dimension, solid = kernel.fractal
+        lines.append(
+            f"flocs of n_f = {dimension:g}, D_p = {primary:g} m, solid of {solid:g} kg/m3: "
+            "drho = (rho_p - rho_w) (D_p/D)^(3 - n_f), as the model is to have it"
+        )
     text = io.StringIO()
-    text.writelines(f"# {line}\n" for line in lines)
+    text.writelines(f"# {line}\n" for line in lines + bound)
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["r_eq [m]", *(number(each) for each in kernel.radii)])
-    for radius, row in zip(kernel.radii, values, strict=True):
-        writer.writerow([number(radius), *(number(each) for each in row)])
+    writer.writerow(["r_eq [m]", *kernel.radii.tolist()])
+    for radius, row in zip(kernel.radii.tolist(), values.tolist(), strict=True):
+        writer.writerow([radius, *("" if math.isnan(each) else each for each in row)])
     return text.getvalue()
 
 
@@ -212,7 +198,7 @@ CORRECTIONS: dict[str, dict[str, Factor]] = {
 
 
 def formula(name: str, mechanism: str) -> Factor:
-    """(function of p, how it is written); UsageError for a name or a mechanism that has none."""
+    """Return (function of p, its formula); UsageError for a name or a mechanism without one."""
     if name not in CORRECTIONS:
         raise UsageError(
             f"the curvilinear factor must be one of {', '.join(CORRECTIONS)}, found {name}"
@@ -227,7 +213,7 @@ def formula(name: str, mechanism: str) -> Factor:
 
 
 def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike) -> np.ndarray:
-    """What the rectilinear kernel of two solid spheres is multiplied by for the water between them.
+    """Return what the rectilinear kernel of two spheres is multiplied by for the water between.
 
     ``name``: "hill" or "burd"; ``mechanism``: "settling" or "shear"; ``r_i``, ``r_j``: radii [m],
     numbers or arrays that broadcast. With p = r_small/r_large the factor, from 0 to 1, is
@@ -253,7 +239,7 @@ def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike
 
 
 def about_factor(name: str, mechanism: str) -> list[str]:
-    """Lines for whoever gets numbers with the factor in them."""
+    """Return lines for whoever gets numbers with the factor in them."""
     _, written = formula(name, mechanism)
     return [
         f"curvilinear factor '{name}' in {mechanism}: {written}, p = r_small/r_large; "

@@ -200,13 +200,13 @@ class SwarmResults(Tables):
         return f"SwarmResults({shape[0]} replicates × {shape[1]} times × {shape[2]} bodies)"
 
     def labelled(self, group: str = "counts") -> Labelled:
-        """A group's arrays with their axes; UsageError for an unknown one."""
+        """Return a group's arrays with their axes; UsageError for an unknown one."""
         name = self.known(group)
         return GROUPS[name].labelled({**self.scales, **self.groups[name]})
 
 
 def mean(values: np.ndarray) -> np.ndarray:
-    """The mean over replicates that got so far; NaN where none did."""
+    """Return the mean over replicates that got so far; NaN where none did."""
     known = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
@@ -227,16 +227,16 @@ def read_swarm(path: str | os.PathLike) -> SwarmResults:
         for replicate, body in np.ndindex(*bodies["first_point"].shape):
             parts_in(points_of(bodies, replicate, body))
     scales: dict[str, np.ndarray] = {}
-    groups: dict[str, dict[str, np.ndarray]] = {}
     for name, group in GROUPS.items():
-        scales |= {axis: stored.groups[name][axis] for axis in group.scales}
-        groups[name] = {column: stored.groups[name][column] for column in group.columns}
-    return SwarmResults(scales, groups, stored.run)
+        scales |= {axis: stored.groups[name].pop(axis) for axis in group.scales}
+    return SwarmResults(scales, stored.groups, stored.run)
 
 
 def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
-    """The columns of EVENTS that follow from the clusters of all bodies, ``labels`` (replicates,
-    times, bodies), below 0 for a body that is of none: what left in between does not count.
+    """Return the columns of EVENTS that follow from the clusters of all bodies.
+
+    ``labels`` (replicates, times, bodies): below 0 for a body of no cluster; what left in between
+    does not count.
 
     Clusters of two snapshots that share bodies belong together, with all that these share bodies
     with. What happened and was undone between two snapshots is not seen.
@@ -252,8 +252,8 @@ def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...]]:
-    """(clusters before, after, bodies, largest, second) of every event from one snapshot to the
-    next, in the order of the first bodies."""
+    """Return (clusters before, after, bodies, largest, second) of each event between snapshots,
+    in the order of the first bodies."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -280,20 +280,20 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
 
 
 def points_of(bodies: Mapping[str, np.ndarray], replicate: int, body: int) -> PointTable:
-    """The core points of a body."""
+    """Return the core points of a body."""
     first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
     rows = slice(first, first + count)
     return PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
 
 
 def table_of(results: SwarmResults) -> str:
-    """Numbers on the clusters over time, means over replicates, as text."""
+    """Return numbers on the clusters over time, means over replicates, as text."""
     many = len(results.scales["replicate"])
     return "\n".join(aligned(table_rows(results)) + ([f"means over {many} swarms"] * (many > 1)))
 
 
 def table_rows(results: SwarmResults) -> list[list[str]]:
-    """The same as rows of words, their heads first."""
+    """Return the same as rows of words, their heads first."""
     counts = results.groups["counts"]
     columns = {
         "time [s]": (results.scales["time"], "{:.4g}"),

@@ -179,7 +179,7 @@ def test_a_damaged_or_strange_file_is_refused(tmp_path):
     wrong = mixed()
     wrong.doublets.columns["type"].values[0] = 7
     write_strengths(tmp_path / "t.h5", wrong)
-    with pytest.raises(FileError, match="a type that the file does not have"):
+    with pytest.raises(FileError, match="doublets/type has impossible values"):
         read_strengths(tmp_path / "t.h5")
 
 

@@ -108,5 +108,3 @@ def test_what_a_matrix_cannot_hold_is_refused():
         kernel_matrix(kernel, "extension", 1, "alpha")
     with pytest.raises(UsageError, match="vertices must be one of 1, 32"):
         kernel_matrix(kernel, "shear", 4)
-    with pytest.raises(UsageError, match="a matrix holds one of"):
-        kernel_matrix(kernel, "shear", 1, "steps")
