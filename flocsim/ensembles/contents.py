@@ -18,7 +18,7 @@ import numpy as np
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io.groups import Group, kind_of
+from flocsim.io.groups import UNREADABLE, Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.plots.style import Figure
 from flocsim.io.results.run_group import describe_kind, source_line, stored
@@ -205,7 +205,7 @@ def summary_of(path: object, kind: Contents, found: Any) -> Summary:
     """What a file says of itself; FileError where that cannot be read."""
     try:
         return kind.summary(found)
-    except ValueError as error:
+    except UNREADABLE as error:
         raise FileError(f"{path} has no readable {kind.title}: {error}") from error
 
 
