@@ -68,9 +68,3 @@ def test_a_modulus_of_one_megapascal_is_the_stiffness_of_the_paper():
 def test_what_no_material_has_is_refused(given, said):
     with pytest.raises(RangeError, match=said):
         Contact(**given)
-
-
-def test_friction_of_zero_leaves_no_tangential_force():
-    law = Contact(young=1e6, poisson=0.2, friction=0.0)
-    assert law.springs[2:] == (0.0, 0.0) and not law.slides
-    assert Contact(young=1e6, poisson=0.2, friction=0.3).slides

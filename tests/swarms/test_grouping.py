@@ -1,16 +1,50 @@
-"""Which bodies form an island: all who may meet in a window."""
+"""Which bodies form an island: who may meet in a window, and who has met."""
 
 import itertools
+import math
 
 import numpy as np
+import pytest
 
 import flocsim.arrays as at
+import flocsim.swarms.arrays as sw
 from flocsim import Body, Sphere
+from flocsim.compiler.composer import compose
 from flocsim.forces import Contact, Gravity, StokesDrag
+from flocsim.swarms.arrays import swarm_of
+from flocsim.swarms.grouping import have_met
 from flocsim.swarms.placement import floor
 from flocsim.swarms.runner import Runner
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R, crowd, forces
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_who_has_met_is_what_a_plain_search_says(seed):
+    """Random walks, at a thousand times each: who came near has met, and none who stayed away by
+    more than the boxes are wide."""
+    rng, n = np.random.default_rng(seed), 12
+    bodies = [Body(Sphere(R), (5.0 * R * k, 0.0), density=2650.0) for k in range(n)]
+    swarm = Swarm(bodies, [Contact()])
+    clock = swarm.integrator.fresh_clock()
+    arrays = swarm_of(swarm.system.scene(jit=False), *swarm.system.motion(), clock)
+    steps = rng.normal(0.0, 0.7, (n, sw.STRETCHES + 1, 2)).cumsum(axis=1)
+    paths = R * (rng.uniform(-15.0, 15.0, (n, 1, 2)) + steps)
+    ends = np.stack([paths[:, :-1], paths[:, 1:]])
+    (left, low), (right, high) = (np.moveaxis(f(ends, axis=0), -1, 0) for f in (np.min, np.max))
+    arrays.ways[:] = np.stack([left, right, low, high], axis=-1)
+    met = compose(have_met, {}, jit=False)
+    widest = np.hypot(*np.abs(np.diff(paths, axis=1)).max(axis=(0, 1)))
+    times = np.linspace(0.0, sw.STRETCHES, 1000)
+    finer = np.array([
+        [np.interp(times, range(sw.STRETCHES + 1), path[:, axis]) for axis in range(2)]
+        for path in paths
+    ])  # fmt: skip
+    for a, b in itertools.combinations(range(n), 2):
+        nearest = np.hypot(*(finer[a] - finer[b])).min()
+        found = met(arrays, a, b, 0.5 * R, math.inf, math.inf)
+        assert found or nearest >= 2.5 * R
+        assert not found or nearest < 2.5 * R + 2.0 * widest
 
 
 def test_who_follows_one_that_lands_is_of_its_island_from_the_first():

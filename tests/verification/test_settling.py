@@ -53,15 +53,6 @@ def speed_in_closed_form(body):
     return 2.0 / 9.0 * (2650.0 - 997.0) * 9.81 * body.shape.radius**2 / WATER_VISCOSITY
 
 
-@pytest.mark.parametrize("shape", [Sphere(RADIUS), hook()], ids=["sphere", "hook"])
-def test_terminal_velocity_follows_the_equivalent_radius(shape):
-    body = Body(shape, angle=0.7, surface_density=2.0)
-    tau, terminal = relaxation_of(body)
-    end = settle(body, Implicit(tolerance=1e-11), 40.0 * tau)
-    assert end.velocity[-1, 0] == pytest.approx([0.0, -terminal, 0.0], rel=1e-6, abs=1e-15)
-    assert end.position[-1, 0, 2] == 0.7
-
-
 @pytest.mark.parametrize(
     ("integrator", "allowed"),
     [

@@ -95,6 +95,7 @@ def test_the_first_switch_is_located_to_the_resolution(seed):
         assert -RESOLUTION <= worst_margin(scene, work, [share])[0] < 0.0
 
 
+@pytest.mark.slow
 def test_these_scenes_switch_and_some_do_not():
     shares = [found(seed)[2] for seed in SCENES]
     assert sum(share < 1.0 for share in shares) > 8

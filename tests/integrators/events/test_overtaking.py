@@ -1,12 +1,15 @@
-"""Boxes that attract a floor and touch it with one corner after the other."""
+"""Boxes that attract a floor and touch it with one corner after the other: which is pressed."""
 
 import math
 
 import pytest
 
+import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
+from flocsim.integrators.events.crossings import overtakes
+from tests.helpers.fast_scene import flagged
 
 OVERLAP = 0.9e-9
 """About that of a corner that bears the attraction [m]."""
@@ -40,3 +43,32 @@ def test_a_corner_that_touches_gently_does_not_draw_the_attraction_to_itself(sid
         angles.append(side * run.position[-1, 1, 2])
     assert angles[0] == pytest.approx(angles[1], rel=1e-3)
     assert angles[0] > 1e-5
+
+
+def between(gaps, step, closed=True):
+    """Whether a corner overtakes the other one in a step of so many seconds, which takes the gaps
+    of both [m] from the first to the second ones."""
+    scene, work = flagged(tilted(0.0, 0.0))
+    touching = [
+        row for row in range(work.tally[at.CANDIDATES]) if work.geometry[at.NOW, row, at.GAP] < 0.0
+    ]
+    work.geometry[at.NOW, :, at.GAP] = work.geometry[at.NEW, :, at.GAP] = 1e-6
+    for state, values in zip((at.NOW, at.NEW), gaps, strict=True):
+        for row, value in zip((touching[0], touching[-1]), values, strict=True):
+            work.geometry[state, row, at.GAP] = value
+    assert len(touching) > 1 and (work.candidates[touching, at.CLOSED] == at.TOUCHES).all()
+    clock = Implicit(1e-9).fresh_clock()
+    clock[at.ACROSS] = 0.0 if closed else 1.0
+    return overtakes(scene, work, clock, step)
+
+
+def test_only_a_long_step_between_far_states_is_in_doubt():
+    far = (-OVERLAP, -1e-13), (-1e-12, -OVERLAP)
+    assert between(far, 1e-4)
+    assert not between(far, 1e-8)
+    assert not between((far[0], far[0]), 1e-4)
+    assert not between(((-OVERLAP, -0.95 * OVERLAP), (-0.95 * OVERLAP, -OVERLAP)), 1e-4)
+
+
+def test_pairs_that_are_open_at_the_start_count_where_steps_go_on_across_switches():
+    assert between(((-OVERLAP, 1e-8), (1e-8, -OVERLAP)), 1e-4, closed=False)
