@@ -260,7 +260,7 @@ def run(args: argparse.Namespace) -> int:
         draw_fits(args.fits, pictures, rule)
     print("\n".join([format_errors(entries), *population_lines(entries)]))
     if coarse := coarse_line(errors_of(entries)):
-        print(f"warning: {coarse} (--vertices)")
+        print(f"warning: {coarse}")
     counts, flocs = ", ".join(map(str, args.vertices)), sum(len(each.regions) for each in pictures)
     print(f"{args.output}: {plural(flocs, 'floc')} at N = {counts}; {summary}: all regions")
     if not lost:

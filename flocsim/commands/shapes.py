@@ -125,7 +125,7 @@ def run_list(args: argparse.Namespace) -> int:
         if entries:
             print("\n".join(population_lines(entries)))
         if coarse := coarse_line(errors_of(entries)):
-            print(f"warning: {coarse}: fit again with more --vertices")
+            print(f"warning: {coarse}")
         if any(each.measures is None for each in entries):
             print("shape measures of the finest fit where the library has none of the picture")
     return 0

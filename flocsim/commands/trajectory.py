@@ -9,11 +9,11 @@ import numpy as np
 
 from flocsim.commands import add_overwrite, add_settings
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
-from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.errors import UsageError
+from flocsim.io.arguments import number
 from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.plots.style import checked_format, save
 from flocsim.io.results.run_group import SOURCE, source_line
@@ -23,7 +23,7 @@ from flocsim.io.trajectory import (
     read_trajectory,
     write_trajectory,
 )
-from flocsim.trajectories.figures import animated, drawn
+from flocsim.trajectories.figures import MOST_FRAMES, animated, drawn
 
 ANIMATION_FRAMES = 60
 STRIP_FRAMES = 7
@@ -44,7 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_replicate(parser)
     add = parser.add_argument
     add("--seed", type=int)
-    add("--frames", type=int, default=6)
+    add("--frames", type=lambda text: int(number("2 to 500", 2, MOST_FRAMES)(text)), default=6)
     add("-o", "--output", nargs="+", default=[])
     for figure in ("--distance", "--forces"):
         add(figure, nargs="+", default=[])
@@ -55,7 +55,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def add_replicate(parser: ArgumentParser) -> None:
-    """Add the arguments that name a replicate of a config; `select` finds it."""
+    """Add the arguments that name a replicate of a config."""
     add = parser.add_argument
     add("config", help="config file (TOML)")
     add("--replicate", type=int, default=0, metavar="K", help="default: 0")
@@ -64,19 +64,9 @@ def add_replicate(parser: ArgumentParser) -> None:
     add("--delta", type=float, metavar="F", help="default: the first")
 
 
-def select(config: Config, args: Namespace) -> tuple[int, int, float]:
-    """(place of the condition, N, share of δ_max) that the arguments choose."""
-    if args.replicate is not None and not args.replicate >= 0:
-        raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
-    if not 2 <= args.frames <= 50:
-        raise UsageError(f"--frames must be from 2 to 50, found {args.frames}")
-    return place_of(config, args.type, args.vertices, args.delta, "--")
-
-
-def outcome_line(config, place, replicate, row):
-    condition, vertices, share = place
+def outcome_line(name: str, vertices: int, share: float, replicate: int, row: dict) -> str:
+    """Return what became of a replicate of a collision type, of N vertices at a share of δ_max."""
     reason = f" ({row['failure']})" if row["failure"] != "none" else ""
-    name = config.scene.names[condition]
     touch = ""
     if row["inside"] != "not_applicable":
         touch = f"collision at {1e3 * row['t_collision']:.4g} ms, "
@@ -91,7 +81,7 @@ def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
     over = nested(map(parse_setting, args.settings))
     config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
-    place = select(config, args)
+    place = place_of(config, args.type, args.vertices, args.delta, "--")
     check_study(config)
     name, vertices, share = config.scene.names[place[0]], *place[1:]
     shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
@@ -109,7 +99,7 @@ def run(args: Namespace) -> int:
     study = one_count_study(config, place[1])
     found = replicate_of(args.replicate, place, study)
     assert found.row is not None, "a replicate of a study"
-    title = outcome_line(config, place, args.replicate, found.row)
+    title = outcome_line(name, vertices, share, args.replicate, found.row)
     source, head = source_line(study.source), title.split(";")[0]
     print(title)
     print(source)

@@ -230,43 +230,38 @@ def too_many_undecided(results: Results) -> bool:
     )
 
 
-def undecided_line(results: Results) -> str:
-    """Return what to say where replicates are undecided or have failed: of pairs where there are
-    more of them than may be, of rates where there are any; "" else."""
-    table, rates = results.probabilities, results.kernel is not None
+def verdict(found: Results) -> tuple[int, str]:
+    """Return the exit code of a study and what to say of replicates without an outcome, or "".
+
+    An error where not one has come to an outcome, WITHHELD where more of them are undecided than
+    may be. Fewer are reported of rates alone.
+    """
+    table, rates = found.probabilities, found.kernel is not None
     total, failed, undecided = (
         int(table[name].sum()) for name in ("n_total", "n_failed", "n_undecided")
     )
-    too_many = too_many_undecided(results)
+    too_many = too_many_undecided(found)
     if not failed + undecided or not (too_many or rates):
-        return ""
-    notes, noun = stored(results.run, "failed"), "points" if rates else "replicates"
-    largest = 100.0 * np.nanmax(shares_undecided(results), initial=0.0)
-    line = (
-        f"of {total} {noun} {failed} failed and {undecided} are undecided, up to {largest:.2g} % "
-        f"of {'a pair' if rates else 'a condition'}"
-    )
-    if failed + undecided == total:
-        line = f"no replicate has reached an outcome, {failed} failed and {undecided} are undecided"
-    elif too_many:
-        line += f", more than stop.undecided = {most_undecided(results):g} allows"
-    if too_many and rates:
-        line += ", so that rates have no estimate"
+        return 0, ""
+    none = failed + undecided == total
+    ends = f"{failed} failed and {undecided} are undecided"
+    line = f"no replicate has reached an outcome, {ends}"
+    if not none:
+        largest = 100.0 * np.nanmax(shares_undecided(found), initial=0.0)
+        line = f"warning: of {total} {'points' if rates else 'replicates'} {ends}, up to "
+        line += f"{largest:.2g} % of {'a pair' if rates else 'a condition'}"
+        line += f", more than stop.undecided = {most_undecided(found):g} allows" * too_many
+    line += ", so that rates have no estimate" * (too_many and rates)
     if undecided:
         line += ": raise integrator.max_steps or scene.time_limit, for another output"
-    return line + (f"; the first: {describe_note(notes[0])}" if notes else "")
+    notes = stored(found.run, "failed")
+    line += f"; the first: {describe_note(notes[0])}" if notes else ""
+    return FlocsimError.exit_code if none else WITHHELD * too_many, line
 
 
-def verdict(found: Results) -> tuple[int, str]:
-    """0, or the code of an error where not one replicate has come to an outcome, or where more are
-    undecided than may be; and what to say of those that have none."""
-    line = undecided_line(found)
-    if not line:
-        return 0, ""
-    counts = found.probabilities
-    if (counts["n_failed"] + counts["n_undecided"]).sum() == counts["n_total"].sum():
-        return FlocsimError.exit_code, line
-    return (WITHHELD if too_many_undecided(found) else 0), f"warning: {line}"
+def undecided_line(results: Results) -> str:
+    """Return what `verdict` says, without the word warning."""
+    return verdict(results)[1].removeprefix("warning: ")
 
 
 def checked_line(results: Results) -> str:

@@ -93,7 +93,7 @@ def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
     worst = max(coarse, key=lambda name: coarse[name])
     return (
         f"N = {most} is too small for {len(coarse)} of {plural(len(errors), 'floc')}: RE is above "
-        f"{MOST_ERROR:g} %, and {coarse[worst]:.3g} % for {worst}; more vertices lower it"
+        f"{MOST_ERROR:g} %, and {coarse[worst]:.3g} % for {worst}; raise the number of vertices"
     )
 
 
