@@ -1,4 +1,5 @@
-"""Studies of pairs and of rates: what rank 0 asks of them, what their files hold and show.
+"""Studies of pairs and of rates: `study`, how results are made of rows; `results`, what commands
+show of a file; `opened`, what a script has of one; `comparison`, of two.
 
-Imports ensembles' study, kernels, estimates, storage and report, and io.
+How a pair is drawn and run is in `flocsim.ensembles.study`. May import report, estimates, storage.
 """

@@ -1,4 +1,4 @@
-"""Studies of pairs and of rates, as rank 0 has them: checks, what they tell, tables from rows."""
+"""How the results of studies of pairs and of rates are made of rows, for good or so far."""
 
 import json
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,6 @@
 """The kind of studies of swarms: `[scene] kind = "swarm"`.
 
-`study` makes the bodies of a replicate, `replicate` runs one from wherever it was left, `records`
-is what of it goes into the journal, when that can be believed, and the results that it makes;
-`kind` is what rank 0 asks, `scene` the table [scene], `contents` what commands show of a file and
-of two.
+`scene` is the table [scene]; `study` makes the bodies of a replicate and runs it from its start or
+from wherever it was stopped; `results` is what is saved of it, what becomes of that, and what
+commands show of a file and of two.
 """
