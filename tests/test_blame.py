@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import System
 from flocsim.__main__ import main
-from flocsim.ensembles.collision.draw import FAILED, FAILURES, run_safely
+from flocsim.ensembles.collision.draw import FAILED, FAILURES
 from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.kind import Condition
 from flocsim.ensembles.study import Study
@@ -77,11 +77,16 @@ def wrong_study(folder, replicates=2, allowed=1):
     return load_text(folder, STUDY.format(replicates=replicates, allowed=allowed))
 
 
+def task(study, replicate):
+    """(row, note) of a replicate of spheres of type III."""
+    return study.run_task(Condition("III", 1, 0.0), replicate, lambda: False)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_force_that_gives_no_number_is_named(tmp_path, name):
     kind, more, answer, said = CASES[name]
     write(tmp_path, kind, more, answer)
-    row, note = run_safely(Study(wrong_study(tmp_path)), Condition("III", 1, 0.0), 0)
+    row, note = task(Study(wrong_study(tmp_path)), 0)
     assert (row["outcome"], FAILURES[row["failure"]]) == (FAILED, "not finite")
     told = note["why"]
     assert told.startswith("not finite: Wrong.") and f"{tmp_path}/wrong.py:" in told
@@ -94,7 +99,7 @@ def test_a_force_that_gives_no_number_to_some_costs_these_alone(tmp_path):
     study = Study(wrong_study(tmp_path))
     found = {}
     for replicate in range(12):
-        row, note = run_safely(study, Condition("III", 1, 0.0), replicate)
+        row, note = task(study, replicate)
         lost = row["outcome"] == FAILED
         assert lost == (max(row["angle_i"], row["angle_j"]) > 3.0) == (note is not None)
         found.setdefault(lost, []).append(row)
@@ -103,7 +108,7 @@ def test_a_force_that_gives_no_number_to_some_costs_these_alone(tmp_path):
     sound = Study(wrong_study(tmp_path))
     for row in found[False]:
         assert row["outcome"] == 0 and row["steps"] > 10
-    assert run_safely(sound, Condition("III", 1, 0.0), 0)[1] is None
+    assert task(sound, 0)[1] is None
 
 
 @pytest.mark.parametrize(

@@ -15,21 +15,24 @@ import numpy as np
 from flocsim.compiler.composer import is_on_disk
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.draw import (
+    BLANK,
     CHECKED,
     FAILED,
     FAILURES,
+    LONGEST_REASON,
     MORE_STEPS,
     NO_FLOC,
     SAMPLE,
     THIRD,
+    WHY,
     Draw,
     columns_of,
     draws,
     exact_methods,
     further_runs,
+    orientations,
     point,
     points_of,
-    run_safely,
 )
 from flocsim.ensembles.collision.encounter import Encounter, make_encounter
 from flocsim.ensembles.collision.equivalent import kinds, placed_system, sphere_pairs
@@ -333,8 +336,28 @@ class Study(StudyKind):
         self, condition: Condition, replicate: int, halted: Callable[[], bool], left: Any = None,
         keep: Keep | None = None, going: Going | None = None,
     ) -> tuple[dict | None, dict | None]:  # fmt: skip
-        """Run one replicate, whatever goes wrong in it."""
-        return run_safely(self, condition, replicate, halted)
+        """Run one replicate. An exception costs that one alone: its row says that it has failed,
+        and a note what is needed to run it again.
+
+        Running out of memory is nobody's fault but the machine's, and ends the study.
+        """
+        name, vertices, share = condition
+        try:
+            row = self.run(self.scene.names.index(name), vertices, share, replicate, halted)
+        except MemoryError:
+            raise
+        except Exception as error:
+            row = dict(BLANK, outcome=FAILED, failure=FAILURES.index("exception"))
+            row["angle_i"], row["angle_j"] = orientations(self.numbers(replicate))
+            why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
+            return row, self.note(condition, replicate, why)
+        if row is None:
+            return None, None
+        why = row.pop(WHY, "")
+        if row["outcome"] != FAILED:
+            return row, None
+        reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
+        return row, self.note(condition, replicate, reason)
 
     def has_failed(self, column: Callable[[str], np.ndarray]) -> np.ndarray:
         """Return flags of the rows of failed replicates."""

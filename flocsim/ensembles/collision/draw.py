@@ -4,9 +4,6 @@ outcome (Draw), and how that is written down, or the reason where it has none.
 With Sobol's sequences replicate k is point k // S of scramble k mod S, S scrambles being dealt in
 turn: all of them grow evenly with the number of replicates, and no number of ranks changes a point.
 
-An exception, or a number that is none, costs that one replicate: a row says so, and a note has
-what is needed to run it again.
-
 Some replicates are run again, more exactly, so that what numerics change is seen and counted. Which
 follows from the seed, the replicate's index and how it ended: whatever ranks, kills, and later
 extensions there are, the same ones are run again. An index does nothing but name random numbers, so
@@ -19,7 +16,7 @@ exactly still: first and second runs may lie on one plateau.
 import math
 from collections.abc import Callable, Sequence
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -34,7 +31,6 @@ from flocsim.io.results.schema import (
     FAILED,
     OUTCOMES,
     REPLICATES,
-    SHAPE_COLUMNS,
 )
 from flocsim.run import UNABLE, Run, force_to_blame
 from flocsim.system import System
@@ -70,12 +66,6 @@ APART = {MISSED: "missed", HELD: "held"}
 
 CLASSES = {(1, BOUND): "A", (1, DEPARTED): "B", (0, BOUND): "C", (0, DEPARTED): "D"}
 """Class by (inside, decision)."""
-
-ALWAYS_FINITE = ("angle_i", "angle_j", "d_c_last", "t_end")
-"""Columns that are numbers in every row of a replicate that has not failed."""
-
-DRAWN = ("r_i", "r_j", "D_0", "floc_i", "floc_j", *SHAPE_COLUMNS)
-"""Columns that are known of every replicate that was begun."""
 
 NO_FLOC = -1
 """In ``floc_i`` and ``floc_j``: a sphere."""
@@ -139,40 +129,6 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
         return OUTCOMES.index(name), 0
     name, reason = ENDS[status]
     return OUTCOMES.index(name), FAILURES.index(reason)
-
-
-def run_safely(
-    study: Any, condition: Any, replicate: int, halted: Callable[[], bool] | None = None
-) -> tuple[dict | None, dict | None]:
-    """(row, None) of one replicate, or (row, note) where it failed; row None where halted.
-
-    ``study``: a Study. Running out of memory is nobody's fault but the machine's, and goes on.
-    """
-    name, vertices, share = condition
-    try:
-        row = study.run(study.scene.names.index(name), vertices, share, replicate, halted=halted)
-    except MemoryError:
-        raise
-    except Exception as error:
-        angles = orientations(study.numbers(replicate))
-        why = f"{type(error).__name__}: {' '.join(str(error).split())}"[:LONGEST_REASON]
-        return failed_row("exception", angles), study.note(condition, replicate, why)
-    if row is None:
-        return None, None
-    why = row.pop(WHY, "")
-    if row["outcome"] != FAILED and not all(math.isfinite(row[name]) for name in ALWAYS_FINITE):
-        drawn = {name: row[name] for name in DRAWN}
-        row = failed_row("not finite", (row["angle_i"], row["angle_j"])) | drawn
-    if row["outcome"] == FAILED:
-        reason = FAILURES[row["failure"]] + (f": {why}" if why else "")
-        return row, study.note(condition, replicate, reason)
-    return row, None
-
-
-def failed_row(reason, angles):
-    """Return the row of a replicate that has failed before anything else is known of it."""
-    told = {"outcome": FAILED, "failure": FAILURES.index(reason)}
-    return BLANK | {"angle_i": angles[0], "angle_j": angles[1]} | told
 
 
 def columns_of(run: str) -> dict[str, str]:

@@ -15,7 +15,6 @@ from flocsim.ensembles.collision.draw import (
     exact_methods,
     expected_checks,
     further_runs,
-    run_safely,
 )
 from flocsim.ensembles.diagnose.dry_run import checked_words
 from flocsim.ensembles.diagnose.preflight import check_study
@@ -142,7 +141,7 @@ def test_an_error_in_a_second_run_costs_no_replicate(tmp_path, monkeypatch):
         return plain_run(*args, **options)
 
     monkeypatch.setattr(Draw, "run", broken)
-    row, note = run_safely(study, study.conditions[0], 0)
+    row, note = study.run_task(study.conditions[0], 0, lambda: False)
     assert note is None
     assert [row[name] for name in CHECKS] == [FAILED, NOT_APPLICABLE, NOT_APPLICABLE]
     assert (row["outcome"], row["steps"]) == (whole["outcome"], whole["steps"])

@@ -327,17 +327,3 @@ def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path,
     # What was computed is still there, and a larger share may be allowed.
     monkeypatch.undo()
     assert go_on(tmp_path, overrides={"stop": {"failed": 0.5}}).computed < 77
-
-
-def test_a_number_that_is_none_counts_as_a_failure(tmp_path, monkeypatch):
-    original = Study.run
-
-    def run(study, condition, vertices, share, replicate, **more):
-        row = original(study, condition, vertices, share, replicate, **more)
-        return row | {"t_end": float("nan")} if replicate == 2 else row
-
-    monkeypatch.setattr(Study, "run", run)
-    go_on(tmp_path, NEW)
-    results = read_results(tmp_path / "r.h5")
-    assert results.probabilities["n_failed"].sum() == 4
-    assert "not finite" in results.run["failed"]
