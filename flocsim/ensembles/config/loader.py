@@ -12,7 +12,7 @@ from typing import Any
 
 import attrs
 import cattrs
-from cattrs.gen import make_dict_structure_fn, override
+from cattrs.gen import make_dict_structure_fn_from_attrs, override
 
 from flocsim.body import Fluid
 from flocsim.ensembles.config.own_classes import FORCE, load_class
@@ -120,7 +120,11 @@ def table_hook(some_class: type) -> Any:
         field.name: override(rename=key, struct_hook=value_hook(field))
         for key, field in keys_of(some_class).items()
     }
-    return make_dict_structure_fn(some_class, CONVERTER, _cattrs_forbid_extra_keys=True, **hooks)
+    # Without the types of a user's class, which need not be importable: the hooks read all values.
+    fields = [field.evolve(type=Any) for field in attrs.fields(some_class)]
+    return make_dict_structure_fn_from_attrs(
+        fields, some_class, CONVERTER, _cattrs_forbid_extra_keys=True, **hooks
+    )
 
 
 def value_hook(field: attrs.Attribute) -> Any:

@@ -310,8 +310,9 @@ class OutputConfig:
     """Results file, relative to the current folder; by default it has the config's name."""
 
 
-SOBOL_REPLICATES = 128
-"""Of every condition of a study by Sobol's points, where nothing is said."""
+def usual_replicates(config: Any) -> int:
+    """Return the replicates of a condition where nothing is said; a power of 2 of Sobol points."""
+    return config.scene.usual_replicates or (128 if config.sampling == pair_scene.SOBOL else 100)
 
 
 @attrs.frozen(eq=False)
@@ -337,15 +338,7 @@ class Config:
 
     scene: pair_scene.PairScene = attrs.Factory(pair_scene.PairScene)
     replicates: int = field(
-        whole(1, 10**9),
-        default=attrs.Factory(
-            lambda self: (
-                self.scene.usual_replicates
-                or (SOBOL_REPLICATES if self.sampling == pair_scene.SOBOL else 100)
-            ),
-            takes_self=True,
-        ),
-        usual=100,
+        whole(1, 10**9), default=attrs.Factory(usual_replicates, takes_self=True), usual=100
     )
     """Pairs of orientations drawn per condition."""
 

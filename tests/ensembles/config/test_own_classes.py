@@ -130,16 +130,6 @@ class Broken(Rod):
     @property
     def vertices(self):
         raise IndexError("no such\\npoint")
-
-
-@attrs.frozen(eq=False)
-class Outline(Shape):
-    vertices: tuple = ()
-    core = ()
-    radius = area = second_moment = 1.0
-
-    def scaled(self, factor):
-        return self
 """
 
 
@@ -182,35 +172,67 @@ def test_a_module_is_run_again_once_it_is_edited(tmp_path, own_module, monkeypat
     assert load_text(tmp_path, text).forces[1].kernel(None, 1.0) == 9.0
 
 
+FORCE = (OWN, "strength = 1")
+METHOD = ('preset = "tang2014"\n[integrator]\nclass = "{}"\n{}\n', "step = 1")
+SHAPES = ('preset = "tang2014"\n[shapes]\nclass = "{}"\n{}\n', "length = 1")
+
+
 @pytest.mark.parametrize(
-    ("name", "more", "said"),
+    ("table", "name", "more", "said"),
     [
         (
+            FORCE,
             "own:Yukawa",
             "strength = '3 kg'",
-            "5: forces.own.strength must be a force such as '1 pN'",
+            "5: forces.own.strength must be a force such as",
         ),
-        ("own:Yukawa", "strength = -1", "5: forces.own.strength must be a finite number at least"),
-        ("own:Yukawa", "strength = 1\npower = -1", "3: forces.own: 'power' must be > 0.0: -1.0"),
-        ("own:Yukawa", "strength = 1\npower = '1 m'", "declares no unit: see flocsim.fields"),
-        (
-            "own:Yukawa",
-            "strength = 1\npower = true",
-            "must be a finite number in SI units, found T",
-        ),
-        ("own:Yukawa", "", "3: forces.own: needs strength"),
-        ("own:Yukawe", "", "has no 'Yukawe' (did you mean 'Yukawa'?)"),
-        ("own:Apple", "", "is not a subclass of flocsim.forces"),
-        ("own:SCALE", "", "is not a subclass of flocsim.forces"),
-        ("own:NoKernel", "", "does not define kernel"),
-        ("own:Undecorated", "", "is not decorated: put @attrs.frozen"),
-        ("math:pi", "", "is not a subclass of flocsim.forces"),
-        ("own.sub:A", "", "there is no module 'own.sub'"),
+        (FORCE, "own:Yukawa", "strength = -1", "5: forces.own.strength must be a finite number at"),
+        (FORCE, "own:Yukawa", "&power = -1", "3: forces.own: 'power' must be > 0.0: -1.0"),
+        (FORCE, "own:Yukawa", "&power = '1 m'", "declares no unit: see flocsim.fields"),
+        (FORCE, "own:Yukawa", "&power = true", "must be a finite number in SI units, found True"),
+        (FORCE, "own:Yukawa", "", "3: forces.own: needs strength"),
+        (FORCE, "own:Yukawe", "", "has no 'Yukawe' (did you mean 'Yukawa'?)"),
+        (FORCE, "own:Apple", "", "is not a subclass of flocsim.forces"),
+        (FORCE, "own:SCALE", "", "is not a subclass of flocsim.forces"),
+        (FORCE, "own:NoKernel", "", "does not define kernel"),
+        (FORCE, "own:Undecorated", "", "is not decorated: put @attrs.frozen"),
+        (FORCE, "own.sub:A", "", "there is no module 'own.sub'"),
+        (METHOD, "own:Mine", "", "2: integrator: needs step"),
+        (METHOD, "own:Mine", "&max_steps = 0.5", "5: integrator.max_steps must be an integer"),
+        (METHOD, "own:Mine", "&faktor = 1", "unknown key (did you mean 'factor'?); known: step"),
+        (METHOD, "own:Mine", "&tolerance = 1", "tolerance: unknown key; known: step, factor"),
+        (METHOD, "own:Mine", "&name = 'implicit'", "5: integrator.name: excludes class, which"),
+        (METHOD, "own:Rod", "", "is not a subclass of flocsim.integrators"),
+        (METHOD, "own:Stepless", "", "does not define attempt, next_step"),
+        (METHOD, "own:Lost", "", "module 'flocsim.hooks' has no attribute 'no_such_hook'"),
+        (METHOD, "own:Backward", "", "first_step must be a number above 0, found -1.0"),
+        (METHOD, "own:Greedy", "", "max_steps is a key of flocsim's own"),
+        (METHOD, "own", "", "must be 'module:Class', found 'own'"),
+        (SHAPES, "own:Rod", "&raduis = 1", "did you mean 'radius'?"),
+        (SHAPES, "own:Rod", "&source = 'library'", "5: shapes.source: excludes class, which"),
+        (SHAPES, "own:Rod", "&pool = 3", "5: shapes.pool: unknown key; known: length, radius, "),
+        (SHAPES, "own:Rod", "&vertices = [1, 4]", "5: shapes.vertices may be 1, the sphere, and 2"),
+        (SHAPES, "own:Rod", "&points = 1", "2: shapes: one core point is a sphere: leave class"),
+        (SHAPES, "own:Rod", "&points = -1", "2: shapes: Number of samples, -1, must be non-neg"),
+        (SHAPES, "own:Stiff", "&", "scaled(2.0) must return a shape of four times the area"),
+        (SHAPES, "own:Hollow", "&", "2: shapes: area must be a finite number above 0, found 0.0"),
+        (SHAPES, "own:Broken", "&", "2: shapes: no such point"),
+        (SHAPES, "own:Mine", "", "is not a subclass of flocsim.geometry.shapes.shape.Shape"),
     ],
 )
-def test_a_force_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
-    [line] = problem_lines(tmp_path, OWN.format(name, more))
+def test_a_class_of_ones_own_that_is_wrong(tmp_path, own_module, table, name, more, said):
+    """``&`` stands for the parameter that the class needs."""
+    text, needed = table
+    [line] = problem_lines(tmp_path, text.format(name, more.replace("&", f"{needed}\n")))
     assert said in line
+
+
+def test_types_of_fields_need_not_be_importable(tmp_path, own_module):
+    text = OWN_MODULE.replace("power: float", "tail: Nowhere = ()\n    power: float")
+    own_module.write_text(f"from __future__ import annotations\n{text}")
+    more = "strength = 1\ntail = [1, 2.5]\npower = 2"
+    force = load_text(tmp_path, OWN.format("own:Yukawa", more)).forces[1]
+    assert (force.tail, force.power) == ((1.0, 2.5), 2.0)
 
 
 def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own_module):
@@ -227,11 +249,7 @@ def test_a_misspelt_parameter_is_unknown_and_the_right_one_missing(tmp_path, own
         ("\n1/0\n", "own.py:2: ZeroDivisionError: division by zero"),
         ("x = (\n", "SyntaxError: '(' was never closed (own.py, line 1)"),
         ("import sys\nsys.exit('bye\\nbye')\n", "own.py:2: SystemExit: bye bye"),
-        (
-            "import no_such_thing\n",
-            "own.py:1: ModuleNotFoundError: No module named 'no_such_thing'",
-        ),
-        ("import math\n\nmath.sqrt(-1)\n", "own.py:3: ValueError"),
+        ("import no_such_thing\n", "own.py:1: ModuleNotFoundError: No module named 'no_such"),
         ("import json\njson.loads('{')\n", "own.py:2: JSONDecodeError"),
         ("x = '\0'", "own"),
         ("def f():\n    f()\nf()\n", "RecursionError"),
@@ -267,12 +285,8 @@ def test_two_configs_may_have_modules_of_the_same_name(tmp_path, own_module):
     assert [kernel(None, 1.0) for kernel in kernels] == [2.0, 0.5]
 
 
-METHOD = 'preset = "tang2014"\n[integrator]\nclass = "{}"\n{}\n'
-SHAPES = 'preset = "tang2014"\n[shapes]\nclass = "{}"\n{}\n'
-
-
 def test_an_integrator_of_ones_own(tmp_path, own_module):
-    text = METHOD.format("own:Mine", 'step = "10 ns"\nfactor = 2\nmax_steps = 7')
+    text = METHOD[0].format("own:Mine", 'step = "10 ns"\nfactor = 2\nmax_steps = 7')
     options = load_text(tmp_path, text).integrator
     assert (options.name, options.label, options.max_steps) == (None, "own:Mine", 7)
     assert (options.method.step, options.method.factor) == (1e-8, 2.0)
@@ -294,52 +308,11 @@ def test_a_name_makes_flocsims_own_integrator(name, made):
     assert IntegratorConfig(name=name, tolerance=1e-8, step=1e-7).method == made
 
 
-@pytest.mark.parametrize(
-    ("name", "more", "said"),
-    [
-        ("own:Mine", "", "2: integrator: needs step"),
-        ("own:Mine", "step = 0", "4: integrator.step must be a finite number above 0 [s], found 0"),
-        (
-            "own:Mine",
-            "step = 1\nmax_steps = 0.5",
-            "5: integrator.max_steps must be an integer",
-        ),
-        (
-            "own:Mine",
-            "step = 1\nfaktor = 1",
-            "5: integrator.faktor: unknown key (did you mean 'factor'?); known: step",
-        ),
-        (
-            "own:Mine",
-            "step = 1\ntolerance = 1",
-            "tolerance: unknown key; known: step, factor",
-        ),
-        ("own:Mine", "step = 1\nname = 'implicit'", "5: integrator.name: excludes class, which"),
-        ("own:Mein", "", "3: integrator.class: module 'own' ("),
-        ("own:Mein", "", "has no 'Mein' (did you mean 'Mine'?)"),
-        ("own:Rod", "", "is not a subclass of flocsim.integrators"),
-        ("own:Stepless", "", "does not define attempt, next_step"),
-        ("own:Lost", "", "2: integrator: module 'flocsim.hooks' has no attribute 'no_such_hook'"),
-        ("own:Backward", "", "2: integrator: first_step must be a number above 0, found -1.0"),
-        (
-            "own:Greedy",
-            "",
-            "max_steps is a key of flocsim's own",
-        ),
-        ("own", "", "must be 'module:Class', found 'own'"),
-        ("nowhere:A", "", "there is no module 'nowhere', neither nowhere.py nor installed"),
-    ],
-)
-def test_an_integrator_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
-    [line] = problem_lines(tmp_path, METHOD.format(name, more))
-    assert said in line.replace(f"{tmp_path}/", "")
-
-
 def test_a_shape_of_ones_own(tmp_path, own_module):
-    shapes = load_text(tmp_path, SHAPES.format("own:Rod", 'length = "6 um"')).shapes
+    shapes = load_text(tmp_path, SHAPES[0].format("own:Rod", 'length = "6 um"')).shapes
     assert (shapes.source, shapes.label, shapes.vertices) == (None, "own:Rod", (2,))
     assert (shapes.own.length, shapes.own.radius) == (6e-6, 1e-6)
-    text = SHAPES.format("own:Rod", "length = 1e-6\npoints = 3\nvertices = [1, 3]")
+    text = SHAPES[0].format("own:Rod", "length = 1e-6\npoints = 3\nvertices = [1, 3]")
     shapes = load_text(tmp_path, text).shapes
     assert shapes.vertices == (1, 3)
     assert attrs.evolve(shapes, vertices=(1,)).own is shapes.own
@@ -347,7 +320,7 @@ def test_a_shape_of_ones_own(tmp_path, own_module):
 
 def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
     config = load_text(
-        tmp_path, SHAPES.format("own:Rod", "length = 6\nradius = 1\nvertices = [1, 2]")
+        tmp_path, SHAPES[0].format("own:Rod", "length = 6\nradius = 1\nvertices = [1, 2]")
     )
     check_study(config)
     study = Study(config)
@@ -361,52 +334,12 @@ def test_a_shape_of_ones_own_is_scaled_to_the_bodies(tmp_path, own_module):
         assert all(isinstance(shape, Sphere) for shape in spheres.shapes)
 
 
-@pytest.mark.parametrize(
-    ("name", "more", "said"),
-    [
-        ("own:Rod", "", "2: shapes: needs length"),
-        (
-            "own:Rod",
-            "length = '1 s'",
-            "4: shapes.length must be a length such as '16.41 um'",
-        ),
-        ("own:Rod", "length = 1\nraduis = 1", "did you mean 'radius'?"),
-        ("own:Rod", "length = 1\nsource = 'library'", "5: shapes.source: excludes class, which"),
-        (
-            "own:Rod",
-            "length = 1\npool = 3",
-            "5: shapes.pool: unknown key; known: length, radius, ",
-        ),
-        (
-            "own:Rod",
-            "length = 1\nvertices = [1, 4]",
-            "5: shapes.vertices may be 1, the sphere, and 2, its core points, found {4}",
-        ),
-        ("own:Rod", "length = 1\npoints = 1", "2: shapes: one core point is a sphere: leave class"),
-        ("own:Rod", "length = 1\npoints = -1", "2: shapes: Number of samples, -1, must be non-neg"),
-        ("own:Stiff", "length = 1", "scaled(2.0) must return a shape of four times the area"),
-        ("own:Hollow", "length = 1", "2: shapes: area must be a finite number above 0, found 0.0"),
-        ("own:Broken", "length = 1", "2: shapes: no such point"),
-        (
-            "own:Outline",
-            "",
-            "vertices is a key of flocsim's own",
-        ),
-        ("own:Mine", "", "is not a subclass of flocsim.geometry.shapes.shape.Shape"),
-        ("own:Rood", "", "has no 'Rood' (did you mean 'Rod'?)"),
-    ],
-)
-def test_a_shape_of_ones_own_that_is_wrong(tmp_path, own_module, name, more, said):
-    [line] = problem_lines(tmp_path, SHAPES.format(name, more))
-    assert said in line
-
-
 def test_a_class_replaces_a_name_from_below_and_the_other_way_round(tmp_path, own_module):
     over = {"integrator": {"class": "own:Mine", "step": 1e-9}}
     text = 'preset = "si"\n[integrator]\nname = "implicit"\n'
     assert load_text(tmp_path, text, over).integrator.label == "own:Mine"
     back = {"integrator": {"name": "velocity_verlet"}}
-    text = METHOD.format("own:Mine", "step = 1e-9")
+    text = METHOD[0].format("own:Mine", "step = 1e-9")
     assert load_text(tmp_path, text, back).integrator.method == VelocityVerlet(1e-9)
 
 

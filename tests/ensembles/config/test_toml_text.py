@@ -1,14 +1,10 @@
 """What the text of a config may be: all that is valid TOML, up to a size that is told."""
 
-import math
-import tomllib
-
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flocsim.ensembles.config.loader import load_config, parse_setting
-from flocsim.ensembles.config.toml_text import parse, read_text_file
 from flocsim.errors import ConfigError
 from tests.helpers.config_texts import MEANT, PLAIN, STUDIES, TABLES
 
@@ -43,26 +39,6 @@ def test_a_list_of_decimals_may_be_long(tmp_path, comma, count):
 @pytest.mark.parametrize("value", ["[" * 5000, "b." * 3000, "10 N/m", '"open'])
 def test_a_setting_that_is_no_toml_is_a_word(value):
     assert parse_setting(f"a.b={value}") == (["a", "b"], value)
-
-
-def same(one, other):
-    """Whether two parsed values are the same, NaN included."""
-    if isinstance(one, dict):
-        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
-    if isinstance(one, list):
-        return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, float) and math.isnan(one):
-        return math.isnan(other)
-    return type(one) is type(other) and one == other
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(TABLES, st.booleans(), st.booleans())
-def test_what_is_read_is_what_tomllib_reads(tmp_path, text, windows, mark):
-    path = tmp_path / "c.toml"
-    written = text.replace("\n", "\r\n") if windows else text
-    path.write_bytes(b"\xef\xbb\xbf" * mark + written.encode())
-    assert same(parse(path, read_text_file(path)), tomllib.loads(written))
 
 
 def check_study(path, text):
