@@ -99,8 +99,10 @@ def load_module(named: str, folder: Path, sources: Sources) -> Any:
         if allowed is None or name not in allowed.own:
             file, top = finder.file_of(name), name.partition(".")[0]
             if allowed is not None and (allowed.folder is None or file is None):
+                lacking = f"{allowed.folder} does not have it; " if allowed.folder else ""
                 raise ConfigError(
                     f"{named} was not loaded, because a file does not decide which code is run: "
+                    f"{lacking}"
                     'name the folder that its module is in (--folder DIR, or folder="DIR") or, if '
                     f'it is installed, the module (--own {name}, or own=["{name}"])'
                 )
