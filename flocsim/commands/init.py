@@ -67,7 +67,7 @@ def with_shapes(text: str, shapes: Path, folder: Path) -> tuple[str, str]:
     kept = re.sub(r"(?m)^(# )?(source|file|vertices) = .*\n?", "", section)
     path = Path(os.path.relpath(shapes, folder)).as_posix()
     new = f'source = "library"\nfile = "{path}"\nvertices = {counts}\n{kept}'.rstrip("\n")
-    return f"{before}{head}{new}{gap}{after}", f"{len(entries)} flocs of {shapes}"
+    return f"{before}{head}{new}{gap}{after}", f" with {len(entries)} flocs of {shapes}"
 
 
 def run(args: Namespace) -> int:
@@ -94,6 +94,5 @@ def run(args: Namespace) -> int:
         write_file(each, content.encode(), rule)
     wrote = " and ".join(map(str, files))
     command = COMMANDS.get(args.kind, "ensemble")
-    shapes = f" with {source}" if source else ""
-    print(f"wrote {wrote}{shapes}; run it with: flocsim {command} {args.file}")
+    print(f"wrote {wrote}{source}; run it with: flocsim {command} {args.file}")
     return 0

@@ -45,8 +45,7 @@ def load_class(name: object, folder: Path, bases: tuple[type, ...], sources: Sou
     where = f"module {module.__name__!r} ({getattr(module, '__file__', None) or 'built in'})"
     found: Any = getattr(module, class_name, None)
     if found is None:
-        hint = suggestion(class_name, vars(module))
-        raise ConfigError(f"{where} has no {class_name!r}{hint}")
+        raise ConfigError(f"{where} has no {class_name!r}{suggestion(class_name, vars(module))}")
     wrong = ""
     if not (isinstance(found, type) and issubclass(found, bases)):
         names = " or ".join(f"{each.__module__}.{each.__qualname__}" for each in bases)

@@ -32,6 +32,12 @@ class SwarmScene:
 
     usual_replicates: ClassVar[int | None] = None
 
+    names: ClassVar[tuple[str]] = ("swarm",)
+    """The one collision type of its conditions, as other scenes have several."""
+
+    delta: ClassVar[tuple[float]] = (0.0,)
+    """Its one displacement: there is none."""
+
     kind: str = choice("swarm", default="swarm")
     """Many bodies, which this table describes."""
 
@@ -124,16 +130,6 @@ class SwarmScene:
             raise ConfigError(
                 f"every = {self.interval:g} s is longer than duration = {self.duration:g} s"
             )
-
-    @property
-    def names(self) -> tuple[str]:
-        """The one collision type of its conditions, as other scenes have several."""
-        return ("swarm",)
-
-    @property
-    def delta(self) -> tuple[float]:
-        """Its one displacement: there is none."""
-        return (0.0,)
 
     @property
     def repeats(self) -> tuple[bool, bool]:
