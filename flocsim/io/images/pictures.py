@@ -294,7 +294,7 @@ def read_names(text: str) -> Names:
 
 def check_names(correction: Correction, found: Sequence[tuple[str, Segmentation]]) -> None:
     """UsageError for a name that none of the (picture's name, Segmentation) has, or several."""
-    known = {
+    known: set[tuple[str | None, int]] = {
         (name, region.label) for name, each in found for region in (*each.regions, *each.rejected)
     }
     if len(found) == 1:
