@@ -56,7 +56,7 @@ def results(
     in_memory: bool,
 ) -> Results:  # fmt: skip
     """The Results of so many replicates; written to ``output``, if any."""
-    reader = summary.Reader(start.store, (*study.shape[:3], count), study.scrambles)
+    reader = summary.Reader(start.store, (*study.shape[:3], count))
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
     rows = reader.table() if in_memory else None
@@ -96,21 +96,15 @@ def so_far(store: RowStore, asked: dict[str, Any]) -> tuple[Results, int, int]:
 
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     """The table of probabilities from all rows of a store, whose conditions have this shape."""
-    many = len(store.conditions)
-    known = {place: counts_of(store, place) for place in range(many) if store.intervals(place)}
-    counts = {}
-    for name, like in next(iter(known.values())).items():
-        every = np.zeros((many, *like.shape[3:]), like.dtype)
-        for place, found in known.items():
-            every[place] = found[name][0, 0, 0]
-        counts[name] = every.reshape(*shape, *like.shape[3:])
-    return summary.table_from(counts)
-
-
-def counts_of(store: RowStore, place: int) -> dict[str, np.ndarray]:
-    """What is counted of a condition (…, 1, 1, 1, …), of whatever replicates of it are there."""
-    sums: summary.Sums = {}
-    for rows in store.all_rows(place):
-        codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
-        sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
-    return summary.part_of(sums, "counted")
+    many, counts = len(store.conditions), {}
+    for place in range(many):
+        sums: summary.Sums = {}
+        for rows in store.all_rows(place):
+            codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
+            sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
+        for name, found in summary.part_of(sums, "counted").items():
+            every = counts.setdefault(name, np.zeros((many, *found.shape[3:]), found.dtype))
+            every[place] = found[0, 0, 0]
+    return summary.table_from(
+        {name: every.reshape(*shape, *every.shape[1:]) for name, every in counts.items()}
+    )
