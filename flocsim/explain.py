@@ -19,7 +19,7 @@ from flocsim.forces.outline import layer_along
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import lone_view
 from flocsim.integrators.implicit import Overdamped
-from flocsim.plausibility import all_settled, doubts_of, settled
+from flocsim.plausibility import all_settled, plausibility_warnings, settled
 
 LAWLESS = (
     ("centre_force", "forces along lines of centres", "none are given"),
@@ -46,8 +46,8 @@ STABLE = 2.0
 
 
 def explain(system: Any) -> str:
-    """The report of System.explain() as text: forces, machinery, settling, time scales, and what
-    is implausible."""
+    """Return the report of System.explain() as text: forces, machinery, settling, time scales,
+    and what is implausible."""
     return "\n".join(
         [
             heading(system),
@@ -57,7 +57,7 @@ def explain(system: Any) -> str:
             "out: events and observer: a plain run has none; an ensemble adds its own",
             *(f"settling: a body of {each.words}" for each in all_settled(system) if each.speed),
             *scale_lines(system),
-            *(f"warning: {line}" for line in doubts_of([system])),
+            *(f"warning: {line}" for line in plausibility_warnings([system])),
         ]
     )
 
@@ -75,7 +75,7 @@ def heading(system):
 
 
 def force_lines(system):
-    """ "in: …" or "out: …" for every force object, two of one class each by itself."""
+    """Return "in: …" or "out: …" for every force object, two of one class each by itself."""
     named = [*zip(names_of(system.forces), system.forces, strict=True)]
     lines = [
         f"in:  {force}: {'; '.join(about(system, force))}" for _, force in named if not force.absent
@@ -111,14 +111,14 @@ def about(system, force):
 
 
 def no_partner(system):
-    """Why no two bodies act on each other."""
+    """Return why no two bodies act on each other."""
     if len(system.bodies) == 1:
         return "a single body has no partner"
     return "fixed bodies do not act on each other"
 
 
 def reach_words(system, force, reach):
-    """How far a pair force reaches [m], and whether it does so at the start."""
+    """Return how far a pair force reaches [m], and whether it does so at the start."""
     if not reach < math.inf:
         return "at every gap"
     words = f"not called at gaps above {reach:.3g} m"
@@ -129,19 +129,19 @@ def reach_words(system, force, reach):
 
 
 def least_gap(bodies, force):
-    """The least gap [m] at the start: of equivalent spheres, or of bounding circles."""
+    """Return the least gap [m] at the start: of equivalent spheres, or of bounding circles."""
     of_spheres = force.acts_on in ("centres", "orientations")
     size = "equivalent_radius" if of_spheres else "bounding_radius"
     return min((gap_between(a, b, size) for a, b in counting(bodies)), default=math.inf)
 
 
 def counting(bodies):
-    """Every two bodies that can act on each other: one of them is free."""
+    """Return every two bodies that can act on each other: one of them is free."""
     return [(a, b) for a, b in combinations(bodies, 2) if not (a.fixed and b.fixed)]
 
 
 def gap_between(a, b, size):
-    """Distance of two bodies' circles of the given size [m]."""
+    """Return the distance of two bodies' circles of the given size [m]."""
     distance = math.dist(a.position, b.position)
     return distance - getattr(a.shape, size) - getattr(b.shape, size)
 
@@ -197,7 +197,7 @@ def history_line(system):
 
 
 def exerts_torque(system, force):
-    """Whether a force may turn a body: by its own torque, or by a lever."""
+    """Return True if a force may turn a body: by its own torque, or by a lever."""
     if force.absent:
         return False
     if isinstance(force, BodyForce):
@@ -216,20 +216,20 @@ def exerts_torque(system, force):
 
 
 def holds_slip(system, force):
-    """Whether a contact force's tangential part depends on the tangential displacement."""
+    """Return True if a contact force depends on the tangential displacement."""
     views = [check.SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
     one, other = tried(system, force, force.kernel, views)
     return one[1] != other[1]
 
 
 def tried(system, force, kernel, views):
-    """What a kernel, uncompiled, returns for some views."""
+    """Return the results of an uncompiled kernel for some views."""
     arguments = check.kernel_arguments(force, system.fluid, kernel)
     return list(check.results(force, kernel, views, arguments))
 
 
 def scale_lines(system):
-    """The lines of the report: scales, how many are stiff, what an explicit method would need."""
+    """Return lines on time scales, how many are stiff, and the step of an explicit method."""
     scales = {name: time for name, time in all_scales(system).items() if 0.0 < time < math.inf}
     if not scales:
         return ["time scales: none, as nothing restores or damps the motion"]
@@ -250,14 +250,17 @@ def scale_lines(system):
 
 
 def pairs_of(system):
-    """(bodies a, b, M of the pair) for every two bodies of which one is free."""
+    """Yield (a, b, reduced mass M) of every two bodies of which one is free."""
     for a, b in counting(system.bodies):
         yield a, b, 1.0 / sum(1.0 / body.mass for body in (a, b) if not body.fixed)
 
 
 def all_scales(system):
-    """{name: time [s]}, the shortest over the pairs: 1/ω0 = √(M/k) of a contact and 1/λ of its
-    damping, √(M/|dF/dd|) where centre or surface forces are steepest; and those of bodies."""
+    """Return {name: time [s]}, the shortest over the pairs, and those of the bodies.
+
+    1/ω0 = √(M/k) of a contact and 1/λ of its damping, √(M/|dF/dd|) where centre or surface forces
+    are steepest.
+    """
     laws, known = system.pieces.laws, system.pieces.parameters
     found = collections.defaultdict(list)
     for a, b, mass in pairs_of(system):
@@ -282,8 +285,10 @@ def all_scales(system):
 
 
 def body_scales(system):
-    """The same of the free bodies: Stokes relaxation m/(6πγ r), at rest, the shortest, and settling
-    by a radius, the longest."""
+    """Return the same of the free bodies.
+
+    Stokes relaxation m/(6πγ r), at rest, the shortest, and settling by a radius, the longest.
+    """
     force, known = system.pieces.laws.get("body_force"), system.pieces.parameters
     free = [body for body in system.bodies if not body.fixed]
     if force is None or not free:
@@ -299,7 +304,7 @@ def body_scales(system):
 
 
 def slope_of(force, view, field, size, parameters, part=None):
-    """Central difference of a scene's force by one field of its view."""
+    """Return the central difference of a scene's force by one field of its view."""
     value = getattr(view, field)
     ends = [force(view._replace(**{field: value + by}), parameters) for by in (size, -size)]
     if part is not None:
@@ -308,10 +313,10 @@ def slope_of(force, view, field, size, parameters, part=None):
 
 
 def vibration_time(mass, stiffness):
-    """√(M/|k|) [s]; inf without stiffness."""
+    """Return √(M/|k|) [s]; inf without stiffness."""
     return math.sqrt(mass / abs(stiffness)) if stiffness != 0.0 else math.inf
 
 
 def decay_time(mass, damping):
-    """M/c [s]; inf without damping."""
+    """Return M/c [s]; inf without damping."""
     return mass / damping if damping > 0.0 else math.inf

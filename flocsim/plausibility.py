@@ -1,12 +1,12 @@
-"""What is possible in a scene but implausible: a line each, with the way out.
+"""Questions about a scene whose answer is a warning: what is possible, but implausible.
 
-The usual ranges of quantities are declared once, with their source and what to do outside. A value
-outside is computed with, and doubted in one line. A force of a user's own that subclasses one of
-these is held to the same. Reynolds and Stokes numbers are those of bodies at their terminal speeds.
+QUESTIONS has them. The usual ranges of quantities are declared once, with their source and what to
+do outside, and hold for subclasses, too. Nothing is refused. Reynolds and Stokes numbers are those
+of bodies at their terminal speeds.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import attrs
@@ -44,99 +44,143 @@ class Names:
     drop: str = "leave {} out"
 
 
-def doubts_of(systems: Sequence[Any], names: Names | None = None) -> list[str]:
-    """Lines on what is implausible of Systems that have forces and fluid in common.
+@attrs.frozen
+class Asked:
+    """What questions are about: Systems that have forces and fluid in common, and their names."""
 
-    Values outside their usual ranges, sizes, weight, drag, contacts.
-    """
-    names, first = names or Names(), systems[0]
-    told = told_apart(names.forces or [type(force).__name__ for force in first.forces])
-    named = zip(told, first.forces, strict=True)
-    forces = {name: force for name, force in named if not force.absent}
-    bodies = [body for system in systems for body in system.bodies]
-    lines = [line for name, force in forces.items() for line in unusual(force, name)]
-    lines += unusual(first.fluid, names.fluid)
-    warm = bool(thermal_in(forces.values()))  # then bodies may be as small as they like
-    for body in bodies:
-        lines += unusual(body, names.body)
-        size = body.shape.equivalent_radius
-        if not warm or size >= RADIUS.low:
-            lines.append(RADIUS.doubt("equivalent radius", size))
-        if len(body.shape.vertices) > 1:
-            share = body.shape.radius / size
-            lines.append(ROUNDING.doubt("spheroradius / equivalent radius", share))
-    settled = [each for system in systems for each in all_settled(system)]
-    # Fixed bodies alone do not act on each other.
-    meeting = [len(each.bodies) for each in systems if not all(body.fixed for body in each.bodies)]
-    lines += [
-        about_weight(first.fluid, bodies, forces, names.buoyancy),
-        beyond_the_law(settled, forces),
-        about_kicks(forces),
-        about_contacts(max(meeting, default=0), forces, names.drop),
-    ]
+    systems: Sequence[Any]
+    names: Names
+
+    @property
+    def fluid(self) -> Any:
+        """The fluid of all Systems."""
+        return self.systems[0].fluid
+
+    @property
+    def forces(self) -> dict[str, Any]:
+        """{name: force} of the forces that act."""
+        forces = self.systems[0].forces
+        names = told_apart(self.names.forces or [type(force).__name__ for force in forces])
+        return {
+            name: each for name, each in zip(names, forces, strict=True) if not each.absent
+        }  # fmt: skip
+
+    @property
+    def bodies(self) -> list[Body]:
+        """The bodies of all Systems."""
+        return [body for system in self.systems for body in system.bodies]
+
+
+def plausibility_warnings(systems: Sequence[Any], names: Names | None = None) -> list[str]:
+    """Return lines on what is implausible of Systems that have forces and fluid in common."""
+    asked = Asked(systems, names or Names())
+    lines = (line for question in QUESTIONS for line in question(asked))
     return [line for line in dict.fromkeys(lines) if line]
 
 
-def about_weight(fluid: Any, bodies: Sequence[Body], forces: dict[str, Any], cure: str) -> str:
-    """A line where bodies of a real density weigh as in a vacuum; "" where none does."""
-    falls = any(isinstance(force, Gravity) for force in forces.values())
-    known = [each.density for each in bodies if each.density is not None and not each.fixed]
+def about_values(asked: Asked) -> Iterator[str]:
+    """Are all values within their usual ranges?"""
+    for name, force in asked.forces.items():
+        yield from unusual(force, name)
+    yield from unusual(asked.fluid, asked.names.fluid)
+    warm = bool(thermal_in(asked.forces.values()))  # then bodies may be as small as they like
+    for body in asked.bodies:
+        yield from unusual(body, asked.names.body)
+        size = body.shape.equivalent_radius
+        if not warm or size >= RADIUS.low:
+            yield RADIUS.warning("equivalent radius", size)
+        if len(body.shape.vertices) > 1:
+            yield ROUNDING.warning("spheroradius / equivalent radius", body.shape.radius / size)
+
+
+def about_weight(asked: Asked) -> Iterator[str]:
+    """Do bodies of a real density weigh as in a vacuum?"""
+    fluid, forces = asked.fluid, asked.forces.values()
+    known = [each.density for each in asked.bodies if each.density is not None and not each.fixed]
+    falls = any(isinstance(force, Gravity) for force in forces)
     if fluid.buoyancy or not falls or not known or not fluid.density > 0.0:
-        return ""
+        return
     density = min(known)
-    what = (
-        "in this fluid it would float"
-        if density <= fluid.density
-        else f"it weighs {density / (density - fluid.density):.3g} times as much as in the fluid"
-    )
-    return (
+    what = "in this fluid it would float"
+    if density > fluid.density:
+        ratio = density / (density - fluid.density)
+        what = f"it weighs {ratio:.3g} times as much as in the fluid"
+    yield (
         f"buoyancy is off, but a body has a real density, {density:g} kg/m^3: {what}, of "
         f"{fluid.density:g} kg/m^3 (Clift, Grace and Weber 1978, Bubbles, Drops and Particles, "
-        f"ch. 5): give {cure}"
+        f"ch. 5): give {asked.names.buoyancy}"
     )
 
 
-def about_kicks(forces: dict[str, Any]) -> str:
-    """A line where random forces are not balanced by the resistance that belongs to them."""
+def about_drag(asked: Asked) -> Iterator[str]:
+    """Is a Reynolds number beyond the drag law? A drag of the user's own says itself what it is
+    good for."""
+    settled = [each for system in asked.systems for each in all_settled(system)]
+    drags = {name: each for name, each in asked.forces.items() if isinstance(each, StokesDrag)}
+    if not drags or not settled:
+        return
+    name, drag = min(drags.items(), key=lambda item: item[1].serves_up_to)
+    worst = max(settled, key=lambda each: each.reynolds)
+    if worst.reynolds <= drag.serves_up_to:
+        return
+    advice = "use smaller or lighter bodies, or a drag of your own"
+    if drag.law == "stokes":
+        advice = (
+            f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
+        )
+    yield (
+        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.serves_up_to:g} "
+        f"(Clift, Grace and Weber 1978, Bubbles, Drops and Particles, ch. 5): {advice}"
+    )
+
+
+def about_kicks(asked: Asked) -> Iterator[str]:
+    """Are random forces balanced by the resistance that belongs to them?"""
+    forces = asked.forces
     drags = [each for each in forces.values() if isinstance(each, StokesDrag)]
+    films = [name for name, each in forces.items() if isinstance(each, Lubrication)]
     for name, thermal in forces.items():
         if not isinstance(thermal, Thermal):
             continue
         if not drags:
-            return (
+            yield (
                 f"{name} kicks the bodies continually, but no StokesDrag takes up the energy, so "
                 "they do not stay at its temperature: add the drag"
             )
-        if thermal.rotational != drags[0].rotational:
-            return (
+        elif thermal.rotational != drags[0].rotational:
+            yield (
                 f"{name} and the drag treat rotation differently, so spins are not at the "
                 "temperature: give both the same rotational"
             )
-        for other, each in forces.items():
-            if isinstance(each, Lubrication):
-                return (
-                    f"{other} resists the motion that {name} causes but adds no kicks of its own: "
-                    "near contact, bodies move as if it were colder; leave one of them out, or "
-                    "read meeting rates as lower bounds"
-                )
-    return ""
+        elif films:
+            yield (
+                f"{films[0]} resists the motion that {name} causes but adds no kicks of its own: "
+                "near contact, bodies move as if it were colder; leave one of them out, or "
+                "read meeting rates as lower bounds"
+            )
 
 
-def about_contacts(count: int, forces: dict[str, Any], drop: str) -> str:
-    """A line where ``count`` bodies pass through each other, or have Contact beside another law."""
-    contacts = {name: each for name, each in forces.items() if isinstance(each, ContactForce)}
+def about_contacts(asked: Asked) -> Iterator[str]:
+    """Do bodies pass through each other, or have Contact beside another law?"""
+    # Fixed bodies alone do not act on each other.
+    moving = (each.bodies for each in asked.systems if not all(body.fixed for body in each.bodies))
+    count = max(map(len, moving), default=0)
+    contacts = {name: each for name, each in asked.forces.items() if isinstance(each, ContactForce)}
+    plain = [name for name, each in contacts.items() if type(each) is Contact]
     if count > 1 and not contacts:
-        return (
+        yield (
             f"{count} bodies and no contact force: they will pass through each other: add "
             "flocsim.forces.Contact(), or a ContactForce of your own"
         )
-    plain = [name for name, each in contacts.items() if type(each) is Contact]
-    if count < 2 or not plain or len(contacts) < 2:
-        return ""
-    return (
-        f"{' and '.join(contacts)} both act at every contact, and their forces add up: if one of "
-        f"them is to replace the other, {drop.format(plain[0])}"
-    )
+    elif count > 1 and plain and len(contacts) > 1:
+        yield (
+            f"{' and '.join(contacts)} both act at every contact, and their forces add up: if one "
+            f"of them is to replace the other, {asked.names.drop.format(plain[0])}"
+        )
+
+
+QUESTIONS = (about_values, about_weight, about_drag, about_kicks, about_contacts)
+"""What is asked about a scene; each yields lines with numbers, source and way out."""
 
 
 @attrs.frozen
@@ -151,13 +195,13 @@ class Usual:
     source: str
     advice: str = CHECK
 
-    def doubt(self, place: str, value: object) -> str:
-        """A line on a value that stands at a place, e.g. "fluid.viscosity"; "" where it is usual.
+    def warning(self, place: str, value: object) -> str:
+        """Return a line on the value of a name, e.g. "fluid.viscosity"; "" where it is usual.
 
         A value that is not a number has no range. The sign does not count.
         """
         if isinstance(value, tuple):
-            return next(filter(None, (self.doubt(place, each) for each in value)), "")
+            return next(filter(None, (self.warning(place, each) for each in value)), "")
         if isinstance(value, str | bool) or not isinstance(value, int | float):
             return ""
         if self.low <= abs(value) <= self.high:
@@ -239,11 +283,13 @@ PIXEL_SIZE = Usual(
 
 
 def unusual(owner: object, place: str) -> list[str]:
-    """Lines on the values of an object that are outside their usual ranges; ``place``: its name."""
+    """Return lines on the values of an object outside their usual ranges; ``place``: its name."""
     found: dict[str, Usual] = {}
     for each in type(owner).__mro__:
         found = USUAL.get(each, {}) | found
-    lines = [usual.doubt(f"{place}.{name}", getattr(owner, name)) for name, usual in found.items()]
+    lines = [
+        usual.warning(f"{place}.{name}", getattr(owner, name)) for name, usual in found.items()
+    ]
     return [line for line in lines if line]
 
 
@@ -269,7 +315,7 @@ class Settled(NamedTuple):
 
 
 def settled(system: Any, body: Body) -> Settled | None:
-    """A free body alone in the system's fluid; None where it is held or does not settle."""
+    """Return how a free body settles alone; None where it is fixed or does not settle."""
     if body.fixed:
         return None
     try:
@@ -288,7 +334,7 @@ def settled(system: Any, body: Body) -> Settled | None:
 
 
 def all_settled(system: Any) -> list[Settled]:
-    """Every free body that settles, those alike once, in the order of the bodies."""
+    """Return every free body that settles, those alike once, in the order of the bodies."""
     by_shape = follows_shape(system.forces)
     alike = {
         (
@@ -300,26 +346,3 @@ def all_settled(system: Any) -> list[Settled]:
     }  # fmt: skip
     found = (settled(system, body) for body in reversed(alike.values()))
     return [each for each in found if each is not None]
-
-
-def beyond_the_law(bodies: Sequence[Settled], forces: dict[str, Any]) -> str:
-    """A line on the body whose Reynolds number is furthest beyond its drag law; "" for none.
-
-    ``forces``: {name: force}. A drag of the user's own says itself what it is good for.
-    """
-    drags = {name: each for name, each in forces.items() if isinstance(each, StokesDrag)}
-    if not drags or not bodies:
-        return ""
-    name, drag = min(drags.items(), key=lambda item: item[1].serves_up_to)
-    worst = max(bodies, key=lambda each: each.reynolds)
-    if worst.reynolds <= drag.serves_up_to:
-        return ""
-    advice = (
-        f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
-        if drag.law == "stokes"
-        else "use smaller or lighter bodies, or a drag of your own"
-    )
-    return (
-        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.serves_up_to:g} "
-        f"(Clift, Grace and Weber 1978, Bubbles, Drops and Particles, ch. 5): {advice}"
-    )

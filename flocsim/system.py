@@ -34,7 +34,7 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
-from flocsim.plausibility import doubts_of
+from flocsim.plausibility import plausibility_warnings
 from flocsim.run import UNABLE, Run, force_to_blame
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
@@ -280,7 +280,7 @@ class System:
             raise UsageError("amplification is that of a whole run: leave start out")
         if watch is not None and not callable(watch):
             raise UsageError(f"watch must be a function of a State, found {watch!r}")
-        for line in doubts_of([self]):
+        for line in plausibility_warnings([self]):
             warnings.warn(line, PlausibilityWarning, stacklevel=2)
         began = time.perf_counter()
 

@@ -17,7 +17,7 @@ from flocsim.forces import (
     Thermal,
     VanDerWaals,
 )
-from flocsim.plausibility import PIXEL_SIZE, USUAL, all_settled, doubts_of, settled
+from flocsim.plausibility import PIXEL_SIZE, USUAL, all_settled, plausibility_warnings, settled
 from tests.helpers.trial_scenes import hook
 
 WATER = Fluid(buoyancy=True)
@@ -27,7 +27,7 @@ USUAL_FORCES = [Gravity(), StokesDrag(), VanDerWaals(4.7e-20), DoubleLayer(), Co
 
 
 def doubts(bodies=PAIR, forces=USUAL_FORCES, fluid=WATER):
-    return doubts_of([System(bodies, forces, fluid=fluid)])
+    return plausibility_warnings([System(bodies, forces, fluid=fluid)])
 
 
 def test_what_is_usual_is_not_doubted():
@@ -41,9 +41,9 @@ def test_every_range_has_its_ends_and_says_value_range_source_and_remedy(kind, f
     usual = USUAL[kind][field]
     inside = [usual.low, usual.high] if usual.low > 0.0 else [0.0, usual.high, -usual.high]
     beyond = [1.01 * usual.high] + [0.99 * usual.low] * (usual.low > 0.0)
-    assert [usual.doubt("x", value) for value in inside] == [""] * len(inside)
+    assert [usual.warning("x", value) for value in inside] == [""] * len(inside)
     for value in beyond:
-        line = usual.doubt("x", value)
+        line = usual.warning("x", value)
         assert line.startswith(f"x = {value:g}") and f"{usual.high:g}" in line
         assert usual.source in line and line.endswith(usual.advice) and "\n" not in line
         scene = {"bodies": PAIR, "forces": USUAL_FORCES, "fluid": WATER}
@@ -53,13 +53,15 @@ def test_every_range_has_its_ends_and_says_value_range_source_and_remedy(kind, f
             scene["bodies"] = [attrs.evolve(each, **{field: value}) for each in PAIR]
         else:
             scene["forces"] = [kind(**{field: value}), Gravity(), StokesDrag(), Contact()]
-        assert usual.doubt(f"{kind.__name__}.{field}", value) in doubts(**scene)
+        assert usual.warning(f"{kind.__name__}.{field}", value) in doubts(**scene)
 
 
 def test_words_and_absent_values_have_no_range():
-    assert USUAL[Body]["density"].doubt("x", None) == ""
-    assert USUAL[Body]["density"].doubt("x", "sphere") == ""
-    assert PIXEL_SIZE.doubt("--pixel-size", 8.6) and not PIXEL_SIZE.doubt("--pixel-size", 9.5e-7)
+    assert USUAL[Body]["density"].warning("x", None) == ""
+    assert USUAL[Body]["density"].warning("x", "sphere") == ""
+    assert PIXEL_SIZE.warning("--pixel-size", 8.6) and not PIXEL_SIZE.warning(
+        "--pixel-size", 9.5e-7
+    )
 
 
 def test_a_force_that_subclasses_is_held_to_the_same_range():

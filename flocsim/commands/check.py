@@ -1,8 +1,4 @@
-"""Run some replicates of a study at the extremes of its sizes, numbers of vertices, contact
-stiffness and tolerance, each combination by itself, compare them with runs at a hundredth of the
-tightest tolerance, and print how far each is off, and whether that is within what it states.
-Nothing is written. Exit code 0 if all are right or within their stated error, 1 otherwise.
-"""
+"""`flocsim check study.toml`: whether a study's own scene is computed right, at its extremes."""
 
 import itertools
 import math
@@ -12,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from flocsim.commands import add_settings
 from flocsim.ensembles.collision.draw import TIGHTER, exact_method
 from flocsim.ensembles.config.loader import load_config, nested, parse_setting
 from flocsim.ensembles.config.schema import Config
@@ -25,11 +22,12 @@ from flocsim.ensembles.diagnose.accuracy import (
 )
 from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.kind import flocs_of, study_of
-from flocsim.errors import ConfigError, UsageError
+from flocsim.errors import ConfigError
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Integrator
+from flocsim.io.arguments import whole
 from flocsim.io.results.schema import AGGREGATED, CLASSES, OUTCOMES
 from flocsim.io.terminal import tell
 
@@ -55,17 +53,19 @@ COLUMNS = {
     "steps": 8, "CPU [ms]": 10, "error [m]": 11, "stated [m]": 12, "  verdict": -1,
 }  # fmt: skip
 
-DESCRIPTION = __doc__
-
 
 def add_arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("config", help="config file (TOML)")
-    add("--count", type=int, default=COUNT, metavar="K",
-        help=f"replicates of each combination (default: {COUNT})")  # fmt: skip
-    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="override any value of the config, as in flocsim ensemble; may be "
-        "repeated")  # fmt: skip
+    """Run some replicates of a study at the extremes of its sizes, numbers of vertices, contact
+    stiffness and tolerance, each combination by itself, compare them with runs at a hundredth of
+    the tightest tolerance, and print how far each is off, and whether that is within what it
+    states. Nothing is written. Exit code 0 if all are right or within their stated error, 1
+    otherwise.
+
+    --count K: replicates of each combination (default: %(default)s)
+    """
+    parser.add_argument("config", help="config file (TOML)")
+    parser.add_argument("--count", type=whole, default=COUNT)
+    add_settings(parser)
 
 
 def of_extremes(config: Config) -> Config:
@@ -147,8 +147,6 @@ def is_close_call(row: dict, exact: dict, most: float) -> bool:
 
 def run(args: Namespace) -> int:
     """Run all cases and print the table; 0 where all are right or within their stated error."""
-    if not args.count >= 1:
-        raise UsageError(f"--count must be at least 1, found {args.count}")
     config = load_config(args.config, nested(map(parse_setting, args.settings)))
     check_study(config)
     config = of_extremes(config)

@@ -279,7 +279,7 @@ def doubts_of_sizes(pictures: Sequence[Picture], given: float | None) -> str:
         if given is None:
             print(f"pixel size {1e6 * size:.4g} um, as {name} says")
         whose = "--pixel-size" if given else f"the pixel size of {name}"
-        doubts += filter(None, [PIXEL_SIZE.doubt(whose, size)])
+        doubts += filter(None, [PIXEL_SIZE.warning(whose, size)])
     for doubt in doubts:
         report(f"warning: {doubt}")
     return "; ".join(doubts)

@@ -43,7 +43,7 @@ from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
 from flocsim.ensembles.config.schema import BAND, CUT, Config
-from flocsim.ensembles.diagnose.preflight import check_study, study_doubts
+from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
 from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
@@ -103,7 +103,7 @@ class Study(StudyKind):
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible in the study."""
-        return study_doubts(self.config, self.flocs)
+        return study_warnings(self.config, self.flocs)
 
     def identity_facts(self) -> dict[str, Any]:
         """Return what rows follow from besides config, flocs, code and machine."""

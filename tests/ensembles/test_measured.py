@@ -8,7 +8,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.diagnose.dry_run import dry_run
-from flocsim.ensembles.diagnose.preflight import check_study, study_doubts
+from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
 from flocsim.ensembles.diagnose.spheres import settling_facts
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
@@ -102,7 +102,7 @@ def test_what_is_said_of_a_study_is_of_its_largest_flocs(folder):
     assert facts["to6um-from6um", "i"] == pytest.approx(5e-6)
     assert facts["to6um-from6um", "j"] == pytest.approx(20e-6)
     assert facts["from6um-from6um", "i"] == pytest.approx(13e-6)
-    assert any("r_eq = 20 um" in line for line in study_doubts(config))
+    assert any("r_eq = 20 um" in line for line in study_warnings(config))
     said = dry_run(config, 1, pilot=False)
     assert "size classes, r_eq: to6um 3 to 5 um (2 flocs), from6um 8 to 20 um (3 flocs)" in said
     assert "library" in said and "drawn by number" in said

@@ -11,7 +11,7 @@ from flocsim.forces import Contact, Lubrication, StokesDrag, Thermal
 from flocsim.forces.body_forces import kicks_of
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.integrators import Implicit
-from flocsim.plausibility import doubts_of
+from flocsim.plausibility import plausibility_warnings
 
 WATER = Fluid(viscosity="0.89 mPa s")
 ROOM = Thermal("298.15 K")
@@ -84,7 +84,9 @@ def test_seeds_are_whole_numbers(seed):
 
 
 def kicked(*forces):
-    return " ".join(doubts_of([System(spheres(1e-6, 1e-6), [*forces, Contact()], fluid=WATER)]))
+    return " ".join(
+        plausibility_warnings([System(spheres(1e-6, 1e-6), [*forces, Contact()], fluid=WATER)])
+    )
 
 
 def test_what_does_not_balance_is_said():

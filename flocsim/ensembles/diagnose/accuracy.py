@@ -107,10 +107,9 @@ class Bench:
             return self.compared(task, method, budget or self.study.config.integrator.max_steps)
         except MemoryError:
             raise
-        except FlocsimError as error:
-            return Comparison(why=str(error))
-        except Exception as error:  # of a class of the user's own
-            return Comparison(why=f"{type(error).__name__}: {' '.join(str(error).split())}")
+        except Exception as error:  # of a class of the user's own, too
+            kind = "" if isinstance(error, FlocsimError) else f"{type(error).__name__}: "
+            return Comparison(why=f"{kind}{' '.join(str(error).split())}")
 
     def compared(self, task: Task, method: Integrator, budget: int) -> Comparison:
         """The same, where an exception goes on."""

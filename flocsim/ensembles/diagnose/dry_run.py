@@ -13,7 +13,7 @@ from flocsim.ensembles.collision.pairings import class_facts, pairings_of
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import CUT, Config
 from flocsim.ensembles.diagnose.pilot import forecast_of
-from flocsim.ensembles.diagnose.preflight import study_doubts, warning_lines
+from flocsim.ensembles.diagnose.preflight import study_warnings, warning_lines
 from flocsim.ensembles.diagnose.spheres import settling_facts, sphere_facts
 from flocsim.ensembles.kind import study_of
 from flocsim.explain import force_lines, scale_lines
@@ -35,7 +35,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *(f"  {line}" for line in force_lines(pairs[0][1].system)),
         "stiffness:",
         *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
-        *warning_lines([*coarse_lines(config, measured), *study_doubts(config, measured)]),
+        *warning_lines([*coarse_lines(config, measured), *study_warnings(config, measured)]),
         *(["pilot:", *(f"  {line}" for line in pilot_lines(config, ranks))] if pilot else []),
         "only the pilot was run (--dry-run)" if pilot
         else "nothing was run (--dry-run); --pilot runs some replicates, to estimate the cost",

@@ -1,7 +1,7 @@
 """What is wrong or implausible in a study, known before anything is compiled or run.
 
 Each question about a study is one function here. Those of REFUSALS raise the error that the study
-would meet; `study_doubts` collects warnings, of which `flocsim.plausibility` asks those that any
+would meet; `study_warnings` collects warnings, of which `flocsim.plausibility` asks those that any
 scene has. Measured flocs are judged by the largest of each collision type, which settle fastest.
 """
 
@@ -32,7 +32,7 @@ from flocsim.forces.contact import impact_exponent
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.integrators.loop.driver import advance
 from flocsim.io.outputs import loaded_sources
-from flocsim.plausibility import ROUNDING, Names, doubts_of
+from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
 from flocsim.run import wrong_answer
 from flocsim.system import System
 
@@ -285,7 +285,9 @@ def warning_lines(doubts: Sequence[str]) -> list[str]:
     return [f"{'note' if line == IMPLIED else 'warning'}: {line}" for line in doubts]
 
 
-def doubts_in(config: Config, systems: Sequence[System], acting: Sequence[Force]) -> list[str]:
+def config_warnings(
+    config: Config, systems: Sequence[System], acting: Sequence[Force]
+) -> list[str]:
     """Return lines on what is implausible of scenes of a config, in its own words.
 
     ``acting``: those of its forces that the scenes have.
@@ -296,24 +298,24 @@ def doubts_in(config: Config, systems: Sequence[System], acting: Sequence[Force]
         fluid="fluid", body="bodies", buoyancy="fluid.buoyancy = true", drop="give {} = false",
         forces=tuple(f"forces.{name}" for name, force in forces if id(force) in known),
     )  # fmt: skip
-    lines = doubts_of(systems, names)
+    lines = plausibility_warnings(systems, names)
     weight = PRESETS.get(config.preset or "", {}).get("bodies", {}).get("surface_density")
     if weight is not None and weight == config.bodies.surface_density:
         lines = [IMPLIED, *(line for line in lines if "Re = " not in line)]
     return lines
 
 
-def study_doubts(config: Config, flocs: Flocs | None = None) -> list[str]:
+def study_warnings(config: Config, flocs: Flocs | None = None) -> list[str]:
     """Return lines on what is implausible in a study; none where all is usual.
 
     ``flocs``: those of the study, where they have been read.
     """
     systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
     # In a flow bodies meet without their weight.
-    lines = doubts_in(config, systems, systems[0].forces)
+    lines = config_warnings(config, systems, systems[0].forces)
     if resizes(config):
         share = config.shapes.radius / smallest(config)
-        lines.append(ROUNDING.doubt("shapes.radius over the smallest equivalent radius", share))
+        lines.append(ROUNDING.warning("shapes.radius over the smallest equivalent radius", share))
     return [line for line in lines if line] + trivial_values(config, flocs)
 
 

@@ -20,7 +20,7 @@ from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
-from flocsim.ensembles.diagnose.preflight import doubts_in, require_contact, warning_lines
+from flocsim.ensembles.diagnose.preflight import config_warnings, require_contact, warning_lines
 from flocsim.ensembles.kind import ORDER, PHYSICS, Code, Condition, Going, Keep, StudyKind
 from flocsim.ensembles.swarms.results import (
     BODIES,
@@ -118,7 +118,7 @@ class SwarmStudy(StudyKind):
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible."""
-        return doubts_in(self.config, [self.largest_pair()], self.config.forces)
+        return config_warnings(self.config, [self.largest_pair()], self.config.forces)
 
     def largest_pair(self) -> System:
         """Return a System of the two largest bodies, for what is said of a swarm."""

@@ -18,7 +18,7 @@ from flocsim.ensembles.diagnose.preflight import (
     check_study,
     depth,
     rounded_up,
-    study_doubts,
+    study_warnings,
 )
 from flocsim.ensembles.diagnose.spheres import settling_facts
 from flocsim.errors import ConfigError, KernelError
@@ -173,11 +173,11 @@ WILD = USUAL | {
 
 
 def test_a_usual_study_is_not_doubted(tmp_path):
-    assert study_doubts(small_config(tmp_path, USUAL)) == []
+    assert study_warnings(small_config(tmp_path, USUAL)) == []
 
 
 def test_doubts_have_the_names_of_the_config(tmp_path):
-    lines = study_doubts(small_config(tmp_path, WILD))
+    lines = study_warnings(small_config(tmp_path, WILD))
     starts = ["forces.van_der_waals.hamaker = 5 J", "fluid.viscosity = 1 Pa s", "buoyancy is off",
               "shapes.radius over the smallest equivalent radius = 0.548"]  # fmt: skip
     assert [line.startswith(start) for line, start in zip(lines, starts, strict=True)] == [True] * 4
@@ -186,21 +186,21 @@ def test_doubts_have_the_names_of_the_config(tmp_path):
 
 def test_the_fastest_body_of_all_types_is_held_to_the_drag_law(tmp_path):
     heavy = {"bodies": {"surface_density": 2.1}}
-    [line] = study_doubts(small_config(tmp_path, heavy))
+    [line] = study_warnings(small_config(tmp_path, heavy))
     assert "r_eq = 23.02 um settles at 88.81 mm/s: Re = 4.6" in line
     assert "give forces.drag law =" in line
     law = {"forces": {"drag": {"law": "schiller_naumann"}}}
-    assert study_doubts(small_config(tmp_path, heavy | law)) == []
+    assert study_warnings(small_config(tmp_path, heavy | law)) == []
 
 
 def test_what_the_paper_preset_implies_is_a_note_in_place_of_a_warning(tmp_path):
     """Of the dry run and the results file; other weights are doubted still."""
     config = small_config(tmp_path)
-    assert study_doubts(config) == [IMPLIED]
+    assert study_warnings(config) == [IMPLIED]
     text = dry_run(config, 1)
     assert text.count("note: preset tang2014 gives") == 1 and "warning:" not in text
     heavier = small_config(tmp_path, {"bodies": {"surface_density": 3.0}})
-    assert IMPLIED not in study_doubts(heavier) and "note: preset" not in dry_run(heavier, 1)
+    assert IMPLIED not in study_warnings(heavier) and "note: preset" not in dry_run(heavier, 1)
 
 
 OWN = """\
@@ -219,11 +219,11 @@ class Hertz(ContactForce):
 def test_an_own_contact_beside_the_presets(tmp_path):
     (tmp_path / "own_hertz.py").write_text(OWN)
     mine = USUAL | {"forces": {"mine": {"class": "own_hertz:Hertz"}, "contact": {"k_n": 200.0}}}
-    [line] = study_doubts(small_config(tmp_path, mine))
+    [line] = study_warnings(small_config(tmp_path, mine))
     assert line.startswith("forces.contact and forces.mine both act")
     assert line.endswith("give forces.contact = false")
     alone = USUAL | {"forces": {"mine": {"class": "own_hertz:Hertz"}, "contact": False}}
-    assert study_doubts(small_config(tmp_path, alone)) == []
+    assert study_warnings(small_config(tmp_path, alone)) == []
 
 
 def test_numbers_of_every_body(tmp_path):
