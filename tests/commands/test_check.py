@@ -134,7 +134,6 @@ def test_the_extremes_of_sizes_and_vertices(folder):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--count", "0"], "--count takes whole numbers from 1, found '0'"),
         (["--set", "forces.contact=false"], "bodies that meet need a contact force"),
         (["--set", "bodies.surface_density=20"], "I: an impact at"),
     ],

@@ -50,7 +50,6 @@ def test_one_replicate(implicit_alone, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--count 0", "--count takes whole numbers from 1, found '0'"),
         ("--replicate -1", "--replicate must be at least 0, found -1"),
         ("--replicate 1 --count 3", "--count is for the whole study"),
         ("--delta 0.3", "--delta must be one of 0.0, 1.0, found 0.3"),

@@ -7,6 +7,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.diagnose.dry_run import dry_run
 from flocsim.ensembles.diagnose.preflight import check_study, study_warnings
 from flocsim.ensembles.diagnose.spheres import settling_facts
@@ -53,7 +54,9 @@ def test_one_key_makes_a_study_of_measured_sizes(folder):
         assert row["r_j"] == pytest.approx(sizes[row["floc_j"]], rel=1e-12)
         assert row["r_i"] < row["r_j"]
         assert row["D_0"] - row["r_i"] - row["r_j"] == pytest.approx(
-            study.zones["measured"] - sum(study.pairings[0].radii), rel=1e-9
+            zone_distance(config.zone, config.forces, *study.pairings[0].radii)
+            - sum(study.pairings[0].radii),
+            rel=1e-9,
         )
         # The same two flocs at every N and displacement.
         first = rows[place - place % 4]
@@ -102,7 +105,8 @@ def test_what_is_said_of_a_study_is_of_its_largest_flocs(folder):
     assert facts["to6um-from6um", "i"] == pytest.approx(5e-6)
     assert facts["to6um-from6um", "j"] == pytest.approx(20e-6)
     assert facts["from6um-from6um", "i"] == pytest.approx(13e-6)
-    assert any("r_eq = 20 um" in line for line in study_warnings(config))
+    heavier = load_text(folder, STUDY, {"bodies": {"surface_density": 2.1}})
+    assert any("r_eq = 20 um" in line for line in study_warnings(heavier))
     said = dry_run(config, 1, pilot=False)
     assert "size classes, r_eq: to6um 3 to 5 um (2 flocs), from6um 8 to 20 um (3 flocs)" in said
     assert "library" in said and "drawn by number" in said

@@ -181,13 +181,13 @@ def require_stiffness(config: Config, flocs: Flocs) -> None:
     """
     found: list[tuple[float, str]] = []
     for name, pair in sphere_pairs(config, flocs, "fastest"):
-        for shapes in kinds(config, pair.shapes):
+        spheres = pair.shapes
+        for shapes in kinds(config, spheres):
             radii = [shape.radius for shape in shapes]
-            spheres = shapes is pair.shapes
-            if flocs and config.shapes.size == "own" and not spheres:
+            if flocs and config.shapes.size == "own" and shapes is not spheres:
                 measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
                 radii = [float(np.median(measured))] * 2
-            what = "the spheres" if spheres else "the outlines, their spheroradii"
+            what = "the spheres" if shapes is spheres else "the outlines, their spheroradii"
             found += impact(name, pair, radii, what)
     if found:
         raise ConfigError(max(found)[1])
