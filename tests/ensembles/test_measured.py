@@ -47,17 +47,15 @@ def test_one_key_makes_a_study_of_measured_sizes(folder):
     check_study(config)
     study = Study(config)
     sizes = np.array([floc.size for floc in study.flocs])
+    radii = study.pairings[0].radii
+    reach = zone_distance(config.zone, config.forces, *radii) - sum(radii)
     rows = [study.run(0, n, share, k) for k in range(6) for n in (1, 4) for share in (0.0, 0.5)]
     assert len({(row["floc_i"], row["floc_j"]) for row in rows}) > 2
     for place, row in enumerate(rows):
         assert row["r_i"] == pytest.approx(sizes[row["floc_i"]], rel=1e-12)
         assert row["r_j"] == pytest.approx(sizes[row["floc_j"]], rel=1e-12)
         assert row["r_i"] < row["r_j"]
-        assert row["D_0"] - row["r_i"] - row["r_j"] == pytest.approx(
-            zone_distance(config.zone, config.forces, *study.pairings[0].radii)
-            - sum(study.pairings[0].radii),
-            rel=1e-9,
-        )
+        assert row["D_0"] - row["r_i"] - row["r_j"] == pytest.approx(reach, rel=1e-9)
         # The same two flocs at every N and displacement.
         first = rows[place - place % 4]
         assert (row["floc_i"], row["floc_j"]) == (first["floc_i"], first["floc_j"])
