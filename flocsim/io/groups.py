@@ -38,10 +38,7 @@ from flocsim.io.seals import checked_sealed, seal_file
 Schema = Mapping[str, tuple[str, str, str]]
 """{name: (type, unit, meaning)}; types are "f8", "i8", "i4", "u1" and "text"."""
 
-UNREADABLE = (
-    OSError, KeyError, ValueError, TypeError, RuntimeError, UsageError, AttributeError,
-    OverflowError, IndexError, EOFError,
-)  # fmt: skip
+UNREADABLE = OSError, LookupError, ValueError, TypeError, AttributeError, UsageError
 """What reading a file raises that does not hold what it should."""
 
 LONGEST_NAME = 80
@@ -373,6 +370,12 @@ class FileFormat:
         """Return what a file holds, checked; FileError where it cannot be read."""
         with self.opened(path) as file:
             return self.contents(file)
+
+
+def facts_of(file: File) -> dict[str, Any]:
+    """Return the attributes of an open file but its format and version."""
+    apart = ("format", "kind", "schema_version")
+    return {name: value for name, value in file.attributes.items() if name not in apart}
 
 
 def run_of(file: File) -> dict[str, str | int | float]:

@@ -30,7 +30,7 @@ from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import Dataset, FileFormat, Group, Stored, declared
+from flocsim.io.groups import Dataset, FileFormat, Group, Stored, declared, facts_of
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.results.schema import BAND_ENDS
 
@@ -326,8 +326,7 @@ def reach_of(entry: ShapeEntry) -> float:
 def read_settings(path: str | os.PathLike) -> dict[str, Any]:
     """Return {name: value} of what the fits of a shape library were made with."""
     with LIBRARY.opened(path) as file:
-        apart = (LIBRARY.attribute, "schema_version")
-        return {name: value for name, value in file.attributes.items() if name not in apart}
+        return facts_of(file)
 
 
 def read_library(path: str | os.PathLike) -> list[ShapeEntry]:

@@ -18,9 +18,9 @@ from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, keep, write_file
-from flocsim.io.groups import FileFormat, Group, declared
+from flocsim.io.groups import FileFormat, Group, declared, facts_of
 from flocsim.io.hdf5 import File
-from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.labelled import Labelled, Tables
 
 TRAJECTORY = FileFormat(
     "flocsim trajectory", 2, "trajectory", {}, attribute="kind", remedy="write it again"
@@ -50,10 +50,12 @@ POINTS = {
 """Columns of the core points of a body with holes or several parts."""
 
 
+MOTION = Group.of(declared(DATASETS, ("time", "body", "component")), SCALES)
+
+
 def motion_group(compounds: Sequence[bool]) -> Group:
     """Return the table of a motion; ``compounds``: which bodies have holes or several parts."""
-    columns = declared(DATASETS, ("time", "body", "component"))
-    scales = dict(SCALES)
+    columns, scales = dict(MOTION.columns), dict(SCALES)
     if len(compounds) == 2:
         columns |= declared(DISTANCE, ("time",))
     for body, compound in enumerate(compounds):
@@ -314,13 +316,12 @@ class StoredTrajectory(Tables):
     indices = INDICES
 
     def labelled(self, group: str = "motion") -> Labelled:
-        """The motion with its axes; UsageError for another group."""
-        axes = (*INDICES[self.known(group)], "component")
-        words = self.t, np.arange(len(self.shapes)), np.array(COMPONENTS, object)
-        return Labelled(
-            {name: Column((name,), each) for name, each in zip(axes, words, strict=True)},
-            {name: Column(axes, getattr(self, name)) for name in ("position", "velocity")},
-        )
+        """Return the motion with its axes; UsageError for another group."""
+        self.known(group)
+        return MOTION.labelled({
+            "time": self.t, "body": np.arange(len(self.shapes)), "component": COMPONENTS,
+            "position": self.position, "velocity": self.velocity,
+        })  # fmt: skip
 
     @property
     def status(self) -> str:
@@ -338,12 +339,8 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
         for array in (position, velocity):
             if array.shape != (len(time), bodies, 3) or not np.isfinite(array).all():
                 raise ValueError("its arrays do not match its times and bodies, or have no numbers")
-        facts = {
-            name: value for name, value in file.attributes.items()
-            if name not in (TRAJECTORY.attribute, "schema_version")
-        }  # fmt: skip
         shapes = tuple(stored_shape(file, body) for body in range(bodies))
-        return StoredTrajectory(time, position, velocity, shapes, facts)
+        return StoredTrajectory(time, position, velocity, shapes, facts_of(file))
 
 
 def stored_shape(file: File, body: int) -> Shape:

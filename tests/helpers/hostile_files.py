@@ -18,7 +18,7 @@ from flocsim import Sphere
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
-from flocsim.io.results.schema import POOLED, blank
+from flocsim.io.results.schema import POOLED
 from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.results.swarm_file import write_swarm
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
@@ -135,7 +135,7 @@ def valid_swarm(folder):
 def valid_sweep(folder):
     """Return the HDF5 data of a small joined file of a sweep."""
     results = make_results(types=("I",), vertices=(1, 8), delta=(0.0, 0.7), count=5)
-    results = attrs.evolve(results, pooled=blank(POOLED, results.shape[:2]))
+    results = attrs.evolve(results, pooled={name: np.zeros(results.shape[:2]) for name in POOLED})
     write_results(folder / "part.h5", results)
     parts = [open_any(folder / "part.h5")] * 2
     swept = {"potential": Swept("forces.double_layer.potential", [-0.02, -0.03], "V")}

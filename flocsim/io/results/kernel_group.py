@@ -1,7 +1,7 @@
 """Group `kernel` of a results file: rates of encounters by mechanism, N and two size classes."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
@@ -107,19 +107,18 @@ class Kernel:
         self, mechanism: str | None = None, vertices: int | None = None
     ) -> tuple[int, int]:
         """Return the places of a mechanism and of N, by default the first and the last one."""
-
-        def place(name: str, value: Any, known: Sequence) -> int:
+        first, last = self.mechanisms[0], int(self.vertices[-1])
+        places = []
+        wanted: Any = (
+            ("mechanism", first if mechanism is None else mechanism, self.mechanisms),
+            ("vertices", last if vertices is None else vertices, self.vertices.tolist()),
+        )
+        for name, value, known in wanted:
             if value not in known:
                 words = ", ".join(map(str, known))
                 raise UsageError(f"{name} must be one of {words}, found {value}")
-            return known.index(value)
-
-        counts = self.vertices.tolist()
-        return (
-            place("mechanism", self.mechanisms[0] if mechanism is None else mechanism,
-                  self.mechanisms),
-            place("vertices", counts[-1] if vertices is None else vertices, counts),
-        )  # fmt: skip
+            places.append(known.index(value))
+        return places[0], places[1]
 
 
 def kernel_in(values: Mapping[str, Any], identity: str) -> Kernel:
