@@ -159,7 +159,7 @@ def agree(comm: Communicator, options: Options) -> tuple[Any, int]:
     problems = [each for each in comm.gather(problem) or [] if each is not None]
     code = comm.broadcast(problems[0][1] if problems else 0)
     if problems:
-        tell(f"flocsim: {problems[0][0]}", sys.stderr)
+        tell(problems[0][0], sys.stderr)
     return (None, code) if code else (config, 0)
 
 

@@ -202,12 +202,15 @@ def start_processes(
 def in_copies(works: Sequence[Callable[[], object]]) -> None:
     """Do some works side by side in copies of this process, for what they leave on the disk: what
     they take of memory is given back. Nothing is done where processes cannot be copied, and nothing
-    fails: who needs what a work leaves does it again.
+    fails: who needs what a work leaves does it again. The first one alone says something.
     """
     if sys.platform != "linux":
         return
     context = multiprocessing.get_context("fork")
-    copies = [context.Process(target=as_copy, args=(work,), daemon=True) for work in works]
+    copies = [
+        context.Process(target=as_copy, args=(work, place > 0), daemon=True)
+        for place, work in enumerate(works)
+    ]
     try:
         for copy in copies:
             copy.start()
@@ -219,10 +222,12 @@ def in_copies(works: Sequence[Callable[[], object]]) -> None:
                 copy.kill()
 
 
-def as_copy(work):
+def as_copy(work, silent):
     """Work in a copied process, which dies with the first one and by any signal."""
     handle(signal.SIG_DFL)
     end_with_parent()
+    if silent:
+        sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (it ends with the process)
     with contextlib.suppress(Exception):
         work()
 
