@@ -132,7 +132,7 @@ def test_without_an_output_results_are_in_memory(tmp_path, monkeypatch):
 
 def test_what_the_command_refuses_is_an_error_here(tmp_path):
     study = flocsim.Study(TABLES, folder=tmp_path).with_({"forces.contact": False})
-    with pytest.raises(UsageError, match=r"needs a contact force.*add \[forces.contact\]"):
+    with pytest.raises(UsageError, match=r"need a contact force.*add \[forces.contact\]"):
         study.run(output=tmp_path / "x.h5")
     for words in ({"jobs": 0}, {"mode": "again"}):
         with pytest.raises(UsageError, match="must be"):
