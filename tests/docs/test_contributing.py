@@ -96,9 +96,3 @@ def test_a_diff_is_all_that_is_needed(copy, section):
     assert run(copy, PAGE) == (0, "")
     code, told = run(copy, "-m", "pytest", "-q", "-x", *VERSION, *CONCERNED[section])
     assert code == 0, told
-
-
-def test_a_diff_that_does_not_fit_is_noticed(copy):
-    wrong = diffs()["Add a config key"].replace("For methods with a fixed", "For a fixed")
-    with pytest.raises(ValueError, match="substring not found"):
-        apply(wrong, copy)

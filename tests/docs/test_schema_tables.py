@@ -6,7 +6,6 @@ import tomllib
 import pytest
 
 from flocsim.ensembles.config.schema import FORCES, TABLES, keys_of
-from flocsim.errors import UsageError
 from flocsim.io.results.file import SCHEMA_VERSION
 from flocsim.io.results.schema import REPLICATES
 from tests.helpers.small_study import ROOT
@@ -51,18 +50,3 @@ def test_the_pages_defaults_are_valid_toml(tables):
     assert len(defaults) > 20
     for default in defaults:
         tomllib.loads(f"key = {default.strip('`')}")
-
-
-PAGE = "Words.\n\n<!-- of the schema: a -->\n\nold\n\n<!-- end -->\n\nMore \\1.\n"
-
-
-def test_parts_of_a_page_are_made_anew_and_words_stay(tables):
-    new = tables.with_parts(PAGE, {"a": "| new \\1 |\n| two |\n"})
-    assert new == PAGE.replace("old", "| new \\1 |\n| two |")
-    assert tables.with_parts(new, {"a": "old"}) == PAGE
-
-
-@pytest.mark.parametrize("parts", [{}, {"b": ""}, {"a": "", "b": ""}])
-def test_a_page_of_other_parts_is_refused(tables, parts):
-    with pytest.raises(UsageError, match="other parts"):
-        tables.with_parts(PAGE, parts)
