@@ -1,2 +1,1 @@
-"""What goes wrong and costs nothing: two jobs for one output, launchers, a batch system,
-other processors."""
+"""What goes wrong and costs nothing: launchers, a batch system, other processors."""

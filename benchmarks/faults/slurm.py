@@ -27,7 +27,6 @@ from pathlib import Path
 
 import attrs
 
-from benchmarks.faults.tally import Tally
 from benchmarks.reporting import Table, begin
 from tests.helpers.jobs import BESIDE_PYTHON, STUDY, run_here
 from tests.helpers.results_files import same_data
@@ -173,6 +172,27 @@ class Submitted:
             sign = "USR1" if way == "warned" else "KILL"
             words = ["scancel", f"--signal={sign}", f"{self.number}.0"]
         subprocess.run(words, env=self.env, check=True, cwd=self.folder, stdout=subprocess.DEVNULL)
+
+
+@attrs.define
+class Tally:
+    """How faults of one kind have ended."""
+
+    faults: int = 0
+    right: int = 0
+    hangs: int = 0
+    slowest: float = 0.0
+    wrong: list = attrs.Factory(list)
+
+    def add(self, problem, seconds, hang=False):
+        """Count a fault; ``problem`` is "" where nothing was lost."""
+        self.faults += 1
+        self.right += not problem
+        self.hangs += hang
+        self.slowest = max(self.slowest, seconds)
+        if problem:
+            self.wrong.append(problem)
+            print(problem, file=sys.stderr, flush=True)
 
 
 WAYS = ("requeued", "warned", "preempted", "step killed")
