@@ -133,7 +133,7 @@ def test_what_it_has_when_killed_is_shown_and_continued(home):
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     code, said = run(home, "info long.h5")
-    assert code == 0 and "of 120 replicates so far" in said, said
+    assert code == 0 and "of 120 flocs so far" in said, said
     code, said = run(home, "plot long.h5")
     assert code == 0 and "long-speed.png" in said, said
     code, said = run(home, f"{words} --resume")
