@@ -5,6 +5,7 @@ commands show of a file and of two.
 import io
 import json
 import warnings
+import zipfile
 from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,6 +31,7 @@ from flocsim.ensembles.contents import (
 )
 from flocsim.ensembles.kind import Condition, OldResults
 from flocsim.errors import FileError, FlocsimError, UsageError, visible
+from flocsim.io.groups import UNREADABLE
 from flocsim.io.labelled import Column, about_of
 from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
 from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
@@ -62,9 +64,14 @@ def encoded(arrays: Arrays) -> bytes:
 
 
 def decoded(data: bytes) -> dict[str, np.ndarray]:
-    """Return the arrays of a part."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as found:
-        return dict(found)
+    """Return the arrays of a part; FileError where the bytes are none."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as found:
+            return dict(found)
+    except (*UNREADABLE, zipfile.BadZipFile) as error:
+        raise FileError(
+            "a saved part of a swarm cannot be read: start over with --restart"
+        ) from error
 
 
 # Results of the parts.

@@ -323,7 +323,7 @@ class SwarmStudy(StudyKind):
         progress = swarm.begin(
             scene.duration, max_steps=self.config.integrator.max_steps, leaving=leaving
         )
-        if left is None or not fits(left, swarm):
+        if left is None or not fits(left, progress.state(), swarm):
             save(BODIES, bodies_part(swarm.bodies, drawn.flocs, box))
             seen = progress.swarm.motion.copy()
             bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
@@ -368,9 +368,18 @@ class SwarmStudy(StudyKind):
         return row, self.note(condition, replicate, why + ", ".join(map(str, failed)))
 
 
-def fits(state: Arrays, swarm: Swarm) -> bool:
-    """Return True if the contacts of a state are between core points that the bodies of a swarm
-    have: the kernels trust them."""
+def fits(state: Arrays, like: Arrays, swarm: Swarm) -> bool:
+    """Return True if a saved state has arrays like those of a swarm at its start, and contacts
+    between core points that its bodies have: the kernels trust them."""
+    for name, first in like.items():
+        found, start = state.get(name), 1 if name in ("links", "slips") else 0
+        if found is None or (found.dtype, found.shape[start:]) != (
+            first.dtype,
+            first.shape[start:],
+        ):
+            return False
+    if state["seen"].shape != like["motion"].shape or len(state["links"]) != len(state["slips"]):
+        return False
     first = np.cumsum([0, *(len(body.shape.vertices) for body in swarm.bodies)])
     owner = np.repeat(np.arange(len(swarm.bodies)), np.diff(first))
     links = state["links"]
