@@ -12,7 +12,7 @@ from flocsim.ensembles.runner import SharedError, run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FlocsimError
-from flocsim.io.journal import PART, ROWS, SESSION
+from flocsim.io.journal import ROWS, SESSION
 from flocsim.io.seals import seal
 from tests.helpers.journals import change, records_in
 from tests.helpers.sealed import read_sealed
@@ -43,7 +43,7 @@ def test_any_odd_record_is_computed_again_or_refused_in_one_line(journal, tmp_pa
         rng = random.Random(number)
         path = tmp_path / f"{number}.h5.journal"
         shutil.copy(original, path)
-        table = rng.choice([SESSION, ROWS, ROWS, PART])
+        table = rng.choice([SESSION, ROWS, ROWS])
         if not (found := records_in(path, table)):
             continue
         record = rng.choice(found)
