@@ -96,7 +96,8 @@ def so_far(store: RowStore, asked: dict[str, Any]) -> tuple[Results, int, int]:
 
 def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
     """The table of probabilities from all rows of a store, whose conditions have this shape."""
-    many, counts = len(store.conditions), {}
+    many = len(store.conditions)
+    counts: dict[str, np.ndarray] = {}
     for place in range(many):
         sums: summary.Sums = {}
         for rows in store.all_rows(place):
