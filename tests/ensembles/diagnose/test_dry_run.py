@@ -50,7 +50,7 @@ def test_a_machine_without_a_compiler_is_told_the_rest(tmp_path, monkeypatch):
     write_small(tmp_path, vertices="[1]")
     done = run_command(tmp_path, "small.toml", "--dry-run", "--pilot")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "none could be run: NUMBA_DISABLE_JIT is set" in done.stdout
+    assert re.search("none could be run: .*NUMBA_DISABLE_JIT is set", done.stdout)
 
 
 def test_a_signal_ends_the_pilot(tmp_path, monkeypatch, capsys):
