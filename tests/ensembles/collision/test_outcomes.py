@@ -184,7 +184,7 @@ def test_beyond_the_largest_displacement_all_miss(study):
 
 def test_what_is_written_down_of_a_collision_agrees_with_itself(study):
     for condition in range(3):
-        zone = list(study.zones.values())[condition]
+        zone = study.encounter(condition, 16, draws(study.config.seed, 0)).zone_distance
         for replicate in range(8):
             row = study.run(condition, 16, 0.25, replicate)
             assert row["inside"] == (row["d_c_collision"] < zone)
