@@ -94,8 +94,8 @@ def folder(tmp_path, monkeypatch):
         ({"scene": 'start_gap = "3 um"'}, "scene.start_gap: applies only with meeting"),
         ({"scene": 'escape_gap = "3 um"'}, "scene.escape_gap: applies only with meeting"),
         ({"scene": 'rest_time = "3 s"'}, "scene.rest_time: applies only with meeting"),
-        ({"scene": 'rate = "3 1/s"'}, 'only with meeting = "shear" or meeting = "extension"'),
-        ({"scene": 'receiver = "fixed"'}, 'applies only with meeting = "settling": remove'),
+        ({"scene": 'rate = "3 1/s"'}, "only with meeting = 'shear' or 'extension'"),
+        ({"scene": 'receiver = "fixed"'}, "applies only with meeting = 'settling': remove"),
         (
             {"scene": "release = 1.1",
              "shapes": 'source = "library"\nfile = "synthetic"\nvertices = [16]\nradius = "50 nm"'},
@@ -111,7 +111,7 @@ def test_other_meetings_have_no_release(tmp_path):
     for scene in ("release = 2.0", "escape = 3.0"):
         path = tmp_path / "study.toml"
         path.write_text(f'preset = "si"\n[scene]\n{scene}\n', "utf-8")
-        with pytest.raises(ConfigError, match='applies only with meeting = "brownian": remove it'):
+        with pytest.raises(ConfigError, match="applies only with meeting = 'brownian': remove it"):
             load_config(path)
 
 
@@ -119,7 +119,7 @@ def test_other_meetings_have_no_release(tmp_path):
     ("scene", "words"),
     [
         ('meeting = "shear"\nrate = "1 1/s"', '"shear" never ends with [forces.thermal]'),
-        ('kind = "kernel"\nsizes = ["5 um", "9 um"]', "the rates would miss them"),
+        ('kind = "kernel"\nsizes = ["5 um", "9 um"]', "beyond the offsets that are sampled"),
     ],
 )
 def test_thermal_motion_is_refused_where_no_proof_holds(tmp_path, scene, words, capsys):

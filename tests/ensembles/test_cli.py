@@ -102,7 +102,7 @@ def test_what_is_wrong_is_one_line(folder, capsys, changes, words, code, said):
 
 MORE = [
     ('[integrator]\nname = "implicite"', "found 'implicite' (did you mean 'implicit'?)"),
-    ('[integrator]\nname = "velocity_verlet"', "needs integrator.step"),
+    ('[integrator]\nname = "velocity_verlet"', "needs step, the fixed step"),
     ("[forces]\ndrag = false", "no terminal velocity"),
     ("[forces]\ncontact = false", "bodies that meet need a contact force"),
     ("[forces]\ngravity = false", "settle at the same speed"),
@@ -166,7 +166,7 @@ def test_no_config_is_not_a_traceback(folder, capsys):
     )
     code, line = failure(capsys, ".")
     assert code == 2
-    assert "not an ordinary file" in line
+    assert "Is a directory" in line
 
 
 @pytest.mark.parametrize("words", [[], ["small.toml", "--seed", "x"], ["small.toml", "--bogus"]])

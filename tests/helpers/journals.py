@@ -37,7 +37,8 @@ def rows_in(path):
 
 def has_begun(path):
     """Return True once something was computed for a journal."""
-    return path.exists() and bool(computed_in(path) or records_in(path, PART))
+    # A swarm is shown from its first snapshot on, which follows its bodies.
+    return path.exists() and bool(computed_in(path) or len(records_in(path, PART)) > 1)
 
 
 def change(path, table, id, **values):

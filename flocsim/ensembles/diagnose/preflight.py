@@ -27,6 +27,7 @@ from flocsim.ensembles.config.schema import PRESETS, Config
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force
+from flocsim.forces.body_forces import kicks_of
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import impact_exponent
 from flocsim.geometry.shapes.shape import Shape, Sphere
@@ -120,8 +121,10 @@ def require_meeting(config: Config, flocs: Flocs) -> None:
 
 
 def check_laws(pair: Encounter) -> None:
-    """Raise KernelError where a kernel cannot be compiled, or gives no number at touch."""
+    """Raise KernelError where a kernel cannot be compiled, or gives no number at touch, and
+    UsageError where thermal kicks cannot act on the bodies."""
     system = pair.system
+    kicks_of(system.forces, system.bodies, system.fluid)
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
     refuse_interpreter(advance, system.fillings(pair.observer))

@@ -79,5 +79,5 @@ def test_a_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
     write_small(tmp_path, vertices="[1]")
     monkeypatch.chdir(tmp_path)
     assert cli.main(["small.toml", "--pilot"]) == 2
-    assert capsys.readouterr().err == "flocsim: --pilot is for --dry-run: leave it out\n"
+    assert capsys.readouterr().err == "--pilot is for --dry-run: leave it out\n"
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]

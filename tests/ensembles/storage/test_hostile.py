@@ -85,7 +85,6 @@ CHANGES = (
     [put("identity", text) for text in ("[]", "{", "[" * 10**5, "NaN", 7, "")]
     + [put(name, text) for name in ("failed", "history", "cpus")
        for text in ("{}", "[1]", '[{"a": ' * 50, 1.5)]
-    + [put("failed", '[{"type": "I", "vertices": 1, "delta": "x", "replicate": 0, "why": "y"}]')]
     + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")]
 )  # fmt: skip
 

@@ -291,10 +291,10 @@ def failing(monkeypatch, *replicates):
     """Let these replicates raise."""
     original = Study.run
 
-    def run(study, condition, vertices, share, replicate, **more):
+    def run(study, condition, vertices, share, replicate, *more):
         if replicate in replicates:
             raise ZeroDivisionError("in a force of one's own")
-        return original(study, condition, vertices, share, replicate, **more)
+        return original(study, condition, vertices, share, replicate, *more)
 
     monkeypatch.setattr(Study, "run", run)
 
