@@ -4,15 +4,17 @@ import math
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
+from typing import NamedTuple
 
 import numpy as np
 
+from flocsim.commands import add_overwrite
 from flocsim.commands.trajectory import add_replicate
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.diagnose.accuracy import Bench, Task, number, setting_of, table_line
 from flocsim.ensembles.diagnose.pilot import expected_replicates, sample_of
-from flocsim.ensembles.diagnose.preflight import check_study
+from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.pairs.opened import Place, place_of, with_one_count
 from flocsim.ensembles.study import Study
@@ -21,6 +23,10 @@ from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.base import Integrator
 from flocsim.io.arguments import whole
 from flocsim.io.confidence import Z, wilson
+from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.plots.accuracy import error_against_time
+from flocsim.io.plots.style import checked_format, save
+from flocsim.io.results.run_group import source_line
 from flocsim.io.terminal import tell
 
 DECADES = 6
@@ -52,13 +58,24 @@ def add_arguments(parser: ArgumentParser) -> None:
     run one replicate, also at fixed steps.
 
     --count K: without --replicate: replicates of each type (default: 60)
+    -o FIGURE: also draw the error against the CPU time: .png, .pdf or .svg
     """
     add_replicate(parser)
+    add_overwrite(parser)
     parser.add_argument("--count", type=whole)
+    parser.add_argument("-o", "--output", metavar="FIGURE")
     parser.set_defaults(replicate=None)
 
 
-def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[str]:
+class Rung(NamedTuple):
+    """A method at one setting: its line of the table, and its point of the figure."""
+
+    method: str
+    line: str
+    point: tuple[float, float]
+
+
+def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[Rung]:
     """Run replicates of a collision type at every setting, the loosest first.
 
     ``alone``: of a single replicate, also by fixed steps.
@@ -82,8 +99,10 @@ def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[str]:
         yield rung(bench, tasks, VelocityVerlet(references[0][0].time / count), budget)
 
 
-def rung(bench: Bench, tasks: Sequence[Task], method: Integrator, budget: int | None = None) -> str:
-    """Run replicates by a method; return the line of the table on them."""
+def rung(
+    bench: Bench, tasks: Sequence[Task], method: Integrator, budget: int | None = None
+) -> Rung:
+    """Run replicates by a method."""
     found = [bench.compare(task, method, budget) for task in tasks]
     flips = sum(each.flipped for each in found)
     low, high = (100.0 * float(end) for end in wilson(flips, len(found)))
@@ -92,13 +111,15 @@ def rung(bench: Bench, tasks: Sequence[Task], method: Integrator, budget: int | 
         known = [value for each in found if math.isfinite(value := getattr(each, name))]
         return float(np.quantile(known or [math.nan], share))
 
-    return table_line(COLUMNS, [
-        type(method).__name__, setting_of(method), flips, f"{100.0 * flips / len(found):.2f}",
-        f"[{low:.2g}, {high:.2g}]", number(quantile("error")), number(quantile("error", 0.9)),
+    name, error = type(method).__name__, quantile("error")
+    cpu = 1e3 * float(np.mean([each.cpu for each in found]))
+    line = table_line(COLUMNS, [
+        name, setting_of(method), flips, f"{100.0 * flips / len(found):.2f}",
+        f"[{low:.2g}, {high:.2g}]", number(error), number(quantile("error", 0.9)),
         number(quantile("stated")), f"{quantile('steps'):.0f}",
-        number(1e3 * float(np.mean([each.cpu for each in found])), ".2f"),
-        sum(bool(each.why) for each in found),
+        number(cpu, ".2f"), sum(bool(each.why) for each in found),
     ])  # fmt: skip
+    return Rung(name, line, (cpu, error))
 
 
 def tasks_of(config: Config, chosen: Place, args: Namespace) -> list[list[Task]]:
@@ -127,16 +148,26 @@ def run(args: Namespace) -> int:
     if args.vertices is not None or alone:
         config = with_one_count(config, chosen[1])
     check_study(config)
+    outputs, rule = [args.output] if args.output else [], data_rule(args.overwrite)
+    for path in outputs:
+        checked_format(path)
+    check_outputs([Output(path, rule) for path in outputs], inputs_of(config, args.config))
     study = study_of(config)
+    ladders: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for tasks in tasks_of(config, chosen, args):
         (condition, n, delta), replicate = tasks[0]
         about = f"{len(tasks)} replicates over all N and delta"
         if alone:
             about = f"N = {n}, delta = {delta:g}, replicate {replicate}"
         tell(f"\ntype {config.scene.names[condition]}, {about}\n{table_line(COLUMNS)}")
-        for line in climb(study, tasks, alone):
-            tell(line)
+        lines = ladders.setdefault(config.scene.names[condition], {})
+        for each in climb(study, tasks, alone):
+            lines.setdefault(each.method, []).append(each.point)
+            tell(each.line)
     # Half of Wilson's 95 % interval of a probability of ½.
     error = 50.0 * Z / math.sqrt(expected_replicates(config) + Z * Z)
     tell(f"\nto compare with flips: the sampling error of the study is {error:.2g} %")
+    for path in outputs:
+        save(error_against_time(ladders), path, rule, source_line(study.source))
+        tell(path)
     return 0

@@ -1,5 +1,7 @@
 """`flocsim work-precision`: error, flips and CPU time of every setting."""
 
+from pathlib import Path
+
 import pytest
 
 from flocsim.__main__ import main
@@ -35,6 +37,15 @@ def test_a_row_for_every_type_and_setting(implicit_alone, capsys):
         assert (loose["setting"], tight["setting"]) == ("1e-06", "1e-07")
         assert 0.0 < float(tight["most"]) < 1e-4 and 0.0 < float(loose["most"]) < 1e-4
     assert "the sampling error of the study is 37 %" in text
+
+
+def test_the_figure_is_written_once(implicit_alone, capsys):
+    words = ["work-precision", "small.toml", "--vertices", "4", "--count", "2", "-o", "error.png"]
+    assert main(words) == 0
+    assert Path("error.png").read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr().out.endswith("error.png\n")
+    assert main(words) == 2
+    assert "error.png" in capsys.readouterr().err
 
 
 def test_one_replicate(implicit_alone, capsys):
