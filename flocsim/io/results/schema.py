@@ -33,7 +33,6 @@ SHAPE_MEASURES = {
     "solidity": "solidity, the share of the convex hull,",
 }
 """Of the outlines of both bodies, as they were run (`flocsim.geometry.shapes.outline`)."""
-SHAPE_COLUMNS = tuple(f"{name}_{body}" for name in SHAPE_MEASURES for body in "ij")
 
 BAND_ENDS = ("closer", "wider")
 """How another eye might have cut the outlines of flocs: the two ends of their bands."""

@@ -71,9 +71,6 @@ BONDS = {
 }
 """Columns (bond,): the pairs that touch at all times of all replicates."""
 
-KIND_COUNT = 4
-"""Kinds of bonds."""
-
 CLUSTERS = {
     "cluster_replicate": ("i4", "1", "replicate of the cluster"),
     "cluster_time": ("i4", "1", "place of the snapshot among the times"),
@@ -88,12 +85,6 @@ CLUSTERS = {
     "cluster_bonds": ("i4", "1", "pairs of its bodies that touch"),
 }  # fmt: skip
 """Columns (row,): every cluster at all times of all replicates."""
-
-OF_CLUSTERS = tuple(name.removeprefix("cluster_") for name in [*CLUSTERS][4:])
-"""What a record of a snapshot has of a cluster."""
-
-ENDLESS = ("cluster_gyration", "cluster_hydrodynamic", "cluster_porosity")
-"""What one that percolates has not."""
 
 EVENTS = {
     "event_replicate": ("i4", "1", "replicate of the clusters"),
