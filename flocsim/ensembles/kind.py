@@ -186,7 +186,7 @@ class StudyKind:
         """Raise the FlocsimError that a config's study would meet."""
 
     def prepare(self) -> None:
-        """Raise the same for what takes the study itself to look at."""
+        """Raise the FlocsimError that shows only once the study with its flocs is made."""
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible in the study."""
@@ -199,29 +199,30 @@ class StudyKind:
 
     @property
     def scene(self) -> Any:
-        """[scene] of the config, of the class that the kind has."""
+        """Return the table [scene] of the config, an instance of one of ``scenes``."""
         return self.config.scene
 
     @property
     def conditions(self) -> tuple[Condition, ...]:
-        """All conditions, in the order of the results file."""
+        """Return all conditions in the order of the results file."""
         scene, vertices = self.config.scene, self.config.shapes.vertices
         return tuple(Condition(*each) for each in product(scene.names, vertices, scene.delta))
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """(types, vertices, delta, replicates): how many there are of each."""
+        """Return the numbers of (types, vertex counts, displacements, replicates)."""
         scene = self.config.scene
         counts = (len(scene.names), len(self.config.shapes.vertices), len(scene.delta))
         return (*counts, self.config.replicates)
 
     @property
     def size(self) -> int:
+        """Return the number of replicates of all conditions."""
         return int(np.prod(self.shape))
 
     @property
     def title(self) -> str:
-        """The study in a few words, before "on 2 ranks"."""
+        """Return the study in a few words, as in "120 replicates: … , on 2 ranks"."""
         types, vertices, delta, replicates = self.shape
         axes = ((types, "type"), (vertices, "vertex count"), (delta, "displacement"))
         words = " x ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in axes)
@@ -229,22 +230,22 @@ class StudyKind:
 
     @property
     def source(self) -> dict[str, Any]:
-        """What `source_line` tells of the study: its flocs, its preset, the version of flocsim."""
+        """Return the flocs, the preset and the version of flocsim, for `source_line`."""
         found = self.config.shapes.described(len(self.flocs)), self.config.preset or ""
         return dict(zip(SOURCE, (*found, package_version("flocsim")), strict=True))
 
     @property
     def remark(self) -> str:
-        """A further line on it; "" for none."""
+        """Return a second line about the study; "" for none."""
         return ""
 
     @property
     def allowed(self) -> float:
-        """How many replicates may fail before the study is given up."""
+        """Return how many replicates may fail before the study ends with an error."""
         return self.config.stop.failed * self.size
 
     def asked(self) -> dict[str, Any]:
-        """What the study consists of, for those who look into its journal."""
+        """Return the axes and the number of replicates, for readers of the journal."""
         config = self.config
         return {
             "types": list(config.scene.names), "vertices": list(config.shapes.vertices),
@@ -253,34 +254,35 @@ class StudyKind:
 
     @property
     def kinds(self) -> list[Code]:
-        """What stands for the kinds of compiled code that the study needs."""
+        """Return one Code for each engine that the study needs to have compiled."""
         return [(0, self.config.shapes.vertices[0])]
 
     def compile(self, kinds: Iterable[Code]) -> None:
-        """Compile, or load from the disk, what these kinds need, by running a replicate of each."""
+        """Compile these engines, or load them from the disk, by running a replicate of each."""
         for place, vertices in kinds:
             condition = Condition(self.scene.names[place], vertices, self.scene.delta[0])
             self.run_task(condition, 0, lambda: False)
 
     def uncompiled(self, kinds: Iterable[Code]) -> list[Code]:
-        """Those that no run on this machine has compiled, as far as can be told before they are
-        run."""
+        """Return those of these engines that are known not to be on the disk yet."""
         return []
 
     def note(self, condition: Condition, replicate: int, why: str) -> dict[str, Any]:
-        """What is needed to run a replicate again, and why one would, as JSON can hold it."""
+        """Return what names a failed replicate and its reason, as values that JSON can store."""
         return condition._asdict() | {"replicate": replicate, "why": why}
 
     def check_whole(self, rows: np.ndarray, parts: Container[str]) -> None:
-        """ValueError where what is saved of the replicate of a row is not all there; ``parts``:
-        the names of what there is."""
+        """Raise ValueError if saved parts of a finished replicate are missing.
+
+        ``rows``: the row of the replicate; ``parts``: the names of its parts in the journal.
+        """
 
     def counts_part(self, name: str) -> bool:
-        """Whether progress counts a part."""
+        """Return True if progress counts a part of this name."""
         return False
 
     def left_of(self, parts: Any) -> Any:
-        """Where a replicate resumes, by its Parts; None: it begins anew."""
+        """Return the state from which a replicate resumes, by its Parts; None to begin anew."""
         return None
 
 

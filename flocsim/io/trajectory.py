@@ -26,7 +26,6 @@ TRAJECTORY = FileFormat(
     "flocsim trajectory", 2, "trajectory", {}, attribute="kind", remedy="write it again"
 )
 """Its arrays are those of `motion_group`, without a group; ``VTKHDF`` is for ParaView."""
-KIND = TRAJECTORY.name
 
 COMPONENTS = ("x", "y", "angle")
 """Of a place and of its rate."""

@@ -11,7 +11,7 @@ from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.groups import kind_of
 from flocsim.io.seals import seal
-from flocsim.io.trajectory import DATASETS, DISTANCE, KIND, read_trajectory, write_trajectory
+from flocsim.io.trajectory import DATASETS, DISTANCE, TRAJECTORY, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
 from tests.helpers.sealed import read_sealed
 
@@ -74,7 +74,7 @@ def test_a_file_that_cannot_be_written(tmp_path):
 def test_what_was_written_is_read_back(tmp_path):
     times, position, velocity = written(tmp_path / "m.h5", replicate=17, status="FINISHED")
     found = read_trajectory(tmp_path / "m.h5")
-    assert kind_of(tmp_path / "m.h5") == KIND
+    assert kind_of(tmp_path / "m.h5") == TRAJECTORY.name
     for array, again in zip((times, position, velocity), (found.t, found.position, found.velocity),
                             strict=True):  # fmt: skip
         np.testing.assert_array_equal(array, again)

@@ -247,9 +247,6 @@ MORE_STEPS = 5
 THIRD_OF = 16
 """One in so many second runs has a third one behind it."""
 
-THIRD_COST = 4.0
-"""CPU time of a third run over that of a second (benchmarks.accuracy.numerical_error)."""
-
 Z = 1.959963984540054
 """Normal quantile of 95 % intervals."""
 
