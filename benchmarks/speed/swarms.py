@@ -59,7 +59,7 @@ def swarm_of(number, fraction, vertices, duration=10.0):
         path = Path(folder) / "swarm.toml"
         text = STUDY.format(number=number, fraction=fraction, vertices=vertices, duration=duration)
         path.write_text(text, "utf-8")
-        swarm, _, _ = SwarmStudy(load_any_config(path)).swarm(0)
+        swarm, _ = SwarmStudy(load_any_config(path)).swarm(0)
     run_briefly(swarm)  # compiled
     return swarm
 

@@ -63,7 +63,7 @@ def alone(swarm, trajectory, at, pair, steps):
 
 def rows_of(study, replicate):
     """A row for each first touch in a swarm that is followed to the end of a binary collision."""
-    swarm, _, _ = study.swarm(replicate)
+    swarm, _ = study.swarm(replicate)
     every = study.scene.interval
     trajectory = swarm.run(study.scene.duration, every=every)
     touching = [pairs_at(trajectory, at) for at in range(len(trajectory.t))]

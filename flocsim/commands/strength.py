@@ -56,7 +56,7 @@ def run(args: Namespace) -> int:
     from flocsim.io.plots.curves import over_rate
     from flocsim.io.plots.style import save
     from flocsim.io.results.run_group import source_line
-    from flocsim.io.results.strength_file import table_of, write_strengths
+    from flocsim.io.results.strength_file import table_of
 
     output = Path(args.output or f"{Path(args.results).stem}-strength.h5")
     figure, resumed = output.with_suffix(".png"), args.resume and output.exists()
@@ -75,7 +75,7 @@ def run(args: Namespace) -> int:
         """Write what was found so far, and return it."""
         nonlocal rule, saved
         found = gathered(survey, tested, complete)
-        write_strengths(output, found, rule)
+        found.write(output, rule)
         rule, saved = extension_rule(output), time.monotonic()
         return found
 

@@ -59,8 +59,8 @@ class OneTable:
         shape = *(len(asked[each]) for each in names), count
         axes = {axis: np.array(asked[each]) for axis, each in zip(AXES, names, strict=True)}
         columns = {name: rows[name].reshape(shape) for name in self.columns}
-        values = axes | {"replicate": np.arange(count)} | columns
-        return Stored(self.file.groups, {ROWS: values}, run, {"format": self.name})
+        found: Stored = self.file.stored({ROWS: columns}, axes, run)
+        return found
 
     def results(
         self, study: Any, start: Any, count: int, run: dict, output: Any, in_memory: bool
@@ -68,7 +68,7 @@ class OneTable:
         """Return the results of a study, written to the output if there is one."""
         found = self.stored(start.store, study.asked(), count, run)
         if output is not None:
-            self.file.write(output, {ROWS: found.labelled(ROWS)}, run, rule=start.replacing)
+            found.write(output, start.replacing)
         return found
 
     @contextmanager

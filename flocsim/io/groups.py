@@ -163,28 +163,41 @@ class Group:
 
 @attrs.frozen(eq=False)
 class Stored(Tables):
-    """What a file holds: ``groups`` {group: {name: values}}, coordinates among them; ``run``, the
-    scalars of the group ``run``; the ``attributes`` of the file."""
+    """What a file of one ``kind`` holds, or is to hold: ``groups`` {group: {name: values}},
+    coordinates among them; ``run``, the scalars of the group ``run``; the ``attributes`` of the
+    file."""
 
-    declared: Mapping[str, Group]
+    kind: "FileFormat"
     groups: dict[str, dict[str, np.ndarray]]
     run: dict[str, Any]
     attributes: dict[str, Any]
 
     @property
     def format(self) -> str:
-        """The kind of file."""
-        return str(self.attributes.get("format", ""))
+        """The name of the kind of file."""
+        return self.kind.name
+
+    @property
+    def scales(self) -> dict[str, np.ndarray]:
+        """{axis: its values} of all groups."""
+        return {axis: values[axis] for name, values in self.groups.items()
+                for axis in self.kind.groups[name].scales}  # fmt: skip
 
     @property
     def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
         """{group: the axes that all of its columns have}."""
-        return {name: self.declared[name].index for name in self.groups}
+        return {name: self.kind.groups[name].index for name in self.groups}
 
-    def labelled(self, group: str) -> Labelled:
-        """Return a group's arrays with their axes; UsageError for an unknown one."""
+    def labelled(self, group: str | None = None) -> Labelled:
+        """Return a group's arrays with their axes, the first if none is named; UsageError for an
+        unknown one."""
         name = self.known(group)
-        return self.declared[name].labelled(self.groups[name])
+        return self.kind.groups[name].labelled(self.groups[name])
+
+    def write(self, path: str | os.PathLike, rule: Rule = keep) -> None:
+        """Write the file, whole or not at all; FileError if that is impossible."""
+        groups = {name: self.labelled(name) for name in self.groups}
+        self.kind.write(path, groups, self.run, self.attributes, rule)
 
 
 @attrs.frozen(eq=False)
@@ -211,6 +224,8 @@ class FileFormat:
         The attribute of the file that has the name.
     remedy : str
         What a user can do about a file that cannot be read.
+    view : type
+        The class of what is read: a `Stored`.
     """
 
     name: str
@@ -222,11 +237,29 @@ class FileFormat:
     oldest: int | None = None
     attribute: str = "format"
     remedy: str = "run the study again"
+    view: type[Stored] = Stored
 
-    @property
-    def indices(self) -> dict[str, list[str]]:
-        """{group: the axes that all of its columns have}."""
-        return {name: group.index for name, group in self.groups.items()}
+    def stored(
+        self, groups: Mapping[str, Mapping[str, Any]], axes: Mapping[str, Any],
+        run: Mapping[str, Any], attributes: Mapping[str, Any] | None = None,
+    ) -> Any:  # fmt: skip
+        """Return arrays in memory as what a file of this kind holds, which can be written.
+
+        ``groups``: the columns of each; ``axes``: values of coordinates, others count from 0.
+        """
+        found = {}
+        for name, columns in groups.items():
+            group = self.groups[name]
+            lengths = {
+                axis: length for column, values in columns.items()
+                for axis, length in zip(group.columns[column].axes, np.shape(values), strict=True)
+            }  # fmt: skip
+            scales = {
+                axis: np.asarray(axes[axis]) if axis in axes else np.arange(lengths[axis])
+                for axis in group.scales
+            }
+            found[name] = scales | dict(columns)
+        return self.view(self, found, dict(run), dict(attributes or {}))
 
     def write(
         self, path: str | os.PathLike, groups: Mapping[str, Labelled],
@@ -348,7 +381,7 @@ class FileFormat:
                 )
         return lengths
 
-    def contents(self, file: File, without: Collection[str] = ()) -> Stored:
+    def contents(self, file: File, without: Collection[str] = ()) -> Any:
         """Return what an open file holds, checked; ``without``: groups that are not read."""
         lengths = self.check(file)
         groups = {
@@ -364,10 +397,10 @@ class FileFormat:
                     first.setdefault(axis, values[axis]), values[axis], equal_nan=not words
                 ):
                     raise Unfit(f"{name}/{axis} is not that of the other groups")
-        return Stored(self.groups, groups, run_of(file), file.attributes)
+        return self.view(self, groups, run_of(file), file.attributes)
 
-    def read(self, path: str | os.PathLike) -> Stored:
-        """Return what a file holds, checked; FileError where it cannot be read."""
+    def read(self, path: str | os.PathLike) -> Any:
+        """Return what a file holds, checked, as a ``view``; FileError where it cannot be read."""
         with self.opened(path) as file:
             return self.contents(file)
 

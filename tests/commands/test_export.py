@@ -10,8 +10,7 @@ from flocsim.__main__ import main
 from flocsim.ensembles.pairs.opened import open_results
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.results.schema import OUTCOMES
-from flocsim.io.results.strength_file import STATUS, write_strengths
-from flocsim.io.results.swarm_file import write_swarm
+from flocsim.io.results.strength_file import STATUS
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
 from flocsim.io.shape_library import read_library
 from flocsim.io.trajectory import write_trajectory
@@ -82,7 +81,7 @@ def test_rates_give_a_row_for_every_pair_of_classes(capsys):
 
 def test_swarms_give_what_is_counted_over_time(capsys):
     results = make_swarm_results()
-    write_swarm("swarm.h5", results)
+    results.write("swarm.h5")
     found = exported(capsys, "swarm.h5")
     assert [*found] == ["swarm-counts.csv", "swarm-clusters.csv", "swarm-events.csv"]
     rows = found["swarm-counts.csv"]
@@ -95,7 +94,7 @@ def test_swarms_give_what_is_counted_over_time(capsys):
 
 def test_strengths_give_every_doublet(capsys):
     found = mixed()
-    write_strengths("s.h5", found)
+    found.write("s.h5")
     written = exported(capsys, "s.h5")
     assert [*written] == ["s-doublets.csv", "s-conditions.csv"]
     rows = written["s-doublets.csv"]

@@ -4,7 +4,6 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.ensembles.contents import text_of
-from flocsim.io.results.strength_file import write_strengths
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.results_files import write_results
 from tests.helpers.small_rates import mixed
@@ -30,7 +29,7 @@ def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
 @pytest.mark.parametrize("complete", [True, False])
 def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
     found = mixed(complete)
-    write_strengths(tmp_path / "s.h5", found)
+    found.write(tmp_path / "s.h5")
     text = text_of(tmp_path / "s.h5")
     assert ("unfinished" in text.splitlines()[0]) is not complete
     told = "4 doublets" if complete else "4 doublets so far; continue with --resume"

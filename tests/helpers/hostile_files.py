@@ -19,8 +19,6 @@ from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.sweep import joined
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import POOLED
-from flocsim.io.results.strength_file import write_strengths
-from flocsim.io.results.swarm_file import write_swarm
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
 from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
@@ -120,14 +118,14 @@ def valid_kernel(folder):
 @cache
 def valid_strengths(folder):
     """Return the HDF5 data of a small file of strengths of bonds."""
-    write_strengths(folder / "valid-strengths.h5", mixed())
+    mixed().write(folder / "valid-strengths.h5")
     return read_sealed(folder / "valid-strengths.h5")
 
 
 @cache
 def valid_swarm(folder):
     """Return the HDF5 data of a small results file of swarms."""
-    write_swarm(folder / "valid-swarm.h5", make_swarm_results())
+    make_swarm_results().write(folder / "valid-swarm.h5")
     return read_sealed(folder / "valid-swarm.h5")
 
 

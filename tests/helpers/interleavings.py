@@ -229,8 +229,8 @@ class Found:
         if kind == "swarms":
             found = read_swarm(path)
             columns = [
-                np.asarray(values) for name in ("counts", "snapshots", "bodies", "ends")
-                for _, values in sorted(found.groups[name].items())
+                found.groups[name][column] for name in ("counts", "snapshots", "bodies", "ends")
+                for column in sorted(found.kind.groups[name].columns)
             ]  # fmt: skip
             numbers = found.scales["replicate"].tolist()
             condition = name_of("swarm", int(found.run["vertices"]), 0.0)

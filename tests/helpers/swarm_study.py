@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SwarmResults, events_of
+from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SWARMS, events_of
 
 SWARM = """\
 preset = "si"
@@ -77,13 +77,8 @@ def make_swarm_results(replicates=2, times=3, bodies=4):
         "events": events_of(np.zeros((0, 0, 0))),
         "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
     }  # fmt: skip
-    scales = {
-        "replicate": np.arange(replicates), "time": 0.1 * np.arange(times),
-        "class": np.array([0.0, 1e-5]), "body": np.arange(bodies),
-        "component": np.array(["x", "y", "angle"]), "axis": np.array(["x", "y"]),
-        "point": np.arange(bodies), "bond": np.arange(2), "row": np.arange(3),
-        "event": np.arange(0),
-    }  # fmt: skip
+    axes = {"time": 0.1 * np.arange(times), "class": [0.0, 1e-5],
+            "component": ["x", "y", "angle"], "axis": ["x", "y"]}  # fmt: skip
     run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,
            "periodic": "xy", "overrides": "{}"}  # fmt: skip
-    return SwarmResults(scales, groups, run)
+    return SWARMS.stored(groups, axes, run)

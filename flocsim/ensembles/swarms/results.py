@@ -6,7 +6,7 @@ import io
 import json
 import warnings
 import zipfile
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -82,93 +82,90 @@ PLACED = ("bond_replicate", "cluster_replicate", "event_replicate")
 """Columns that count replicates."""
 
 
-def groups_of(swarms: list[Any], times: int) -> Groups:
-    """Return {group: {column: array}} of the Parts of replicates, but for their ends; NaN, or no
-    cluster, at times that a replicate has not reached."""
-    bodies = [decoded(own.read(BODIES)[1]) for own in swarms]
-    moments = [
-        [
-            decoded(own.read(moment_name(place))[1]) if moment_name(place) in own else {}
-            for place in range(times)
-        ]
-        for own in swarms
-    ]
-    known = next((each for own in moments for each in own if each), {})
-    groups: Groups = {"bodies": joined_bodies([{k: v[np.newaxis] for k, v in each.items()}
-                                               for each in bodies])}  # fmt: skip
+def groups_of(parts: Any, times: int, classes: int) -> Groups:
+    """Return {group: {column: array}} of the Parts of one replicate, but for its ends; NaN, or no
+    cluster, at times that it has not reached."""
+    bodies = decoded(parts.read(BODIES)[1])
+    moments = {
+        place: decoded(parts.read(moment_name(place))[1])
+        for place in range(times) if moment_name(place) in parts
+    }  # fmt: skip
+    groups: Groups = {"bodies": {name: values[np.newaxis] for name, values in bodies.items()}}
+    lengths = {"class": classes, "body": len(bodies["r_eq"]), "component": 3}
     for group in ("counts", "snapshots"):
         groups[group] = {}
-        for name in swarm_file.GROUPS[group].columns:
-            blank = -1 if name == "cluster" else np.nan
-            # Empty swarms have no means of clusters.
-            default = np.full_like(known.get(name, np.array(np.nan)), blank)
-            groups[group][name] = np.array(
-                [[each.get(name, default) for each in own] for own in moments]
-            )
+        for name, each in swarm_file.GROUPS[group].columns.items():
+            shape = 1, times, *(lengths[axis] for axis in each.axes[2:])
+            values = np.full(shape, -1 if name == "cluster" else np.nan, each.type)
+            for place, moment in moments.items():
+                # Empty swarms have no means of clusters.
+                values[0, place] = moment.get(name, np.nan)
+            groups[group][name] = values
     # Lists of pairs and clusters, after the replicate and the time that they are of.
     for group in ("bonds", "clusters"):
-        columns = swarm_file.GROUPS[group].columns
-        names = list(columns)
-        listed = [
-            np.column_stack([np.broadcast_to([row, place], (len(each[names[2]]), 2)),
-                             *(each[name] for name in names[2:])])
-            for row, own in enumerate(moments) for place, each in enumerate(own) if each
-        ]  # fmt: skip
-        table = np.concatenate([np.zeros((0, len(names))), *listed])
+        replicate, time, *names = swarm_file.GROUPS[group].columns
+        counts = [len(moment[names[0]]) for moment in moments.values()]
+        listed = {replicate: np.zeros(sum(counts)), time: np.repeat([*moments], counts)} | {
+            name: np.concatenate([[], *(moment[name] for moment in moments.values())])
+            for name in names
+        }
         groups[group] = {
-            name: values.astype(columns[name].type)
-            for name, values in zip(names, table.T, strict=True)
+            name: values.astype(swarm_file.GROUPS[group].columns[name].type)
+            for name, values in listed.items()
         }
     groups["events"] = swarm_file.events_of(groups["snapshots"]["cluster"])
     return groups
 
 
-def joined_bodies(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Return the bodies of replicates after each other, their core points filled up with zeros."""
-    most = max(each["points"].shape[1] for each in parts)
-    found = {}
-    for name, first in parts[0].items():
-        columns = [each[name] for each in parts]
+def joined(parts: Sequence[Mapping[str, Any]]) -> Groups:
+    """Return the groups of replicates after each other, core points filled up with zeros."""
+    most = max(each["bodies"]["points"].shape[1] for each in parts)
+    begun = np.cumsum([0, *(len(each["bodies"]["box"]) for each in parts)])
+
+    def column(group: str, name: str) -> np.ndarray:
+        values = [each[group][name] for each in parts]
         if name in swarm_file.POINTS | swarm_file.RINGS:
-            columns = [at.grown(each, 1, most) for each in columns]
-        found[name] = np.concatenate(columns).astype(first.dtype)
-    return found
+            values = [at.grown(each, 1, most) for each in values]
+        if name in PLACED:
+            values = [each + first for each, first in zip(values, begun, strict=False)]
+        return np.concatenate(values).astype(swarm_file.GROUPS[group].columns[name].type)
+
+    return {
+        group: {name: column(group, name) for name in swarm_file.GROUPS[group].columns}
+        for group in swarm_file.GROUPS if group != "ends"
+    }  # fmt: skip
 
 
 def results_from(
-    groups: Groups, asked: Mapping[str, Any], run: Mapping[str, Any],
-    replicates: np.ndarray | None = None,
+    groups: Groups, ends: Mapping[str, np.ndarray], asked: Mapping[str, Any],
+    run: Mapping[str, Any], replicates: Sequence[int],
 ) -> SwarmResults:  # fmt: skip
-    """Return the results of whole groups; ``replicates``: their numbers, 0, 1, … unless given."""
-    count, points = groups["bodies"]["points"].shape[:2]
+    """Return the results of the replicates of these numbers."""
     times = groups["counts"]["clusters"].shape[1]
-    scales = {
-        "replicate": np.arange(count) if replicates is None else replicates,
-        "time": np.array(asked["times"][:times]), "class": np.array([0.0, *asked["bounds"]]),
-        "body": np.arange(groups["bodies"]["r_eq"].shape[1]),
-        "component": np.array(swarm_file.COMPONENTS), "axis": np.array(swarm_file.AXES),
-        "point": np.arange(points), "bond": np.arange(len(groups["bonds"]["bond_kind"])),
-        "row": np.arange(len(groups["clusters"]["cluster_bodies"])),
-        "event": np.arange(len(groups["events"]["event_time"])),
+    axes = {
+        "replicate": replicates, "time": asked["times"][:times], "class": [0.0, *asked["bounds"]],
+        "component": swarm_file.COMPONENTS, "axis": swarm_file.AXES,
     }  # fmt: skip
-    return SwarmResults(scales, groups, dict(run))
+    found: SwarmResults = swarm_file.SWARMS.stored(groups | {"ends": ends}, axes, run)
+    return found
 
 
 def results(
     study: Any, start: Any, count: int, run: dict, output: str | Path | None, in_memory: bool
 ) -> SwarmResults:
     """Return the results of so many replicates; written to ``output`` where there is one."""
-    store = start.store
-    groups = first_of(start.old.found, count) if start.old else {}
-    begun = len(groups["ends"]["finished"]) if groups else 0
-    if begun < count:
-        new = groups_of([store.parts[0, each] for each in range(begun, count)], study.pieces)
-        groups = appended(groups, new, begun) if groups else new
+    store, asked = start.store, study.asked()
+    old = [first_of(start.old.found, count)] if start.old else []
+    begun = len(old[0]["bodies"]["box"]) if old else 0
+    new = [
+        groups_of(store.parts[0, each], study.pieces, 1 + len(asked["bounds"]))
+        for each in range(begun, count)
+    ]
     rows = store.rows(0, 0, count)
-    groups["ends"] = {name: rows[name].copy() for name in swarm_file.ENDS}
-    made = results_from(groups, study.asked(), run)
+    ends = {name: rows[name].copy() for name in swarm_file.ENDS}
+    made = results_from(joined([*old, *new]), ends, asked, run, range(count))
     if output is not None:
-        swarm_file.write_swarm(output, made, start.replacing)
+        made.write(output, start.replacing)
     return made
 
 
@@ -177,22 +174,8 @@ def first_of(found: SwarmResults, count: int) -> Groups:
     groups = {}
     for group, columns in found.groups.items():
         listed = [columns[name] for name in PLACED if name in columns]
-        kept = listed[0] < count if listed else slice(count)
-        groups[group] = {name: values[kept] for name, values in columns.items()}
-    return groups
-
-
-def appended(old: Groups, new: Groups, begun: int) -> Groups:
-    """Return the groups of ``begun`` replicates, and of others after them."""
-    groups = {"bodies": joined_bodies([old["bodies"], new["bodies"]])}
-    for group, columns in new.items():
-        if group != "bodies":
-            groups[group] = {
-                name: np.concatenate(
-                    [old[group][name], column + begun if name in PLACED else column]
-                ).astype(column.dtype)
-                for name, column in columns.items()
-            }
+        chosen = listed[0] < count if listed else slice(count)
+        groups[group] = {name: columns[name][chosen] for name in swarm_file.GROUPS[group].columns}
     return groups
 
 
@@ -201,9 +184,9 @@ def old_rows(output: str | Path) -> Iterator[OldResults]:
     """Open a results file that is to be extended."""
     found = swarm_file.read_swarm(output)
     ends = found.groups["ends"]
-    rows = np.zeros(len(ends["finished"]), [(name, each.dtype) for name, each in ends.items()])
-    for name, values in ends.items():
-        rows[name] = values
+    rows = np.zeros(len(ends["finished"]), [(name, ends[name].dtype) for name in swarm_file.ENDS])
+    for name in swarm_file.ENDS:
+        rows[name] = ends[name]
     condition = Condition("swarm", int(found.run.get("vertices", 0)), 0.0)
     yield OldResults([condition], len(rows), [(condition, 0, rows)], found.run, found)
 
@@ -221,12 +204,10 @@ def so_far(store: Any, asked: dict[str, Any]) -> tuple[SwarmResults, int, int]:
         [place for place in range(planned) if moment_name(place) in parts]
         for parts in swarms.values()
     ]
-    groups = groups_of(list(swarms.values()), 1 + max(each[-1] for each in there))
-    groups["ends"] = {
-        name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()
-    }
-    run = {"periodic": asked["periodic"]}
-    made = results_from(groups, asked, run, np.array(list(swarms)))
+    times, classes = 1 + max(each[-1] for each in there), 1 + len(asked["bounds"])
+    groups = joined([groups_of(parts, times, classes) for parts in swarms.values()])
+    ends = {name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()}
+    made = results_from(groups, ends, asked, {"periodic": asked["periodic"]}, [*swarms])
     return made, sum(map(len, there)), asked["replicates"] * planned
 
 

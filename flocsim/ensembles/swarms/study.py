@@ -38,10 +38,9 @@ from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import ENDS, FORMAT, GONE, WALL
+from flocsim.io.results.swarm_file import ENDS, GONE, SWARMS, WALL
 from flocsim.io.terminal import duration
 from flocsim.plausibility import settled
-from flocsim.swarms.arrays import AT_EDGE, AT_VERTEX, EARLIER_BODY, LATER_BODY
 from flocsim.swarms.islands import run_islands
 from flocsim.swarms.placement import KEEP, Leaving, floor, place_at_random
 from flocsim.swarms.progress import Progress
@@ -65,10 +64,13 @@ MOST_NAMED = 6
 
 @attrs.frozen(eq=False)
 class Drawn:
-    """The bodies of a replicate before they are placed: index of the floc, and shape, of each."""
+    """The bodies of a replicate before they are placed: index of the floc, and shape, of each, the
+    ``box`` [m], and the random numbers that place them."""
 
     flocs: np.ndarray
     shapes: list[Shape]
+    box: tuple[float, float]
+    rng: np.random.Generator
 
 
 def shapes_of(config: Config) -> ShapesConfig:
@@ -87,7 +89,7 @@ class SwarmStudy(StudyKind):
         default=attrs.Factory(lambda self: self.flocs_of(self.config), takes_self=True)
     )
     scenes: ClassVar[Sequence[type]] = (SwarmScene,)
-    format: ClassVar[str] = FORMAT
+    format: ClassVar[str] = SWARMS.name
     code: ClassVar[Sequence[str]] = (*PHYSICS, "swarms", "ensembles/swarms/study.py")
     row: ClassVar[np.dtype] = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
     most_rows: ClassVar[int] = 1
@@ -200,7 +202,7 @@ class SwarmStudy(StudyKind):
     # The bodies of a replicate.
 
     @functools.cached_property
-    def beginning(self) -> tuple[Swarm, Drawn, tuple[float, float]]:
+    def beginning(self) -> tuple[Swarm, Drawn]:
         """The first replicate as `swarm` gives it, by which the study is known and checked; it is
         run as it is here, since resizing its flocs takes seconds."""
         return self.make_swarm(0)
@@ -210,71 +212,62 @@ class SwarmStudy(StudyKind):
         """The swarm of the first replicate at its start."""
         return self.beginning[0]
 
-    def swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
-        """Return (the Swarm of a replicate at its start, its bodies before, its box [m]).
+    def swarm(self, replicate: int) -> tuple[Swarm, Drawn]:
+        """Return the Swarm of a replicate at its start, and what was drawn for it.
 
         UsageError where bodies find no place, or the box is too small for them.
         """
         return self.beginning if replicate == 0 else self.make_swarm(replicate)
 
-    def make_swarm(self, replicate: int) -> tuple[Swarm, Drawn, tuple[float, float]]:
+    def make_swarm(self, replicate: int) -> tuple[Swarm, Drawn]:
         """Draw a replicate, place its bodies, and let them settle at their own speeds."""
-        drawn, box, rng = self.drawn(replicate)
-        scene, forces, fluid = self.scene, self.config.forces, self.config.fluid
-        places = place_at_random(drawn.shapes, box, rng, scene.repeats, scene.gap)
-        bodies, walls = self.bodies(drawn, box, places.tolist())
-        known = System(bodies, forces, self.config.integrator.method, fluid)
-        period = np.where(scene.repeats, box, math.inf).tolist()
+        drawn, scene, forces = self.drawn(replicate), self.scene, self.config.forces
+        method, fluid = self.config.integrator.method, self.config.fluid
+        places = place_at_random(drawn.shapes, drawn.box, drawn.rng, scene.repeats, scene.gap)
+        placed = self.bodies(drawn, places.tolist())
+        known = System([body for body in placed if not body.fixed], forces, method, fluid)
+        width, height = np.where(scene.repeats, drawn.box, math.inf).tolist()
         swarm = Swarm(
-            [*(settling(known, body) for body in bodies), *walls], forces,
-            self.config.integrator.method, fluid, box=(period[0], period[1]),
-            all_pairs=scene.all_pairs, seed=(self.config.seed, replicate),
+            [body if body.fixed else settling(known, body) for body in placed], forces, method,
+            fluid, box=(width, height), all_pairs=scene.all_pairs,
+            seed=(self.config.seed, replicate),
         )  # fmt: skip
-        return swarm, drawn, box
+        return swarm, drawn
 
-    def bodies(
-        self, drawn: Drawn, box: tuple[float, float], places: Sequence[Sequence[float]]
-    ) -> tuple[list[Body], list[Body]]:
-        """Return (the bodies of a replicate at these places, the walls of its box)."""
+    def bodies(self, drawn: Drawn, places: Sequence[Sequence[float]]) -> list[Body]:
+        """Return the bodies of a replicate at these places, and after them the floor of its box."""
         bodies = [
             Body(shape, (x, y), angle, **self.config.body_options(shape))
             for shape, (x, y, angle) in zip(drawn.shapes, places, strict=True)
         ]
         beyond = BEYOND * max(shape.bounding_radius for shape in drawn.shapes)
-        return bodies, [floor(box[0], 0.0, beyond=beyond)] if self.scene.floor else []
+        return bodies + [floor(drawn.box[0], 0.0, beyond=beyond)] * self.scene.floor
 
-    def drawn(self, replicate: int) -> tuple[Drawn, tuple[float, float], np.random.Generator]:
-        """Return (the bodies of a replicate, its box [m], the random numbers that place them)."""
+    def drawn(self, replicate: int) -> Drawn:
+        """Return the bodies of a replicate, and its box."""
         stream = np.random.SeedSequence(self.config.seed, spawn_key=(replicate,))
         rng, scene = np.random.Generator(np.random.Philox(stream)), self.scene
-        drawn, box = self.draw(rng), scene.box
-        if box is None:
-            covered = sum(shape.area for shape in drawn.shapes) / scene.area_fraction
-            width = math.sqrt(covered / scene.aspect)
-            box = width, covered / width
-        return drawn, box, rng
-
-    def draw(self, rng: np.random.Generator) -> Drawn:
-        """Return the bodies of a replicate, by its random numbers."""
-        numbers = rng.random((self.scene.number, 2))
-        if self.scene.is_measured:
-            places = self.choosable
-            weights = drawing_weights(self.scene, [self.flocs[each] for each in places])
-            flocs = [int(places[quantile(weights, each)]) for each in numbers[:, 0].tolist()]
+        numbers = rng.random((scene.number, 2))
+        if scene.is_measured:
+            weights = drawing_weights(scene, [self.flocs[each] for each in self.choosable])
+            flocs = [int(self.choosable[quantile(weights, u)]) for u in numbers[:, 0].tolist()]
             radii = [self.flocs[each].measured_size for each in flocs]
         else:
-            radii = lognormal(self.scene, numbers[:, 0]).tolist()
+            radii = lognormal(scene, numbers[:, 0]).tolist()
             flocs = [
-                self.floc_for(radius, u)
-                for radius, u in zip(radii, numbers[:, 1].tolist(), strict=True)
+                self.floc_for(*each) for each in zip(radii, numbers[:, 1].tolist(), strict=True)
             ]
         shapes = [
             self.pool.shape(floc, self.vertices, radius)
             for floc, radius in zip(flocs, radii, strict=True)
         ]
         self.pool.made.clear()
+        if (box := scene.box) is None:
+            covered = sum(shape.area for shape in shapes) / scene.area_fraction
+            width = math.sqrt(covered / scene.aspect)
+            box = width, covered / width
         names = flocs if self.vertices > 1 else [SPHERE] * len(flocs)
-        return Drawn(np.array(names, dtype=np.int32), shapes)
+        return Drawn(np.array(names, dtype=np.int32), shapes, box, rng)
 
     def floc_for(self, radius: float, number: float) -> int:
         """Return the index of a floc of the pool nearest in r_eq/r to a body of that radius [m]."""
@@ -308,23 +301,25 @@ class SwarmStudy(StudyKind):
 
         scene, stops = self.scene, self.stops
         try:
-            swarm, drawn, box = self.swarm(replicate)
+            swarm, drawn = self.swarm(replicate)
         except UsageError as error:  # its bodies find no place in the box
-            drawn, box, _ = self.drawn(replicate)
-            bodies, walls = self.bodies(drawn, box, [(0.0, 0.0, 0.0)] * len(drawn.shapes))
-            save(BODIES, bodies_part([*bodies, *walls], drawn.flocs, box))
+            drawn = self.drawn(replicate)
+            bodies = self.bodies(drawn, [(0.0, 0.0, 0.0)] * len(drawn.shapes))
+            save(BODIES, bodies_part(bodies, drawn))
             return dict.fromkeys(ENDS, 0), self.note(condition, replicate, str(error))
         gauge, bond_gauge = swarm.gauge(), swarm.bond_gauge()
         swarm.check_overlaps(gauge)
         leaving = None
         if scene.leaving != KEEP:
             key = self.config.seed, replicate
-            leaving = Leaving(scene.leaving, box, scene.repeats, scene.floor, key, swarm.gauge())
+            leaving = Leaving(
+                scene.leaving, drawn.box, scene.repeats, scene.floor, key, swarm.gauge()
+            )
         progress = swarm.begin(
             scene.duration, max_steps=self.config.integrator.max_steps, leaving=leaving
         )
-        if left is None or not fits(left, progress.state(), swarm):
-            save(BODIES, bodies_part(swarm.bodies, drawn.flocs, box))
+        if left is None:
+            save(BODIES, bodies_part(swarm.bodies, drawn))
             seen = progress.swarm.motion.copy()
             bonds = bond_gauge.bonds(0.0, seen, gauge.neighbours(seen[:, :3]))
             save(moment_name(0), moment_part(scene, swarm, gauge, progress, bonds))
@@ -368,46 +363,24 @@ class SwarmStudy(StudyKind):
         return row, self.note(condition, replicate, why + ", ".join(map(str, failed)))
 
 
-def fits(state: Arrays, like: Arrays, swarm: Swarm) -> bool:
-    """Return True if a saved state has arrays like those of a swarm at its start, and contacts
-    between core points that its bodies have: the kernels trust them."""
-    for name, first in like.items():
-        found, start = state.get(name), 1 if name in ("links", "slips") else 0
-        if found is None or (found.dtype, found.shape[start:]) != (
-            first.dtype,
-            first.shape[start:],
-        ):
-            return False
-    if state["seen"].shape != like["motion"].shape or len(state["links"]) != len(state["slips"]):
-        return False
-    first = np.cumsum([0, *(len(body.shape.vertices) for body in swarm.bodies)])
-    owner = np.repeat(np.arange(len(swarm.bodies)), np.diff(first))
-    links = state["links"]
-    points = links[:, [AT_VERTEX, AT_EDGE]]
-    if np.any(points < 0) or np.any(points >= first[-1]):
-        return False
-    bodies = np.sort(links[:, [LATER_BODY, EARLIER_BODY]], axis=1)
-    return bool(np.all(np.sort(owner[points], axis=1) == bodies))
-
-
-def bodies_part(bodies: Sequence[Body], flocs: np.ndarray, box: tuple[float, float]) -> Arrays:
+def bodies_part(bodies: Sequence[Body], drawn: Drawn) -> Arrays:
     """Return what is the same at all times: the bodies, a wall the last of them, and the box."""
     shapes = [body.shape for body in bodies]
     tables = [table_of(shape.parts) for shape in shapes]
-    walls = len(shapes) - len(flocs)
+    walls = len(shapes) - len(drawn.flocs)
     counts = np.array([len(each.place) for each in tables])
     return {
         "r_eq": np.array([shape.equivalent_radius for shape in shapes]),
         "spheroradius": np.array([shape.radius for shape in shapes]),
         "mass": np.array([body.mass for body in bodies]),
-        "floc": np.append(flocs, np.full(walls, WALL)).astype(np.int32),
+        "floc": np.append(drawn.flocs, np.full(walls, WALL)).astype(np.int32),
         "first_point": np.cumsum(counts) - counts,
         "point_count": counts,
         "points": np.concatenate([each.place for each in tables]),
         "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
         "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
         "point_radius": np.concatenate([each.radius for each in tables]),
-        "box": np.array(box),
+        "box": np.array(drawn.box),
     }
 
 
@@ -515,37 +488,32 @@ BODY_BYTES = 8 * 6 + 4
 
 
 def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
-    """All that is known of a study before it is run."""
+    """Return all that is known of a study before it is run."""
     study = SwarmStudy(config)
     study.prepare()
-    scene = study.scene
-    swarm, drawn, (width, height) = study.swarm(0)
+    scene, (swarm, drawn), pair = study.scene, study.beginning, study.largest_pair()
     radii = 1e6 * np.array([shape.equivalent_radius for shape in drawn.shapes])
-    area = sum(shape.area for shape in drawn.shapes)
-    method, moments = config.integrator.method, len(study.stops)
-    pair = study.largest_pair()
-    largest = settled(pair, pair.bodies[0])
-    repeats = {"xy": "along x and y", "x": "along x", "none": "along no axis"}[scene.periodic]
-    size = config.replicates * moments * len(swarm.bodies) * BODY_BYTES
-    speed = ""
+    width, height = 1e6 * np.array(drawn.box)
+    area = 1e12 * sum(shape.area for shape in drawn.shapes)
+    largest, speed = settled(pair, pair.bodies[0]), ""
     if largest is not None:
         speed = (
             f", {1e3 * largest.speed:.4g} mm/s alone for the largest, of Re = "
             f"{largest.reynolds:.2g}, St = {largest.stokes:.2g}"
         )
-    sizes = "measured" if scene.is_measured else f"lognormal, ln r_eq of sd {scene.spread:g}"
+    size = config.replicates * study.pieces * len(swarm.bodies) * BODY_BYTES
     lines = [
         f"{config.replicates} swarms of {scene.number} bodies, N = {study.vertices}, seed "
         f"{config.seed}, on {ranks} rank{'s' * (ranks != 1)}, results in {config.output.file}",
-        f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, "
-        f"median {np.median(radii):.4g} ({sizes})",
-        f"  box {1e6 * width:.5g} x {1e6 * height:.5g} um, periodic {repeats}"
+        f"  r_eq {radii.min():.4g} to {radii.max():.4g} um, median {np.median(radii):.4g}",
+        f"  box {width:.5g} x {height:.5g} um, periodic: {scene.periodic}"
         f"{', with a floor' if scene.floor else ''}; bodies cover {area / (width * height):.4f}",
         f"  {scene.duration:g} s{speed}",
-        f"  {moments} snapshots, one every {scene.interval:g} s; a state to resume from every "
+        f"  {study.pieces} snapshots, one every {scene.interval:g} s; a state to resume from every "
         f"{duration(scene.checkpoint)}; results file about {size / 1e6:.3g} MB",
-        *([f"  {words}"] if (words := config.fluid.words) else []),
-        f"  integrator: {config.integrator.label}, tolerance {method.tolerance:g} m",
+        f"  {config.fluid.words}",
+        f"  integrator: {config.integrator.label}, tolerance "
+        f"{config.integrator.method.tolerance:g} m",
         "forces:",
         *(f"  {line}" for line in force_lines(pair)),
         "stiffness, of the two largest:",
@@ -553,7 +521,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *warning_lines(study.doubts()),
         "nothing was run (--dry-run)",
     ]
-    return "\n".join(lines)
+    return "\n".join(filter(str.strip, lines))
 
 
 KINDS = (SwarmStudy,)

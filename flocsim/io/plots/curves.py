@@ -268,7 +268,7 @@ def shares_opened(found: Strengths, type_place: int, vertices_place: int) -> tup
 
 def over_rate(found: Strengths) -> Figure:
     """A panel per type, a line per N, all displacements together."""
-    types, vertices = (found.conditions.axes[name].values for name in ("type", "vertices"))
+    types, vertices = found.table("type"), found.table("vertices")
     x_label = f"rate G of the {plain(found.about.get('flow'))} [1/s]"
     titles = style.type_titles(types)
     with panel_grid(titles, "share of bonds opened", 2.0, x_label) as (figure, panels, last):

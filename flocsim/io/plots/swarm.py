@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flocsim.geometry.shapes.cores import parts_in
+from flocsim.errors import FileError
+from flocsim.geometry.shapes.cores import PointTable, parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule, keep
@@ -22,7 +23,7 @@ from flocsim.io.plots.style import (
     save_gif,
     set_log_axis,
 )
-from flocsim.io.results.swarm_file import GONE, SwarmResults, mean, points_of
+from flocsim.io.results.swarm_file import GONE, POINTS, RINGS, SwarmResults, mean
 
 MICRO = 1e6
 MOST_POINTS = 160
@@ -181,8 +182,17 @@ def last_known(results: SwarmResults) -> int:
 
 
 def shape_of(results: SwarmResults, replicate: int, body: int) -> Shape:
-    """The shape of a body, made of what the file has of it."""
-    return shape_of_parts(parts_in(points_of(results.groups["bodies"], replicate, body)))
+    """The shape of a body, made of what the file has of it; FileError where that is none."""
+    bodies = results.groups["bodies"]
+    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
+    rows = slice(first, first + count)
+    table = PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
+    try:
+        return shape_of_parts(parts_in(table))
+    except ValueError as error:
+        raise FileError(
+            f"body {body} of swarm {replicate} is no readable shape: {error}"
+        ) from error
 
 
 def outlines_of(results: SwarmResults, replicate: int) -> list[list[np.ndarray]]:

@@ -11,18 +11,14 @@ there is so far. Here its tables are made of rows, too, and told.
 """
 
 import json
-import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep
-from flocsim.io.groups import FileFormat, Group, declared
+from flocsim.io.groups import FileFormat, Group, Stored, declared
 from flocsim.io.json_text import read_json
-from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
 from flocsim.io.terminal import aligned
 
@@ -72,59 +68,42 @@ GROUPS = {
     ),
     "conditions": Group.of(declared(COUNTS, AXES) | declared(RATE, (*AXES, "quantile")), SCALES),
 }
-STRENGTHS = FileFormat(
-    "flocsim strength", 2, "strengths of bonds", GROUPS, lengths={"quantile": len(QUANTILES)},
-    remedy="test the bonds again",
-)  # fmt: skip
 
 
 @attrs.frozen(eq=False)
-class Strengths(Tables):
-    """What `flocsim strength` has found: ``about``, how; the two groups of its file as Labelled."""
+class Strengths(Stored):
+    """What `flocsim strength` has found: the two groups of its file, and ``about``, how."""
 
-    about: dict[str, Any]
-    doublets: Labelled
-    conditions: Labelled
-    indices = STRENGTHS.indices
-    format = STRENGTHS.name
+    about: dict[str, Any] = attrs.field(init=False)
+
+    def __attrs_post_init__(self) -> None:
+        object.__setattr__(self, "about", read_json(self.attributes["about"], {}))
 
     @property
     def complete(self) -> bool:
-        """Whether all doublets that were asked for have been tested."""
+        """Return True if all doublets that were asked for have been tested."""
         return self.about.get("complete") is True
 
     @property
     def progress(self) -> str:
-        """How many doublets have been tested, in words."""
+        """Return how many doublets have been tested, in words."""
         return f"{len(self.column('status'))} doublets"
 
-    def labelled(self, group: str = "doublets") -> Labelled:
-        """The arrays of "doublets" or "conditions"; UsageError for another group."""
-        found: Labelled = getattr(self, self.known(group))
-        return found
-
     def column(self, name: str) -> np.ndarray:
-        """A column of the doublets (k,)."""
-        return self.doublets.columns[name].values
+        """Return a column of the doublets (k,)."""
+        return self.groups["doublets"][name]
 
     def table(self, name: str) -> np.ndarray:
-        """A column of the conditions (type, vertices, delta, …)."""
-        return self.conditions.columns[name].values
+        """Return a column of the conditions (type, vertices, delta, …)."""
+        return self.groups["conditions"][name]
 
 
-def write_strengths(path: str | Path, found: Strengths, rule: Rule = keep) -> None:
-    """Write the file, whole or not at all; FileError if that is impossible."""
-    groups = {"doublets": found.doublets, "conditions": found.conditions}
-    STRENGTHS.write(path, groups, attributes={"about": json.dumps(found.about)}, rule=rule)
-
-
-def read_strengths(path: str | os.PathLike) -> Strengths:
-    """Return the Strengths of a file; FileError for one that is absent, damaged, or of another
-    kind."""
-    with STRENGTHS.opened(path) as file:
-        stored = STRENGTHS.contents(file)
-        about = read_json(stored.attributes["about"], {})
-        return Strengths(about, stored.labelled("doublets"), stored.labelled("conditions"))
+STRENGTHS = FileFormat(
+    "flocsim strength", 2, "strengths of bonds", GROUPS, lengths={"quantile": len(QUANTILES)},
+    remedy="test the bonds again", view=Strengths,
+)  # fmt: skip
+read_strengths = STRENGTHS.read
+"""(path) → Strengths; FileError for a file that is absent, damaged or of another kind."""
 
 
 def quantiles_of(opens: np.ndarray, holding: int) -> np.ndarray:
@@ -150,23 +129,21 @@ def strengths_of(
     """
     status, opens = np.asarray(columns["status"]), np.asarray(columns["opens"])
     places = np.column_stack([columns[name] for name in AXES])
-    shape = bound.shape
-    counts = {name: np.zeros(shape, dtype=np.int64)
-              for name in ("n_tested", "n_opened", "n_holding", "n_failed")}  # fmt: skip
-    rate = np.full((*shape, len(QUANTILES)), np.nan)
+    found = {name: np.zeros(bound.shape, np.int64) for name in COUNTS} | {"n_bound": bound}
+    found["rate"] = np.full((*bound.shape, len(QUANTILES)), np.nan)
+    has_opened = np.isin(status, (OPENED, OPENS_AT_LEAST))
     for place in map(tuple, np.unique(places, axis=0).tolist()):
         rows = np.all(places == place, axis=1)
-        opened = rows & np.isin(status, (OPENED, OPENS_AT_LEAST))
-        holding = int(np.sum(rows & (status == HOLDS)))
-        counts["n_tested"][place], counts["n_opened"][place] = rows.sum(), opened.sum()
-        counts["n_holding"][place] = holding
-        counts["n_failed"][place] = np.sum(rows & (status == FAILED))
-        rate[place] = quantiles_of(opens[opened], holding)
+        opened, holding = rows & has_opened, int(np.sum(rows & (status == HOLDS)))
+        found["n_tested"][place], found["n_opened"][place] = rows.sum(), opened.sum()
+        found["n_holding"][place] = holding
+        found["n_failed"][place] = np.sum(rows & (status == FAILED))
+        found["rate"][place] = quantiles_of(opens[opened], holding)
     scales = dict(zip(AXES, axes, strict=True)) | {"quantile": QUANTILES}
-    return Strengths(
-        about, GROUPS["doublets"].labelled({"doublet": np.arange(len(status)), **columns}),
-        GROUPS["conditions"].labelled({**scales, "n_bound": bound, **counts, "rate": rate}),
-    )  # fmt: skip
+    made: Strengths = STRENGTHS.stored(
+        {"doublets": columns, "conditions": found}, scales, {}, {"about": json.dumps(about)}
+    )
+    return made
 
 
 def table_of(found: Strengths) -> str:
@@ -174,7 +151,7 @@ def table_of(found: Strengths) -> str:
     counts = ("n_bound", "n_tested", "n_opened")
     heads = ["type", "N", "delta", *(name.removeprefix("n_") for name in counts)]
     rows = [heads + [f"G {100.0 * each:g} %" for each in QUANTILES]]
-    axes = [found.conditions.axes[name].values.tolist() for name in AXES]
+    axes = [found.table(name).tolist() for name in AXES]
     for place in map(tuple, np.argwhere(found.table("n_bound"))):
         name, n, delta = (values[each] for values, each in zip(axes, place, strict=True))
         rates = [f"{each:.4g}" for each in found.table("rate")[place]]

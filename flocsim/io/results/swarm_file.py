@@ -10,18 +10,9 @@
 - ``run``        scalars: config text, versions, machine
 """
 
-import os
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
-import attrs
 import numpy as np
 
-from flocsim.geometry.shapes.cores import PointTable, parts_in
-from flocsim.io.files import Rule, keep
-from flocsim.io.groups import FileFormat, Group, declared
-from flocsim.io.labelled import Labelled, Tables
+from flocsim.io.groups import FileFormat, Group, Stored, declared
 from flocsim.io.terminal import aligned
 
 WALL = -2
@@ -170,30 +161,22 @@ GROUPS = {
     "events": Group.of(declared(EVENTS, ("event",), low=0, along=PLACES), SCALES),
     "ends": Group.of(declared(ENDS, ("replicate",), low=0), SCALES),
 }  # fmt: skip
-SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS)
-FORMAT = SWARMS.name
 
 
-@attrs.frozen(eq=False)
-class SwarmResults(Tables):
+class SwarmResults(Stored):
     """What a swarm study has found: ``scales`` {axis: values}, ``groups`` {group: {column: array}}
     as in GROUPS, ``run`` scalars."""
 
-    scales: dict[str, np.ndarray]
-    groups: dict[str, dict[str, np.ndarray]]
-    run: dict[str, Any]
-    indices = SWARMS.indices
     exported = ("counts", "clusters", "events")
-    format = FORMAT
 
     def __repr__(self) -> str:
         shape = self.groups["snapshots"]["cluster"].shape
         return f"SwarmResults({shape[0]} replicates × {shape[1]} times × {shape[2]} bodies)"
 
-    def labelled(self, group: str = "counts") -> Labelled:
-        """Return a group's arrays with their axes; UsageError for an unknown one."""
-        name = self.known(group)
-        return GROUPS[name].labelled({**self.scales, **self.groups[name]})
+
+SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS, view=SwarmResults)
+read_swarm = SWARMS.read
+"""(path) → SwarmResults; FileError for a file that is absent, damaged or of another kind."""
 
 
 def mean(values: np.ndarray) -> np.ndarray:
@@ -201,26 +184,6 @@ def mean(values: np.ndarray) -> np.ndarray:
     known = np.isfinite(values)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
-
-
-def write_swarm(path: str | Path, results: SwarmResults, rule: Rule = keep) -> None:
-    """Write the file, whole or not at all; FileError if that is impossible."""
-    groups = {name: results.labelled(name) for name in GROUPS}
-    SWARMS.write(path, groups, results.run, rule=rule)
-
-
-def read_swarm(path: str | os.PathLike) -> SwarmResults:
-    """Return the SwarmResults in a file; FileError for one that is absent, damaged, of another
-    kind or version."""
-    with SWARMS.opened(path) as file:
-        stored = SWARMS.contents(file)
-        bodies = stored.groups["bodies"]
-        for replicate, body in np.ndindex(*bodies["first_point"].shape):
-            parts_in(points_of(bodies, replicate, body))
-    scales: dict[str, np.ndarray] = {}
-    for name, group in GROUPS.items():
-        scales |= {axis: stored.groups[name].pop(axis) for axis in group.scales}
-    return SwarmResults(scales, stored.groups, stored.run)
 
 
 def events_of(labels: np.ndarray) -> dict[str, np.ndarray]:
@@ -268,13 +231,6 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
             found = len(sizes[0]), len(sizes[1]), inside.sum(), parts[0], parts[1]
             events.append(tuple(map(int, found)))
     return events
-
-
-def points_of(bodies: Mapping[str, np.ndarray], replicate: int, body: int) -> PointTable:
-    """Return the core points of a body."""
-    first, count = (int(bodies[name][replicate, body]) for name in ("first_point", "point_count"))
-    rows = slice(first, first + count)
-    return PointTable(*(bodies[name][replicate, rows] for name in (*POINTS, *RINGS)))
 
 
 def table_of(results: SwarmResults) -> str:

@@ -22,7 +22,6 @@ from flocsim.io.results.strength_file import (
     quantiles_of,
     read_strengths,
     table_of,
-    write_strengths,
 )
 from tests.helpers.small_rates import AXES, mixed
 from tests.helpers.small_study import small_config
@@ -147,19 +146,17 @@ def test_counts_of_a_condition():
 
 def test_the_file_comes_back(tmp_path):
     found, path = mixed(), tmp_path / "s.h5"
-    write_strengths(path, found)
+    found.write(path)
     back = read_strengths(path)
     assert back.about == found.about
     for group in ("doublets", "conditions"):
-        one, other = getattr(found, group), getattr(back, group)
-        for name, column in one.columns.items():
-            np.testing.assert_array_equal(column.values, other.columns[name].values)
-            assert column.values.dtype == other.columns[name].values.dtype
-    assert back.conditions.axes["quantile"].values.tolist() == list(QUANTILES)
+        for name, values in found.groups[group].items():
+            np.testing.assert_array_equal(values, back.groups[group][name])
+    assert back.table("quantile").tolist() == list(QUANTILES)
 
 
 def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
-    write_strengths(tmp_path / "s.h5", mixed(complete=False))
+    mixed(complete=False).write(tmp_path / "s.h5")
     back = read_strengths(tmp_path / "s.h5")
     assert not back.complete and mixed().complete
     assert plot.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 doublets"
@@ -170,15 +167,15 @@ def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
 
 def test_a_damaged_or_strange_file_is_refused(tmp_path):
     path = tmp_path / "s.h5"
-    write_strengths(path, mixed())
+    mixed().write(path)
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
     with pytest.raises(FileError):
         read_strengths(path)
     wrong = mixed()
-    wrong.doublets.columns["type"].values[0] = 7
-    write_strengths(tmp_path / "t.h5", wrong)
+    wrong.column("type")[0] = 7
+    wrong.write(tmp_path / "t.h5")
     with pytest.raises(FileError, match="doublets/type has impossible values"):
         read_strengths(tmp_path / "t.h5")
 
@@ -208,8 +205,8 @@ def command(fake, tmp_path, monkeypatch):
 def same(one, other):
     """Whether two surveys have found the same of the same."""
     for group in ("doublets", "conditions"):
-        for name, column in getattr(one, group).columns.items():
-            np.testing.assert_array_equal(column.values, getattr(other, group).columns[name].values)
+        for name, values in one.groups[group].items():
+            np.testing.assert_array_equal(values, other.groups[group][name])
     known = [{k: v for k, v in each.about.items() if k != "date"} for each in (one, other)]
     assert known[0] == known[1]
     return True

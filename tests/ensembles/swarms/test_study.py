@@ -30,7 +30,8 @@ def test_a_replicate_follows_from_seed_and_number_alone(tmp_path):
 
 
 def test_bodies_cover_the_share_that_is_asked_for_and_settle(tmp_path):
-    swarm, drawn, (width, height) = study(tmp_path, {"scene": {"aspect": 2.0}}).swarm(0)
+    swarm, drawn = study(tmp_path, {"scene": {"aspect": 2.0}}).swarm(0)
+    width, height = drawn.box
     area = sum(math.pi * body.shape.radius**2 for body in swarm.bodies)
     assert area / (width * height) == pytest.approx(0.2, rel=1e-12)
     assert height == pytest.approx(2.0 * width) and swarm.box == (width, height)
@@ -62,13 +63,13 @@ def inside(x):
 def test_measured_flocs_keep_their_sizes(tmp_path):
     write_star_library(tmp_path / "stars.h5", ratios=(3.0, 5.0, 8.0))
     made = study(tmp_path, text=MEASURED)
-    swarm, drawn, _ = made.swarm(0)
+    swarm, drawn = made.swarm(0)
     radii = [body.shape.equivalent_radius for body in swarm.bodies]
     sizes = [made.flocs[each].size for each in drawn.flocs]
     np.testing.assert_allclose(radii, sizes, rtol=1e-12)
     assert len(set(drawn.flocs.tolist())) == 3
     few = study(tmp_path, {"scene": {"max_radius": "6 um"}}, MEASURED)
-    assert max(few.drawn(0)[0].flocs) < 2
+    assert max(few.drawn(0).flocs) < 2
     with pytest.raises(ConfigError, match="leave no floc"):
         study(tmp_path, {"scene": {"min_radius": "1 mm"}}, MEASURED)
 
@@ -76,15 +77,15 @@ def test_measured_flocs_keep_their_sizes(tmp_path):
 def test_larger_flocs_are_drawn_more_often_by_volume(tmp_path):
     write_star_library(tmp_path / "stars.h5", ratios=(3.0, 6.0))
     made = study(tmp_path, {"scene": {"weight": "volume", "number": 4000}}, MEASURED)
-    share = np.mean(made.drawn(0)[0].flocs == 1)
+    share = np.mean(made.drawn(0).flocs == 1)
     assert share == pytest.approx(8.0 / 9.0, abs=0.02)
 
 
 def test_a_floor_lies_below_the_box(tmp_path):
     scene = {"periodic": "x", "floor": True}
-    swarm, drawn, (width, _) = study(tmp_path, {"scene": scene}).swarm(0)
+    swarm, drawn = study(tmp_path, {"scene": scene}).swarm(0)
     assert swarm.bodies[-1].fixed and len(swarm.bodies) == len(drawn.flocs) + 1
-    assert swarm.box == (width, math.inf)
+    assert swarm.box == (drawn.box[0], math.inf)
     assert all(body.position[1] > body.shape.bounding_radius for body in swarm.bodies[:-1])
 
 
@@ -103,7 +104,7 @@ def test_a_replicate_whose_bodies_find_no_place_is_a_failed_one(tmp_path):
     """In a box given by its sides, where one replicate has drawn too much for it."""
     sides = {"box": ["85 um", "85 um"], "spread": 0.6, "number": 12}
     found = study(tmp_path, {"scene": sides, "replicates": 30}, without("area_fraction"))
-    drawn = [found.drawn(replicate)[0].shapes for replicate in range(30)]
+    drawn = [found.drawn(replicate).shapes for replicate in range(30)]
     least = np.array([6.0 * max(shape.radius for shape in shapes) for shapes in drawn])
     faults = np.flatnonzero(least > 85e-6)
     assert len(faults) and faults[0] > 0, "else this shows nothing"
@@ -117,13 +118,13 @@ def test_a_replicate_whose_bodies_find_no_place_is_a_failed_one(tmp_path):
 
 def test_the_first_replicate_is_drawn_once_before_it_is_run(tmp_path, monkeypatch):
     """Resizing thousands of flocs takes longer than the start of the run."""
-    drawn, draw = [], SwarmStudy.draw
-    monkeypatch.setattr(SwarmStudy, "draw", lambda self, rng: drawn.append(1) or draw(self, rng))
+    drawn, draw = [], SwarmStudy.drawn
+    monkeypatch.setattr(SwarmStudy, "drawn", lambda self, k: drawn.append(k) or draw(self, k))
     config = swarm_config(
         tmp_path, {"replicates": 1, "scene": {"duration": "0.1 ms", "every": "0.1 ms"}}
     )
     run(config)
-    assert len(drawn) == 1
+    assert drawn == [0]
 
 
 def without(key):
@@ -133,8 +134,8 @@ def without(key):
 
 def test_bodies_begin_at_the_flow_of_their_places(tmp_path):
     shear = {"scene": {"periodic": "x"}, "fluid": {"gradient": [0.0, 3.0, 0.0, 0.0]}}
-    sheared, _, _ = study(tmp_path, shear).swarm(0)
-    still, _, _ = study(tmp_path, {"scene": {"periodic": "x"}}).swarm(0)
+    sheared, _ = study(tmp_path, shear).swarm(0)
+    still, _ = study(tmp_path, {"scene": {"periodic": "x"}}).swarm(0)
     for one, other in zip(sheared.bodies, still.bodies, strict=True):
         assert one.velocity[0] == pytest.approx(3.0 * one.position[1], rel=1e-9)
         assert one.velocity[1] == pytest.approx(other.velocity[1], rel=1e-9)

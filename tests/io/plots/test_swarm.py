@@ -8,7 +8,7 @@ from flocsim.errors import FileError
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.plots.style import new_figure
 from flocsim.io.plots.swarm import SWARM_FIGURES, draw_bodies, last_known, outlines_of, shape_of
-from flocsim.io.results.swarm_file import GONE, read_swarm, write_swarm
+from flocsim.io.results.swarm_file import GONE, read_swarm
 from tests.helpers.compound_shapes import beads, framed
 from tests.helpers.swarm_study import make_swarm_results
 
@@ -30,12 +30,12 @@ def compound_results():
         "spheroradius": np.array([SHAPES[k % 2].radius for k in range(4)]),
     }  # fmt: skip
     bodies |= {name: np.array([column] * 2) for name, column in columns.items()}
-    scales = results.scales | {"point": np.arange(sum(counts))}
-    return attrs.evolve(results, groups=results.groups | {"bodies": bodies}, scales=scales)
+    bodies["point"] = np.arange(sum(counts))
+    return attrs.evolve(results, groups=results.groups | {"bodies": bodies})
 
 
 def test_shapes_come_back_from_the_file(tmp_path):
-    write_swarm(tmp_path / "s.h5", compound_results())
+    compound_results().write(tmp_path / "s.h5")
     results = read_swarm(tmp_path / "s.h5")
     for body in range(4):
         shape = shape_of(results, 1, body)
@@ -44,19 +44,18 @@ def test_shapes_come_back_from_the_file(tmp_path):
     assert [len(rings) for rings in outlines_of(results, 0)][:1] == [2]
 
 
-def test_parts_that_cannot_be_are_refused(tmp_path):
+def test_parts_that_cannot_be_are_refused():
     results = compound_results()
     results.groups["bodies"]["point_ring"][1, 5] = 7
-    write_swarm(tmp_path / "s.h5", results)
-    with pytest.raises(FileError, match="has no readable results"):
-        read_swarm(tmp_path / "s.h5")
+    with pytest.raises(FileError, match="body 0 of swarm 1 is no readable shape"):
+        outlines_of(results, 1)
 
 
 def test_bonds_of_bodies_that_are_not_there_are_refused(tmp_path):
     for name in ("bond_later", "bond_time"):
         results = make_swarm_results()
         results.groups["bonds"][name] = np.array([0, 9], "i4")
-        write_swarm(tmp_path / f"{name}.h5", results)
+        results.write(tmp_path / f"{name}.h5")
         with pytest.raises(FileError, match=f"bonds/{name} has impossible values"):
             read_swarm(tmp_path / f"{name}.h5")
 
