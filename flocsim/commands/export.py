@@ -15,6 +15,7 @@ from flocsim.errors import UsageError
 from flocsim.io.files import unfinished, write_file
 from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.results import kernel_tables
+from flocsim.io.results.file import read_results
 from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
@@ -81,7 +82,7 @@ def export_motion(args: argparse.Namespace) -> int:
 def export_tables(args: argparse.Namespace) -> int:
     """Write tables of a file of any kind as CSV."""
     kind = file_kind(source := held(args.source))
-    tables = (kind.opened or kind.read)(source)
+    tables = kind.opened(source)
     names = [tables.known(args.table)] if args.table else tables.exported or list(tables.indices)
     found = {f"{Path(args.source).stem}-{name}.csv": name for name in names}
     if args.output:
@@ -116,8 +117,8 @@ def water_factors(path: Any, allowed: Any) -> dict[str, np.ndarray]:
 
 def export_matrices(args: argparse.Namespace) -> int:
     """Write a matrix for each mechanism, that the model and the factor have, and N."""
-    kind = file_kind(source := held(args.source), "rates")
-    kernel, rule = kind.rates(kind.read(source)), data_rule(args.overwrite)
+    kernel = read_results(args.source, replicates=False).kernel
+    rule = data_rule(args.overwrite)
     if kernel is None:
         raise UsageError(
             f"{args.source} is not from a kernel study and has no rates: run flocsim kernel with a "

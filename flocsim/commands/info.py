@@ -44,8 +44,8 @@ def run(args: argparse.Namespace) -> int:
         source = held(args.results)
         print("\n".join(file_kind(source, "water").water(source, allowed_by(args))))
     elif args.config or args.modules:
-        kind = file_kind(source := held(args.results), "run")
-        print_inputs(args, kind.run(kind.read(source)))
+        kind = file_kind(source := held(args.results))
+        print_inputs(args, getattr(kind.read(source), "run", {}))
     else:
         print(text_of(args.results))
     return 0

@@ -31,10 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --figures LIST: figures, separated by commas (default: all that the file has)
     --animation FILE.gif: for a swarm study: also write its first swarm as an animation
     """
-    drawn = {words: figures for name in FILES for words, figures in contents_of(name).drawn.items()}
+    kinds = map(contents_of, FILES)
     parser.description = "\n".join([
         "Draw the figures of a file, each to its own file.",
-        *(f"Of {words}:\n{listed(figures)}" for words, figures in drawn.items()),
+        *(f"Of {kind.title}:\n{listed(kind.figures())}" for kind in kinds),
         "Of a running study, the figures of the replicates so far are drawn, marked as unfinished.",
         "Figures are numbered as in Tang et al. (2014).",
     ])  # fmt: skip
@@ -65,9 +65,9 @@ def run(args: argparse.Namespace) -> int:
     }
     animation = animation_of(args, kind)
     check_outputs([Output(path, rule) for path in (*paths.values(), *animation)], [args.results])
-    if kind.rows_drawn & paths.keys() and not remark:
+    if not remark:
         most = MOST_ROWS if args.figures is None else math.inf
-        content = kind.with_rows(source, content, most)
+        content = kind.with_rows(source, content, names, most)
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.ensembles.contents import Contents, Example, Table, overview_of, summary_of
+from flocsim.ensembles.contents import Contents, Example, Table, file_kind, summary_of
 from flocsim.errors import UsageError, visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import Output, check_outputs, data_rule
@@ -86,9 +86,10 @@ def run(args: argparse.Namespace) -> int:
     rule = data_rule(args.overwrite)
     check_outputs([Output(path, rule)], [args.results])
     source = held(args.results)
-    kind, found = overview_of(source)
+    kind = file_kind(source)
+    found = kind.read(source)
     examples = [] if args.no_motion else kind.examples(source, allowed_by(args))
-    found = kind.with_rows(source, found, MOST_ROWS)
+    found = kind.with_rows(source, found, kind.figures(found), MOST_ROWS)
     write_file(path, report_page(str(args.results), kind, found, examples).encode(), rule)
     for example in examples:
         if example.reason:
@@ -106,14 +107,13 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
     # Outcomes and the figure of everything come first.
     figures, first = kind.figures(found), ("outcomes", "overview")
     names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
-    tables = kind.tables(found) or filter(None, [kind.table(found)])
-    config = str(kind.run(found).get("config", "")) if kind.run else ""
+    config = str(getattr(found, "run", {}).get("config", ""))
     motions = "\n".join(map(motion_of, examples))
     sections = {
         "Study and results": facts_of(about.facts),
         "Warnings": list_of(about.warnings, "warnings") + list_of(failed, "failed"),
         "Figures": "\n".join(figure_of(name, figures[name], found, source) for name in names),
-        "Numbers": "\n".join(map(numbers_of, tables)),
+        "Numbers": "\n".join(map(numbers_of, kind.tables(found))),
         "In motion": motions and f"{IN_MOTION}<div class='motions'>{motions}</div>",
         "Origin": (facts_of(about.origin) if about.origin else "")
         + (f"<h3>Config</h3>{verbatim(config)}" if config else ""),

@@ -14,7 +14,7 @@ import attrs
 
 from flocsim import commands
 from flocsim.commands import add_overwrite
-from flocsim.ensembles.contents import Contents, Summary
+from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import prism_drag
 from flocsim.io.arguments import document, number
@@ -233,40 +233,6 @@ class Library(Tables):
         return labelled_flocs(self.entries)
 
 
-def read(path: str | os.PathLike) -> Library:
-    """Return all that a library holds."""
-    return Library(read_library(path), read_settings(path))
-
-
-def summary(found: Library) -> Summary:
-    """Return how many flocs of how many pictures, their sizes, and how they were fitted."""
-    images = {entry.image for entry in found.entries}
-    sizes = [MICRO * entry.measured_radius for entry in found.entries]
-    banded = all(entry.is_banded for entry in found.entries)
-    return Summary([
-        ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
-        ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
-        *([("outlines", "as cut, and at both ends of their bands (--band)")] if banded else []),
-        *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
-    ])  # fmt: skip
-
-
-def water(path: str | os.PathLike, allowed: object = None) -> list[str]:
-    """Return lines on what slow flow makes of the flocs of a library."""
-    rows = [["floc", "sinks", "at least", "turns", "B", "+- %"]]
-    for entry in read_library(path):
-        drag = prism_drag(entry.fits[max(entry.fits)].shape.outline())
-        numbers = (*drag.mobility, drag.turning, drag.elongation)
-        words = [*(f"{each:.3f}" for each in numbers), f"{100.0 * drag.error:.1f}"]
-        rows.append([entry.floc_id, *words])
-    heading = (
-        f"prisms of {len(rows) - 1} outlines, 4/3 r_eq deep: largest and least settling speed, and "
-        "rate of turning, over those of the equivalent spheres; B, the response to strain, over "
-        "that of a line"
-    )
-    return [heading, *aligned(rows)]
-
-
 def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
     """Return a figure of flocs as one of a Library."""
     return wraps(draw)(lambda found: draw(found.entries))
@@ -274,16 +240,55 @@ def of_entries(draw: Callable[[Any], Figure]) -> Callable[[Library], Figure]:
 
 FIGURES = {name: of_entries(draw) for name, draw in POPULATION_FIGURES.items()}
 
-LIBRARY = Contents(
-    title="a shape library",
-    read=read,
-    summary=summary,
-    table=lambda found: format_errors(found.entries),
-    figures=lambda found: FIGURES,
-    source=lambda found: (
-        f"{plural(len(found.entries), 'floc')} of "
-        f"{plural(len({each.image for each in found.entries}), 'picture')}"
-    ),
-    drawn={"a shape library written by flocsim fit": FIGURES},
-    water=water,
-)
+
+class LibraryFiles(Contents):
+    """What commands show of a shape library."""
+
+    title = "a shape library"
+
+    def read(self, path: str | os.PathLike) -> Library:
+        """Return all that a library holds."""
+        return Library(read_library(path), read_settings(path))
+
+    def summary(self, found: Library) -> Summary:
+        """Return how many flocs of how many pictures, their sizes, and how they were fitted."""
+        images = {entry.image for entry in found.entries}
+        sizes = [MICRO * entry.measured_radius for entry in found.entries]
+        banded = all(entry.is_banded for entry in found.entries)
+        return Summary([
+            ("shapes", f"{len(found.entries)} of {len(images)} pictures"),
+            ("r_eq", f"{min(sizes):.3g} to {max(sizes):.3g} µm"),
+            *([("outlines", "as cut, and at both ends of their bands (--band)")] if banded else []),
+            *((name.replace("_", " "), str(value)) for name, value in found.settings.items()),
+        ])  # fmt: skip
+
+    def water(self, path: str | os.PathLike, allowed: object = None) -> list[str]:
+        """Return lines on what slow flow makes of the flocs of a library."""
+        rows = [["floc", "sinks", "at least", "turns", "B", "+- %"]]
+        for entry in read_library(path):
+            drag = prism_drag(entry.fits[max(entry.fits)].shape.outline())
+            numbers = (*drag.mobility, drag.turning, drag.elongation)
+            words = [*(f"{each:.3f}" for each in numbers), f"{100.0 * drag.error:.1f}"]
+            rows.append([entry.floc_id, *words])
+        heading = (
+            f"prisms of {len(rows) - 1} outlines, 4/3 r_eq deep: largest and least settling speed, "
+            "and rate of turning, over those of the equivalent spheres; B, the response to strain, "
+            "over that of a line"
+        )
+        return [heading, *aligned(rows)]
+
+    def table(self, found: Library) -> str:
+        """Return the errors of the fits."""
+        return format_errors(found.entries)
+
+    def figures(self, found: Library | None = None) -> Figures:
+        """Return the figures of a population."""
+        return FIGURES
+
+    def source(self, found: Library) -> str:
+        """Return of how many flocs and pictures it is."""
+        images = {each.image for each in found.entries}
+        return f"{plural(len(found.entries), 'floc')} of {plural(len(images), 'picture')}"
+
+
+LIBRARY = LibraryFiles()

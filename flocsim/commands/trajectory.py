@@ -119,28 +119,6 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def summary_of_motion(found: StoredTrajectory) -> Summary:
-    """What a trajectory file holds."""
-    moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
-    facts = [
-        ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
-        *((f"body {number}", f"N = {len(shape.vertices)}, r_eq {1e6 * shape.equivalent_radius:.4g} "
-           f"µm, moved {1e6 * way:.4g} µm")
-          for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
-    ]  # fmt: skip
-    if len(found.shapes) == 2:
-        apart = 1e6 * centre_distance(found.position)
-        facts.append(
-            ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
-             f"{apart[-1]:.4g} at last")
-        )  # fmt: skip
-    for name, value in found.facts.items():
-        if name not in ("config", *SOURCE):
-            told = f"{value:.6g}" if isinstance(value, float) else str(value)
-            facts.append((name.replace("_", " "), told))
-    return Summary(facts)
-
-
 def strip(trajectory: Any, figure: str = "strip") -> Any:
     """Frames of the motion, evenly along the way of the bodies against each other."""
     return drawn(trajectory, figure, STRIP_FRAMES)
@@ -153,13 +131,46 @@ def distance(trajectory: Any) -> Any:
 
 MOTION_FIGURES: Figures = {"strip": strip, "distance": distance}
 
-TRAJECTORY = Contents(
-    title="a trajectory",
-    read=read_trajectory,
-    summary=summary_of_motion,
-    table=lambda found: "",
-    figures=lambda found: MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip},
-    drawn={"a trajectory file (flocsim trajectory --save, Trajectory.save)": MOTION_FIGURES},
-    source=lambda found: source_line(found.facts),
-    motion=lambda found: (found.t, found.position, found.velocity, found.shapes),
-)
+
+class TrajectoryFiles(Contents):
+    """What commands show of a stored motion."""
+
+    title = "a trajectory"
+    read = staticmethod(read_trajectory)
+
+    def summary(self, found: StoredTrajectory) -> Summary:
+        """Return what a trajectory file holds."""
+        moved = np.hypot(*np.moveaxis(np.diff(found.position[:, :, :2], axis=0), 2, 0)).sum(axis=0)
+        facts = [
+            ("time", f"{found.t[0]:.6g} to {found.t[-1]:.6g} s, {len(found.t)} states"),
+            *((f"body {number}", f"N = {len(shape.vertices)}, r_eq "
+               f"{1e6 * shape.equivalent_radius:.4g} µm, moved {1e6 * way:.4g} µm")
+              for number, (shape, way) in enumerate(zip(found.shapes, moved, strict=True))),
+        ]  # fmt: skip
+        if len(found.shapes) == 2:
+            apart = 1e6 * centre_distance(found.position)
+            facts.append(
+                ("centre distance", f"{apart[0]:.4g} µm at first, {apart.min():.4g} at least, "
+                 f"{apart[-1]:.4g} at last")
+            )  # fmt: skip
+        for name, value in found.facts.items():
+            if name not in ("config", *SOURCE):
+                told = f"{value:.6g}" if isinstance(value, float) else str(value)
+                facts.append((name.replace("_", " "), told))
+        return Summary(facts)
+
+    def figures(self, found: StoredTrajectory | None = None) -> Figures:
+        """Return the figures of a motion: distances are those of two bodies."""
+        two = found is None or len(found.shapes) == 2
+        return MOTION_FIGURES if two else {"strip": strip}
+
+    def source(self, found: StoredTrajectory) -> str:
+        """Return of which flocs, preset and version it is."""
+        return source_line(found.facts)
+
+    def motion(self, found: StoredTrajectory) -> tuple:
+        """Return (times, positions, velocities, shapes)."""
+        return found.t, found.position, found.velocity, found.shapes
+
+
+TRAJECTORY = TrajectoryFiles()

@@ -197,7 +197,7 @@ def study(config: Any, comm: Communicator, options: Options) -> int:
     shown = contents_of(kind_of(config).format)
     found, seconds = ended.results, ended.wall_time
     if not options.quiet:
-        tell((shown.told or shown.table)(found))
+        tell(shown.told(found))
         tell(shown.source(found))
         tell(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip

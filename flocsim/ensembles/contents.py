@@ -9,7 +9,7 @@ kind differ in, and Differences what comparisons of all kinds have in common.
 import importlib
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -20,7 +20,6 @@ from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import UNREADABLE, Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.plots.style import Figure
 from flocsim.io.results.run_group import describe_kind, source_line, stored
 from flocsim.io.seals import held
 from flocsim.io.terminal import aligned
@@ -28,8 +27,9 @@ from flocsim.io.terminal import aligned
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
 
-Figures = Mapping[str, Callable[..., Figure]]
-"""{name: function}, the first line of whose docstring is its help."""
+Figures = Mapping[str, Callable[..., Any]]
+"""{name: function that returns a matplotlib Figure}, the first line of whose docstring is its
+help."""
 
 SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history", "cpus",
               "warnings", "modules")  # fmt: skip
@@ -81,7 +81,7 @@ class Joined:
 
     groups: Mapping[str, Group]
     rows: Callable[[Any], list[tuple[str, ...]]]
-    figures: Figures
+    figures: Callable[[], Figures]
     asked: Callable[[Any], dict]
     """(results) → the axes and the number of replicates, as StudyKind.asked has them."""
     axes: Mapping[str, int] = attrs.Factory(dict)
@@ -89,75 +89,79 @@ class Joined:
     below: Callable[[Any], list[str]] = lambda swept: []
 
 
-def later(module: str, name: str) -> Callable[..., Any]:
-    """A function of a module of flocsim that is loaded when it is called: what shows a file has no
-    need of the engine."""
-    return lambda *args, **more: getattr(importlib.import_module(f"flocsim.{module}"), name)(
-        *args, **more
+def later(module: str, name: str) -> Any:
+    """Return a function of a module of flocsim that is loaded when it is called, as a static
+    method: what shows a file has no need of the engine."""
+    return staticmethod(
+        lambda *args: getattr(importlib.import_module(f"flocsim.{module}"), name)(*args)
     )
 
 
-def title_of(config: Any) -> str:
-    """Return what a study of a config would do, in a few words."""
-    from flocsim.ensembles.kind import study_of  # which needs the engine
-
-    return str(study_of(config, []).title)
-
-
-@attrs.frozen(eq=False, kw_only=True)
 class Contents:
-    """What the commands ask of a kind of file; ``found`` is what `read` gives."""
+    """What the commands ask of a kind of file; ``found`` is what `read` gives.
+
+    A subclass gives ``title``, what such a file holds in words, `read` and `summary`. All else has
+    a default, and an ability that is None is refused in one line.
+    """
 
     title: str
-    """What a file holds, in words."""
-    read: Callable[[Any], Any]
-    """(path) → found; FileError for a file that is absent, damaged, or of another kind."""
-    summary: Callable[[Any], Summary]
-    """(found) → what it says of itself; ValueError where that cannot be read."""
-    table: Callable[[Any], str]
-    """(found) → its numbers as text."""
-    figures: Callable[[Any], Figures]
-    """(found) → the figures that it has."""
-    source: Callable[[Any], str] = lambda found: source_line(found.run)
-    """(found) → which flocs, preset and version it is of, in a line."""
-    drawn: Mapping[str, Figures]
-    """{what has them, in words: all figures}."""
-    told: Callable[[Any], str] | None = None
-    """(found) → what is printed where a study has been run, instead of the table."""
-    overview: Callable[[Any], Any] | None = None
-    """(path) → found, with what only `summary` needs."""
-    with_rows: Callable[[Any, Any, float], Any] = lambda path, found, most: found
-    """(path, found, most) → found with its single replicates, unless these are more."""
-    rows_drawn: Collection[str] = ()
-    """Names of figures that draw single replicates."""
-    tables: Callable[[Any], list[Table | str]] = lambda found: []
-    """(found) → the tables and texts of its page, in the place of the table as text."""
-    examples: Callable[[Any, Allowed], list[Example]] = lambda path, allowed: []
-    """(path, allowed modules) → replicates that are worth watching."""
-    mark: Callable[[Any], str] = lambda found: ""
-    """(found) → what each figure has to say, as that it is not complete."""
-    opened: Any = None
-    """(path, allowed modules) → what a script has of it; its ``format`` is that of the file."""
-    compare: Any = None
-    """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
-    compared: Mapping[str, str] = attrs.Factory(dict)
+    compared: Mapping[str, str] = {}
     """{name: words} of what can be compared."""
     joined: Joined | None = None
     """What sweeps join; None where they cannot be run."""
+    compare: Any = None
+    """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
     """(path, found, rule) writes a GIF."""
     motion: Any = None
     """(found) → (times, positions, velocities, shapes)."""
-    rates: Any = None
-    """(found) → Kernel; None where it has none."""
     water: Any = None
     """(path, allowed modules) → lines on what slow flow makes of it."""
-    run: Any = None
-    """(found) → scalars of the group ``run``."""
-    running: Any = None
-    """(Unfinished) → facts of a study that has not ended."""
 
-    # What rank 0 asks of a kind of study; the functions may need the engine.
+    def read(self, path: Any) -> Any:
+        """Return what a file holds; FileError for one that is absent, damaged, or of another
+        kind."""
+        raise NotImplementedError
+
+    def summary(self, found: Any) -> Summary:
+        """Return what a file says of itself; ValueError where that cannot be read."""
+        raise NotImplementedError
+
+    def table(self, found: Any) -> str:
+        """Return its numbers as text."""
+        return ""
+
+    def tables(self, found: Any) -> list[Table | str]:
+        """Return the tables and texts of its page."""
+        return list(filter(None, [self.table(found)]))
+
+    def figures(self, found: Any = None) -> Figures:
+        """Return the figures that a file has; without one, those of all files of the kind."""
+        return {}
+
+    def source(self, found: Any) -> str:
+        """Return of which flocs, preset and version it is, in a line."""
+        return source_line(found.run)
+
+    def mark(self, found: Any) -> str:
+        """Return what each figure has to say, as that it is not complete; "" for nothing."""
+        return ""
+
+    def with_rows(self, path: Any, found: Any, figures: Iterable[str], most: float) -> Any:
+        """Return ``found`` with its single replicates, if these figures draw them and there are no
+        more than ``most``."""
+        return found
+
+    def opened(self, path: Any, allowed: Allowed | None = None) -> Any:
+        """Return what a script has of it; ``allowed``: modules that may be imported."""
+        return self.read(path)
+
+    def examples(self, path: Any, allowed: Allowed) -> list[Example]:
+        """Return replicates that are worth watching."""
+        return []
+
+    # What rank 0 asks of a kind of study.
+
     results: Any = None
     """(study, beginning, count, run, output or None, whether all rows are to be in memory) →
     results of so many replicates of each condition, written to the output."""
@@ -166,14 +170,32 @@ class Contents:
     so_far: Any = None
     """(store, what the study's session asked for) → (results so far, how many of those that
     progress counts are there, and of how many)."""
-    facts: Callable[[Any], dict[str, Any]] = lambda study: {}
-    """(study) → what the results say of it besides their tables, as JSON can hold it."""
-    verdict: Callable[[Any], tuple[int, str]] = lambda found: (0, "")
-    """(results) → (exit code, what to say of replicates without an outcome; "" for nothing)."""
-    stop_rule: Callable[[Any, Any], Callable[[int], bool]] = lambda study, store: lambda n: False
-    """(study, store) → whether so many replicates of each condition are enough."""
-    dry_run: Callable[[Any, int, bool], str] = lambda config, *_: title_of(config)
-    """(config, ranks, with a pilot) → what a study would do."""
+
+    def running(self, found: Any) -> Facts:
+        """Return facts of an Unfinished, a study that has not ended."""
+        return []
+
+    def facts(self, study: Any) -> dict[str, Any]:
+        """Return what the results say of a study besides their tables, as JSON can hold it."""
+        return {}
+
+    def told(self, found: Any) -> str:
+        """Return what is printed where a study has been run."""
+        return self.table(found)
+
+    def verdict(self, found: Any) -> tuple[int, str]:
+        """Return (exit code, what to say of replicates without an outcome; "" for nothing)."""
+        return 0, ""
+
+    def stop_rule(self, study: Any, store: Any) -> Callable[[int], bool]:
+        """Return a function: are so many replicates of each condition enough?"""
+        return lambda n: False
+
+    def dry_run(self, config: Any, ranks: int, pilot: bool) -> str:
+        """Return what a study would do."""
+        from flocsim.ensembles.kind import study_of  # which needs the engine
+
+        return str(study_of(config, []).title)
 
 
 def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:
@@ -195,12 +217,6 @@ def studies() -> list[Contents]:
     return [contents_of(name) for name in STUDIES]
 
 
-def overview_of(path: str | os.PathLike) -> tuple[Contents, Any]:
-    """(Contents, found) of a file, with all that its summary needs."""
-    kind = file_kind(path)
-    return kind, (kind.overview or kind.read)(path)
-
-
 def summary_of(path: object, kind: Contents, found: Any) -> Summary:
     """What a file says of itself; FileError where that cannot be read."""
     try:
@@ -211,7 +227,8 @@ def summary_of(path: object, kind: Contents, found: Any) -> Summary:
 
 def text_of(path: str | os.PathLike) -> str:
     """What `flocsim info` prints of a file."""
-    kind, found = overview_of(held(path))
+    kind = file_kind(source := held(path))
+    found = kind.read(source)
     said, mark = summary_of(path, kind, found), kind.mark(found)
     title = f"{kind.title}; {mark}" if mark else kind.title
     lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]

@@ -14,7 +14,6 @@ signals and progress exist once and ask these two. `kinds` has all of them, by t
 
 import json
 from collections.abc import Callable, Collection, Container, Iterable, Mapping, Sequence
-from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -300,16 +299,13 @@ class OldResults:
     sparse: bool = False
 
 
-@cache
-def kinds() -> dict[type, type[StudyKind]]:
-    """Class of [scene] → its kind of study; rates are pairs with other draws and conditions."""
-    found = [each for folder in STUDIES.values() for each in folder.part("study").KINDS]
-    return {scene: each for each in found for scene in each.scenes}
-
-
 def kind_of(config: "Config") -> type[StudyKind]:
-    """Return the kind of a config's study."""
-    return kinds()[type(config.scene)]
+    """Return the kind of a config's study; rates are pairs with other draws and conditions."""
+    folders = {each.scene: each for each in STUDIES.values()}
+    folder = folders.get(config.scene.kind, folders[""])
+    found = (each for each in folder.part("study").KINDS if type(config.scene) in each.scenes)
+    kind: type[StudyKind] = next(found)
+    return kind
 
 
 def study_of(config: "Config", flocs: Sequence | None = None) -> Any:

@@ -31,7 +31,7 @@ ROWS = "replicates"
 
 
 @attrs.frozen(eq=False)
-class OneTable:
+class OneTable(Contents):
     """The ``columns`` {name: (type, unit, meaning)} of the replicates of a kind of study.
 
     ``name``: what its results files say that they are; ``title``: what they hold, in words.
@@ -74,7 +74,7 @@ class OneTable:
     @contextmanager
     def old_rows(self, output: Any) -> Iterator[OldResults]:
         """Open a results file that is to be extended."""
-        found = self.file.read(output)
+        found = self.read(output)
         values = found.groups[ROWS]
         places = places_in(*(values[axis] for axis in AXES))
         rows = np.zeros(values[next(iter(self.columns))].shape, self.row)
@@ -138,16 +138,23 @@ class OneTable:
 
         return {name: figure_of(name) for name, (kind, *_) in self.columns.items() if kind == "f8"}
 
-    def contents(self) -> Contents:
-        """Return what commands show of such files."""
-        return Contents(
-            title=self.title, read=self.file.read, table=self.table, figures=self.figures,
-            summary=lambda found: Summary(facts_of(found), origin(found.run)),
-            drawn={self.title: self.figures()}, running=lambda found: facts_of(found.results),
-            run=lambda found: found.run, opened=lambda path, allowed=None: self.file.read(path),
-            joined=Joined(self.file.groups, self.sweep_rows, {}, asked_of),
-            results=self.results, old_rows=self.old_rows, so_far=self.so_far,
-        )  # fmt: skip
+    def read(self, path: Any) -> Stored:
+        """Return what a results file holds."""
+        found: Stored = self.file.read(path)
+        return found
+
+    def summary(self, found: Stored) -> Summary:
+        """Return what a results file says of itself."""
+        return Summary(facts_of(found), origin(found.run))
+
+    def running(self, found: Any) -> Facts:
+        """Return facts of a study that has not ended."""
+        return facts_of(found.results)
+
+    @property
+    def joined(self) -> Joined:  # type: ignore[override]
+        """Return what sweeps join."""
+        return Joined(self.file.groups, self.sweep_rows, dict, asked_of)
 
 
 def axes_in(found: Stored) -> dict[str, np.ndarray]:

@@ -19,6 +19,7 @@ from flocsim.ensembles.config import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
 from flocsim.ensembles.contents import (
     Contents,
+    Figures,
     Joined,
     Summary,
     in_words,
@@ -265,26 +266,30 @@ def joined_in(found: SweepResults) -> Joined:
     return next(each for each in kinds_joined() if each.groups.keys() == found.groups.keys())
 
 
-def summary(found: SweepResults) -> Summary:
-    """The swept keys, by the names of their dimensions, and their values."""
-    facts: list[tuple[str, str]] = []
-    for name, each in found.swept.items():
-        unit = "" if each.unit == "1" else f" {each.unit}"
-        values = ", ".join(map(in_words, each.values))
-        facts.append((f"{each.key} (as {name})", f"{values}{unit}"))
-    return Summary(facts)
+class SweepFiles(Contents):
+    """What commands show of the joined file of a sweep."""
+
+    title = "a sweep"
+    read = staticmethod(read_joined)
+
+    def summary(self, found: SweepResults) -> Summary:
+        """Return the swept keys, by the names of their dimensions, and their values."""
+        facts: list[tuple[str, str]] = []
+        for name, each in found.swept.items():
+            unit = "" if each.unit == "1" else f" {each.unit}"
+            values = ", ".join(map(in_words, each.values))
+            facts.append((f"{each.key} (as {name})", f"{values}{unit}"))
+        return Summary(facts)
+
+    def table(self, found: SweepResults) -> str:
+        """Return numbers at every value."""
+        kind = joined_in(found)
+        return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
+
+    def figures(self, found: SweepResults | None = None) -> Figures:
+        """Return figures along a swept key."""
+        kinds = kinds_joined() if found is None else [joined_in(found)]
+        return {name: draw for each in kinds for name, draw in each.figures().items()}
 
 
-def table(found: SweepResults) -> str:
-    """Numbers at every value."""
-    kind = joined_in(found)
-    return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
-
-
-CONTENTS = Contents(
-    title="a sweep", read=read_joined, summary=summary, table=table,
-    figures=lambda found: joined_in(found).figures,
-    drawn={"the joined file of flocsim sweep":
-           {name: draw for each in kinds_joined() for name, draw in each.figures.items()}},
-    opened=lambda path, allowed=None: read_joined(path),
-)  # fmt: skip
+CONTENTS = SweepFiles()

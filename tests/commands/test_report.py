@@ -12,10 +12,10 @@ import pytest
 
 import flocsim
 from flocsim.commands import add_command
-from flocsim.ensembles.pairs import results as contents
-from flocsim.ensembles.report import efficiency_rows
+from flocsim.ensembles.report import efficiency_lines, share
 from flocsim.ensembles.script_study import Study
 from flocsim.errors import FileError, UsageError
+from flocsim.io.plots import results as drawings
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.results.file import first_of_each, read_results
 from flocsim.io.results.run_group import provenance
@@ -70,7 +70,7 @@ def write_made_up(path):
 def made_up(tmp_path, monkeypatch):
     """The folder of made-up results; their page has one figure."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(contents, "FIGURES", {"4": FIGURES["4"]})
+    monkeypatch.setattr(drawings, "FIGURES", {"4": FIGURES["4"]})
     write_made_up("r.h5")
     return tmp_path
 
@@ -87,7 +87,7 @@ def whole(request, tmp_path_factory):
     path = tmp_path_factory.mktemp("whole") / "r.h5"
     write_made_up(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contents, "FIGURES", {name: FIGURES[name] for name in request.param})
+        patch.setattr(drawings, "FIGURES", {name: FIGURES[name] for name in request.param})
         assert call(path, "--no-motion", "--output", path.with_suffix(".html")) == 0
     return path, path.with_suffix(".html").read_text("utf-8"), len(request.param)
 
@@ -98,7 +98,7 @@ def real(tmp_path_factory):
     folder = tmp_path_factory.mktemp("real")
     results = Study(write_small(folder, vertices="[1]")).run(output=folder / "small.h5")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contents, "FIGURES", {name: FIGURES[name] for name in FEW})
+        patch.setattr(drawings, "FIGURES", {name: FIGURES[name] for name in FEW})
         assert call(results.path, "--output", folder / "small.html") == 0
     return results.path, folder / "small.html"
 
@@ -118,9 +118,9 @@ def test_sizes_and_efficiencies_stand_in_the_page(whole):
     path, text, _ = whole
     results, rows = read_results(path), Page(text).rows
     names = {row[0] for row in rows if row}
-    assert {"D_0 [um]", "steps"} <= names
-    wanted = [[str(cell) for cell in row] for row in efficiency_rows(results)]
-    assert len(wanted) == 4 and all(row in rows for row in wanted)
+    assert {"outcomes", "bonds"} <= names
+    lines = efficiency_lines(results)
+    assert len(lines) == 5 and all(html.escape(line) in text for line in lines)
 
 
 def test_tables_have_both_errors_of_every_condition(whole):
@@ -128,15 +128,15 @@ def test_tables_have_both_errors_of_every_condition(whole):
     results = read_results(path)
     rows = [row for row in Page(text).rows if len(row) > 15]
     head, *rows = rows
-    assert head[:3] == ["type", "N", "δ/δ_max"] and len(rows) == np.prod(results.shape)
+    assert head[:3] == ["type", "N", "delta"] and len(rows) == np.prod(results.shape)
     table = results.probabilities
     for row, place in zip(rows, np.ndindex(*results.shape), strict=True):
         assert row[1] == str(results.vertices[place[1]])
-        value, low, high, numerical = (table[f"pr_a{end}"][place]
-                                       for end in ("", "_low", "_high", "_numerical"))  # fmt: skip
-        added = "?" if np.isnan(numerical) else f"{numerical:.3f}"
-        expected = f"{value:.3f} [{low:.3f}, {high:.3f}] ± {added}" if value == value else "–"
-        assert row[head.index("Pr[A]")] == expected
+        value, numerical = table["pr_a"][place], table["pr_a_numerical"][place]
+        words = row[head.index("Pr[A] 95 %  num.")].split()
+        if not np.isnan(value):
+            added = "-" if np.isnan(numerical) else f"+-{share(numerical)}"
+            assert (words[0], words[-1]) == (share(value), added)
         assert row[head.index("D")] == str(table["n_class"][place][3])
 
 

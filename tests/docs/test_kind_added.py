@@ -97,7 +97,7 @@ def test_its_files_are_shown(home, words, told):
     ("words", "why"),
     [
         ("compare a.h5 a.h5", "holds a flocsim lone: name a file of flocsim results or"),
-        ("export matrix a.h5", "holds a flocsim lone: name a file of flocsim results"),
+        ("export matrix a.h5", "holds a flocsim lone: name a file with results"),
         ("plot a.h5 --animation a.gif", "--animation is for results of a swarm study"),
         ("kernel s.toml", 's.toml has scene.kind = "lone"'),
     ],

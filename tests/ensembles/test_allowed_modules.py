@@ -11,8 +11,8 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
-from flocsim.ensembles.pairs import results as contents
 from flocsim.errors import ConfigError, UsageError
+from flocsim.io.plots import results as drawings
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import OWN, write_own
 from tests.helpers.results_files import write_results
@@ -131,7 +131,7 @@ def test_no_name_in_a_file_reaches_an_import(study, spy, name):
     ids=" ".join,
 )  # fmt: skip
 def test_no_command_imports_what_a_file_names(study, words, name, monkeypatch, capsys):
-    monkeypatch.setattr(contents, "FIGURES", {"4": contents.FIGURES["4"]})
+    monkeypatch.setattr(drawings, "FIGURES", {"4": drawings.FIGURES["4"]})
     renamed(study, name)
     code = main(words)
     out, err = capsys.readouterr()
@@ -194,7 +194,7 @@ def test_an_installed_module_is_allowed_by_its_whole_name(study, spy, finished, 
 
 @pytest.mark.parametrize("words", [["info", "r.h5", "--water"], ["report", "r.h5", "--overwrite"]])
 def test_commands_take_a_folder_or_a_module(study, finished, words, monkeypatch, capsys):
-    monkeypatch.setattr(contents, "FIGURES", {"4": contents.FIGURES["4"]})
+    monkeypatch.setattr(drawings, "FIGURES", {"4": drawings.FIGURES["4"]})
     monkeypatch.setattr(sys, "path", [str(finished), *sys.path[2:]])
     for allowed in (["--folder", str(finished)], ["--own", "json", "--own", "own_pull"]):
         forget()

@@ -101,14 +101,12 @@ class Cell:
 
 
 def columns(found):
-    """The bytes of all arrays of results, whatever their kind."""
+    """All arrays of results as text, whatever their kind."""
     groups = getattr(found, "groups", None) or {
-        name: group for name in ("replicates", "probabilities", "doublets", "conditions")
-        if (group := getattr(found, name, None)) is not None
-    }  # fmt: skip
+        name: getattr(found, name) for name in ("replicates", "probabilities")
+    }
     for group in groups.values():
-        arrays = getattr(group, "columns", group)
-        yield from (np.asarray(getattr(each, "values", each)).tobytes() for each in arrays.values())
+        yield from (str(np.asarray(each).tolist()) for each in group.values())
 
 
 def in_processes(cell):

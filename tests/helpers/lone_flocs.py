@@ -106,4 +106,4 @@ class LoneStudy(StudyKind):
         return column("failed") == 1
 
 
-SCENE, KINDS, CONTENTS = LoneScene, (LoneStudy,), TABLE.contents()
+SCENE, KINDS, CONTENTS = LoneScene, (LoneStudy,), TABLE

@@ -18,7 +18,7 @@ from flocsim.ensembles.sweep import read_joined
 from flocsim.errors import FileError
 from flocsim.io import hdf5
 from flocsim.io.groups import kind_of
-from flocsim.io.results.file import opened, read_overview, read_results
+from flocsim.io.results.file import opened, read_results
 from flocsim.io.results.strength_file import read_strengths
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.io.seals import seal
@@ -167,7 +167,7 @@ def test_a_file_of_the_system_is_not_read_as_storage(results):
 
     changed(results, change)
     refused(results)
-    for reader in (read_overview, read_settings):
+    for reader in (read_results, read_settings):
         with pytest.raises(FileError, match="has no readable"):
             reader(results)
 

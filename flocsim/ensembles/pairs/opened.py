@@ -17,7 +17,7 @@ from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Allowed, Sources
-from flocsim.ensembles.contents import Example, file_kind, stored_in
+from flocsim.ensembles.contents import Example, stored_in
 from flocsim.ensembles.diagnose.spheres import water_facts
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.report import checked_line, format_table
@@ -306,7 +306,6 @@ def open_results(
     """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
     modules and libraries."""
     source = held(path)
-    file_kind(source, "rates")
     found = read_results(source, replicates=False)
     return StudyResults(found, source, allowed or Allowed(), sources)
 

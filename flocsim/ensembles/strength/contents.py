@@ -1,9 +1,9 @@
 """What a file of `flocsim strength` holds, for the commands."""
 
 from collections import Counter
+from typing import Any
 
-from flocsim.ensembles.contents import Contents, Facts, Summary
-from flocsim.io.plots.curves import STRENGTH_FIGURES
+from flocsim.ensembles.contents import Contents, Facts, Figures, Summary
 from flocsim.io.results.run_group import source_line
 from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths, table_of
 
@@ -23,11 +23,30 @@ def facts_of(found: Strengths) -> Facts:
     ]  # fmt: skip
 
 
-CONTENTS = Contents(
-    title="strengths of bonds", read=read_strengths,
-    summary=lambda found: Summary(facts_of(found)), table=table_of,
-    figures=lambda found: STRENGTH_FIGURES, drawn={"a file of flocsim strength": STRENGTH_FIGURES},
-    mark=lambda found: "" if found.complete else f"unfinished: {found.progress}",
-    source=lambda found: source_line(found.about),
-    opened=lambda path, allowed=None: read_strengths(path),
-)  # fmt: skip
+class StrengthFiles(Contents):
+    """What commands show of a file of `flocsim strength`."""
+
+    title = "strengths of bonds"
+    read = staticmethod(read_strengths)
+    table = staticmethod(table_of)
+
+    def summary(self, found: Strengths) -> Summary:
+        """Return what a file says of itself."""
+        return Summary(facts_of(found))
+
+    def figures(self, found: Any = None) -> Figures:
+        """Return the one figure."""
+        from flocsim.io.plots.curves import STRENGTH_FIGURES
+
+        return STRENGTH_FIGURES
+
+    def mark(self, found: Strengths) -> str:
+        """Return that a survey has not ended."""
+        return "" if found.complete else f"unfinished: {found.progress}"
+
+    def source(self, found: Strengths) -> str:
+        """Return of which flocs, preset and version it is."""
+        return source_line(found.about)
+
+
+CONTENTS = StrengthFiles()

@@ -33,8 +33,6 @@ from flocsim.ensembles.kind import Condition, OldResults
 from flocsim.errors import FileError, FlocsimError, UsageError, visible
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.labelled import Column, about_of
-from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
-from flocsim.io.plots.swarm import SWARM_FIGURES, last_known, shape_of, write_swarm_animation
 from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
@@ -150,25 +148,6 @@ def results_from(
     return found
 
 
-def results(
-    study: Any, start: Any, count: int, run: dict, output: str | Path | None, in_memory: bool
-) -> SwarmResults:
-    """Return the results of so many replicates; written to ``output`` where there is one."""
-    store, asked = start.store, study.asked()
-    old = [first_of(start.old.found, count)] if start.old else []
-    begun = len(old[0]["bodies"]["box"]) if old else 0
-    new = [
-        groups_of(store.parts[0, each], study.pieces, 1 + len(asked["bounds"]))
-        for each in range(begun, count)
-    ]
-    rows = store.rows(0, 0, count)
-    ends = {name: rows[name].copy() for name in swarm_file.ENDS}
-    made = results_from(joined([*old, *new]), ends, asked, run, range(count))
-    if output is not None:
-        made.write(output, start.replacing)
-    return made
-
-
 def first_of(found: SwarmResults, count: int) -> Groups:
     """Return the groups of the first replicates of results."""
     groups = {}
@@ -179,67 +158,11 @@ def first_of(found: SwarmResults, count: int) -> Groups:
     return groups
 
 
-@contextmanager
-def old_rows(output: str | Path) -> Iterator[OldResults]:
-    """Open a results file that is to be extended."""
-    found = swarm_file.read_swarm(output)
-    ends = found.groups["ends"]
-    rows = np.zeros(len(ends["finished"]), [(name, ends[name].dtype) for name in swarm_file.ENDS])
-    for name in swarm_file.ENDS:
-        rows[name] = ends[name]
-    condition = Condition("swarm", int(found.run.get("vertices", 0)), 0.0)
-    yield OldResults([condition], len(rows), [(condition, 0, rows)], found.run, found)
-
-
-def so_far(store: Any, asked: dict[str, Any]) -> tuple[SwarmResults, int, int]:
-    """Make results of the swarms that have begun."""
-    swarms = {
-        replicate: parts for (_, replicate), parts in sorted(store.parts.items())
-        if has(parts, 1) and replicate < asked["replicates"]
-    }  # fmt: skip
-    if not swarms:
-        raise FileError(f"{store.journal.path} has no snapshot yet: try again later")
-    planned = len(asked["times"])
-    there = [
-        [place for place in range(planned) if moment_name(place) in parts]
-        for parts in swarms.values()
-    ]
-    times, classes = 1 + max(each[-1] for each in there), 1 + len(asked["bounds"])
-    groups = joined([groups_of(parts, times, classes) for parts in swarms.values()])
-    ends = {name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()}
-    made = results_from(groups, ends, asked, {"periodic": asked["periodic"]}, [*swarms])
-    return made, sum(map(len, there)), asked["replicates"] * planned
-
-
-def facts(study: Any) -> dict[str, Any]:
-    """What the results say of a study besides their groups."""
-    return {"periodic": study.scene.periodic, "vertices": study.vertices}
-
-
-def verdict(found: SwarmResults) -> tuple[int, str]:
-    """0, or the code of an error where no swarm has come to its end; what to say of those."""
-    finished = found.groups["ends"]["finished"]
-    missed = int(np.count_nonzero(finished == 0))
-    if not missed:
-        return 0, ""
-    notes = json.loads(found.run.get("failed", "[]"))
-    first = f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
-    line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
-    return (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
-
-
 # What commands show.
 
 
-def summary(results: SwarmResults) -> Summary:
-    """What a results file of swarms says of its study; ValueError where that cannot be read."""
-    failed = [f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")]
-    warnings = [str(line) for line in stored(results.run, "warnings")]
-    return Summary(facts_of(results), origin(results.run), warnings, failed)
-
-
 def facts_of(results: SwarmResults) -> Facts:
-    """[(name, value)] of swarms, also of those that still run."""
+    """Return facts of swarms, also of those that still run."""
     bodies, ends = results.groups["bodies"], results.groups["ends"]
     free = bodies["floc"][0] != swarm_file.WALL
     radii = 1e6 * bodies["r_eq"][:, free]
@@ -259,7 +182,7 @@ def facts_of(results: SwarmResults) -> Facts:
 
 
 def sweep_rows(found: Any) -> list[tuple[str, ...]]:
-    """Clusters at the end at every value, means over swarms, heads first."""
+    """Return clusters at the end at every value, means over swarms, heads first."""
     table = found.labelled("counts")
     rows = [(*found.swept, "swarms", "time [s]", "clusters", "mean size", "settling [mm/s]")]
     axes = [table.axes[name].values.tolist() for name in found.swept]
@@ -274,38 +197,15 @@ def sweep_rows(found: Any) -> list[tuple[str, ...]]:
     return rows
 
 
-def figures(found: SwarmResults) -> Figures:
-    """{name: function} of the figures that swarms have."""
-    there = {
-        "classes": len(found.scales["class"]) > 1,
-        "speed": len(found.groups["clusters"]["cluster_speed"]) > 0,
-    }
-    return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
+def sweep_figures() -> Figures:
+    """Return the figures of a sweep of swarms."""
+    from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
 
-
-def first_swarm(found: SwarmResults) -> tuple:
-    """(times, positions, velocities, shapes) of the first swarm; UsageError where bodies have left
-    it."""
-    moments = found.groups["snapshots"]
-    known = slice(last_known(found) + 1)
-    position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
-    if not np.isfinite(position).all():
-        raise UsageError(
-            "bodies have left the first swarm, and exported motion has the same bodies at all "
-            "times: flocsim plot --animation shows it"
-        )
-    shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
-    return found.scales["time"][known], position, velocity, shapes
-
-
-def tables(results: SwarmResults) -> list[Table | str]:
-    """Clusters over time."""
-    heads, *rows = swarm_file.table_rows(results)
-    return [Table("Clusters over time, means over swarms", heads, rows)]
+    return SWARM_SWEEP_FIGURES
 
 
 def asked(results: SwarmResults) -> dict[str, Any]:
-    """The axes of results, and how many replicates there are."""
+    """Return the axes of results, and how many replicates there are."""
     return {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))], "delta": [0.0],
             "replicates": len(results.scales["replicate"])}  # fmt: skip
 
@@ -323,28 +223,8 @@ class SwarmComparison(Differences):
 
     @property
     def times(self) -> np.ndarray:
-        """The times [s] that both have."""
+        """Return the times [s] that both have."""
         return self.axes["time"].values
-
-
-def compare(first: SwarmResults, second: SwarmResults) -> SwarmComparison:
-    """The SwarmComparison of two files: of replicates of one number, paired where their bodies
-    begin alike."""
-    times = common(first.scales["time"], second.scales["time"], "time")
-    mine, yours = first.groups, second.groups
-    begun, also = (each["snapshots"]["position"][:, 0] for each in (mine, yours))
-    pairs = min(len(begun), len(also))
-    paired = np.array_equal(begun[:pairs], also[:pairs], equal_nan=True)
-    at = [np.flatnonzero(np.isin(each["time"], times)) for each in (first.scales, second.scales)]
-    arrays = {
-        name: mean_differences(
-            mine["counts"][name][:, at[0]], yours["counts"][name][:, at[1]],
-            pairs if paired else None,
-        ) for name in swarm_file.COUNTS
-    }  # fmt: skip
-    axes = {"time": Column(("time",), np.array(times), about_of(swarm_file.SCALES["time"]))}
-    changes = changes_between(first, second)
-    return SwarmComparison(paired, pairs if paired else 0, axes, arrays, changes)
 
 
 def mean_differences(
@@ -382,16 +262,153 @@ def mean_differences(
     }  # fmt: skip
 
 
-CONTENTS = Contents(
-    title="results of a swarm study", read=swarm_file.read_swarm, summary=summary,
-    table=swarm_file.table_of, tables=tables,
-    figures=figures, drawn={"a swarm study": SWARM_FIGURES},
-    running=lambda found: facts_of(found.results)[:-1], run=lambda found: found.run,
-    opened=lambda path, allowed=None: swarm_file.read_swarm(path),
-    compare=compare,
-    compared={name: words for name, (_, _, words) in swarm_file.COUNTS.items()},
-    joined=Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, SWARM_SWEEP_FIGURES, asked),
-    results=results, old_rows=old_rows, so_far=so_far, facts=facts, verdict=verdict,
-    dry_run=later("ensembles.swarms.study", "dry_run"),
-    animate=write_swarm_animation, motion=first_swarm,
-)  # fmt: skip
+class SwarmFiles(Contents):
+    """What becomes of the rows of a study of swarms, and what commands show of its files."""
+
+    title = "results of a swarm study"
+    read = staticmethod(swarm_file.read_swarm)
+    table = staticmethod(swarm_file.table_of)
+    compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
+    joined = Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, sweep_figures, asked)
+    dry_run = later("ensembles.swarms.study", "dry_run")
+    animate = later("io.plots.swarm", "write_swarm_animation")
+
+    def results(
+        self, study: Any, start: Any, count: int, run: dict, output: str | Path | None,
+        in_memory: bool,
+    ) -> SwarmResults:  # fmt: skip
+        """Return the results of so many replicates; written to ``output`` where there is one."""
+        store, asked = start.store, study.asked()
+        old = [first_of(start.old.found, count)] if start.old else []
+        begun = len(old[0]["bodies"]["box"]) if old else 0
+        new = [
+            groups_of(store.parts[0, each], study.pieces, 1 + len(asked["bounds"]))
+            for each in range(begun, count)
+        ]
+        rows = store.rows(0, 0, count)
+        ends = {name: rows[name].copy() for name in swarm_file.ENDS}
+        made = results_from(joined([*old, *new]), ends, asked, run, range(count))
+        if output is not None:
+            made.write(output, start.replacing)
+        return made
+
+    @contextmanager
+    def old_rows(self, output: str | Path) -> Iterator[OldResults]:
+        """Open a results file that is to be extended."""
+        found = swarm_file.read_swarm(output)
+        ends = found.groups["ends"]
+        rows = np.zeros(
+            len(ends["finished"]), [(name, ends[name].dtype) for name in swarm_file.ENDS]
+        )
+        for name in swarm_file.ENDS:
+            rows[name] = ends[name]
+        condition = Condition("swarm", int(found.run.get("vertices", 0)), 0.0)
+        yield OldResults([condition], len(rows), [(condition, 0, rows)], found.run, found)
+
+    def so_far(self, store: Any, asked: dict[str, Any]) -> tuple[SwarmResults, int, int]:
+        """Make results of the swarms that have begun."""
+        swarms = {
+            replicate: parts for (_, replicate), parts in sorted(store.parts.items())
+            if has(parts, 1) and replicate < asked["replicates"]
+        }  # fmt: skip
+        if not swarms:
+            raise FileError(f"{store.journal.path} has no snapshot yet: try again later")
+        planned = len(asked["times"])
+        there = [
+            [place for place in range(planned) if moment_name(place) in parts]
+            for parts in swarms.values()
+        ]
+        times, classes = 1 + max(each[-1] for each in there), 1 + len(asked["bounds"])
+        groups = joined([groups_of(parts, times, classes) for parts in swarms.values()])
+        ends = {name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()}
+        made = results_from(groups, ends, asked, {"periodic": asked["periodic"]}, [*swarms])
+        return made, sum(map(len, there)), asked["replicates"] * planned
+
+    def facts(self, study: Any) -> dict[str, Any]:
+        """Return what the results say of a study besides their groups."""
+        return {"periodic": study.scene.periodic, "vertices": study.vertices}
+
+    def verdict(self, found: SwarmResults) -> tuple[int, str]:
+        """Return 0, or the code of an error where no swarm has come to its end, and what to say of
+        those that have not."""
+        finished = found.groups["ends"]["finished"]
+        missed = int(np.count_nonzero(finished == 0))
+        if not missed:
+            return 0, ""
+        notes = json.loads(found.run.get("failed", "[]"))
+        first = (
+            f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
+        )
+        line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
+        return (
+            (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
+        )
+
+    def summary(self, results: SwarmResults) -> Summary:
+        """Return what a results file of swarms says of its study."""
+        failed = [
+            f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")
+        ]
+        warnings = [str(line) for line in stored(results.run, "warnings")]
+        return Summary(facts_of(results), origin(results.run), warnings, failed)
+
+    def running(self, found: Any) -> Facts:
+        """Return facts of swarms that still run."""
+        return facts_of(found.results)[:-1]
+
+    def tables(self, results: SwarmResults) -> list[Table | str]:
+        """Return clusters over time."""
+        heads, *rows = swarm_file.table_rows(results)
+        return [Table("Clusters over time, means over swarms", heads, rows)]
+
+    def figures(self, found: SwarmResults | None = None) -> Figures:
+        """Return the figures that swarms have."""
+        from flocsim.io.plots.swarm import SWARM_FIGURES
+
+        if found is None:
+            return SWARM_FIGURES
+        there = {
+            "classes": len(found.scales["class"]) > 1,
+            "speed": len(found.groups["clusters"]["cluster_speed"]) > 0,
+        }
+        return {name: draw for name, draw in SWARM_FIGURES.items() if there.get(name, True)}
+
+    def motion(self, found: SwarmResults) -> tuple:
+        """Return (times, positions, velocities, shapes) of the first swarm; UsageError where bodies
+        have left it."""
+        from flocsim.io.plots.swarm import last_known, shape_of
+
+        moments = found.groups["snapshots"]
+        known = slice(last_known(found) + 1)
+        position, velocity = (moments[name][0, known] for name in ("position", "velocity"))
+        if not np.isfinite(position).all():
+            raise UsageError(
+                "bodies have left the first swarm, and exported motion has the same bodies at all "
+                "times: flocsim plot --animation shows it"
+            )
+        shapes = [shape_of(found, 0, body) for body in range(position.shape[1])]
+        return found.scales["time"][known], position, velocity, shapes
+
+    def compare(self, first: SwarmResults, second: SwarmResults) -> SwarmComparison:
+        """Return the SwarmComparison of two files: of replicates of one number, paired where their
+        bodies begin alike."""
+        times = common(first.scales["time"], second.scales["time"], "time")
+        mine, yours = first.groups, second.groups
+        begun, also = (each["snapshots"]["position"][:, 0] for each in (mine, yours))
+        pairs = min(len(begun), len(also))
+        paired = np.array_equal(begun[:pairs], also[:pairs], equal_nan=True)
+        at = [
+            np.flatnonzero(np.isin(each["time"], times)) for each in (first.scales, second.scales)
+        ]
+        arrays = {
+            name: mean_differences(
+                mine["counts"][name][:, at[0]], yours["counts"][name][:, at[1]],
+                pairs if paired else None,
+            ) for name in swarm_file.COUNTS
+        }  # fmt: skip
+        axes = {"time": Column(("time",), np.array(times), about_of(swarm_file.SCALES["time"]))}
+        changes = changes_between(first, second)
+        return SwarmComparison(paired, pairs if paired else 0, axes, arrays, changes)
+
+
+CONTENTS = SwarmFiles()

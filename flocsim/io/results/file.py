@@ -131,55 +131,6 @@ def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[
         return row
 
 
-SPANNED = ("r_i", "r_j", "D_0", "d_c_over_D_0")
-
-
-@attrs.define
-class Totals:
-    """How many replicates had each outcome and each reason, what steps they took, and between
-    which values the columns of SPANNED lie, where these are known."""
-
-    outcomes: np.ndarray
-    failures: np.ndarray
-    count: int
-    steps: int
-    most_steps: int
-    rejected: int
-    spans: dict[str, tuple[float, float]] = attrs.Factory(dict)
-
-
-@attrs.frozen(eq=False)
-class Overview(Results):
-    """Results with the ``totals`` of their replicates."""
-
-    totals: Totals = attrs.field(kw_only=True)
-
-
-def read_overview(path: str | os.PathLike) -> Overview:
-    """Return the Results in a file without its table of replicates, but with its Totals.
-
-    A column is in memory at a time; FileError as `read_results`.
-    """
-    with opened(path) as file:
-
-        def column(name: str) -> np.ndarray:
-            return file.read(f"replicates/{name}").ravel()
-
-        results = results_in(file, replicates=False)
-        steps = column("steps")
-        totals = Totals(
-            np.bincount(column("outcome"), minlength=len(OUTCOMES)),
-            np.bincount(column("failure"), minlength=len(results.failures)),
-            steps.size, int(steps.sum()), int(steps.max(initial=0)), int(column("rejected").sum()),
-        )  # fmt: skip
-        for name in SPANNED:
-            values = column(name)
-            if (finite := values[np.isfinite(values)]).size:
-                totals.spans[name] = float(finite.min()), float(finite.max())
-        known = {each.name: getattr(results, each.name) for each in attrs.fields(Results)}
-        return Overview(**known, totals=totals)
-
-
 def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
     """Return {outcome: place (type, vertices, delta, replicate)} of its first replicate, if any.
 
