@@ -13,10 +13,13 @@ import pytest
 
 from flocsim.ensembles.storage import resume
 from tests.helpers import interleavings
-from tests.helpers.interleavings import STEPS, Asked, Child, Truths, World, Wrong, write
+from tests.helpers.interleavings import EVENTS, Child, Truths, World, Wrong
 
-COUNT = int(os.environ.get("FLOCSIM_INTERLEAVINGS", "25"))
-"""Interleavings of each kind of study."""
+FIRST, COUNT = (
+    int(os.environ.get("FLOCSIM_FIRST", "0")),
+    int(os.environ.get("FLOCSIM_INTERLEAVINGS", "25")),
+)
+"""Interleavings of each kind of study, and the number of the first."""
 
 LENGTH = 8
 
@@ -32,9 +35,9 @@ def interleaved(truths, number, folder):
     folder.mkdir()
     rng = random.Random(f"{truths.kind} {number}")
     try:
-        # Other ranks are processes that start anew, which takes seconds: once in a while.
-        steps = rng.choices([*STEPS, World.resume_on_other_ranks], [3] * len(STEPS) + [1], k=LENGTH)
-        World(truths.kind, folder, truths, rng).go(steps)
+        weights = [weight for weight, _ in EVENTS.values()]
+        names = rng.choices(list(EVENTS), weights, k=LENGTH)
+        World(truths.kind, folder, truths, rng).go(names)
     except Wrong as error:
         return f"{number}: {error}"
     return ""
@@ -42,7 +45,8 @@ def interleaved(truths, number, folder):
 
 @pytest.mark.slow
 def test_nothing_that_happens_mixes_or_loses_rows(truths, tmp_path):
-    found = [interleaved(truths, number, tmp_path / str(number)) for number in range(COUNT)]
+    numbers = range(FIRST, FIRST + COUNT)
+    found = [interleaved(truths, number, tmp_path / str(number)) for number in numbers]
     assert not any(found), "\n".join(filter(None, found))
 
 
@@ -52,7 +56,7 @@ def test_rows_that_are_mixed_are_seen(truths, tmp_path, monkeypatch):
     monkeypatch.setattr(resume, "refuse_other", lambda *_: None)
     with pytest.raises(Wrong, match="of another physics"):
         World(truths.kind, tmp_path, truths, random.Random(1)).go(
-            [World.resume, World.edit_module, World.resume]
+            ["resume", "edit module", "resume"]
         )
 
 
@@ -62,12 +66,13 @@ def test_rows_that_are_lost_are_seen(truths, tmp_path, monkeypatch):
     """The same where results may take the place of others that have more rows."""
 
     def ask(world):
-        world.asked = Asked(2, (0.5,))
-        write(world.folder, world.kind, world.physics, world.asked)
+        world.delta = (0.5,)
+        world.write()
 
+    monkeypatch.setitem(EVENTS, "ask", (1, ask))
     monkeypatch.setattr(resume, "refuse_fewer", lambda *_: None)
     with pytest.raises(Wrong, match="tasks are lost"):
-        World(truths.kind, tmp_path, truths, random.Random(1)).go([World.resume, ask, World.resume])
+        World(truths.kind, tmp_path, truths, random.Random(1)).go(["resume", "ask", "resume"])
 
 
 def test_what_hangs_is_seen(tmp_path, monkeypatch):
