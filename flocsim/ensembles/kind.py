@@ -21,7 +21,6 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config import STUDIES
-from flocsim.errors import visible
 from flocsim.io.results.run_group import SOURCE, package_version
 from flocsim.io.results.schema import REPLICATES
 
@@ -89,15 +88,6 @@ class Chunk(NamedTuple):
     first: int
     stop: int
     left: Any = None
-
-
-def named(condition: Sequence, first: int, count: int) -> str:
-    """Return a chunk for messages: "type I, N = 4, delta 0.5, replicates 0 to 63"."""
-    name, vertices, delta = condition
-    return (
-        f"type {visible(name, keep='')}, N = {vertices}, delta {delta:g}, replicates {first} to "
-        f"{first + count - 1}"
-    )
 
 
 def layout(row: np.dtype = ROW) -> str:
@@ -288,7 +278,7 @@ class StudyKind:
 @attrs.frozen(eq=False)
 class OldResults:
     """A results file that is to be extended: the replicates of its ``conditions``, of which it has
-    ``count`` each (where not ``sparse``), as ``chunks`` (condition, first replicate, rows);
+    ``count`` each, as ``chunks`` (condition, first replicate, rows);
     ``run``, its scalars; ``found``, what else its kind of study takes from it."""
 
     conditions: Collection[Condition]
@@ -296,7 +286,6 @@ class OldResults:
     chunks: Iterable[tuple[Condition, int, np.ndarray]]
     run: Mapping[str, Any]
     found: Any = None
-    sparse: bool = False
 
 
 def kind_of(config: "Config") -> type[StudyKind]:

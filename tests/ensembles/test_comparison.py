@@ -101,7 +101,8 @@ def test_conditions_that_both_have_are_found_by_their_names(files, tmp_path):
     )  # fmt: skip
     write_results(tmp_path / "d.h5", fewer)
     comparison = flocsim.compare(flocsim.open(a), flocsim.open(tmp_path / "d.h5"))
-    assert comparison.types == first.types[1:] and len(comparison.delta) == 4
+    axes = {name: each.values.tolist() for name, each in comparison.axes.items()}
+    assert axes["type"] == [*first.types[1:]] and len(axes["delta"]) == 4
     assert not np.nan_to_num(comparison.arrays["pr_a"]["difference"]).any()
     none = attrs.evolve(fewer, types=("X", "Y"))
     write_results(tmp_path / "e.h5", none)

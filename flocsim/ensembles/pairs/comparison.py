@@ -41,21 +41,6 @@ class Comparison(Differences):
     word = "probability"
     digits = ".3f"
 
-    @property
-    def types(self) -> tuple[str, ...]:
-        """The collision types that both have."""
-        return tuple(self.axes["type"].values.tolist())
-
-    @property
-    def vertices(self) -> np.ndarray:
-        """The numbers of vertices that both have."""
-        return self.axes["vertices"].values
-
-    @property
-    def delta(self) -> np.ndarray:
-        """The shares of δ_max that both have."""
-        return self.axes["delta"].values
-
 
 def compare(first: StudyResults, second: StudyResults) -> Comparison:
     """The Comparison of two results files, over the conditions that both have; UsageError for
@@ -87,17 +72,11 @@ def compare(first: StudyResults, second: StudyResults) -> Comparison:
     return Comparison(paired, pairs if paired else 0, axes, arrays, changes_between(first, second))
 
 
-def places(results, wanted):
-    """The places of the wanted values in a file, for np.ix_."""
+def picked(results: StudyResults, wanted: Sequence[Sequence]) -> dict[str, np.ndarray]:
+    """Return the columns that are compared, at the wanted types, numbers of vertices and δ."""
     axes = (np.asarray(getattr(results, axis)).tolist() for axis in ORDER)
-    return [
-        [each.index(value) for value in values] for each, values in zip(axes, wanted, strict=True)
-    ]
-
-
-def picked(results, wanted):
-    """The columns that are compared, at the wanted conditions."""
-    at = np.ix_(*places(results, wanted))
+    at = np.ix_(*([axis.index(value) for value in values]
+                  for axis, values in zip(axes, wanted, strict=True)))  # fmt: skip
     return {name: results.replicates[name][at] for name in ("angle_i", "angle_j", *EXACT_RUNS)}
 
 
@@ -129,7 +108,7 @@ def paired_of(first: Events, second: Events, scrambles: int) -> dict[str, np.nda
     ends = bounded_difference(joint if scrambles else joint[..., 0, :], bool(scrambles))
     both, here, there, _ = np.moveaxis(cells, -1, 0)
     n = cells.sum(axis=-1)
-    return told(both + there, n, both + here, n, ends)
+    return arrays_of(both + there, n, both + here, n, ends)
 
 
 def apart_of(files: Sequence[Events], scrambles: Sequence[int]) -> dict[str, np.ndarray]:
@@ -142,7 +121,7 @@ def apart_of(files: Sequence[Events], scrambles: Sequence[int]) -> dict[str, np.
         (p, p_low, p_high), (q, q_low, q_high) = map(interval_of, files, scrambles)
         down, up = joined(q - q_low, p_high - p, 0.0), joined(q_high - q, p - p_low, 0.0)
         ends = difference - down, difference + up
-    return told(s, n, t, m, (difference, *ends))
+    return arrays_of(s, n, t, m, (difference, *ends))
 
 
 def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -155,7 +134,9 @@ def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, n
     return found[0], *scrambled_proportion(came, tried, left)[:2]
 
 
-def told(s, n, t, m, ends):
+def arrays_of(s, n, t, m, ends):
+    """Return the arrays of MEANINGS of s of n events in the first file, and t of m in the second;
+    ``ends``: the difference with its interval."""
     difference, low, high = ends
     with np.errstate(divide="ignore", invalid="ignore"):
         return {

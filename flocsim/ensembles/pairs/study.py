@@ -85,27 +85,23 @@ def facts(study: Study) -> dict[str, Any]:
 
 
 def so_far(store: RowStore, asked: dict[str, Any]) -> tuple[Results, int, int]:
-    """Make Results of the rows that a store has, without single replicates and pooled tables."""
-    table = tables(store, tuple(len(asked[name]) for name in kind.ORDER))
+    """Return Results of the rows that a store has, without single replicates and pooled tables."""
+    shape, counts = tuple(len(asked[name]) for name in kind.ORDER), []
+    for place in range(len(store.conditions)):
+        sums: summary.Sums = {}
+        for rows in store.all_rows(place):
+            codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
+            sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
+        counts.append(summary.part_of(sums, "counted"))
+    known = next(each for each in counts if each)  # a condition that has begun
+    counted = {
+        name: np.stack([each.get(name, np.zeros_like(first)) for each in counts])
+        .reshape(*shape, *first.shape[3:])
+        for name, first in known.items()
+    }  # fmt: skip
+    table = summary.table_from(counted)
     made = Results(
         types=asked["types"], vertices=asked["vertices"], delta=asked["delta"], replicates=None,
         probabilities=table, failures=FAILURES, count=int(table["n_total"].max()),
     )  # fmt: skip
     return made, store.there(), asked["replicates"] * len(store.conditions)
-
-
-def tables(store: RowStore, shape: tuple[int, ...]) -> dict[str, np.ndarray]:
-    """The table of probabilities from all rows of a store, whose conditions have this shape."""
-    many = len(store.conditions)
-    counts: dict[str, np.ndarray] = {}
-    for place in range(many):
-        sums: summary.Sums = {}
-        for rows in store.all_rows(place):
-            codes = tuple(rows[name].reshape(1, 1, 1, -1) for name in COUNTED)
-            sums = summary.added(sums, summary.sums_of(lambda *_, c=codes: c, 1, 0, len(rows)))
-        for name, found in summary.part_of(sums, "counted").items():
-            every = counts.setdefault(name, np.zeros((many, *found.shape[3:]), found.dtype))
-            every[place] = found[0, 0, 0]
-    return summary.table_from(
-        {name: every.reshape(*shape, *every.shape[1:]) for name, every in counts.items()}
-    )

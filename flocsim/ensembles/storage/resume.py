@@ -70,7 +70,6 @@ class Beginning:
         """Return True if the older results file has so many replicates of all conditions."""
         return (
             self.old is not None
-            and not self.old.sparse
             and count <= self.old.count
             and set(self.store.conditions) <= set(self.old.conditions)
         )

@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from itertools import product
 from statistics import fmean
+from typing import NamedTuple
 
 import attrs
 import numpy as np
@@ -59,8 +60,7 @@ hundred steps. Edges that slide over each other near the rate at which they open
 1e-15 m, tens of thousands of times; coarser steps go over that (docs/strength.md)."""
 
 
-@attrs.frozen
-class Opening:
+class Opening(NamedTuple):
     """Between which rates a doublet opens: it ``holds`` at one and ``opens`` at the next [1/s].
 
     NaN where there is none; ``status``: a code of STATUS; ``runs`` made, each at one rate, at
@@ -207,7 +207,7 @@ class Doublet:
             return found
 
         found = first_opening(opens_at, self.rate_of_spheres(), precision)
-        return attrs.evolve(found, tolerance=max(used))
+        return found._replace(tolerance=max(used))
 
 
 def first_opening(

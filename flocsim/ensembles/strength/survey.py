@@ -3,7 +3,6 @@
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,12 +17,15 @@ from flocsim.errors import UsageError
 from flocsim.fields import check_whole, is_number
 from flocsim.forces.outline import refuse_outlines
 from flocsim.io.results.run_group import SOURCE, now
-from flocsim.io.results.schema import AGGREGATED, AXES, OUTCOMES
+from flocsim.io.results.schema import AGGREGATED, OUTCOMES
 from flocsim.io.results.strength_file import DOUBLETS, STATUS, Strengths, strengths_of
 
 
 class Bound(NamedTuple):
-    """A bound doublet of a file: indices of type, N and δ, the replicate, and what holds it."""
+    """A bound doublet of a file: indices of type, N and δ, the replicate, and what holds it.
+
+    Its fields, and those of Opening after them, are the columns of DOUBLETS.
+    """
 
     type: int
     vertices: int
@@ -127,16 +129,14 @@ def bound_doublets(results: Any, count: int | None = None) -> list[Bound]:
 
 def gathered(survey: Survey, tested: dict[Bound, Opening], complete: bool) -> Strengths:
     """Return the Strengths of the doublets that were tested, all that were asked for or not."""
-    results, rows = survey.results, sorted(tested.items())
+    results = survey.results
     bound = np.zeros((len(results.types), len(results.vertices), len(results.delta)), np.int64)
     for each in bound_doublets(results):
         bound[each[:3]] += 1
+    table = zip(*((*doublet, *opening) for doublet, opening in sorted(tested.items())), strict=True)
     columns = {
-        name: np.array(
-            [getattr(each if name in Bound._fields else opening, name) for each, opening in rows],
-            kind,
-        )
-        for name, (kind, _, _) in DOUBLETS.items()
+        name: np.array(values, kind)
+        for (name, (kind, _, _)), values in zip(DOUBLETS.items(), table, strict=True)
     }
     about = survey.about | {"date": now(), "complete": complete}
     return strengths_of((results.types, results.vertices, results.delta), bound, columns, about)
@@ -144,13 +144,9 @@ def gathered(survey: Survey, tested: dict[Bound, Opening], complete: bool) -> St
 
 def tested_in(found: Strengths) -> dict[Bound, Opening]:
     """Return what an earlier survey has tested, by doublet."""
-
-    def rows(names: Iterable[str]) -> Iterable[tuple]:
-        return zip(*(found.column(name).tolist() for name in names), strict=True)
-
-    openings = (Opening(*each) for each in rows(each.name for each in attrs.fields(Opening)))
-    doublets = (Bound(*each) for each in rows((*AXES, "replicate", "bond")))
-    return dict(zip(doublets, openings, strict=True))
+    known = len(Bound._fields)
+    rows = zip(*(found.column(name).tolist() for name in DOUBLETS), strict=True)
+    return {Bound(*row[:known]): Opening(*row[known:]) for row in rows}
 
 
 def in_words(opening: Opening) -> str:

@@ -221,11 +221,6 @@ class SwarmComparison(Differences):
     }
     word = "quantity"
 
-    @property
-    def times(self) -> np.ndarray:
-        """Return the times [s] that both have."""
-        return self.axes["time"].values
-
 
 def mean_differences(
     first: np.ndarray, second: np.ndarray, pairs: int | None
