@@ -1,7 +1,6 @@
 """`flocsim plot`: the figures of a file."""
 
 import argparse
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_of
 from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.io.plots.results import MOST_ROWS
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.seals import held
 
@@ -65,9 +63,6 @@ def run(args: argparse.Namespace) -> int:
     }
     animation = animation_of(args, kind)
     check_outputs([Output(path, rule) for path in (*paths.values(), *animation)], [args.results])
-    if not remark:
-        most = MOST_ROWS if args.figures is None else math.inf
-        content = kind.with_rows(source, content, names, most)
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:

@@ -33,7 +33,6 @@ from flocsim.io.plots.collision import (
     time_unit,
     windows,
 )
-from flocsim.io.plots.results import MOST_ROWS
 from flocsim.io.plots.style import (
     BODY_COLOURS,
     CLASS_WORDS,
@@ -89,7 +88,6 @@ def run(args: argparse.Namespace) -> int:
     kind = file_kind(source)
     found = kind.read(source)
     examples = [] if args.no_motion else kind.examples(source, allowed_by(args))
-    found = kind.with_rows(source, found, kind.figures(found), MOST_ROWS)
     write_file(path, report_page(str(args.results), kind, found, examples).encode(), rule)
     for example in examples:
         if example.reason:

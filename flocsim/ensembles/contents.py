@@ -9,7 +9,7 @@ kind differ in, and Differences what comparisons of all kinds have in common.
 import importlib
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -146,11 +146,6 @@ class Contents:
     def mark(self, found: Any) -> str:
         """Return what each figure has to say, as that it is not complete; "" for nothing."""
         return ""
-
-    def with_rows(self, path: Any, found: Any, figures: Iterable[str], most: float) -> Any:
-        """Return ``found`` with its single replicates, if these figures draw them and there are no
-        more than ``most``."""
-        return found
 
     def opened(self, path: Any, allowed: Allowed | None = None) -> Any:
         """Return what a script has of it; ``allowed``: modules that may be imported."""

@@ -33,7 +33,7 @@ from flocsim.errors import FileError, UsageError
 from flocsim.io.files import Rule, keep, unfinished
 from flocsim.io.hdf5 import File, Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.seals import checked_sealed, seal_file
+from flocsim.io.seals import seal_file
 
 Schema = Mapping[str, tuple[str, str, str]]
 """{name: (type, unit, meaning)}; types are "f8", "i8", "i4", "u1" and "text"."""
@@ -320,18 +320,19 @@ class FileFormat:
         Raises FileError for an absent or damaged file, and for one of another kind or version. So
         do errors of the block that say that the file does not hold what it should (UNREADABLE).
         """
-        with checked_sealed(path) as data:
-            try:
-                file = open_hdf5(path, data)
-                self.check_version(path, file)
-                yield file
-            except FileError:
-                raise
-            except UNREADABLE as error:
-                why = " ".join(str(error).split())
-                raise FileError(
-                    f"{path} has no readable {self.title}: {why}; {self.remedy}"
-                ) from error
+        try:
+            file = open_hdf5(path)
+            self.check_version(path, file)
+            yield file
+        except FileError:
+            raise
+        except UNREADABLE as error:
+            raise self.unreadable(path, error) from error
+
+    def unreadable(self, path: object, error: Exception) -> FileError:
+        """Return the FileError for a file that does not hold what it should."""
+        why = " ".join(str(error).split())
+        return FileError(f"{path} has no readable {self.title}: {why}; {self.remedy}")
 
     def check_version(self, path: object, file: File) -> None:
         """Raise FileError unless an open file is of this format and of a version that is read.
@@ -388,15 +389,6 @@ class FileFormat:
             name: group.read(file, name, lengths) for name, group in self.groups.items()
             if name in file and name not in without
         }  # fmt: skip
-        first: dict[str, np.ndarray] = {}
-        for name, values in groups.items():
-            for axis in self.groups[name].scales:
-                # Coordinates may be unknown: NaN is NaN.
-                words = values[axis].dtype == object
-                if not np.array_equal(
-                    first.setdefault(axis, values[axis]), values[axis], equal_nan=not words
-                ):
-                    raise Unfit(f"{name}/{axis} is not that of the other groups")
         return self.view(self, groups, run_of(file), file.attributes)
 
     def read(self, path: str | os.PathLike) -> Any:
@@ -480,9 +472,10 @@ def kind_of(path: str | os.PathLike) -> str:
     "" where HDF5 cannot read it: the reader that is tried then says what is wrong. FileError for
     an absent file or a wrong checksum.
     """
-    with checked_sealed(path) as data:
-        try:
-            file = open_hdf5(path, data)
-        except UNREADABLE:
-            return ""
-        return text_of(file, "kind") or text_of(file, "format")
+    try:
+        file = open_hdf5(path)
+    except FileError:
+        raise
+    except UNREADABLE:
+        return ""
+    return text_of(file, "kind") or text_of(file, "format")

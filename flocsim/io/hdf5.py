@@ -20,6 +20,7 @@ import numpy as np
 
 from flocsim.errors import FileError, visible
 from flocsim.io import hdf5_child
+from flocsim.io.seals import CHANGED, check_seal, end_of, open_file
 from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING
 
 MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
@@ -37,33 +38,31 @@ class Unfit(ValueError):
 @attrs.frozen(eq=False)
 class Node:
     """A group (``type`` None) or a dataset: its type ("f8", "i8", "i4", "u1" or "text"), its shape,
-    where its numbers lie in the open file ``data``, its attributes {name: value} (but for units and
-    the like, which are known from the schema), and its text in one list."""
+    where its numbers lie in the file, its attributes {name: value} (but for units and the like,
+    which are known from the schema), and its text in one list."""
 
     type: str | None
     shape: tuple[int, ...]
     offset: int | None
     attributes: dict[str, Any]
     text: list[str] | None
-    data: BinaryIO
-
-    def __getitem__(self, at: tuple) -> np.ndarray:
-        """Return all values for (), or some numbers for (indices along all axes but the last,
-        slice); texts are objects."""
-        if self.text is not None:
-            return np.array(self.text, object).reshape(self.shape)
-        first, shape, dtype = 0, self.shape, np.dtype(f"<{self.type}")
-        if at:
-            *place, part = at
-            start, stop, _ = part.indices(shape[-1])
-            row = int(np.ravel_multi_index((*place, 0), (*shape[:-1], 1)))
-            first, shape = row * shape[-1] + start, (stop - start,)
-        self.data.seek((self.offset or 0) + first * dtype.itemsize)
-        return np.fromfile(self.data, dtype, math.prod(shape)).reshape(shape)
 
 
 class File(dict[str, Node]):
-    """An open HDF5 file: {path: Node} of all that is in it, "" being its root."""
+    """An open HDF5 file: {path: Node} of all that is in it, "" being its root.
+
+    It stays open, so that its numbers can be read whatever takes its place, until nobody refers to
+    it any more; ``path``: its name in messages.
+    """
+
+    def __init__(self, path: object, data: BinaryIO) -> None:
+        self.path, self.data = path, data
+        self.seal = check_seal(path, data)
+        for name, (kind, shape, *more) in describe(path, data).items():
+            self[name] = Node(kind, tuple(shape), *more)
+
+    def __del__(self) -> None:
+        self.data.close()
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -82,16 +81,37 @@ class File(dict[str, Node]):
         return self[path]
 
     def read(self, path: str, at: tuple = ()) -> np.ndarray:
-        """Return the values of a dataset, or some of them (see Node); Unfit where there is none."""
-        return self.node(path)[at]
+        """Return the values of a dataset, texts as objects; Unfit where there is none.
+
+        ``at``: all of it for (), or some numbers for (indices along all axes but the last, slice).
+        FileError where another file has been copied over this one.
+        """
+        node = self.node(path)
+        if end_of(self.data) != self.seal:
+            raise FileError(f"{self.path} {CHANGED}")
+        if node.text is not None:
+            return np.array(node.text, object).reshape(node.shape)
+        first, shape, dtype = 0, node.shape, np.dtype(f"<{node.type}")
+        if at:
+            *place, part = at
+            start, stop, _ = part.indices(shape[-1])
+            row = int(np.ravel_multi_index((*place, 0), (*shape[:-1], 1)))
+            first, shape = row * shape[-1] + start, (stop - start,)
+        self.data.seek((node.offset or 0) + first * dtype.itemsize)
+        return np.fromfile(self.data, dtype, math.prod(shape)).reshape(shape)
 
 
-def open_hdf5(path: object, data: BinaryIO) -> File:
-    """Return the File of an open file whose checksum was found right.
+def open_hdf5(path: str | os.PathLike) -> File:
+    """Open a file whose checksum is right.
 
-    ``path``: its name in messages. Raises Unfit for all that flocsim does not write, and FileError
-    for a file that the HDF5 library fails on.
+    Raises Unfit for all that flocsim does not write, and FileError for another checksum and for a
+    file that the HDF5 library fails on.
     """
+    return File(path, open_file(path))
+
+
+def describe(path: object, data: BinaryIO) -> dict[str, list]:
+    """Return {path: [type, shape, offset, attributes, text]} of all that is in an open file."""
     # The other process may move the place in the file that both have, which a buffer does not
     # notice unless it is sought from the end.
     seconds = hdf5_child.cpu_seconds(data.seek(0, os.SEEK_END))
@@ -107,10 +127,8 @@ def open_hdf5(path: object, data: BinaryIO) -> File:
         ) from None
     if "refused" in found:
         raise Unfit(visible(found["refused"][:LONGEST], ""))
-    return File(
-        (name, Node(kind, tuple(shape), offset, attributes, words, data))
-        for name, (kind, shape, offset, attributes, words) in found["nodes"].items()
-    )
+    nodes: dict[str, list] = found["nodes"]
+    return nodes
 
 
 def can_fork() -> bool:

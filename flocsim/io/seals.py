@@ -4,10 +4,8 @@ It follows the HDF5 data, where every HDF5 library ignores it: a damaged HDF5 fi
 reader or keep it busy for ever, a wrong checksum cannot.
 """
 
-import contextlib
 import hashlib
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -18,6 +16,8 @@ from flocsim.errors import FileError
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 SEAL_MARK = b"\nflocsim blake2b-256 "
 SEAL_LENGTH = len(SEAL_MARK) + 64 + 1
+
+CHANGED = "has changed since it was opened: open it again"
 
 BLOCK = 2**20
 """Bytes that are read at a time."""
@@ -84,31 +84,30 @@ def end_of(file: BinaryIO) -> bytes:
     return file.read()
 
 
-@contextlib.contextmanager
-def checked_sealed(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Open a file whose checksum is right; FileError for any other."""
+def open_file(path: str | os.PathLike) -> BinaryIO:
+    """Open an ordinary file for reading; FileError where that is impossible."""
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise FileError(f"{path} is not an ordinary file: name a results file")
     try:
-        if os.path.exists(path) and not os.path.isfile(path):
-            raise FileError(f"{path} is not an ordinary file: name a results file")
-        file = open(path, "rb")  # noqa: SIM115 (closed below)
-    except FileError:
-        raise
+        return open(path, "rb")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"{path} could not be read: {reason}; check the name") from error
-    with file:
-        end, size = end_of(file), max(file.tell() - SEAL_LENGTH, 0)
-        if isinstance(path, Held) and path.end != end:
-            raise FileError(f"{path} has changed since it was opened: open it again")
-        file.seek(0)
-        if file.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
-            raise FileError(f"{path} is not an HDF5 file: name a file written by flocsim")
-        if not end.startswith(SEAL_MARK):
-            raise FileError(
-                f"{path} does not end in flocsim's checksum: it is not from flocsim, was truncated "
-                "or was changed by another program; use the original file"
-            )
-        if seal_of(file, size) != end:
-            raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
-        file.seek(0)
-        yield file
+
+
+def check_seal(path: object, file: BinaryIO) -> bytes:
+    """Return the seal of an open file; FileError where its checksum is not right."""
+    end, size = end_of(file), max(file.tell() - SEAL_LENGTH, 0)
+    if isinstance(path, Held) and path.end != end:
+        raise FileError(f"{path} {CHANGED}")
+    file.seek(0)
+    if file.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
+        raise FileError(f"{path} is not an HDF5 file: name a file written by flocsim")
+    if not end.startswith(SEAL_MARK):
+        raise FileError(
+            f"{path} does not end in flocsim's checksum: it is not from flocsim, was truncated "
+            "or was changed by another program; use the original file"
+        )
+    if seal_of(file, size) != end:
+        raise FileError(f"{path} is damaged, its checksum is wrong: use a copy or run it again")
+    return end

@@ -166,7 +166,7 @@ def test_wrong_names_are_refused(made_up):
 
 def test_the_first_of_each_outcome_has_the_most_vertices(made_up):
     results = read_results("r.h5")
-    found = first_of_each("r.h5")
+    found = first_of_each(results)
     outcome = results.replicates["outcome"]
     for code, name in enumerate(OUTCOMES):
         places = np.argwhere(outcome == code)
@@ -187,7 +187,7 @@ def test_what_cannot_be_run_again_is_said(made_up, capsys):
 def test_motion_is_that_of_the_replicate(real):
     path, file = real
     text = file.read_text("utf-8")
-    found = first_of_each(path)
+    found = first_of_each(read_results(path))
     classes = [name for name in "ABCD" if name in found]
     motions = [json.loads(html.unescape(each))
                for each in re.findall(r"data-frames='([^']*)'", text)]  # fmt: skip

@@ -18,7 +18,7 @@ def read_results_file(path):
     from flocsim.ensembles.contents import text_of
     from flocsim.io.results.file import read_results
 
-    read_results(path)
+    dict(read_results(path).replicates)
     text_of(path)
 
 

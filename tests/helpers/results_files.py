@@ -19,7 +19,7 @@ def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
             return False
         if mine.text is not None:
             return mine.text == yours.text
-        return mine[()].tobytes() == yours[()].tobytes()
+        return one.read(path).tobytes() == other.read(path).tobytes()
 
     with opened(path_a) as a, opened(path_b) as b:
         names = {f"{group}/{name}" for file in (a, b) for group in file.names("")

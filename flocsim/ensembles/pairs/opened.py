@@ -5,7 +5,7 @@ study, run again, their motions kept as Trajectories.
 import functools
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +28,9 @@ from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import data_rule
-from flocsim.io.plots.results import FIGURES, OF_ROWS
+from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, add_foot, save
-from flocsim.io.results.file import FORMAT, first_of_each, read_results, read_row
+from flocsim.io.results.file import FORMAT, first_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
@@ -112,8 +112,8 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
 def row_in_words(row: dict) -> dict:
     """A row of the table of replicates with the words of its codes."""
     words = {name: dict(zip(*flags, strict=True)) for name, flags in FLAGS.items()}
-    found = {name: words[name][value] if name in words else value for name, value in row.items()}
-    return found | {"failure": FAILURES[row["failure"]]}
+    words["failure"] = dict(enumerate(FAILURES))
+    return {name: words[name][value] if name in words else value for name, value in row.items()}
 
 
 REPEATED = ("outcome", "inside", "bond")
@@ -156,14 +156,14 @@ class StudyResults(Tables):
     @functools.cached_property
     def replicates(self) -> dict[str, np.ndarray]:
         """{column: (type, vertices, delta, replicate)} of all replicates, read from the file that
-        was opened; FileError where another has taken its place."""
-        found = read_results(self.source).replicates
-        assert found is not None
-        return found
+        was opened; FileError where another has been copied over it."""
+        assert self.results.replicates is not None
+        return dict(self.results.replicates)
 
     def load_all(self) -> None:
         """Read all rows now, so that the file may go."""
-        _, self.path = self.replicates, Path("results in memory")
+        self.results = attrs.evolve(self.results, replicates=self.replicates)
+        self.path = Path("results in memory")
 
     @functools.cached_property
     def config(self) -> Config:
@@ -198,10 +198,9 @@ class StudyResults(Tables):
             radii = found.axes.pop("r_eq")
             by_size = {"r_i": radii, "r_j": attrs.evolve(radii, axes=("j",))}
             return attrs.evolve(found, axes=found.axes | by_size)
-        arrays: Mapping[str, np.ndarray] = getattr(self, group)
-        if not arrays:
+        if not getattr(self.results, group):
             raise UsageError(f"{self.path} has no group {group}: it was written without it")
-        return self.results.labelled(group, arrays)
+        return self.results.labelled(group)
 
     def plot(
         self, figure: str = "overview", file: str | os.PathLike | None = None, *,
@@ -214,10 +213,7 @@ class StudyResults(Tables):
         """
         if figure not in FIGURES:
             raise UsageError(f"figure must be one of {', '.join(FIGURES)}, found {figure!r}")
-        results = self.results
-        if figure in OF_ROWS:
-            results = attrs.evolve(results, replicates=self.replicates)
-        drawn = FIGURES[figure](results)
+        drawn = FIGURES[figure](self.results)
         add_foot(drawn, source_line(self.run))
         if file is not None:
             save(drawn, Path(file), data_rule(overwrite))
@@ -242,7 +238,13 @@ class StudyResults(Tables):
         place = place_of(self.config, type, vertices, delta)
         study, row = self.study_with(place[1]), self.row(int(replicate), place)
         found = replicate_of(int(replicate), place, study)
-        self.hold(found, row)
+        assert found.row is not None, "a replicate of a study"
+        for name in REPEATED:
+            if found.row[name] != row[name]:
+                raise UsageError(
+                    f"{self.path} cannot be reproduced: {name} is {row[name]} in the file, "
+                    f"{found.row[name]} now; use the kind of machine that it was made on"
+                )
         return found
 
     def in_water(self) -> list[dict[str, Any]]:
@@ -255,25 +257,14 @@ class StudyResults(Tables):
         return water_facts(self.config)
 
     def row(self, replicate: int, place: Place) -> dict[str, Any]:
-        """The stored row of a replicate, in words."""
+        """Return REPEATED of the stored row of a replicate, in words."""
         name = self.config.scene.names[place[0]]
         at = (
             list(self.types).index(name), self.vertices.tolist().index(place[1]),
             self.delta.tolist().index(place[2]), replicate,
         )  # fmt: skip
-        if "replicates" in vars(self):
-            return row_in_words({each: self.replicates[each][at] for each in self.replicates})
-        return row_in_words(read_row(self.source, at))
-
-    def hold(self, found: Trajectory, row: Mapping[str, Any]) -> None:
-        """UsageError where a replicate has come out otherwise than its row says."""
-        assert found.row is not None, "a replicate of a study"
-        for name in REPEATED:
-            if found.row[name] != row[name]:
-                raise UsageError(
-                    f"{self.path} cannot be reproduced: {name} is {row[name]} in the file, "
-                    f"{found.row[name]} now; use the kind of machine that it was made on"
-                )
+        assert self.results.replicates is not None
+        return row_in_words({each: self.results.replicates[each][at] for each in REPEATED})
 
     def study_with(self, vertices: int) -> Study:
         """The study of the file with bodies of so many vertices, ready to run replicates again.
@@ -306,14 +297,13 @@ def open_results(
     """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
     modules and libraries."""
     source = held(path)
-    found = read_results(source, replicates=False)
-    return StudyResults(found, source, allowed or Allowed(), sources)
+    return StudyResults(read_results(source), source, allowed or Allowed(), sources)
 
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     """The first replicate of each class that the file has, of its flocs with the most vertices."""
     opened = open_results(path, allowed)
-    found = first_of_each(opened.source)
+    found = first_of_each(opened.results)
     return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
 
 

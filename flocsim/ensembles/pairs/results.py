@@ -4,7 +4,6 @@ page.
 
 import json
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from flocsim.ensembles.contents import (
 from flocsim.errors import visible
 from flocsim.io.results import run_group, schema
 from flocsim.io.results.events import ENDS_COUNTED, ends_of
-from flocsim.io.results.file import read_results, with_rows
+from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import stored
 
 SAID_APART = (report.MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
@@ -156,7 +155,7 @@ class PairFiles(Contents):
 
     def read(self, path: Any) -> schema.Results:
         """Return what a results file holds, its single replicates left on the disk."""
-        return read_results(path, replicates=False)
+        return read_results(path)
 
     def summary(self, results: schema.Results) -> Summary:
         """Return what a results file says of its study."""
@@ -230,12 +229,6 @@ class PairFiles(Contents):
         if found is None:
             return FIGURES | KERNEL_FIGURES
         return FIGURES if found.kernel is None else KERNEL_FIGURES
-
-    def with_rows(self, path: Any, found: Any, figures: Iterable[str], most: float) -> Any:
-        """Return results with their single replicates, if these figures draw them."""
-        from flocsim.io.plots.results import OF_ROWS
-
-        return with_rows(path, found, most) if OF_ROWS & set(figures) else found
 
     def water(self, path: Any, allowed: Allowed) -> list[str]:
         """Return lines on how often the equivalent spheres touch with water between them."""

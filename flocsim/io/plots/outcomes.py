@@ -15,7 +15,7 @@ from flocsim.io.confidence import bounded_sums, clustered_proportion, explained_
 from flocsim.io.plots import style
 from flocsim.io.plots.style import Figure, drawing, plain
 from flocsim.io.results.events import NOT_COLLIDED, ends_of, events, events_of
-from flocsim.io.results.schema import Results
+from flocsim.io.results.schema import SHAPE_MEASURES, Results
 
 COLOURS = {
     "aggregated": "#0072B2", "departed": "#56B4E9", "missed": "0.85", "held": "#009E73",
@@ -267,6 +267,12 @@ PAIR_MEASURES = {
 }
 """What is said of the shapes of two flocs: of both the mean, of their radii the ratio."""
 
+SHAPE_COLUMNS = (
+    "outcome", "inside", "bond", "r_i", "r_j", "floc_i", "floc_j",
+    *(f"{name}_{body}" for name in SHAPE_MEASURES for body in "ij"),
+)  # fmt: skip
+"""Columns of replicates that Pr[A] against shape is drawn of."""
+
 BINS = 5
 """Of about as many replicates each."""
 
@@ -354,17 +360,20 @@ def shape_effects(results: Results) -> Figure:
     """
     number = int(np.argmax(results.vertices))
     count = len(results.types)
+    rows = {} if results.replicates is None else {
+        name: results.replicates[name][:, number] for name in SHAPE_COLUMNS
+    }  # fmt: skip
     with drawing(2.15 * len(PAIR_MEASURES) + 1.9, 1.95 * count + 0.5) as figure:
         grid = figure.subplots(count, len(PAIR_MEASURES), sharey=True, sharex="col", squeeze=False)
         for t, (row, title) in enumerate(zip(grid, style.type_titles(results.types), strict=True)):
             row[0].set_ylabel(f"{title}\nprobability")
             for axes in row:
                 style.set_probability_axis(axes)
-            if results.replicates is None:
+            if not rows:
                 style.note(row[0], "only for finished studies")
                 continue
-            rows = {name: each[t, number] for name, each in results.replicates.items()}
-            effects = {name: shape_effect(rows, name) for name in PAIR_MEASURES}
+            own = {name: each[t] for name, each in rows.items()}
+            effects = {name: shape_effect(own, name) for name in PAIR_MEASURES}
             for axes, effect in zip(row, effects.values(), strict=True):
                 draw_effect(axes, effect)
                 axes.set_title(share_words("explains", effect.explained), fontsize=7.5)

@@ -304,9 +304,3 @@ FIGURES: dict[str, Callable[[Results], Figure]] = {
     "shape": shape_effects,
     "size": against_size,
 }
-
-OF_ROWS = frozenset({"shape"})
-"""Figures that are drawn of the table of replicates."""
-
-MOST_ROWS = 2**22
-"""Of which they are drawn unasked, from 1 GB."""

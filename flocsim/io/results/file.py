@@ -1,19 +1,18 @@
 """The results file of pairs and rates (`schema.RESULTS`): writing it, and reading it in parts.
 
 Its table of replicates may be larger than the memory: rank 0 writes it a part at a time, and a
-reader takes all of it, a summary, or single rows.
+reader takes a column at a time.
 """
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.io.files import Rule, keep
-from flocsim.io.groups import File
+from flocsim.io.groups import Dataset, File, Unfit
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import kernel_in
 from flocsim.io.results.schema import (
@@ -22,8 +21,8 @@ from flocsim.io.results.schema import (
     OUTCOMES,
     REPLICATES,
     RESULTS,
-    ROWS,
     Results,
+    row_columns,
 )
 
 FORMAT, SCHEMA_VERSION = RESULTS.name, RESULTS.version
@@ -76,35 +75,54 @@ def parts_of(shape: Sequence[int], most: int) -> Iterator[list[slice]]:
             yield [own, *each]
 
 
-def read_results(path: str | os.PathLike, replicates: bool = True) -> Results:
+class Rows(Mapping[str, np.ndarray]):
+    """The table of replicates in an open file: a column is read whenever it is asked for.
+
+    FileError where it has values that no run can have given.
+    """
+
+    def __init__(self, file: File, columns: Mapping[str, Dataset]) -> None:
+        self.file, self.columns = file, columns
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        column, path = self.columns[name], f"replicates/{name}"
+        values = self.file.read(path)
+        try:
+            column.check(path, values, {})
+        except Unfit as error:
+            raise RESULTS.unreadable(self.file.path, error) from error
+        return values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+def read_results(path: str | os.PathLike) -> Results:
     """Return the Results in a file; FileError if it is absent, damaged, of another kind or version.
 
-    Without ``replicates`` their table, which may be larger than the memory, stays on the disk.
+    Their table of replicates, which may be larger than the memory, is read from the file a column
+    at a time, whenever one is asked for.
     """
-    with opened(path) as file:
-        return results_in(file, replicates)
-
-
-def results_in(file: File, replicates: bool = True) -> Results:
-    """Return the Results in an open file."""
-    stored = RESULTS.contents(file, without=() if replicates else ("replicates",))
-    table, run = stored.groups["probabilities"], stored.run
-    failures = failures_of(file)
-    tables: dict[str, Any] = {"replicates": None} | {
-        name: {column: stored.groups[name][column] for column in group.columns}
-        for name, group in GROUPS.items() if name in stored.groups
-    }  # fmt: skip
-    if replicates and np.any(tables["replicates"]["failure"] >= len(failures)):
-        raise ValueError("replicates/failure has codes without a word")
-    kernel = stored.groups.get("kernel")
-    return Results(
-        types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
-        failures=failures, flocs=stored.groups.get("flocs", {"floc": ()})["floc"],
-        count=file.node("replicates/replicate").shape[0],
-        radii={name: table[name] for name in ("r_i", "r_j")},
-        kernel=None if kernel is None else kernel_in(kernel, str(run.get("identity", ""))),
-        **tables,
-    )  # fmt: skip
+    with RESULTS.opened(path) as file:
+        stored = RESULTS.contents(file, without=("replicates",))
+        table, run = stored.groups["probabilities"], stored.run
+        failures = failures_of(file)
+        tables: dict[str, Any] = {
+            name: {column: stored.groups[name][column] for column in group.columns}
+            for name, group in GROUPS.items() if name in stored.groups
+        }  # fmt: skip
+        kernel = stored.groups.get("kernel")
+        return Results(
+            types=table["type"], vertices=table["vertices"], delta=table["delta"], run=run,
+            failures=failures, flocs=stored.groups.get("flocs", {"floc": ()})["floc"],
+            count=file.node("replicates/replicate").shape[0],
+            radii={name: table[name] for name in ("r_i", "r_j")},
+            kernel=None if kernel is None else kernel_in(kernel, str(run.get("identity", ""))),
+            replicates=Rows(file, row_columns(failures)), **tables,
+        )  # fmt: skip
 
 
 def failures_of(file: File) -> list[str]:
@@ -113,37 +131,19 @@ def failures_of(file: File) -> list[str]:
     return words.split()
 
 
-def with_rows(path: str | os.PathLike, results: Results, most: float = np.inf) -> Results:
-    """Return results with their table of replicates, unless that has more than ``most`` rows."""
-    rows = int(np.prod(results.shape)) * results.count
-    if results.replicates is not None or rows > most:
-        return results
-    return attrs.evolve(results, replicates=read_results(path).replicates)
-
-
-def read_row(path: str | os.PathLike, place: tuple[int, int, int, int]) -> dict[str, Any]:
-    """Return {column: value} of one replicate, at (type, vertices, delta, replicate)."""
-    with opened(path) as file:
-        at = (*place[:-1], slice(place[-1], place[-1] + 1))
-        row = {name: file.read(f"replicates/{name}", at)[0] for name in REPLICATES}
-        for name, value in row.items():
-            ROWS[name].check(f"replicates/{name}", value, {})
-        return row
-
-
-def first_of_each(path: str | os.PathLike) -> dict[str, tuple[int, int, int, int]]:
+def first_of_each(results: Results) -> dict[str, tuple[int, int, int, int]]:
     """Return {outcome: place (type, vertices, delta, replicate)} of its first replicate, if any.
 
     Conditions of the most vertices come first: of an outcome the most detailed flocs are found.
     """
-    with opened(path) as file:
-        order = np.argsort(-file.read("replicates/vertices"), kind="stable")
-        codes = np.moveaxis(file.read("replicates/outcome")[:, order], 1, 0)
-        found = {}
-        for code, first in zip(*np.unique(codes, return_index=True), strict=True):
-            v, t, d, row = map(int, np.unravel_index(first, codes.shape))
-            found[OUTCOMES[code]] = (t, int(order[v]), d, row)
-        return found
+    assert results.replicates is not None
+    order = np.argsort(-results.vertices, kind="stable")
+    codes = np.moveaxis(results.replicates["outcome"][:, order], 1, 0)
+    found = {}
+    for code, first in zip(*np.unique(codes, return_index=True), strict=True):
+        v, t, d, row = map(int, np.unravel_index(first, codes.shape))
+        found[OUTCOMES[code]] = (t, int(order[v]), d, row)
+    return found
 
 
 @contextlib.contextmanager

@@ -3,7 +3,7 @@
 The file itself is read and written by `flocsim.io.results.file`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -276,13 +276,19 @@ def as_names(names: Iterable) -> tuple[str, ...]:
     return tuple(map(str, names))
 
 
+def row_columns(failures: Sequence[str]) -> dict[str, Dataset]:
+    """Return the columns of the replicates of a file that has these words for its failures."""
+    codes = tuple(range(len(failures))), failures
+    return ROWS | {"failure": attrs.evolve(ROWS["failure"], codes=codes)}
+
+
 @attrs.frozen(eq=False)
 class Results:
     """All results of one study of pairs or rates.
 
     ``types`` names; ``vertices`` N [-]; ``delta`` shares of delta_max [-]; ``replicates`` the
-    arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where they were left
-    on the disk, with their ``count`` then; ``probabilities`` those of `TABLE`, each (type,
+    arrays of `REPLICATES`, each (type, vertices, delta, replicate), or None where there are none
+    yet, with their ``count`` then; ``probabilities`` those of `TABLE`, each (type,
     vertices, delta), with `LAST_AXES` last where the name has one; ``run`` plain scalars;
     ``failures`` the words for the codes of ``replicates["failure"]``, the first being "none" (in
     a fixed order, else equal runs differ in bytes); ``flocs`` the names of the flocs; ``pooled``
@@ -295,7 +301,7 @@ class Results:
     types: tuple[str, ...] = attrs.field(converter=as_names)
     vertices: np.ndarray = attrs.field(converter=np.asarray)
     delta: np.ndarray = attrs.field(converter=np.asarray)
-    replicates: dict[str, np.ndarray] | None
+    replicates: Mapping[str, np.ndarray] | None
     probabilities: dict[str, np.ndarray]
     run: dict[str, str | int | float] = attrs.field(factory=dict)
     failures: tuple[str, ...] = attrs.field(default=("none",), converter=as_words)
@@ -314,19 +320,17 @@ class Results:
     kernel: Kernel | None = None
 
     def __attrs_post_init__(self):
-        if self.replicates is not None:
+        if not self.count and self.replicates is not None:
             object.__setattr__(self, "count", np.shape(self.replicates["outcome"])[-1])
 
-    def labelled(self, group: str, arrays: Mapping[str, np.ndarray] | None = None) -> Labelled:
-        """Return a group with its axes; ``arrays``: those of the group, where they are not here.
+    def labelled(self, group: str) -> Labelled:
+        """Return a group with its axes.
 
-        Replicates that were left on the disk are zeros that take no memory.
+        Replicates that are not in memory yet are zeros that take none.
         """
-        declared = GROUPS[group]
-        values = getattr(self, group) if arrays is None else arrays
+        declared, values = GROUPS[group], getattr(self, group)
         if group == "replicates":
-            codes = tuple(range(len(self.failures))), self.failures
-            columns = ROWS | {"failure": attrs.evolve(ROWS["failure"], codes=codes)}
+            columns = row_columns(self.failures)
             declared = attrs.evolve(declared, columns=columns)
             shape = (*self.shape, self.count)
             values = values or {
