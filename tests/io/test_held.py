@@ -9,9 +9,9 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.flocs import read_flocs
-from flocsim.ensembles.pairs import results as contents
 from flocsim.errors import FileError
 from flocsim.io import seals
+from flocsim.io.plots import results as contents
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import SMALL, load_text, write_star_library
