@@ -16,7 +16,7 @@ from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.pair_scene import SOBOL, SOBOL_SCRAMBLES
 from flocsim.ensembles.runner import run
-from flocsim.io.confidence import scrambled_proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion
 from flocsim.io.results.events import events
 
 TYPES = ("I", "II", "III")
@@ -50,7 +50,8 @@ def coverage(sums, studies, rng):
     truth = sums[1].sum() / sums[0].sum()
     some = rng.integers(0, sums.shape[-1], (studies, SOBOL_SCRAMBLES))
     trials, successes, unknown = sums[:, some]
-    low, high, _ = scrambled_proportion(successes, trials, unknown)
+    clusters = bounded_sums(successes, trials, unknown)
+    _, low, high, _ = clustered_proportion(clusters, SOBOL_SCRAMBLES)
     return np.mean((low <= truth) & (truth <= high)), 0.5 * np.mean(high - low)
 
 

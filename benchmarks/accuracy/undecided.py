@@ -9,7 +9,6 @@ that gives nan at chosen orientations of i (nan). The truth is what the large st
 95 % intervals of each probability, efficiency and rate hold it in 95 % of the small studies.
 """
 
-import attrs
 import numpy as np
 
 from benchmarks.reporting import EXAMPLES, Table, begin
@@ -78,9 +77,9 @@ def of_pairs(rows):
     return found | {"efficiency, axial": axial}
 
 
-def of_rates(points, rows, rate, scrambles):
+def of_rates(points, rows, scrambles):
     """The same of the rates of a pair of sizes."""
-    values = estimate(points, rows, "shear", rate, scrambles).values
+    values = estimate(points, rows, scrambles)
     return {name: [values[f"{name}{end}"] for end in ("", "_low", "_high")] for name in ESTIMATES}
 
 
@@ -118,12 +117,12 @@ def pair_samples(arguments):
 
 
 def of_seed(seed):
-    """(Weighted points, rows, rate) of the encounters of 5 with 8 um."""
+    """(weighted points, rows) of the encounters of 5 with 8 um."""
     config = load_config(EXAMPLES / "kernel.toml", RATES | {"seed": seed})
     study, found = study_of(config), run(config)
     rows = {name: each[1, 0, 0] for name, each in found.replicates.items()}
     points = points_of(seed, SCRAMBLES_RUN, 0, found.count)
-    return weighted(study, (1, 1), rows, points), rows, study.scene.rate
+    return weighted(study, (1, 1), rows, points), rows
 
 
 def rate_samples(arguments):
@@ -134,9 +133,7 @@ def rate_samples(arguments):
     order = np.arange(count * len(parts)).reshape(len(parts), -1, SCRAMBLES_RUN)
     order = order.transpose(1, 0, 2).ravel()
     rows = {name: np.concatenate([each[1][name] for each in parts])[order] for name in parts[0][1]}
-    columns = zip(*(attrs.astuple(each[0]) for each in parts), strict=True)
-    points = type(parts[0][0])(*(np.concatenate(each, axis=-1)[..., order] for each in columns))
-    rate = parts[0][2]
+    points = np.concatenate([each[0] for each in parts])[order].view(np.recarray)
     made = {}
 
     def sample(rng, share, how):
@@ -144,11 +141,10 @@ def rate_samples(arguments):
             made[share, how] = cut(rows, share, how)
         some = rng.integers(0, scrambles, SCRAMBLES)
         at = np.arange(len(order)).reshape(-1, scrambles)[:, some].ravel()
-        fewer = type(points)(*(np.asarray(each)[..., at] for each in attrs.astuple(points)))
         mine = {name: each[at] for name, each in made[share, how].items()}
-        return of_rates(fewer, mine, rate, SCRAMBLES)
+        return of_rates(points[at], mine, SCRAMBLES)
 
-    return of_rates(points, rows, rate, scrambles), sample
+    return of_rates(points, rows, scrambles), sample
 
 
 def main():

@@ -7,7 +7,8 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.collision.draw import Draw, draws, orientations, outcome_of
-from flocsim.ensembles.collision.encounter import OBSERVER, Encounter
+from flocsim.ensembles.collision.encounter import Encounter
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.integrators.base import Status
 
 VERTICES = 64

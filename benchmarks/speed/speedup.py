@@ -21,7 +21,7 @@ from benchmarks.speed.cases import VERTICES, Result, differing, make_cases, run_
 from benchmarks.speed.measure import largest_step
 from benchmarks.speed.scenes import collisions
 from flocsim.ensembles.collision.draw import outcome_of
-from flocsim.ensembles.collision.encounter import OBSERVER
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.study import Study
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.base import Status

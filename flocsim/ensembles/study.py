@@ -26,6 +26,7 @@ from flocsim.ensembles.collision.draw import (
     THIRD,
     WHY,
     Draw,
+    as_draws,
     columns_of,
     draws,
     exact_methods,
@@ -34,10 +35,11 @@ from flocsim.ensembles.collision.draw import (
     point,
     points_of,
 )
-from flocsim.ensembles.collision.encounter import Encounter, make_encounter
+from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.equivalent import kinds, placed_system, sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
-from flocsim.ensembles.collision.offsets import as_draws, offsets_of
+from flocsim.ensembles.collision.mechanisms import make_encounter
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.kernel_scene import KernelScene
@@ -144,7 +146,7 @@ class Study(StudyKind):
                 system = placed_system(config, pair.system, shapes)
                 name = system.family + (f" in {pair.meeting}" * (pair.meeting != SETTLING))
                 laws = sorted(system.pieces.laws.items())
-                codes = [fingerprint(advance, system.fillings(pair.observer))]
+                codes = [fingerprint(advance, system.fillings(OBSERVER))]
                 codes += [f"{law} {fingerprint(function, {})}" for law, function in laws]
                 digest = hashlib.blake2b("\n".join(codes).encode(), digest_size=12)
                 facts[f"kernels.{name}"] = digest.hexdigest()
@@ -218,9 +220,8 @@ class Study(StudyKind):
                 radii = (shapes[0].equivalent_radius, shapes[1].equivalent_radius)
             zone = zone_distance(self.config.zone, self.config.forces, *radii)
             made = make_encounter(
-                self.config, shapes, zone, self.config.integrator.method,
-                self.pairings[condition].meeting, self.first.get(name),
-            )  # fmt: skip
+                self.config, shapes, zone, self.pairings[condition].meeting, self.first.get(name)
+            )
             self.first.setdefault(name, made)
             self.encounters[key] = made
         return self.encounters[key]
@@ -248,7 +249,7 @@ class Study(StudyKind):
         kind = *encounter.kind, type(method)
         if kind not in self.drivers:
             made = system.changed(integrator=method)
-            self.drivers[kind] = made.compose(observer=encounter.observer)
+            self.drivers[kind] = made.compose(observer=OBSERVER)
         return self.drivers[kind]
 
     def run(
@@ -387,6 +388,6 @@ class KernelStudy(Study):
         self, encounter: Encounter, share: float, numbers: Sequence[float] | np.ndarray
     ) -> float:
         """The offset of a replicate over R_i + R_j, as a number between −1 and somewhat over 1."""
-        angles = np.array(encounter.orientations(numbers))[:, None]
-        offsets = offsets_of(encounter, angles[0], angles[1], np.array(numbers[4:]))
-        return float(offsets[0]) / encounter.outer
+        bounds = encounter.bounds(*np.array(encounter.orientations(numbers))[:, None])
+        [offset] = encounter.offsets(*bounds, np.array(numbers[4:]))
+        return float(offset) / encounter.outer

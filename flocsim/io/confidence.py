@@ -15,9 +15,8 @@ of two settling bodies (Pruppacher and Klett 1997, Microphysics of Clouds and Pr
 14.4; Han and Lawler 1991, J. Hydraul. Eng. 117, 1269); P makes it the mean over orientations.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from statistics import NormalDist
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -154,89 +153,67 @@ def bounded_sums(successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray)
     return np.stack([cluster_sums(*each) for each in parts])
 
 
-def clustered_proportion(
-    sums: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(p, low, high, n): p = Σ S/Σ M, and an interval at the n events that it is worth.
-
-    ``sums``: those of bounded_sums. S successes of M trials in each cluster (W. G. Cochran,
-    Sampling Techniques, 1977, ch. 6): at n independent events p (1 − p)/n is the variance between
-    clusters; n is no more than the trials there were, and the number of clusters where all agree.
-    The interval is that of `proportion`, unknown ones included.
-    """
-    known, least, most = (share_and_worth(each) for each in np.asarray(sums, dtype=float))
-    low, high = between_bounds(least[0], most[0], least[1], most[1])
-    return known[0], low, high, known[1]
-
-
-def share_and_worth(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(p, n) of cluster_sums, NaN without trials."""
-    s, m, ss, sm, mm, clusters = sums
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = s / m
-        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, 0.0)
-        variance = clusters / (clusters - 1.0) * spread / (m * m)
-        number = np.minimum(p * (1.0 - p) / variance, m)
-        number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
-        return p, np.where(m > 0, number, np.nan)
-
-
-def scrambled_proportion(
-    successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(low, high, n) of Σ S/Σ M over independent scrambles, along the last axis, whose points are
-    more even than independent ones; n: the independent events that it is worth.
-
-    The variance is that of a ratio between scrambles, each taken to scatter by half a point at
-    least; at the n events of which it is p (1 − p)/n the interval is Wilson's, at Student's
-    quantile of the scrambles in the place of the normal one. Where all agree n is the trials.
-    """
-    from scipy.special import stdtrit
-
-    count = successes.shape[-1]
-    t = float(stdtrit(count - 1, 0.975))
-    known, least, most = (
-        scrambled_worth(sums, count) for sums in bounded_sums(successes, trials, unknown)
-    )
-    low, high = score_interval(*least, t)[0], score_interval(*most, t)[1]
-    return low, high, known[1]
-
-
-def scrambled_worth(sums: np.ndarray, scrambles: int) -> tuple[np.ndarray, np.ndarray]:
-    """(p, n) of cluster_sums, NaN without trials."""
-    s, m, ss, sm, mm, _ = sums.astype(float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        p = s / m
-        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, LEAST_SCATTER * (scrambles - 1.0))
-        number = p * (1.0 - p) * m * m * (scrambles - 1.0) / (scrambles * spread)
-    return p, np.where((p == 0.0) | (p == 1.0), m, number)
-
-
 LEAST_SCATTER = 0.25
-"""Square of half a point."""
+"""Square of half a point: even points in a simple set are as many in every scramble, up to one."""
 
 
-def scrambled_difference(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(difference, low, high) of two paired proportions, here minus there, over independent
-    scrambles.
-
-    ``cells``: whole numbers (…, scramble, 4) of replicates in both, here only, there only, in
-    neither. D = Σ d/Σ m, d the difference of a scramble's two counts and m its replicates; the
-    interval is Student's of the scrambles, each taken to scatter by half a point at least.
-    """
+def student_quantile(scrambles: int) -> float:
+    """Return Student's t of a two-sided 95 % interval from so many scrambles."""
     from scipy.special import stdtrit
 
-    _, here, there, _ = np.moveaxis(np.asarray(cells, dtype=float), -1, 0)
-    m = np.sum(cells, axis=-1, dtype=float)
-    count = m.shape[-1]
+    return float(stdtrit(scrambles - 1, 0.975))
+
+
+def ratio_and_variance(sums: np.ndarray, scrambles: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Return p = Σ S/Σ M of cluster_sums and its variance between clusters, NaN without trials.
+
+    k/(k − 1) Σ (S − p M)²/(Σ M)² of k clusters (W. G. Cochran, Sampling Techniques, 1977, ch. 6);
+    of ``scrambles``, each is taken to scatter by half a point at least.
+    """
+    s, m, ss, sm, mm, clusters = np.asarray(sums, dtype=float)
+    k = scrambles or clusters
     with np.errstate(divide="ignore", invalid="ignore"):
-        difference = np.sum(here - there, axis=-1) / m.sum(axis=-1)
-        spread = np.sum((here - there - difference[..., np.newaxis] * m) ** 2, axis=-1)
-        spread = np.maximum(spread, LEAST_SCATTER * (count - 1.0))
-        half = np.sqrt(count * spread / (count - 1.0)) / m.sum(axis=-1)
-        half *= float(stdtrit(count - 1, 0.975))
-    low, high = np.maximum(difference - half, -1.0), np.minimum(difference + half, 1.0)
-    return difference, low, high
+        p = s / m
+        least = LEAST_SCATTER * (scrambles - 1.0) if scrambles else 0.0
+        spread = np.maximum(ss - 2.0 * p * sm + p * p * mm, least)
+        return p, k / (k - 1.0) * spread / (m * m)
+
+
+def clustered_proportion(
+    sums: np.ndarray, scrambles: int = 0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return (p, low, high, n): p = Σ S/Σ M, and an interval at the n events that it is worth.
+
+    ``sums``: those of bounded_sums, S successes of M trials in each cluster. At n independent
+    events p (1 − p)/n is the variance between clusters; n is no more than the trials there were,
+    and the number of clusters where all agree. The interval is that of `proportion`, unknown ones
+    included.
+
+    Clusters that are ``scrambles``, whose points are more even than independent ones, may be worth
+    more than their trials, and where all agree just these; the interval is Wilson's at Student's
+    quantile of the scrambles in the place of the normal one.
+    """
+    shares, numbers = [], []
+    for each in sums:
+        p, variance = ratio_and_variance(each, scrambles)
+        trials, clusters = np.asarray(each[1], float), each[5]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            number = p * (1.0 - p) / variance
+        if scrambles:
+            number = np.where((p == 0.0) | (p == 1.0), trials, number)
+        else:
+            number = np.minimum(number, trials)
+            number = np.where(np.isfinite(number) & (number > 0.0), number, clusters)
+            number = np.where(trials > 0, number, np.nan)
+        shares.append(p)
+        numbers.append(number)
+    if scrambles:
+        t = student_quantile(scrambles)
+        low = score_interval(shares[1], numbers[1], t)[0]
+        high = score_interval(shares[2], numbers[2], t)[1]
+    else:
+        low, high = between_bounds(shares[1], shares[2], numbers[1], numbers[2])
+    return shares[0], low, high, numbers[0]
 
 
 def aggregated(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -278,98 +255,6 @@ def efficiency(
     return value, low, high
 
 
-SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
-MEANS = np.geomspace(1e-5, 0.3, 16)
-"""Gamma distributions of rates over conditions: from a few that flip to all alike."""
-
-
-class FurtherFlips(NamedTuple):
-    """How many more may flip: arrays of one shape, a place for each condition."""
-
-    most: np.ndarray
-    """No more than so many, with the probability that was asked for."""
-    mean: np.ndarray
-    none: np.ndarray
-    """Probability that none does."""
-
-
-def further_flips(
-    flipped: ArrayLike, checked: ArrayLike, exposed: ArrayLike, confidence: float = 0.95
-) -> FurtherFlips:
-    """How many more flip.
-
-    Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
-    others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
-
-    Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
-    k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
-    weighed by what all conditions show: f is negative binomial. Given f of c, the rate here has
-    shape k + f and rate k/m + c, and the number of further flips is at most q with probability
-    I_p(k + f, q + 1), I the incomplete beta function, p = b/(b + u), b = k/m + c; their mean over
-    k and m has its quantile here. So where flips sit in few conditions a condition in which few
-    were run again is in doubt, and where all are alike it borrows from the others.
-    """
-    from scipy.special import betainc, gammaln
-
-    f, c, u = np.broadcast_arrays(
-        *(np.asarray(each, float) for each in (flipped, checked, exposed))
-    )
-    if not np.any(c > 0.0):
-        unknown = np.where(u > 0.0, np.nan, 0.0)
-        return FurtherFlips(unknown, unknown, 1.0 + unknown)
-    seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
-    k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
-    rate = (k / m)[:, np.newaxis]
-    f_seen, c_seen = seen
-    logs = (
-        gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
-        + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
-    )  # fmt: skip
-    logs = logs @ times + 0.5 * np.log(m)
-    weights = np.exp(logs - logs.max())
-    weights /= weights.sum()
-    some = weights > NEGLIGIBLE
-    k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
-    cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
-                              return_inverse=True)  # fmt: skip
-    f_here, c_here, u_here = cases
-    shape, b = k[:, np.newaxis] + f_here, rate + c_here
-    low, high = np.full(f_here.shape, -1.0), np.ceil(u_here)
-    # The smallest q lies above low, and is no more than high: halve until they are neighbours.
-    while np.any(high - low > 1.0):
-        middle = np.floor(0.5 * (low + high))
-        enough = weights @ betainc(shape, middle + 1.0, b / (b + u_here)) >= confidence
-        split = high - low > 1.0
-        low = np.where(split & ~enough, middle, low)
-        high = np.where(split & enough, middle, high)
-    mean = np.minimum(weights @ (shape * u_here / b), u_here)
-    none = weights @ (b / (b + u_here)) ** shape
-    return FurtherFlips(*(each[places.reshape(f.shape)] for each in (high, mean, none)))
-
-
-def flips_together(parts: Sequence[FurtherFlips], confidence: float = 0.95) -> np.ndarray:
-    """How many more flip at most, with this probability, of independent parts.
-
-    With means µ and bounds q of the parts, each at the same probability,
-    Σ µ + √(Σ (q − µ)²), upwards to a whole number; 0 where all parts together are so likely to
-    have none. One part keeps its bound. Added up, the bounds would hold far more often than they
-    are asked to, as all parts reach theirs together hardly ever.
-    Source: G. Y. Zou and A. Donner, Stat. Med. 27 (2008) 1693-1702.
-    """
-    most, mean, none = (np.stack(each) for each in zip(*parts, strict=True))
-    bound = mean.sum(axis=0) + np.sqrt(np.sum(np.maximum(most - mean, 0.0) ** 2, axis=0))
-    bound = np.ceil(bound * (1.0 - ROUNDED))
-    return np.where(none.prod(axis=0) >= confidence, 0.0, bound)
-
-
-ROUNDED = 1e-12
-"""What a sum of whole numbers may be off by, so that it does not count as one more."""
-
-
-NEGLIGIBLE = 1e-6
-"""Weight below which a distribution is left out."""
-
-
 def explained_share(groups: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
     """Return (share, low, high) of the variance of ``values`` (n,) that lies between groups, of
     which ``groups`` (n,) has the numbers.
@@ -400,7 +285,8 @@ def explained_share(groups: np.ndarray, values: np.ndarray) -> tuple[float, floa
         """Return that at which so many ratios lie below this one; 0 where none is as small."""
         if f.cdf(ratio, k - 1, n - k) <= quantile:
             return 0.0
-        most = 1.0 + n
+        # From below, as the distribution is no number (NaN) where it underflows.
+        most = 1.0
         while ncf.cdf(ratio, k - 1, n - k, most) > quantile:
             most *= 2.0
         return float(brentq(lambda c: ncf.cdf(ratio, k - 1, n - k, c) - quantile, 0.0, most))

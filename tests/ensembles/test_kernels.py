@@ -4,17 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from flocsim.ensembles.collision.draw import point, points_of
-from flocsim.ensembles.collision.offsets import (
-    ANGLE_I,
-    OFFSET,
-    as_draws,
-    bounds_of,
-    flow_offset,
+from flocsim.ensembles.collision.draw import ANGLE_I, OFFSET, as_draws, point, points_of
+from flocsim.ensembles.collision.mechanisms import settling_interval
+from flocsim.ensembles.collision.start import (
+    half_extents,
     half_widths,
-    settling_interval,
+    largest_displacement,
+    place_pair,
 )
-from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.study import KernelStudy, Study
 from flocsim.geometry.shapes.shape import Sphere
@@ -60,12 +57,17 @@ def test_no_start_is_nearer_than_what_acts_there_is_small(study):
         assert apart >= (3e-5 + encounter.start_gap) * (1.0 - 1e-6)
 
 
-def test_in_a_flow_offsets_reach_as_far_as_turning_outlines(tmp_path):
-    config = kernel_config(tmp_path, meeting='"shear"', scene='rate = "10 1/s"')
-    study = study_of(config)
+def test_offsets_in_a_flow_are_as_frequent_as_the_flow_brings_them(tmp_path):
+    study = study_of(kernel_config(tmp_path, meeting='"shear"', scene='rate = "10 1/s"'))
     encounter = study.encounter(0, 1, study.numbers(0))
-    low, high = bounds_of(encounter, np.zeros(1), np.zeros(1))
-    assert high[0] == -low[0] == encounter.outer + encounter.reach
+    low, high = encounter.bounds(np.zeros(4000), np.zeros(4000))
+    largest = encounter.outer + encounter.reach
+    assert np.all(high == -low) and np.all(high == largest)
+    offsets = encounter.offsets(low, high, (np.arange(4000) + 0.5) / 4000) / largest
+    assert np.mean(offsets) == pytest.approx(0.0, abs=1e-12)
+    # p(b) ∝ |b|: ⟨b²⟩ = b_max²/2, and a quarter within half of it.
+    assert np.mean(offsets**2) == pytest.approx(0.5, rel=1e-3)
+    assert np.mean(np.abs(offsets) < 0.5) == pytest.approx(0.25, abs=1e-3)
 
 
 def test_a_replicate_is_the_same_however_it_is_asked_for(study):
@@ -114,15 +116,6 @@ def test_draws_have_the_offset_last():
     found = point(1, 2, 3)
     assert as_draws(found)[0] == found[ANGLE_I]
     assert as_draws(found)[4] == found[OFFSET]
-
-
-def test_offsets_in_a_flow_are_as_frequent_as_the_flow_brings_them():
-    numbers = (np.arange(4000) + 0.5) / 4000
-    offsets = flow_offset(numbers, 2.0)
-    assert np.mean(offsets) == pytest.approx(0.0, abs=1e-12)
-    # p(b) ∝ |b|: ⟨b²⟩ = b_max²/2, and a quarter within half of it.
-    assert np.mean(offsets**2) == pytest.approx(2.0, rel=1e-3)
-    assert np.mean(np.abs(offsets) < 1.0) == pytest.approx(0.25, abs=1e-3)
 
 
 def hull_perimeter(shape):

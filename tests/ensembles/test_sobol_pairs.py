@@ -10,7 +10,7 @@ from flocsim.ensembles.estimates.summary import added
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.errors import ConfigError
-from flocsim.io.confidence import proportion, scrambled_proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
 from tests.helpers.small_study import small_config, small_study
 from tests.helpers.synthetic_results import draw_codes
 
@@ -67,6 +67,11 @@ def test_sums_of_scrambles_add_up_whatever_the_blocks():
         np.testing.assert_array_equal(sums, parts[name])
     aggregated = np.isin(codes[0], (0, 2))
     np.testing.assert_array_equal(whole["pr_a"][1, ..., 3], aggregated[..., 3::16].sum(axis=-1))
+
+
+def scrambled_proportion(*sums):
+    """(low, high, n) of successes, trials, unknown (…, scramble)."""
+    return clustered_proportion(bounded_sums(*sums), sums[0].shape[-1])[1:]
 
 
 def test_the_interval_is_students_of_the_scrambles_and_wilsons_where_all_agree():

@@ -12,7 +12,7 @@ from flocsim.arrays import work_of
 from flocsim.bonds.certificate import CALM, CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.constants import BOLTZMANN
-from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import REST_TIME, bond_of, start_rest
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates

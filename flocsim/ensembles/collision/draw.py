@@ -38,7 +38,9 @@ from flocsim.system import System
 if TYPE_CHECKING:
     from flocsim.ensembles.collision.encounter import Encounter
 
-DIMENSIONS = 5
+OFFSET, ANGLE_I, ANGLE_J, FLOC_I, FLOC_J = range(5)
+"""What the dimensions of a Sobol point are for: the offset comes first, as the first dimensions of
+the sequence are the most even ones."""
 POINTS_STREAM = (0, 0, 2)
 """Spawn key, with the scramble's number behind it, of the numbers that scramble the sequence."""
 
@@ -104,7 +106,7 @@ def points(seed: int, scramble: int, size: int) -> np.ndarray:
 
     stream = np.random.SeedSequence(seed, spawn_key=(*POINTS_STREAM, scramble))
     generator = np.random.Generator(np.random.Philox(stream))
-    sequence = qmc.Sobol(DIMENSIONS, scramble=True, seed=generator)
+    sequence = qmc.Sobol(5, scramble=True, seed=generator)
     found = np.asarray(sequence.random_base2(size.bit_length() - 1))
     found.flags.writeable = False
     return found
@@ -120,6 +122,11 @@ def point(seed: int, scrambles: int, replicate: int) -> np.ndarray:
 def points_of(seed: int, scrambles: int, first: int, stop: int) -> np.ndarray:
     """The points (stop − first, 5) of replicates."""
     return np.array([point(seed, scrambles, replicate) for replicate in range(first, stop)])
+
+
+def as_draws(point: np.ndarray) -> np.ndarray:
+    """Return a point in the order of `draws`, the offset last."""
+    return point[[ANGLE_I, ANGLE_J, FLOC_I, FLOC_J, OFFSET]]
 
 
 def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:

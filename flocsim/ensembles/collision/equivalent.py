@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from flocsim.ensembles.collision.encounter import Encounter, make_encounter
+from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.schema import Config

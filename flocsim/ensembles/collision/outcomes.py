@@ -16,8 +16,8 @@ Of a bond the observer knows the load, and how long the pair has kept its pose. 
 of flocsim.bonds. In a flow the load comes from everywhere, as the doublet turns round in it, and
 the rest time is that of a whole turn.
 
-Where random forces kick the pair the observer is `watch_kicked_pair`. No proof that follows from
-drifts and loads alone holds there, so that each is held against k_B T:
+Where random forces kick the pair no proof that follows from drifts and loads alone holds, so that
+each is compared with k_B T:
 
 - Parted: against a relative drift v that carries them apart, bodies that diffuse with D against
   each other come back over a way a with a probability of exp(−v a/D) at most, exactly that of a
@@ -28,14 +28,16 @@ drifts and loads alone holds there, so that each is held against k_B T:
   centres are the stated distance apart.
 - Certificate, rest and hook: by BARRIER k_B T besides what they need without kicks (flocsim.bonds).
 - Held: by BARRIER k_B T on either side of a secondary minimum of spheres, or of surface forces
-  (`meetings.caged_between`).
+  (`attraction.caged_between`).
 
 What is none of these goes on until it is, or is undecided at the end.
 """
 
 import math
+from collections.abc import Callable
 
 import flocsim.arrays as at
+from flocsim import hooks
 from flocsim.bonds.certificate import (
     CERTIFICATE,
     NO_BOND,
@@ -107,24 +109,17 @@ def follow(observed, distance):
             observed[CROSSED] = 1.0
 
 
-def look_at_pair(scene, work, observed, time):
-    """(direction from i to j, d_c, the least gap of the listed features), their first touch and
-    their distances noted."""
+def watch_pair(scene, work, observed, time):
+    """The observer: return 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
     nx, ny, distance = centre_line(scene, work, at.NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(observed, time, distance)
     follow(observed, distance)
-    return nx, ny, distance, gap
-
-
-def watch_pair(scene, work, observed, time):
-    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
-    nx, ny, distance, gap = look_at_pair(scene, work, observed, time)
-    if has_departed(scene, work, observed, time, nx, ny, distance, gap):
+    if has_parted(scene, work, observed, time, nx, ny, distance, gap):
         return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
     if observed[COLLIDED] == 0.0:
-        return HELD if rests_for_long(scene, work, observed, time) else 0
+        return HELD if is_held_apart(scene, work, observed, time) else 0
     observed[BOND] = bond_of(scene, work, observed, time)
     return 0 if observed[BOND] == NO_BOND else BOUND
 
@@ -158,18 +153,12 @@ def is_parting(scene, work, observed, time, nx, ny):
 
 
 def is_away(scene, work, observed, distance, gap):
-    """Whether the outlines are further apart than the escape gap; cheap bounds first."""
-    far = (
-        distance
-        - scene.bodies[BODY_I, at.BOUNDING_RADIUS]
-        - scene.bodies[BODY_J, at.BOUNDING_RADIUS]
-    )
-    if far > observed[ESCAPE]:
+    """Return True if the outlines are further apart than the escape gap."""
+    if distance - outer_of(scene) > observed[ESCAPE]:
         return True
-    return (
-        gap > 0.0
-        and gap > observed[ESCAPE] * 0.25
-        and gap_between(scene, work, BODY_J, BODY_I) > observed[ESCAPE]
+    # Distances of listed features are known already, and bound the costly one from above.
+    return gap > 0.25 * observed[ESCAPE] and (
+        gap_between(scene, work, BODY_J, BODY_I) > observed[ESCAPE]
     )
 
 
@@ -248,8 +237,12 @@ def is_carried_away(scene, work, observed, time, nx, ny, distance):
     return speed > 0.0 and rate > 0.0
 
 
-def has_departed(scene, work, observed, time, nx, ny, distance, gap):
-    """Whether the bodies have parted for good; ``gap``: the least of the listed pairs [m]."""
+def has_parted(scene, work, observed, time, nx, ny, distance, gap):
+    """Return True if the bodies have parted for good; ``gap``: the least of listed features [m]."""
+    if observed[BROWNIAN] != 0.0:
+        return distance >= observed[ESCAPE]
+    if observed[KICK_ENERGY] > 0.0:
+        return return_bound(scene, work, observed, time) <= RETURN_SHARE
     if observed[IN_FLOW] != 0.0:
         return is_carried_away(scene, work, observed, time, nx, ny, distance)
     return (
@@ -288,31 +281,17 @@ def rest_of(scene, work, observed, time, load):
     return (time - observed[REST_SINCE]) / observed[REST_TIME]
 
 
-def rests_for_long(scene, work, observed, time):
-    """Whether two bodies have kept still against each other far longer than the rest time."""
-    return rest_of(scene, work, observed, time, load_on(observed)) >= FAR_LONGER
-
-
-def kind_of_bond(scene, work, observed, time, bond, load, certain):
-    """The kind of a bond between two bodies, ``certain`` or proved by their rest."""
+def bond_of(scene, work, observed, time):
+    """Return the kind of bond of two bodies that have touched, NO_BOND where none is proved."""
+    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
+    if observed[KICK_ENERGY] > 0.0:
+        certain = is_certain_in_kicks(scene, work, time, bond, load)
+    else:
+        certain = is_certain(scene, work, time, bond, load)
     if certain:
         return CERTIFICATE
     rested = rest_of(scene, work, observed, time, load)
     return kind_at_rest(scene, work, time, bond, load, rested)
-
-
-def bond_of(scene, work, observed, time):
-    """The kind of bond of two bodies that have touched, NO_BOND where none is proved."""
-    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
-    certain = is_certain(scene, work, time, bond, load)
-    return kind_of_bond(scene, work, observed, time, bond, load, certain)
-
-
-def bond_in_kicks(scene, work, observed, time):
-    """The same where kicks may open it."""
-    bond, load = bond_between(scene, work, time, BODY_I, BODY_J), load_on(observed)
-    certain = is_certain_in_kicks(scene, work, time, bond, load)
-    return kind_of_bond(scene, work, observed, time, bond, load, certain)
 
 
 RETURN_SHARE = 1e-4
@@ -330,11 +309,8 @@ def drift_from(work, observed, outer):
         return abs(x), observed[FLOW_XX] * 0.5 * (abs(x) + outer), math.hypot(ux, uy)
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
-    return (
-        along,
-        drift,
-        math.hypot(ux - observed[DRIFT_X], uy - observed[DRIFT_Y]),
-    )
+    besides = math.hypot(ux - observed[DRIFT_X], uy - observed[DRIFT_Y])
+    return along, drift, besides
 
 
 def return_bound(scene, work, observed, time):
@@ -359,15 +335,11 @@ def return_bound(scene, work, observed, time):
     return math.exp(-drift * way / (observed[KICK_ENERGY] * mobility))
 
 
-def have_parted(scene, work, observed, time, distance):
-    """Whether the two count as apart for good."""
-    if observed[BROWNIAN] != 0.0:
-        return distance >= observed[ESCAPE]
-    return return_bound(scene, work, observed, time) <= RETURN_SHARE
-
-
-def is_caged(scene, work, observed, time):
-    """Whether two that never touched lie in a secondary minimum out of which kicks do not come."""
+def is_held_apart(scene, work, observed, time):
+    """Return True if two that never touched stay where they are: without kicks, as they have kept
+    still for far longer than the rest time; in a secondary minimum, if kicks do not lead out."""
+    if observed[KICK_ENERGY] == 0.0:
+        return rest_of(scene, work, observed, time, load_on(observed)) >= FAR_LONGER
     if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
         return False
     bond = bond_between(scene, work, time, BODY_I, BODY_J)
@@ -377,12 +349,8 @@ def is_caged(scene, work, observed, time):
     return observed[CAGE_LOW] < between < observed[CAGE_HIGH]
 
 
-def watch_kicked_pair(scene, work, observed, time):
-    """The observer: 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
-    _, _, distance, _ = look_at_pair(scene, work, observed, time)
-    if have_parted(scene, work, observed, time, distance):
-        return MISSED if observed[COLLIDED] == 0.0 else DEPARTED
-    if observed[COLLIDED] == 0.0:
-        return HELD if is_caged(scene, work, observed, time) else 0
-    observed[BOND] = bond_in_kicks(scene, work, observed, time)
-    return 0 if observed[BOND] == NO_BOND else BOUND
+OBSERVER: dict[Callable, Callable] = {
+    hooks.awaits_touch: has_not_touched,
+    hooks.observe: watch_pair,
+}
+"""What a binary collision puts into the driver."""

@@ -40,6 +40,17 @@ def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
     )
 
 
+def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the half-extents [m] at many angles."""
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    # Each part by its own spheroradius: the widest part need not be the one that reaches farthest.
+    ends = [(c * p.points[:, 0] - s * p.points[:, 1], p.radius) for p in shape.parts]
+    return (
+        np.max([radius - x.min(axis=1) for x, radius in ends], axis=0),
+        np.max([radius + x.max(axis=1) for x, radius in ends], axis=0),
+    )
+
+
 def largest_displacement(
     rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
 ) -> float:

@@ -19,7 +19,8 @@ from flocsim.ensembles.collision.draw import exact_method
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.equivalent import kinds, measured_flocs, sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
-from flocsim.ensembles.collision.meetings import refuse_release
+from flocsim.ensembles.collision.mechanisms import refuse_release
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
@@ -127,7 +128,7 @@ def check_laws(pair: Encounter) -> None:
     kicks_of(system.forces, system.bodies, system.fluid)
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
-    refuse_interpreter(advance, system.fillings(pair.observer))
+    refuse_interpreter(advance, system.fillings(OBSERVER))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
     views = close_views(system)

@@ -19,6 +19,7 @@ from flocsim.constants import MINIMUM_GAP
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.equivalent import sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc
+from flocsim.ensembles.collision.mechanisms import Brownian
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
@@ -53,7 +54,7 @@ def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[di
     """
     facts = []
     for name, pair in sphere_pairs(config, flocs):
-        if pair.meeting != BROWNIAN:
+        if not isinstance(pair, Brownian):
             continue
         forces, ends = pair.system.forces, pair.ends
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)

@@ -7,7 +7,7 @@ on a plateau, the same at the first two tolerances and another one at the third.
 
 Where all were run exactly, S of M would be S' of M'. What was run again is known: S' and M' by the
 most exact run of each of these alone make the one part of the change. Of the others so many may
-gain, and so many lose, as `flocsim.io.confidence.further_flips` says from what did of the same kind
+gain, and so many lose, as `further_flips` says from what did of the same kind
 (`io.results.events.KINDS`) between first and second runs; and of all that were not run a third
 time, as it says from what changed between second and third ones. What these parts come to together
 is said by `flips_together`. Each flip counts at most 1/M: the interval of the change goes from the
@@ -15,10 +15,11 @@ first part less what may be lost to the first part and what may be gained.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from flocsim.io.confidence import FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import WITHOUT_OUTCOME, Events, events, events_of, kinds_of
 from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 
@@ -140,11 +141,11 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
     members, checked, thrice, lost_sight = np.moveaxis(counts, (-1, -2), (0, 1))
     found = []
     for side in range(2):
-        parts = further_of_kinds(changed[side], checked, members - checked + lost_sight)
+        parts = [*further_of_kinds(changed[side], checked, members - checked + lost_sight)]
         if thrice.any():
             third = changed[2 + side], thrice, members - thrice
             parts.append(further_of_all(*(each.sum(axis=0) for each in third)))
-        found.append(flips_together(parts, EACH_SIDE))
+        found.append(flips_together(parts))
     return found
 
 
@@ -171,37 +172,29 @@ def change_intervals(
     return found
 
 
-def further_of_kinds(
-    flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray
-) -> list[FurtherFlips]:
-    """How many more flip of each kind: arrays (kind, type, vertices, …), whose rates are compared
-    among the conditions of one N.
+def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
+    """Return further_flips (kind, 3, …) of each kind: of arrays (kind, type, vertices, …), whose
+    rates are compared among the conditions of one N.
 
     Of a kind of which none was run again at this N all may flip; NaN where no replicate was.
     """
-    together: list = [np.s_[:, n] for n in range(checked.shape[2])] if checked.ndim > 2 else [...]
-    found = np.zeros((len(flipped), len(FurtherFlips._fields), *flipped.shape[1:]))
-    for at in together:
-        some = np.any(checked[(slice(None), *np.index_exp[at])])
-        for kind in range(len(flipped)):
-            f, c, u = (each[kind][at] for each in (flipped, checked, exposed))
-            more = further_flips(f, c, u, EACH_SIDE)
-            all_of_them = np.ceil(u), u, np.zeros(u.shape)
-            found[(kind, slice(None), *np.index_exp[at])] = np.where(
-                np.isnan(more.most) & some, all_of_them, more
-            )
-    return [FurtherFlips(*each) for each in found]
+    found = np.zeros((len(flipped), 3, *flipped.shape[1:]))
+    for n in range(checked.shape[2]) if checked.ndim > 2 else [...]:
+        at: Any = (slice(None), n) if n is not ... else ...
+        for part, *of_kind in zip(found, flipped, checked, exposed, strict=True):
+            f, c, u = (each[at] for each in of_kind)
+            more = further_flips(f, c, u)
+            if np.any(checked[:, *np.index_exp[at]]):
+                more = np.where(np.isnan(more[0]), [np.ceil(u), u, np.zeros(u.shape)], more)
+            part[:, *np.index_exp[at]] = more
+    return found
 
 
-def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> FurtherFlips:
-    """How many more flip of third runs, which are few: rates are compared among all conditions,
-    and with SEEN_BEFORE."""
-    f, c, u = (
-        np.append(each.ravel(), before)
-        for each, before in zip((flipped, checked, exposed), SEEN_BEFORE, strict=True)
-    )
-    more = further_flips(f, c, u, EACH_SIDE)
-    return FurtherFlips(*(each[: flipped.size].reshape(flipped.shape) for each in more))
+def further_of_all(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarray) -> np.ndarray:
+    """Return further_flips (3, …) of third runs, which are few: rates are compared among all
+    conditions, and with SEEN_BEFORE."""
+    f, c, u = map(np.append, (flipped, checked, exposed), SEEN_BEFORE)
+    return further_flips(f, c, u)[:, : flipped.size].reshape(3, *flipped.shape)
 
 
 SEEN_BEFORE = [0, 1], [250, 250], [0, 0]
@@ -209,6 +202,89 @@ SEEN_BEFORE = [0, 1], [250, 250], [0, 0]
 (benchmarks.accuracy.numerical_error), as in two conditions, of which none is left: without them a
 study of one condition, of which a few replicates are run a third time, would know next to nothing
 of this."""
+
+
+SHAPES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
+MEANS = np.geomspace(1e-5, 0.3, 16)
+"""Gamma distributions of rates over conditions: from a few that flip to all alike."""
+
+
+def further_flips(
+    flipped: ArrayLike, checked: ArrayLike, exposed: ArrayLike, confidence: float = EACH_SIDE
+) -> np.ndarray:
+    """Return (most, mean, none) (3, …): how many more flip at most, with the probability that is
+    asked for, and on average, and the probability that none does.
+
+    Arrays of one shape, a place for each condition: f ``flipped`` of c ``checked``, and how many
+    others, u, may flip (``exposed``, need not be whole). NaN where nothing was checked anywhere.
+
+    Rates of flips scatter over conditions by a gamma distribution of shape k and mean m, of which
+    k in SHAPES and m in MEANS (before anything is seen as the square root of m, per log m) are
+    weighed by what all conditions show: f is negative binomial. Given f of c, the rate here has
+    shape k + f and rate k/m + c, and the number of further flips is at most q with probability
+    I_p(k + f, q + 1), I the incomplete beta function, p = b/(b + u), b = k/m + c; their mean over
+    k and m has its quantile here. So where flips sit in few conditions a condition in which few
+    were run again is in doubt, and where all are alike it borrows from the others.
+    """
+    from scipy.special import betainc, gammaln
+
+    f, c, u = np.broadcast_arrays(
+        *(np.asarray(each, float) for each in (flipped, checked, exposed))
+    )
+    if not np.any(c > 0.0):
+        unknown = np.where(u > 0.0, np.nan, 0.0)
+        return np.stack([unknown, unknown, 1.0 + unknown])
+    seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
+    k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
+    rate = (k / m)[:, np.newaxis]
+    f_seen, c_seen = seen
+    logs = (
+        gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
+        + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
+    )  # fmt: skip
+    logs = logs @ times + 0.5 * np.log(m)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    some = weights > NEGLIGIBLE
+    k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
+    cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
+                              return_inverse=True)  # fmt: skip
+    f_here, c_here, u_here = cases
+    shape, b = k[:, np.newaxis] + f_here, rate + c_here
+    low, high = np.full(f_here.shape, -1.0), np.ceil(u_here)
+    # The smallest q lies above low, and is no more than high: halve until they are neighbours.
+    while np.any(high - low > 1.0):
+        middle = np.floor(0.5 * (low + high))
+        enough = weights @ betainc(shape, middle + 1.0, b / (b + u_here)) >= confidence
+        split = high - low > 1.0
+        low = np.where(split & ~enough, middle, low)
+        high = np.where(split & enough, middle, high)
+    mean = np.minimum(weights @ (shape * u_here / b), u_here)
+    none = weights @ (b / (b + u_here)) ** shape
+    return np.stack([high, mean, none])[:, places.reshape(f.shape)]
+
+
+def flips_together(parts: ArrayLike, confidence: float = EACH_SIDE) -> np.ndarray:
+    """Return how many more flip at most, with this probability, of independent parts (part, 3, …).
+
+    With means µ and bounds q of the parts, each at the same probability,
+    Σ µ + √(Σ (q − µ)²), upwards to a whole number; 0 where all parts together are so likely to
+    have none. One part keeps its bound. Added up, the bounds would hold far more often than they
+    are asked to, as all parts reach theirs together hardly ever.
+    Source: G. Y. Zou and A. Donner, Stat. Med. 27 (2008) 1693-1702.
+    """
+    most, mean, none = np.moveaxis(np.asarray(parts), 1, 0)
+    bound = mean.sum(axis=0) + np.sqrt(np.sum(np.maximum(most - mean, 0.0) ** 2, axis=0))
+    bound = np.ceil(bound * (1.0 - ROUNDED))
+    return np.where(none.prod(axis=0) >= confidence, 0.0, bound)
+
+
+ROUNDED = 1e-12
+"""What a sum of whole numbers may be off by, so that it does not count as one more."""
+
+
+NEGLIGIBLE = 1e-6
+"""Weight below which a distribution is left out."""
 
 
 def numerical_of(

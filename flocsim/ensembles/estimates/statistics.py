@@ -21,7 +21,7 @@ from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.kind import StudyKind
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io import confidence
-from flocsim.io.confidence import scrambled_difference, wilson
+from flocsim.io.confidence import cluster_sums, ratio_and_variance, student_quantile, wilson
 from flocsim.io.results import schema
 from flocsim.io.results.events import (
     HELD,
@@ -140,7 +140,8 @@ def scrambled_probabilities(
         if pooled and name not in schema.POOLED_PROBABILITIES:
             continue
         trials, successes, unknown = each.sum(axis=3) if pooled else each
-        low, high, effective = confidence.scrambled_proportion(successes, trials, unknown)
+        clusters = confidence.bounded_sums(successes, trials, unknown)
+        _, low, high, effective = confidence.clustered_proportion(clusters, trials.shape[-1])
         table |= {f"{name}_low": low, f"{name}_high": high}
         if pooled:
             table[f"n_effective_{name}"] = effective
@@ -175,10 +176,8 @@ def stop_rule(study: StudyKind, store: RowStore) -> Callable[[int], bool]:
         widths = [table[f"{name}_high"] - table[f"{name}_low"] for name in stop.of]
         return not np.any(0.5 * np.array(widths) > wanted)
 
-    return lambda replicates: (
-        stop.half_width is not None
-        and all(is_narrow(place, replicates) for place in range(len(store.conditions)))
-    )
+    places = range(len(store.conditions))
+    return lambda replicates: all(is_narrow(place, replicates) for place in places)
 
 
 def of_each_scramble(first: int, scrambles: int) -> list[slice]:
@@ -266,6 +265,22 @@ def bounded_difference(
         for each in joint
     )
     return known[0], least[1], most[2]
+
+
+def scrambled_difference(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (difference, low, high) of two paired proportions, here minus there, over independent
+    scrambles.
+
+    ``cells``: whole numbers (…, scramble, 4) of replicates in both, here only, there only, in
+    neither. D = Σ d/Σ m, d the difference of a scramble's two counts and m its replicates; the
+    interval is Student's of the scrambles.
+    """
+    _, here, there, _ = np.moveaxis(cells, -1, 0)
+    count = cells.shape[-2]
+    sums = cluster_sums(here - there, cells.sum(axis=-1))
+    difference, variance = ratio_and_variance(sums, count)
+    half = student_quantile(count) * np.sqrt(variance)
+    return difference, np.maximum(difference - half, -1.0), np.minimum(difference + half, 1.0)
 
 
 def newcombe(

@@ -21,7 +21,7 @@ from flocsim.ensembles.estimates.statistics import (
 from flocsim.ensembles.kind import ORDER
 from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.report import SCRAMBLES
-from flocsim.io.confidence import proportion, scrambled_proportion
+from flocsim.io.confidence import bounded_sums, clustered_proportion, proportion
 from flocsim.io.labelled import Column, about_of
 from flocsim.io.results.events import Events, approaches, events
 from flocsim.io.results.schema import AXES, COMPARED, COORDINATES, PER_APPROACH
@@ -131,7 +131,7 @@ def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, n
     if not scrambles:
         return found
     tried, came, left = sums_of_scrambles(np.stack(each), 0, scrambles)
-    return found[0], *scrambled_proportion(came, tried, left)[:2]
+    return clustered_proportion(bounded_sums(came, tried, left), scrambles)[:3]
 
 
 def arrays_of(s, n, t, m, ends):

@@ -14,6 +14,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES, Draw
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Allowed, Sources
@@ -79,7 +80,7 @@ def one_count_study(config: Config, vertex_count: int) -> Study:
 def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: bool = False) -> Run:
     """Return a Run of a replicate that has yet to take its first step; see Draw.begin."""
     encounter = draw.encounter
-    driver = encounter.system.compose(observer=encounter.observer)
+    driver = encounter.system.compose(observer=OBSERVER)
     return draw.begin(driver, steps, integrator=method, record=record)
 
 

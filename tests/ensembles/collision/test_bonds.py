@@ -21,7 +21,7 @@ from flocsim.bonds.certificate import (
 )
 from flocsim.bonds.rest import FAR_LONGER, HANGING, NEST, STILL
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import BOUND, bond_of, load_on, start_rest, watch_pair
 from flocsim.forces import VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates

@@ -9,7 +9,8 @@ import flocsim.arrays as at
 from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import Draw, draws, orientations
-from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS, make_encounter
+from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config, small_study

@@ -13,7 +13,7 @@ from flocsim.arrays import work_of
 from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import FAILURES, Draw, draws, orientations
-from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
     CLEARANCE,

@@ -11,26 +11,18 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.encounter import KICKED, OBSERVER, make_encounter
-from flocsim.ensembles.collision.meetings import (
-    GAPS,
-    caged_between,
-    ends_of,
-    refuse_release,
-    speeds_of,
-    start_apart,
-)
+from flocsim.ensembles.collision.attraction import GAPS, caged_between, speeds_of
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import (
     BOUND,
     DEPARTED,
     HELD,
     MISSED,
     RETURN_SHARE,
-    bond_in_kicks,
+    bond_of,
     return_bound,
-    watch_kicked_pair,
+    watch_pair,
 )
-from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.errors import UsageError
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
@@ -79,23 +71,14 @@ class Pair:
         return self
 
     def seen(self):
-        return watch_kicked_pair(self.scene, self.work, self.observed, 0.0)
+        return watch_pair(self.scene, self.work, self.observed, 0.0)
 
     def bound(self):
         """The bound of the probability to come back."""
         return return_bound(self.scene, self.work, self.observed, 0.0)
 
     def bond(self, time=0.0):
-        return bond_in_kicks(self.scene, self.work, self.observed, time)
-
-
-def test_the_observer_is_that_of_kicks_where_there_are_any(tmp_path):
-    pair = Pair(tmp_path)
-    assert pair.encounter.observer is KICKED
-    assert pair.observed[outcomes.KICK_ENERGY] == pytest.approx(ENERGY)
-    cold = make_encounter(small_config(tmp_path), pair.shapes, 3.5e-6)
-    assert cold.observer is OBSERVER
-    assert cold.observed()[outcomes.KICK_ENERGY] == 0.0
+        return bond_of(self.scene, self.work, self.observed, time)
 
 
 def disc_return(speed, diffusion, touch, distance):
@@ -286,31 +269,3 @@ def test_a_load_may_open_a_cage():
 def test_what_attracts_everywhere_is_no_cage():
     speeds = speeds_of((VanDerWaals(1e-18),), None, (5e-6, 5e-6), 1e7)
     assert caged_between(speeds, 1e7, 0.0, 1e-21) == (0.0, 0.0)
-
-
-SPHERES = (Sphere(1e-6), Sphere(3e-6))
-SCENE = PairScene(meeting="brownian", release=1.5, escape=5.0)
-
-
-def test_distances_are_multiples_of_the_sum_of_radii():
-    assert ends_of(SCENE, SPHERES) == pytest.approx((6e-6, 2e-5))
-    usual = PairScene(meeting="brownian")
-    assert (usual.release, usual.escape, usual.delta) == (2.0, 4.0, (0.0,))
-
-
-def test_a_start_is_as_far_away_in_any_direction():
-    for share in (0.0, 0.3, 0.9):
-        places = start_apart((1.0, 2.0), share, 6e-6)
-        assert places[:, 2].tolist() == [1.0, 2.0] and places[0, :2].tolist() == [0.0, 0.0]
-        assert math.hypot(*places[1, :2]) == pytest.approx(6e-6)
-        turn = math.atan2(places[1, 1], places[1, 0]) / (2.0 * math.pi)
-        assert turn % 1.0 == pytest.approx(share)
-
-
-def test_what_never_meets_or_touches_at_first_is_refused():
-    refuse_release(SCENE, SPHERES, 1e-13)
-    with pytest.raises(UsageError, match="do not diffuse never meet"):
-        refuse_release(SCENE, SPHERES, 0.0)
-    rod = SpheroPolygon([(-9e-6, 0.0), (9e-6, 0.0)], 5e-7)
-    with pytest.raises(UsageError, match=r"scene.release = 1.5 \(r_i \+ r_j\) lets outlines"):
-        refuse_release(SCENE, (rod, rod), 1e-13)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import flocsim.arrays as at
+from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.forces.body_forces import key_of
 from flocsim.run import Run
 from tests.helpers.small_study import small_study
@@ -30,7 +31,7 @@ def study(tmp_path, monkeypatch):
 def end_of(study, replicate, share, until=0.0015):
     """Where the bodies of a replicate are after some kicks, uncompiled."""
     draw = study.draw(0, 1, share, replicate)
-    driver = draw.encounter.system.compose(observer=draw.encounter.observer, jit=False)
+    driver = draw.encounter.system.compose(observer=OBSERVER, jit=False)
     run = draw.begin(driver, 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
@@ -66,7 +67,7 @@ def test_kicks_move_a_pair_off_its_way(study):
     draw = study.draw(0, 1, 0.5, 0)
     system = attrs.evolve(draw.encounter.system, forces=cold_forces)
     cold = attrs.evolve(draw.encounter, system=system)
-    driver = cold.system.compose(observer=cold.observer, jit=False)
+    driver = cold.system.compose(observer=OBSERVER, jit=False)
     run = attrs.evolve(draw, encounter=cold).begin(driver, 10**6, 0.0015)
     run.to_end()
     moved = np.abs(warm[:, :2] - run.work.motion[at.NOW, :, :2]).max()

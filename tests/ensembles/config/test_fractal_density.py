@@ -5,7 +5,7 @@ import pytest
 
 from flocsim import Sphere
 from flocsim.ensembles import load_config
-from flocsim.ensembles.collision.encounter import make_encounter
+from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.errors import ConfigError
 
 CONFIG = """

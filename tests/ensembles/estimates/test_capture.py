@@ -10,13 +10,10 @@ from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
     estimate,
-    flow_width,
     kernel_of,
-    mean_of,
-    numerical_parts,
+    numerics_of,
     ratio_of,
     weighted,
-    widened,
 )
 from flocsim.ensembles.kind import study_of
 from flocsim.ensembles.report import kernel_lines, too_many_undecided, undecided_line
@@ -62,7 +59,7 @@ def test_spheres_have_the_rectilinear_kernels(tmp_path, meeting, rate):
     study = study_of(config)
     place = config.scene.names.index(f"{meeting}:10um-20um")
     points, rows = made_up(study, place, lambda share: np.abs(share) <= 1.0)
-    found = estimate(points, rows, meeting, config.scene.rate, 4).values
+    found = estimate(points, rows, 4)
     size = 3e-5
     speed = math.hypot(*study.encounter(place, 1, study.numbers(0)).drift)
     plane = {"settling": 2.0 * size * speed, "shear": rate * size**2,
@@ -83,7 +80,7 @@ def test_spheres_have_the_rectilinear_kernels(tmp_path, meeting, rate):
 def test_both_signs_count_by_themselves(tmp_path):
     config = kernel_config(tmp_path, replicates=4096)
     points, rows = made_up(study_of(config), 0, lambda b: (b > 0.2) & (b < 0.5))
-    found = estimate(points, rows, "settling", None, 4).values
+    found = estimate(points, rows, 4)
     assert found["width_a"] == pytest.approx(0.3 * 3e-5, rel=0.01)
 
 
@@ -95,26 +92,28 @@ def test_flips_change_rates_by_their_weight_and_with_their_sign(tmp_path, meetin
     points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.9)
     caught = np.flatnonzero((rows["outcome"] == 0) & (rows["checked_outcome"] == 0))[:2]
     points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.9, flips=caught)
-    found = estimate(points, rows, meeting, config.scene.rate, 4)
+    found = estimate(points, rows, 4)
     # Both fall out, by the second run; the third says the same.
-    lost = {name: each[:, 1].sum() for name, each in found.changes.items()}
-    assert lost == dict.fromkeys((*WHAT, "alpha"), 2)
-    assert not any(each[:, [0, 2, 3]].any() for each in found.changes.values())
-    assert found.values["flips_a"] == pytest.approx(2 / 64)
+    for name in (*WHAT, "alpha"):
+        gained, lost, *third = found[f"{name} changes"].sum(axis=0)
+        assert (gained, lost, *third) == (0, 2, 0, 0)
+    assert found["flips_a"] == pytest.approx(2 / 64)
     exactly = np.delete(np.arange(512), caught)
     weight = points.plane
     now = np.sum((weight * (rows["outcome"] == 0))[exactly])
-    assert found.shifts["beta2"] == pytest.approx(now / 512 - found.values["beta2"])
-    assert found.largest["beta2"] == pytest.approx(weight.max() / 512)
-    told = numerical_parts({(0, 0, 0, 0): found}, (1, 1, 1, 1))[0, 0, 0, 0]
+    assert found["beta2 shift"] == pytest.approx(now / 512 - found["beta2"])
+    assert found["beta2 largest"] == pytest.approx(weight.max() / 512)
+    told = numerics_of(found)
     for name in ESTIMATES:
         low, high = (told[f"{name}_change{end}"] for end in ("_low", "_high"))
-        if math.isnan(found.values[name]):
+        if math.isnan(found[name]):
             assert math.isnan(low)
             continue
-        assert low <= found.shifts[name] * (1.0 + 1e-9) + 1e-30 and high >= found.shifts[name]
+        assert (
+            low <= found[f"{name} shift"] * (1.0 + 1e-9) + 1e-30 and high >= found[f"{name} shift"]
+        )
         assert told[f"{name}_numerical"] == max(abs(low), high)
-        assert low >= -found.values[name]
+        assert low >= -found[name]
     assert abs(told["beta2_change_low"]) > told["beta2_change_high"]
 
 
@@ -146,14 +145,14 @@ def test_the_unknown_cannot_leave_the_interval(tmp_path, meeting, rate, share, w
         points, rows = made_up(study, 0, lambda b, s=start, w=width: (b > s) & (b < s + w))
         lost = rng.random(128) < 0.4 * rng.random()  # touched, and parted again
         rows["outcome"] = np.where(lost & (rows["outcome"] == 0), 1, rows["outcome"])
-        truth = estimate(points, rows, meeting, config.scene.rate, 4).values
+        truth = estimate(points, rows, 4)
         touched = rows["inside"] != NOT_APPLICABLE
         of = {"any": True, "captures": rows["outcome"] == 0, "misses": ~touched, "touched": touched}
         unknown = (rng.random(128) < share) & of[which]
         kept = rng.random(128) < 0.5  # of those that touch, some are seen to
         rows["outcome"] = np.where(unknown, UNDECIDED + (rng.random(128) < 0.3), rows["outcome"])
         rows["inside"] = np.where(unknown & ~kept, NOT_APPLICABLE, rows["inside"])
-        found = estimate(points, rows, meeting, config.scene.rate, 4).values
+        found = estimate(points, rows, 4)
         for name in ESTIMATES:
             value, low, high = (found[name + end] for end in ("", "_low", "_high"))
             assert np.isnan(truth[name]) or low <= truth[name] * (1 + 1e-12), name
@@ -172,12 +171,12 @@ def test_what_is_undecided_flips_nothing(tmp_path):
     )
     for name in ("checked_inside", "third_outcome", "third_inside"):
         rows[name][:] = NOT_APPLICABLE
-    found = estimate(points, rows, "settling", None, 4)
-    assert np.isnan(found.values["flips_a"]) and found.values["checked"] == 64
-    assert not any(found.shifts.values())
+    found = estimate(points, rows, 4)
+    assert np.isnan(found["flips_a"]) and found["checked"] == 64
+    assert not any(found[f"{name} shift"] for name in ESTIMATES)
     # They may have come to anything, and so may as many of those that were not run again.
-    told = numerical_parts({(0, 0, 0, 0): found}, (1, 1, 1, 1))[0, 0, 0, 0]
-    assert told["beta2_change_low"] < -0.9 * found.values["beta2"]
+    told = numerics_of(found)
+    assert told["beta2_change_low"] < -0.9 * found["beta2"]
 
 
 @pytest.mark.slow
@@ -202,19 +201,26 @@ def test_a_study_cut_short_holds_the_rates_of_the_whole(tmp_path):
 
 def test_intervals_are_students_of_the_scrambles():
     values = np.array([1.0, 2.0, 3.0, 4.0])
-    mean, low, high = mean_of(values, None)
+    mean, low, high = ratio_of(values, np.ones(4), 0.0)
     half = 3.18244630528371 * values.std(ddof=1) / 2.0
-    assert (mean, high) == pytest.approx((2.5, 2.5 + half))
-    assert low == pytest.approx(2.5 - half)
+    assert (mean, low, high) == pytest.approx((2.5, max(2.5 - half, 0.0), 2.5 + half))
     # Four scrambles that agree up to a point do not know the mean to better than that.
-    assert mean_of(np.ones(4), None, 0.1)[2] == pytest.approx(1.0 + 1.591223 * 0.05)
-    assert mean_of(np.zeros(4), 0.3) == (0.0, 0.0, 0.3)
-    assert mean_of(np.ones(4), 0.3) == (1.0, 0.7, 1.0)
-    assert ratio_of(values, 2.0 * values) == pytest.approx((0.5, 0.5, 0.5))
-    assert np.isnan(ratio_of(values, 0.0 * values)).all()
-    low, high = widened((1.0, 1.0, 1.0), 100, 100)
-    assert 0.95 < low < 1.0 == high
-    assert flow_width(4.0, 1.0) == 4.0
+    assert ratio_of(np.ones(4), np.ones(4), 0.1)[2] == pytest.approx(1.0 + 1.591223 * 0.05)
+    assert ratio_of(values, 2.0 * values, 0.0) == pytest.approx((0.5, 0.5, 0.5))
+    assert np.isnan(ratio_of(values, 0.0 * values, 0.0)).all()
+
+
+@pytest.mark.parametrize("all_touch", [True, False])
+def test_where_all_points_agree_the_interval_is_wilsons_at_their_number(tmp_path, all_touch):
+    points, rows = made_up(study_of(kernel_config(tmp_path)), 0, lambda b: (b > -9.0) == all_touch)
+    found, rare = estimate(points, rows, 4), 3.841459 / (32 + 3.841459)
+    low, high = found["width_a_low"], found["width_a_high"]
+    if all_touch:
+        assert low <= found["width_a"] * (1.0 - rare) * (1.0 + 1e-6) <= high
+        assert found["alpha_low"] == pytest.approx(1.0 - rare) and found["alpha_high"] == 1.0
+    else:
+        assert (found["width_a"], low) == (0.0, 0.0)
+        assert high == pytest.approx(rare * np.mean(points.width))
 
 
 @pytest.mark.slow
@@ -225,7 +231,7 @@ def test_intervals_cover_what_they_say(tmp_path):
         study = study_of(config)
         object.__setattr__(study.config, "seed", seed)
         points, rows = made_up(study, 0, lambda b: np.abs(b) < 0.77)
-        found = estimate(points, rows, "settling", None, 4).values
+        found = estimate(points, rows, 4)
         covered.append(found["width_a_low"] <= 2 * 0.77 * 3e-5 <= found["width_a_high"])
     # 60 trials of 0.95 are below 0.88 once in a hundred times.
     assert np.mean(covered) >= 0.88

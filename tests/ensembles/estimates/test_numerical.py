@@ -8,15 +8,18 @@ from scipy.stats import nbinom, poisson
 from benchmarks.accuracy.tolerance import outcome_changes, percent_changed
 from examples.tang2014.changes import second_run_changes
 from flocsim.ensembles.estimates.numerical import (
+    MEANS,
+    SHAPES,
     change_intervals,
     count_changes,
+    flips_together,
+    further_flips,
     further_of_kinds,
     numerical_of,
 )
 from flocsim.ensembles.estimates.statistics import COUNTED, EXACT_RUNS, by_runs, count
 from flocsim.ensembles.estimates.summary import added, sums_of, tables_of
 from flocsim.errors import UsageError
-from flocsim.io.confidence import MEANS, SHAPES, FurtherFlips, flips_together, further_flips
 from flocsim.io.results.events import Events, events, events_of
 from flocsim.io.results.schema import NOT_APPLICABLE, PROBABILITIES
 from tests.helpers.paper_like import paper_results, relabelled
@@ -140,31 +143,27 @@ def test_further_flips_are_the_quantile_of_a_mixture_of_negative_binomials():
 def test_parts_together_need_less_than_the_sum_of_their_bounds_and_hold():
     rng = np.random.default_rng(6)
     means = np.array([0.2, 1.0, 6.0])
-    parts = [
-        FurtherFlips(*(np.array([each]) for each in (poisson.ppf(0.975, m), m, np.exp(-m))))
-        for m in means
-    ]
-    (bound,) = flips_together(parts, 0.975)
-    assert bound < sum(part.most[0] for part in parts)
+    parts = np.array([poisson.ppf(0.975, means), means, np.exp(-means)]).T
+    bound = flips_together(parts)
+    assert bound < parts[:, 0].sum()
     assert np.mean(rng.poisson(means, (100_000, 3)).sum(axis=1) <= bound) >= 0.975
     for part in parts:
-        assert flips_together([part], 0.975) == part.most
-    rare = [FurtherFlips(*map(np.array, ([1.0], [0.01], [0.99])))] * 2
-    assert flips_together(rare, 0.975) == 0.0 or 0.99**2 < 0.975
-    assert flips_together(rare * 2, 0.975) > 0.0
+        assert flips_together([part]) == part[0]
+    rare = [(1.0, 0.01, 0.99)] * 2
+    assert flips_together(rare) == 0.0 < flips_together(rare * 2)
 
 
 def test_where_nothing_may_flip_nothing_does_and_nothing_seen_says_nothing():
-    assert further_flips([3, 0], [50, 20], [0, 0]).most.tolist() == [0.0, 0.0]
-    assert further_flips([0, 0], [0, 0], [5, 0]).most[1] == 0.0
-    assert np.isnan(further_flips([0, 0], [0, 0], [5, 0]).most[0])
+    assert further_flips([3, 0], [50, 20], [0, 0])[0].tolist() == [0.0, 0.0]
+    assert further_flips([0, 0], [0, 0], [5, 0])[0, 1] == 0.0
+    assert np.isnan(further_flips([0, 0], [0, 0], [5, 0])[0, 0])
     # Where none of one condition was run again, the others speak for it.
-    borrowed = further_flips([0, 10], [0, 1000], [100, 0]).most
+    borrowed = further_flips([0, 10], [0, 1000], [100, 0], 0.95)[0]
     assert 1 < borrowed[0] < 50
 
 
 def test_more_checks_without_flips_make_it_smaller():
-    bounds = [float(further_flips([0], [c], [1000 - c]).most[0]) for c in (2, 20, 200, 900, 1000)]
+    bounds = [float(further_flips([0], [c], [1000 - c])[0, 0]) for c in (2, 20, 200, 900, 1000)]
     assert all(np.diff(bounds) <= 0.0) and bounds[0] > bounds[1] > bounds[2] > bounds[-1] == 0.0
 
 
@@ -182,7 +181,7 @@ def test_the_bound_holds_also_in_the_conditions_that_flip(mean, spread):
     known = rng.binomial(checked, rates)
     more = rng.binomial(trials - checked, rates)
     bound = np.array([
-        further_flips(each, np.full(20, checked), np.full(20, trials - checked), 0.975).most
+        further_flips(each, np.full(20, checked), np.full(20, trials - checked))[0]
         for each in known
     ])  # fmt: skip
     assert np.mean(bound >= more) >= 0.95

@@ -11,8 +11,9 @@ from flocsim.ensembles.estimates.statistics import (
     paired_differences,
     pooled_probabilities,
     pooled_sums,
+    scrambled_difference,
 )
-from flocsim.io.confidence import scrambled_difference, wilson
+from flocsim.io.confidence import wilson
 from flocsim.io.results.schema import NOT_APPLICABLE
 from tests.helpers.synthetic_results import bonds_of, draw_codes
 from tests.helpers.tabulate import tabulate

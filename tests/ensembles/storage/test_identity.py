@@ -11,7 +11,7 @@ from flocsim.ensembles.storage.identity import PACKAGE, physics_digest, physics_
 from tests.helpers.tiers import rest_slow
 
 ENTRIES = (
-    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/collision/offsets.py",
+    "ensembles/study.py", "ensembles/collision/encounter.py", "ensembles/collision/mechanisms.py",
 )  # fmt: skip
 """From these files a replicate reaches all that it runs."""
 

@@ -100,3 +100,11 @@ def test_nothing_known_is_no_bin():
     for name in PAIR_MEASURES:
         found = shape_effect(rows, name)
         assert found.measure.size == 0 and np.isnan(found.explained).all()
+
+
+def test_the_share_of_a_large_study_has_an_interval():
+    """The noncentral F distribution underflows far from it."""
+    groups = np.arange(100_000) % 8
+    values = groups + np.random.default_rng(1).normal(0.0, 9.0, len(groups))
+    share, low, high = explained_share(groups, values)
+    assert 0.0 < low < share < high < low + 0.01

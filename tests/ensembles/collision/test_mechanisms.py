@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from flocsim.body import Body, Fluid
-from flocsim.ensembles.collision import meetings
+from flocsim.ensembles.collision.attraction import GAPS, attraction_width, far_gap, speeds_of
 from flocsim.ensembles.collision.draw import Draw
+from flocsim.ensembles.collision.mechanisms import Extension, Shear
+from flocsim.ensembles.collision.turning import angles_by_turning, turning_rates
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
@@ -23,49 +25,57 @@ from tests.helpers.kernel_study import kernel_config
 FLOWS = ("shear", "extension")
 
 
-@pytest.mark.parametrize("meeting", FLOWS)
+@pytest.mark.parametrize("flow", [Shear, Extension])
 @pytest.mark.parametrize("offset", [-1.3e-5, -1e-9, 2e-6, 1.9e-5])
-def test_a_start_is_far_away_and_its_way_passes_at_the_offset(meeting, offset):
-    x, y = meetings.start_in_flow(meeting, offset, 6e-5)
+def test_a_start_is_far_away_and_its_path_passes_at_the_offset(flow, offset):
+    x, y = flow.upstream(offset, 6e-5)
     assert math.hypot(x, y) == pytest.approx(6e-5, rel=1e-12, abs=0.0)
-    xx, xy, yx, yy = meetings.gradient_of(meeting, 7.0)
+    xx, xy, yx, yy = flow.gradient(7.0)
     assert x * (xx * x + xy * y) + y * (yx * x + yy * y) < 0.0, "it comes nearer"
-    if meeting == "shear":
+    if flow is Shear:
         assert y == offset
     else:
         # On x y = c the least distance is √(2|c|).
         assert math.copysign(math.sqrt(abs(2.0 * x * y)), x * y) == pytest.approx(offset, rel=1e-6)
 
 
-@pytest.mark.parametrize("meeting", FLOWS)
-def test_flows_carry_no_volume_and_their_strain_is_said(meeting):
-    xx, xy, yx, yy = meetings.gradient_of(meeting, 4.0)
+@pytest.mark.parametrize("flow", [Shear, Extension])
+def test_flows_carry_no_volume_and_stretch_at_their_strain(flow):
+    xx, xy, yx, yy = flow.gradient(4.0)
     assert xx + yy == 0.0
     strain = np.linalg.eigvalsh([[xx, 0.5 * (xy + yx)], [0.5 * (xy + yx), yy]])
-    assert strain[-1] == pytest.approx(meetings.strain_of(meeting, 4.0))
+    assert strain[-1] == pytest.approx(4.0 * flow.strain)
 
 
-def test_weight_is_left_out_of_flows_alone():
-    forces, fluid = (Gravity(), StokesDrag()), Fluid()
-    assert meetings.circumstances(forces, fluid, "settling", None) == (forces, fluid)
-    kept, moving = meetings.circumstances(forces, fluid, "shear", 3.0)
-    assert [type(force) for force in kept] == [StokesDrag]
-    assert moving.gradient == (0.0, 3.0, 0.0, 0.0)
+def sheared(folder, sizes="10um-10um", **words):
+    """A study of rates in shear, and the Encounter of two of its spheres."""
+    config = kernel_config(folder, meeting='["settling", "shear"]', scene='rate = "2 1/s"', **words)
+    study = Study(config)
+    return study, study.encounter(config.scene.names.index(f"shear:{sizes}"), 1, np.zeros(5))
+
+
+def test_weight_is_left_out_of_flows_alone(tmp_path):
+    study, moving = sheared(tmp_path)
+    falling = study.encounter(0, 1, np.zeros(5))
+    for encounter, gradient in ((moving, (0.0, 2.0, 0.0, 0.0)), (falling, (0.0,) * 4)):
+        weighs = any(isinstance(force, Gravity) for force in encounter.system.forces)
+        assert weighs == (encounter is falling)
+        assert encounter.system.fluid.gradient == gradient
 
 
 def test_far_is_where_the_forces_move_less_than_the_share():
     force, radii, mobility = VanDerWaals(hamaker=1e-18), (1e-5, 2e-5), 1e7
-    speeds = meetings.speeds_of((force, StokesDrag()), Fluid(), radii, mobility)
-    gap = meetings.far_gap(speeds, 1e-4, 1e-3, sum(radii))
+    speeds = speeds_of((force, StokesDrag()), Fluid(), radii, mobility)
+    gap = far_gap(speeds, 1e-4, 1e-3, sum(radii))
     # H r*/(6 d²) µ = 1e-3 w
     exact = math.sqrt(1e-18 * (1e-5 * 2e-5 / 3e-5) * mobility / (6.0 * 1e-7))
     assert exact <= gap <= 1.1 * exact
-    assert meetings.far_gap(speeds, 1e3, 1e-3, 3e-5) == pytest.approx(0.01 * 3e-5)
+    assert far_gap(speeds, 1e3, 1e-3, 3e-5) == pytest.approx(0.01 * 3e-5)
 
 
 def test_nothing_is_caught_from_afar_without_attraction():
-    speeds = meetings.speeds_of((StokesDrag(),), Fluid(), (1e-5, 2e-5), 1e7)
-    assert meetings.attraction_width(speeds, 1e-4, 1e-4) == 0.0
+    speeds = speeds_of((StokesDrag(),), Fluid(), (1e-5, 2e-5), 1e7)
+    assert attraction_width(speeds, 1e-4, 1e-4) == 0.0
 
 
 @pytest.mark.parametrize("ratio", [1e-2, 1e-4, 1e-6, 1e-8])
@@ -73,8 +83,8 @@ def test_the_width_for_attraction_covers_what_it_catches(ratio):
     # Overdamped spheres are caught up to R + 1.88 R ratio^0.4 and less, ratio = k/(w R²).
     size, speed = 3e-5, 1e-4
     strength = ratio * speed * size * size
-    speeds = np.stack([strength / meetings.GAPS**2] * 2) * np.array([[1.0], [-1.0]])
-    width = meetings.attraction_width(speeds, speed, 2.0 * size)
+    speeds = np.stack([strength / GAPS**2] * 2) * np.array([[1.0], [-1.0]])
+    width = attraction_width(speeds, speed, 2.0 * size)
     caught = 1.88 * ratio**0.4 * size
     assert caught < width < 6.0 * caught
 
@@ -83,9 +93,9 @@ def test_spheres_turn_evenly_and_start_at_any_angle():
     fluid = Fluid(gradient=(0.0, 8.0, 0.0, 0.0))
     body = Body(Sphere(1e-5), surface_density=2.0)
     system = System([body], [StokesDrag()], fluid=fluid)
-    rates = meetings.turning_rates(system, body)
+    rates = turning_rates(system, body)
     assert rates == pytest.approx(np.full(len(rates), -4.0))
-    angle = meetings.angles_by_turning(rates)
+    angle = angles_by_turning(rates)
     assert [angle(u) for u in (0.0, 0.25, 0.5)] == pytest.approx([0.0, 0.5 * np.pi, np.pi])
 
 
@@ -105,7 +115,7 @@ class Straining(BodyForce):
 def turning_of(strength, gradient=(0.0, 8.0, 0.0, 0.0)):
     body = Body(Sphere(1e-5), surface_density=2.0)
     forces = [StokesDrag(), Straining(strength)]
-    return meetings.turning_rates(System([body], forces, fluid=Fluid(gradient=gradient)), body)
+    return turning_rates(System([body], forces, fluid=Fluid(gradient=gradient)), body)
 
 
 def test_a_force_with_a_turning_law_of_its_own_has_its_say():
@@ -113,7 +123,7 @@ def test_a_force_with_a_turning_law_of_its_own_has_its_say():
     rates = turning_of(0.8)
     theta = 2.0 * np.pi * np.arange(len(rates)) / len(rates)
     assert rates == pytest.approx(-4.0 * (1.0 - 0.8 * np.cos(2.0 * theta)), rel=1e-9)
-    angle = meetings.angles_by_turning(rates)
+    angle = angles_by_turning(rates)
     found = np.array([angle(u) for u in (np.arange(20000) + 0.5) / 20000])
     # The mean of cos 2θ under that density is (1 − √(1 − B²))/B.
     assert np.mean(np.cos(2.0 * found)) == pytest.approx((1.0 - 0.6) / 0.8, abs=1e-4)
@@ -121,7 +131,7 @@ def test_a_force_with_a_turning_law_of_its_own_has_its_say():
 
 def test_bodies_that_come_to_lie_still_have_the_angle_at_which_they_do():
     rates = turning_of(1.25)  # θ' = 0 where cos 2θ = 0.8; stable where θ' falls
-    angle = meetings.angles_by_turning(rates)
+    angle = angles_by_turning(rates)
     found = {round(angle(u), 3) for u in np.linspace(0.0, 0.999, 200)}
     stable = 0.5 * math.acos(0.8)
     slope = -4.0 * 2.0 * 1.25 * math.sin(2.0 * stable)
@@ -130,15 +140,25 @@ def test_bodies_that_come_to_lie_still_have_the_angle_at_which_they_do():
     assert sorted(found) == pytest.approx(expected, abs=2e-3)
 
 
-def test_the_turn_of_a_doublet_of_equal_spheres_is_known():
-    bodies = [(1e-5, 1.0 / (6.0 * math.pi * 1e-3 * 1e-5))] * 2
-    turn = meetings.turn_in_flow("shear", 2.0, 2e-5, bodies)
-    assert turn == pytest.approx(2.0 * 6.9542 / 2.0, rel=1e-4)
+def test_the_turn_of_a_doublet_of_equal_spheres_is_known(tmp_path):
+    _, encounter = sheared(tmp_path)
+    assert encounter.full_turn == pytest.approx(2.0 * 6.9542 / 2.0, rel=1e-4)
 
 
-def test_bodies_that_drift_by_themselves_are_refused_in_flows():
-    with pytest.raises(UsageError, match=r"0\.1 mm/s by other forces"):
-        meetings.refuse_drift(np.array([0.0, 1e-4]), 1e-3, ["Pull"])
+@attrs.frozen
+class Pull(BodyForce):
+    """A pull as of a weight."""
+
+    @staticmethod
+    def kernel(body, viscosity, flow):
+        return 0.0, -1e-12 * (body.radius / 1e-5) ** 3, 0.0
+
+
+def test_bodies_that_drift_by_themselves_are_refused_in_flows(tmp_path):
+    _, encounter = sheared(tmp_path, "10um-20um")
+    system = attrs.evolve(encounter.system, forces=(*encounter.system.forces, Pull()))
+    with pytest.raises(UsageError, match=r"mm/s by other forces \(.*Pull\): leave these out"):
+        attrs.evolve(encounter, system=system)
 
 
 @pytest.mark.parametrize("meeting", FLOWS)
@@ -173,15 +193,10 @@ def test_shapes_turn_as_their_resistance_says_and_may_be_pried_harder():
     body = Body(SpheroPolygon(corners, 2e-7), surface_density=2.0)
     fluid = Fluid(gradient=(1.0, 8.0, 2.0, -1.0))
     system = System([body], [StokesDrag(law="shape")], fluid=fluid)
-    rates = meetings.turning_rates(system, body)
+    rates = turning_rates(system, body)
     resistance, strain = resistance_matrices(body_resistance(body))
     by_strain = np.linalg.solve(resistance, strain)[2]
     twice = 2.0 * (2.0 * np.pi * np.arange(len(rates)) / len(rates))
     e_xx, e_xy = np.cos(twice) + 5.0 * np.sin(twice), 5.0 * np.cos(twice) - np.sin(twice)
     wanted = -3.0 + by_strain[0] * e_xx + by_strain[1] * e_xy
     assert rates == pytest.approx(wanted, rel=1e-6, abs=1e-6)
-    sphere = (1e-5, 1e7)
-    shape = (*sphere, 2.0 * 4.0 / 3.0 * 1e-10 / 1e7)
-    loads = [meetings.flow_load("shear", 2.0, 2e-5, [sphere, each]) for each in (sphere, shape)]
-    far = 2e-5 / 2e7
-    assert loads[1] - far == pytest.approx(2.0 * (loads[0] - far))
