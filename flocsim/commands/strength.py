@@ -40,7 +40,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("results")
     add("--flow", default="shear")
-    add("--count", type=int)
+    add("--count", type=whole)
     add("--precision", type=float, default=5e-3)
     add("--jobs", type=whole, default=1)
     add("--resume", action="store_true")

@@ -14,11 +14,11 @@ from flocsim.ensembles.config.sources import Allowed
 from flocsim.ensembles.pairs.opened import open_results
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Opening
 from flocsim.errors import UsageError
-from flocsim.fields import check_whole, is_number
+from flocsim.fields import is_number
 from flocsim.forces.outline import refuse_outlines
 from flocsim.io.results.run_group import SOURCE, now
 from flocsim.io.results.schema import AGGREGATED, OUTCOMES
-from flocsim.io.results.strength_file import DOUBLETS, STATUS, Strengths, strengths_of
+from flocsim.io.results.strength_file import DOUBLETS, Strengths, strengths_of
 
 
 class Bound(NamedTuple):
@@ -66,8 +66,6 @@ class Survey:
     def __attrs_post_init__(self) -> None:
         if self.flow not in FLOWS:
             raise UsageError(f"flow must be one of {', '.join(FLOWS)}, found {self.flow!r}")
-        if self.count is not None:
-            check_whole(self.count, 1, "count")
         if not is_number(self.precision) or not 1e-9 <= self.precision <= 1.0:
             raise UsageError(f"precision must lie between 1e-9 and 1, found {self.precision!r}")
 
@@ -149,14 +147,15 @@ def tested_in(found: Strengths) -> dict[Bound, Opening]:
     return {Bound(*row[:known]): Opening(*row[known:]) for row in rows}
 
 
+IN_WORDS = (
+    "opens at {0.opens:.4g} 1/s",
+    "opens at {0.opens:.4g} 1/s already, the lowest rate",
+    "holds up to {0.holds:.4g} 1/s, the highest rate",
+    "a run failed above {0.holds:.4g} 1/s",
+)
+"""What was found of a doublet, by its status."""
+
+
 def in_words(opening: Opening) -> str:
     """Describe what was found of one doublet."""
-    runs = f"({opening.runs} runs)"
-    word = STATUS[opening.status]
-    if word == "opened":
-        return f"opens at {opening.opens:.4g} 1/s {runs}"
-    if word == "opens_at_least_rate":
-        return f"opens at {opening.opens:.4g} 1/s already, the lowest rate {runs}"
-    if word == "holds_at_most_rate":
-        return f"holds up to {opening.holds:.4g} 1/s, the highest rate {runs}"
-    return f"a run failed above {opening.holds:.4g} 1/s {runs}"
+    return f"{IN_WORDS[opening.status].format(opening)} ({opening.runs} runs)"

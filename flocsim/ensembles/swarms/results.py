@@ -22,7 +22,6 @@ from flocsim.ensembles.contents import (
     Figures,
     Joined,
     Summary,
-    Table,
     changes_between,
     common,
     in_words,
@@ -350,11 +349,6 @@ class SwarmFiles(Contents):
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""
         return facts_of(found.results)[:-1]
-
-    def tables(self, results: SwarmResults) -> list[Table | str]:
-        """Return clusters over time."""
-        heads, *rows = swarm_file.table_rows(results)
-        return [Table("Clusters over time, means over swarms", heads, rows)]
 
     def figures(self, found: SwarmResults | None = None) -> Figures:
         """Return the figures that swarms have."""

@@ -235,13 +235,7 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
 
 def table_of(results: SwarmResults) -> str:
     """Return numbers on the clusters over time, means over replicates, as text."""
-    many = len(results.scales["replicate"])
-    return "\n".join(aligned(table_rows(results)) + ([f"means over {many} swarms"] * (many > 1)))
-
-
-def table_rows(results: SwarmResults) -> list[list[str]]:
-    """Return the same as rows of words, their heads first."""
-    counts = results.groups["counts"]
+    counts, many = results.groups["counts"], len(results.scales["replicate"])
     columns = {
         "time [s]": (results.scales["time"], "{:.4g}"),
         "clusters": (mean(counts["clusters"]), "{:.1f}"),
@@ -258,7 +252,5 @@ def table_rows(results: SwarmResults) -> list[list[str]]:
     }
     if not np.any(counts["percolating"] > 0.0):
         del columns["percolating"]
-    rows = [list(columns)]
-    for place in range(len(results.scales["time"])):
-        rows.append([form.format(values[place]) for values, form in columns.values()])
-    return rows
+    rows = zip(*(map(form.format, values) for values, form in columns.values()), strict=True)
+    return "\n".join(aligned([[*columns], *rows]) + [f"means over {many} swarms"] * (many > 1))
