@@ -93,21 +93,6 @@ def test_what_fails_is_tried_again_more_exactly(study, monkeypatch):
     assert study.run(0, 4, 0.0, 1)["outcome"] == FAILED
 
 
-def test_an_encounter_is_made_once_for_each_pair_of_shapes(study):
-    numbers = draws(1, 0)
-    assert study.encounter(0, 4, numbers) is study.encounter(0, 4, numbers)
-    assert study.encounter(0, 4, numbers) is not study.encounter(0, 16, numbers)
-    assert study.encounter(0, 4, numbers) is not study.encounter(1, 4, numbers)
-    # All spheres of one type are alike, whatever flocs the replicate would draw.
-    assert len({id(study.encounter(0, 1, draws(1, k))) for k in range(10)}) == 1
-
-
-def test_one_driver_for_spheres_and_one_for_polygons(study):
-    drivers = [study.driver(study.encounter(0, n, draws(1, 0))) for n in (1, 4, 16)]
-    assert drivers[1] is drivers[2]
-    assert drivers[0] is not drivers[1]
-
-
 def test_each_type_has_its_zone(study):
     first, second = (study.encounter(k, 1, draws(1, 0)).zone_distance for k in range(2))
     assert first - 39.43e-6 == pytest.approx(second - 9.57e-6, rel=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from flocsim.ensembles.config.loader import load_any_config
-from flocsim.io.results.swarm_file import BONDS, CLUSTERS, ENDS, SWARMS, events_of
+from flocsim.io.results.swarm_file import BONDS, CLUSTERS, GROUPS, SWARMS
 
 SWARM = """\
 preset = "si"
@@ -41,42 +41,32 @@ def swarm_config(folder, overrides=None, text=SWARM):
 
 def make_swarm_results(replicates=2, times=3, bodies=4):
     """SwarmResults of discs that fall, two of which hold together."""
-    rng = np.random.default_rng(1)
-    shape = replicates, times
-    position = np.zeros((*shape, bodies, 3))
-    position[..., :2] = 1e-5 * rng.random((replicates, 1, bodies, 2))
-    position[..., 1] -= 1e-6 * np.arange(times)[:, None]
-    numbers = ("clusters", "largest", "percolating", "mean_size", "gyration", "porosity",
-               "fractal_dimension", "settling", "bonds_certificate", "bonds_hook", "bonds_rest",
-               "bonds_touching",
-               "removed", "reentered", "median_error", "error")  # fmt: skip
-    counts = {name: np.full(shape, 2.0) for name in numbers}
-    each = {name: np.full((replicates, bodies), 1e-6) for name in ("r_eq", "spheroradius", "mass")}
-    places = np.broadcast_to(np.arange(bodies), (replicates, bodies)).copy()
+    lengths = {"replicate": replicates, "time": times, "class": 2, "body": bodies, "component": 3,
+               "axis": 2, "point": bodies, "bond": 2, "row": 3, "event": 0}  # fmt: skip
     groups = {
-        "counts": counts | {"n_class": np.full((*shape, 2), 1.0)},
-        "snapshots": {
-            "position": position, "velocity": np.zeros_like(position),
-            "cluster": np.broadcast_to(np.array([0, 0, *range(1, bodies - 1)], "i4"),
-                                       (*shape, bodies)).copy(),
-        },
-        "bodies": each | {
-            "floc": np.full((replicates, bodies), -1, "i4"), "first_point": places,
-            "point_count": np.ones_like(places), "points": np.zeros((replicates, bodies, 2)),
-            "point_part": np.zeros((replicates, bodies), "i4"),
-            "point_ring": np.zeros((replicates, bodies), "i4"),
-            "point_radius": np.full((replicates, bodies), 1e-6),
-            "box": np.full((replicates, 2), 2e-5),
-        },
-        "bonds": dict(zip(BONDS, np.array([[0, 1, 1, 0, 1], [1, 2, 1, 0, 2]], "i4").T.copy(),
-                          strict=True)),
-        "clusters": {
-            name: np.arange(3).astype(kind) if kind == "f8" else np.array([0, 1, 1], kind)
-            for name, (kind, _, _) in CLUSTERS.items()
-        },
-        "events": events_of(np.zeros((0, 0, 0))),
-        "ends": {name: np.ones(replicates, kind) for name, (kind, _, _) in ENDS.items()},
+        name: {
+            column: np.ones([lengths[axis] for axis in each.axes], each.type)
+            for column, each in group.columns.items()
+        } for name, group in GROUPS.items()
     }  # fmt: skip
+    groups["counts"] = {name: 2.0 * values for name, values in groups["counts"].items()}
+    groups["counts"]["n_class"] /= 2.0
+    moments, found = groups["snapshots"], groups["bodies"]
+    moments["velocity"][:] = moments["position"][:] = 0.0
+    rng = np.random.default_rng(1)
+    moments["position"][..., :2] = 1e-5 * rng.random((replicates, 1, bodies, 2))
+    moments["position"][..., 1] -= 1e-6 * np.arange(times)[:, None]
+    moments["cluster"][:] = [0, 0, *range(1, bodies - 1)]
+    for name in ("r_eq", "spheroradius", "mass", "point_radius"):
+        found[name] *= 1e-6
+    found["first_point"][:], found["floc"][:] = np.arange(bodies), -1
+    found["box"] *= 2e-5
+    for name in ("points", "point_part", "point_ring"):
+        found[name][:] = 0
+    pairs = np.array([[0, 1, 1, 0, 1], [1, 2, 1, 0, 2]], "i4")
+    groups["bonds"] = dict(zip(BONDS, pairs.T.copy(), strict=True))
+    for name, (kind, _, _) in CLUSTERS.items():
+        groups["clusters"][name] = np.array([0, 1, 2] if kind == "f8" else [0, 1, 1], kind)
     axes = {"time": 0.1 * np.arange(times), "class": [0.0, 1e-5],
             "component": ["x", "y", "angle"], "axis": ["x", "y"]}  # fmt: skip
     run = {"config": SWARM, "seed": 1, "identity": "{}", "warnings": "[]", "wall_time": 1.0,

@@ -109,17 +109,6 @@ def moments_in(parts):
     return [data for name, data in parts if name.startswith("moment")]
 
 
-def test_a_replicate_goes_on_to_the_same_bytes(tmp_path):
-    config = swarm_config(tmp_path)
-    whole, ended = run_parts(config)
-    assert ended
-    first, halted = run_parts(config, halts={5})
-    assert halted is None and first[-1][0] == "state"
-    rest, again = run_parts(config, left=decoded(first[-1][1]))
-    assert moments_in(whole) == moments_in([*first, *rest])
-    assert ended == again
-
-
 def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
     config = swarm_config(tmp_path)
     whole, _ = run_parts(config)
