@@ -117,7 +117,7 @@ def water_factors(path: Any, allowed: Any) -> dict[str, np.ndarray]:
 
 def export_matrices(args: argparse.Namespace) -> int:
     """Write a matrix for each mechanism, that the model and the factor have, and N."""
-    kernel = read_results(args.source, replicates=False).kernel
+    kernel = read_results(args.source).kernel
     rule = data_rule(args.overwrite)
     if kernel is None:
         raise UsageError(

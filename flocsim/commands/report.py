@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.ensembles.contents import Contents, Example, Table, file_kind, summary_of
+from flocsim.ensembles.contents import Contents, Example, file_kind, summary_of
 from flocsim.errors import UsageError, visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import Output, check_outputs, data_rule
@@ -111,7 +111,7 @@ def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Exampl
         "Study and results": facts_of(about.facts),
         "Warnings": list_of(about.warnings, "warnings") + list_of(failed, "failed"),
         "Figures": "\n".join(figure_of(name, figures[name], found, source) for name in names),
-        "Numbers": "\n".join(map(numbers_of, kind.tables(found))),
+        "Numbers": verbatim(kind.table(found)),
         "In motion": motions and f"{IN_MOTION}<div class='motions'>{motions}</div>",
         "Origin": (facts_of(about.origin) if about.origin else "")
         + (f"<h3>Config</h3>{verbatim(config)}" if config else ""),
@@ -164,20 +164,6 @@ def list_of(lines: Iterable[str], kind: str) -> str:
     """Return a list of lines; nothing for none."""
     items = "".join(f"<li>{text(line)}</li>" for line in lines)
     return f"<ul class='{kind}'>{items}</ul>" if items else ""
-
-
-def numbers_of(table: Table | str) -> str:
-    """Return a table under its heading, or text as it is."""
-    if isinstance(table, str):
-        return verbatim(table)
-    above = "\n".join(f"<p>{text(line)}</p>" for line in table.said)
-    heads = "\n".join(f"<th>{text(head)}</th>" for head in table.heads)
-    lines = [f"<h3>{text(table.heading)}</h3>{above}<div class='wide'><table><thead><tr>{heads}"]
-    lines.append("</tr></thead><tbody>")
-    for number, row in enumerate(table.rows):
-        kind = " class='first'" if number in table.firsts else ""
-        lines.append(f"<tr{kind}>" + "".join(f"<td>{text(cell)}</td>" for cell in row) + "</tr>")
-    return "\n".join([*lines, "</tbody></table></div>"])
 
 
 def data_of(figure: Figure) -> str:

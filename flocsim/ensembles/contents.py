@@ -49,18 +49,6 @@ class Summary:
     failed: list[str] = attrs.Factory(list)
 
 
-@attrs.frozen
-class Table:
-    """A table of a page: its heading, lines above it, heads, rows, and the numbers of the rows with
-    a line above them."""
-
-    heading: str
-    heads: Sequence[str]
-    rows: Sequence[Sequence[object]]
-    said: Sequence[str] = ()
-    firsts: Sequence[int] = ()
-
-
 @attrs.frozen(eq=False)
 class Example:
     """A replicate of a class: ``title`` says which, ``trajectory`` is None where it could not be
@@ -130,10 +118,6 @@ class Contents:
     def table(self, found: Any) -> str:
         """Return its numbers as text."""
         return ""
-
-    def tables(self, found: Any) -> list[Table | str]:
-        """Return the tables and texts of its page."""
-        return list(filter(None, [self.table(found)]))
 
     def figures(self, found: Any = None) -> Figures:
         """Return the figures that a file has; without one, those of all files of the kind."""

@@ -242,10 +242,7 @@ class StudyResults(Tables):
         assert found.row is not None, "a replicate of a study"
         for name in REPEATED:
             if found.row[name] != row[name]:
-                raise UsageError(
-                    f"{self.path} cannot be reproduced: {name} is {row[name]} in the file, "
-                    f"{found.row[name]} now; use the kind of machine that it was made on"
-                )
+                self.refuse(f"{name} is {row[name]} in the file, {found.row[name]} now")
         return found
 
     def in_water(self) -> list[dict[str, Any]]:
@@ -275,17 +272,17 @@ class StudyResults(Tables):
         if vertices not in self.studies:
             config, identity = self.config, self.stored("identity")
             study = one_count_study(config, vertices)
-            self.refuse(differences(identity, identity_of(study)))
+            for line in differences(identity, identity_of(study)):
+                self.refuse(line)
             self.studies[vertices] = study
         return self.studies[vertices]
 
-    def refuse(self, unlike: Sequence[str]) -> None:
-        """UsageError where something differs from what the file says."""
-        if unlike:
-            raise UsageError(
-                f"{self.path} cannot be reproduced: {unlike[0]}; use the version of flocsim, the "
-                "files and the kind of machine that it was made with"
-            )
+    def refuse(self, unlike: str) -> None:
+        """Raise UsageError for what differs from what the file says."""
+        raise UsageError(
+            f"{self.path} cannot be reproduced: {unlike}; use the version of flocsim, the files "
+            "and the kind of machine that it was made with"
+        )
 
     def __repr__(self) -> str:
         shape = " × ".join(map(str, self.results.shape))
@@ -302,21 +299,17 @@ def open_results(
 
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
-    """The first replicate of each class that the file has, of its flocs with the most vertices."""
-    opened = open_results(path, allowed)
-    found = first_of_each(opened.results)
-    return [example_of(opened, name, found[name]) for name in CLASSES if name in found]
-
-
-def example_of(opened: StudyResults, outcome: str, at: tuple[int, int, int, int]) -> Example:
-    """The Example at one place of the table of replicates."""
-    t, v, d, replicate = at
-    name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
-    title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {replicate}"
-    try:
-        trajectory = opened.replicate(replicate, name, vertices, delta)
-        place = place_of(opened.config, name, vertices, delta)
-        zone = opened.study_with(vertices).draw(*place, replicate).encounter.zone_distance
-    except FlocsimError as error:
-        return Example(outcome, title, reason=" ".join(str(error).split()))
-    return Example(outcome, title, trajectory, float(zone))
+    """Return the first replicate of each class that the file has, of its flocs with the most
+    vertices."""
+    opened, found = open_results(path, allowed), []
+    first = first_of_each(opened.results)
+    for outcome in filter(first.__contains__, CLASSES):
+        t, v, d, k = first[outcome]
+        name, vertices, delta = opened.types[t], int(opened.vertices[v]), float(opened.delta[d])
+        title = f"type {name}, N = {vertices}, δ = {delta:g} δ_max, replicate {k}"
+        try:
+            run: Any = opened.replicate(k, name, vertices, delta)
+            found.append(Example(outcome, title, run, run.row["D_0"]))
+        except FlocsimError as error:
+            found.append(Example(outcome, title, reason=" ".join(str(error).split())))
+    return found

@@ -16,7 +16,6 @@ from flocsim.ensembles.contents import (
     Figures,
     Joined,
     Summary,
-    Table,
     in_words,
     later,
     origin,
@@ -29,19 +28,6 @@ from flocsim.io.results.run_group import stored
 
 SAID_APART = (report.MOST_UNDECIDED, "settling", "size_classes", "equivalent_spheres")
 """Facts of the group ``run`` that the summary has in its own words."""
-
-ERRORS_TEXT = (
-    "Each probability is followed by its 95 % interval (Wilson's, the longer side; it covers the "
-    "possible outcomes of undecided and failed replicates), and by its numerical error (95 %): - "
-    "where no replicate was run again."
-)
-
-
-def counts_of(results: schema.Results) -> list[str]:
-    """Return lines of the counts and probabilities, or of the rates."""
-    if results.kernel is not None:
-        return report.kernel_lines(results.kernel)
-    return [report.format_table(results)]
 
 
 def conditions(results: schema.Results) -> Facts:
@@ -152,10 +138,7 @@ class PairFiles(Contents):
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
     verdict = staticmethod(report.verdict)
-
-    def read(self, path: Any) -> schema.Results:
-        """Return what a results file holds, its single replicates left on the disk."""
-        return read_results(path)
+    read = staticmethod(read_results)
 
     def summary(self, results: schema.Results) -> Summary:
         """Return what a results file says of its study."""
@@ -172,15 +155,17 @@ class PairFiles(Contents):
         return Summary(facts, origin(run, SAID_APART), warnings, failed)
 
     def table(self, results: schema.Results) -> str:
-        """Return the counts and probabilities, after the efficiencies if there are any; or the
-        rates."""
-        before = report.efficiency_lines(results) if results.kernel is None else []
-        return "\n".join([*before, *[""] * bool(before), *counts_of(results)])
+        """Return the rates; or the efficiencies, if there are any, and the counts and
+        probabilities."""
+        if results.kernel is not None:
+            return "\n".join(report.kernel_lines(results.kernel))
+        before = report.efficiency_lines(results)
+        return "\n".join([*before, *[""] * bool(before), report.format_table(results)])
 
     def told(self, found: schema.Results) -> str:
         """Return what is printed of a study that has been run."""
         errors = report.checked_line(found), *report.change_lines(found)
-        return "\n".join([*counts_of(found), *report.touch_lines(found), *filter(None, errors)])
+        return "\n".join([self.table(found), *report.touch_lines(found), *filter(None, errors)])
 
     def running(self, found: Any) -> Facts:
         """Return the conditions of a study of pairs that still runs."""
@@ -194,32 +179,6 @@ class PairFiles(Contents):
             ("numerical error",
              report.checked_line(results) or "unknown: no replicate was run again yet"),
         ]  # fmt: skip
-
-    def tables(self, results: schema.Results) -> list[Table | str]:
-        """Return the probabilities of every condition, as in the terminal, and those pooled over
-        displacements."""
-        columns = report.columns_of(results)
-        heads = ["type", *(head.replace("-/", "").replace("/", " ").strip() for head in columns)]
-        places = list(np.ndindex(*results.shape))
-        rows = [[results.types[place[0]], *(cell(place) for cell in columns.values())]
-                for place in places]  # fmt: skip
-        firsts = [row for row, place in enumerate(places) if place[1:] == (0, 0)]
-        said = [ERRORS_TEXT, *report.graze_lines(results.delta)]
-        before = report.efficiency_lines(results)
-        if results.kernel is not None:
-            before = report.kernel_lines(results.kernel)
-        found: list[Table | str] = ["\n".join(before)] if before else []
-        found.append(Table("Probabilities", heads, rows, said, firsts))
-        if results.pooled:
-            names = schema.POOLED_PROBABILITIES
-            rows = [
-                [results.types[t], str(results.vertices[v]),
-                 *(report.with_errors(results.pooled, name, (t, v)) for name in names)]
-                for t, v in np.ndindex(*results.shape[:2])
-            ]  # fmt: skip
-            heads = ["type", "N", *(schema.PROBABILITIES[name] for name in names)]
-            found.append(Table("All displacements pooled", heads, rows))
-        return found
 
     def figures(self, found: schema.Results | None = None) -> Figures:
         """Return the figures of pairs, or of rates."""
