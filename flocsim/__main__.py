@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 from flocsim import __version__
 from flocsim.commands import STUDIES, SUMMARIES, add_command
-from flocsim.io.terminal import fill_descriptors, output_problem, plain_streams, plain_warnings
+from flocsim.io.terminal import output_problem, plain_streams, plain_warnings
 from flocsim.process import check_memory, forget_left_over_launch, install, is_limited
 
 if STUDIES.intersection(sys.argv[1:2]):
-    fill_descriptors()
     install()  # before anything slow is imported
 if is_limited():
     check_memory()

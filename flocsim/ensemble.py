@@ -2,11 +2,9 @@
 
 import sys
 
-from flocsim.io.terminal import fill_descriptors
 from flocsim.process import check_memory, install
 
 if __name__ == "__main__":
-    fill_descriptors()
     install()  # before anything slow is imported
     check_memory()
 

@@ -1,8 +1,7 @@
-"""What a scene is made of: what runs, what is left out, and why; and how stiff it is.
+"""What a scene is made of: which forces act and where, which do not and why; and how stiff it is.
 
-The lines on forces and machinery are read off the force objects and off the laws that the engine is
-really given, so that they cannot disagree with what runs. Time scales are slopes of the
-uncompiled kernels by differences, so that a user's own force counts like the built-in ones.
+The lines on forces are read off the force objects that the engine is given. Time scales are slopes
+of the uncompiled kernels by differences, so that a user's own force counts like the built-in ones.
 """
 
 import collections
@@ -14,20 +13,11 @@ import numpy as np
 
 from flocsim.arrays import ContactView, PairView
 from flocsim.forces import check
-from flocsim.forces.base import BodyForce, ContactForce, PairForce, names_of
+from flocsim.forces.base import BodyForce, ContactForce, names_of
 from flocsim.forces.outline import layer_along
-from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
+from flocsim.forces.pair_resistance import PairResistance
 from flocsim.forces.settling import lone_view
-from flocsim.integrators.implicit import Overdamped
 from flocsim.plausibility import all_settled, plausibility_warnings, settled
-
-LAWLESS = (
-    ("centre_force", "forces along lines of centres", "none are given"),
-    ("surface_force", "forces between outlines", "none are given, so no gap is computed"),
-    ("slip_limit", "sliding", "no contact force limits its slip"),
-    ("contact_event", "search for kinks of the contact law", "it has none with these parameters"),
-)
-"""(law, what is left out where a scene has none, why)."""
 
 STIFF = 100.0
 """A scale this much shorter than the slowest one is stiff."""
@@ -46,15 +36,12 @@ STABLE = 2.0
 
 
 def explain(system: Any) -> str:
-    """Return the report of System.explain() as text: forces, machinery, settling, time scales,
-    and what is implausible."""
+    """Return the report of System.explain() as text: forces, settling, time scales, and what is
+    implausible."""
     return "\n".join(
         [
             heading(system),
             *force_lines(system),
-            *machinery_lines(system),
-            "in:  recording: every accepted step; run(record=False) keeps start and end only",
-            "out: events and observer: a plain run has none; an ensemble adds its own",
             *(f"settling: a body of {each.words}" for each in all_settled(system) if each.speed),
             *scale_lines(system),
             *(f"warning: {line}" for line in plausibility_warnings([system])),
@@ -151,75 +138,6 @@ def sliding(system, force):
         return "no sliding"
     limits = tried(system, force, force.slip_limit, check.SAMPLE_CONTACTS)
     return "slides at its limit" if min(limits) < math.inf else "no sliding: its limit is infinite"
-
-
-def machinery_lines(system):
-    laws = system.pieces.laws
-    touching = "contact_force" in laws or "surface_force" in laws
-    touching = touching or resistance_of_pairs(system.forces) is not None
-    lines = [search_line(system, touching)]
-    if system.spheres_only:
-        lines.append("out: vertex-edge pairs, rotation of vertices: no body has an edge")
-    lines += [spin_line(system), history_line(system)]
-    lines += [f"out: {what}: {why}" for law, what, why in LAWLESS if law not in laws]
-    if isinstance(system.integrator, Overdamped):
-        lines.append("out: inertia: the method balances forces and drag at every instant")
-    return lines
-
-
-def search_line(system, touching):
-    if not touching:
-        return "out: contact search: no force acts at contacts or between outlines"
-    far = [gap_between(a, b, "bounding_radius") for a, b in counting(system.bodies)]
-    if not far:
-        return f"out: contact search: {no_partner(system)}"
-    words = "in:  contact search, skipped for bodies whose bounding circles do not overlap"
-    return f"{words} (at the start {sum(gap > 0.0 for gap in far)} of {len(far)} pairs)"
-
-
-def spin_line(system):
-    named = zip(names_of(system.forces), system.forces, strict=True)
-    turning = [name for name, force in named if exerts_torque(system, force)]
-    if turning:
-        return f"in:  rotation of bodies: torques come from {', '.join(turning)}"
-    if system.spheres_only:
-        return "idle: rotation of spheres: no force exerts a torque, spins stay as they are"
-    return "in:  rotation of bodies: no force exerts a torque, but outlines turn with their spin"
-
-
-def history_line(system):
-    forces = [force for force in system.forces if isinstance(force, ContactForce)]
-    if not forces:
-        return "out: tangential history: no contact force"
-    if any(holds_slip(system, force) for force in forces):
-        return "in:  tangential history: displacements are kept while a contact lasts"
-    return "idle: tangential history: no tangential stiffness, displacements carry no force"
-
-
-def exerts_torque(system, force):
-    """Return True if a force may turn a body: by its own torque, or by a lever."""
-    if force.absent:
-        return False
-    if isinstance(force, BodyForce):
-        kernel = force.kernel_in(system.fluid)
-        return any(result[2] != 0.0 for result in tried(system, force, kernel, check.SAMPLE_BODIES))
-    if not counting(system.bodies):
-        return False
-    if isinstance(force, PairResistance):
-        return True
-    if isinstance(force, PairForce):
-        if force.acts_on == "orientations":
-            return True
-        return force.acts_on != "centres" and not system.spheres_only
-    sideways = tried(system, force, force.kernel, check.SAMPLE_CONTACTS)
-    return not system.spheres_only or any(result[1] != 0.0 for result in sideways)
-
-
-def holds_slip(system, force):
-    """Return True if a contact force depends on the tangential displacement."""
-    views = [check.SAMPLE_CONTACTS[0]._replace(slip_rate=0.0, slip=slip) for slip in (1e-9, -1e-9)]
-    one, other = tried(system, force, force.kernel, views)
-    return one[1] != other[1]
 
 
 def tried(system, force, kernel, views):

@@ -72,9 +72,7 @@ def add_command(subparsers: Any, command: str) -> None:
     """Add the parser of a command."""
     name = "ensembles.cli" if command in STUDIES else f"commands.{command.replace('-', '_')}"
     module, summary = importlib.import_module(f"flocsim.{name}"), SUMMARIES[command]
-    parser = subparsers.add_parser(
-        command, help=summary, description=getattr(module, "DESCRIPTION", None)
-    )
+    parser = subparsers.add_parser(command, help=summary)
     module.add_arguments(parser)
-    document(parser, module.add_arguments.__doc__ or summary, __doc__)
+    document(parser, module.add_arguments.__doc__, __doc__)
     parser.set_defaults(run=module.run)

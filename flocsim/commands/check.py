@@ -10,7 +10,7 @@ import attrs
 
 from flocsim.commands import add_settings
 from flocsim.ensembles.collision.draw import TIGHTER, exact_method
-from flocsim.ensembles.config.loader import load_config, nested, parse_setting
+from flocsim.ensembles.config.loader import load_config, settings_in
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.diagnose.accuracy import (
     Bench,
@@ -147,7 +147,7 @@ def is_close_call(row: dict, exact: dict, most: float) -> bool:
 
 def run(args: Namespace) -> int:
     """Run all cases and print the table; 0 where all are right or within their stated error."""
-    config = load_config(args.config, nested(map(parse_setting, args.settings)))
+    config = load_config(args.config, settings_in(args.settings))
     check_study(config)
     config = of_extremes(config)
     method = config.integrator.method

@@ -69,9 +69,7 @@ def export_motion(args: argparse.Namespace) -> int:
     """Write a motion for a program that shows it."""
     suffix, rule = SUFFIXES[args.format], data_rule(args.overwrite)
     path = Path(args.output or f"{Path(args.source).stem}{suffix}")
-    if path.suffix.lower() != suffix:
-        raise UsageError(f"--output {path}: the name must end in {suffix}")
-    check_outputs([Output(path, rule)], [args.source])
+    check_outputs([Output(path, rule, endings=(suffix,))], [args.source])
     kind = file_kind(source := held(args.source), "motion")
     t, position, velocity, shapes = kind.motion(kind.read(source))
     WRITERS[suffix](path, t, position, velocity, shapes, rule)

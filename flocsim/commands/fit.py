@@ -36,8 +36,8 @@ from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image, read_names
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL, TIFF_SUFFIXES
-from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.io.plots.style import checked_format
+from flocsim.io.outputs import Output, check_ending, check_outputs, data_rule
+from flocsim.io.plots.style import FIGURE_ENDINGS
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
 
@@ -208,7 +208,7 @@ def run(args: argparse.Namespace) -> int:
     args.correction = {name: getattr(args, name) for name in ("drop", "keep", "add")}
     summary = args.summary or Path(args.output).with_suffix(".csv")
     if args.overlay is not None:
-        checked_format(args.overlay, "--overlay ")
+        check_ending(args.overlay, FIGURE_ENDINGS)
     paths = list_pictures(args.images, args.masks)
     titles = titles_of(paths)
     if args.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):

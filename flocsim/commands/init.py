@@ -5,11 +5,10 @@ import re
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from flocsim.commands import add_overwrite
 from flocsim.errors import UsageError
 from flocsim.io.files import write_file
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
-
-DEFAULT_FILE = "study.toml"
+from flocsim.io.outputs import Output, check_outputs, data_rule
 
 TEMPLATES = Path(__file__).with_name("templates")
 """The folder of what is written: NAME.toml of each kind, and force.py."""
@@ -32,21 +31,18 @@ COMMANDS = {"swarm": "swarm", "kernel": "kernel"}
 """What runs it, where that is not `flocsim ensemble`."""
 
 
-DESCRIPTION = "Write a commented example of a config file, ready to run."
-
-
 def add_arguments(parser: ArgumentParser) -> None:
+    """Write a commented example of a config file, ready to run.
+
+    file: file to write (default: %(default)s)
+    --shapes FILE: shape library of `flocsim fit` whose flocs the study has
+    """
     kinds = "; ".join(f"{name}: {words}" for name, words in KINDS.items())
-    parser.add_argument(
-        "file", nargs="?", default=DEFAULT_FILE, help=f"file to write (default: {DEFAULT_FILE})"
-    )
-    parser.add_argument(
-        "--kind", choices=KINDS, default="study", help=f"{kinds} (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--shapes", metavar="FILE", help="shape library of `flocsim fit` whose flocs the study has"
-    )
-    parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    add = parser.add_argument
+    add("file", nargs="?", default="study.toml")
+    add("--kind", choices=KINDS, default="study", help=f"{kinds} (default: %(default)s)")
+    add("--shapes")
+    add_overwrite(parser)
 
 
 def with_shapes(text: str, shapes: Path, folder: Path) -> tuple[str, str]:

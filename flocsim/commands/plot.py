@@ -62,7 +62,9 @@ def run(args: argparse.Namespace) -> int:
         name: folder / f"{Path(args.results).stem}-{label(name)}.{args.format}" for name in names
     }
     animation = animation_of(args, kind)
-    check_outputs([Output(path, rule) for path in (*paths.values(), *animation)], [args.results])
+    outputs = [Output(path, rule) for path in paths.values()]
+    outputs += [Output(path, rule, endings=(".gif",)) for path in animation]
+    check_outputs(outputs, [args.results])
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:
@@ -84,8 +86,6 @@ def animation_of(args: argparse.Namespace, kind: Contents) -> list[Path]:
         raise UsageError(
             f"--animation is for {able}; for one collision use flocsim trajectory --animation"
         )
-    if Path(args.animation).suffix.lower() != ".gif":
-        raise UsageError(f"--animation {args.animation} must end in .gif")
     return [Path(args.animation)]
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
 from flocsim.ensembles.contents import Contents, Example, file_kind, summary_of
-from flocsim.errors import UsageError, visible
+from flocsim.errors import visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.plots.collision import (
@@ -80,10 +80,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the page and print its path; returns the exit code."""
     path = Path(args.output or f"{Path(args.results).stem}.html")
-    if path.suffix.lower() != ".html":
-        raise UsageError(f"--output {path}: a page's name must end in .html")
     rule = data_rule(args.overwrite)
-    check_outputs([Output(path, rule)], [args.results])
+    check_outputs([Output(path, rule, endings=(".html",))], [args.results])
     source = held(args.results)
     kind = file_kind(source)
     found = kind.read(source)

@@ -9,38 +9,41 @@ from shlex import quote
 from types import FrameType
 from typing import Any
 
+from flocsim.commands import add_overwrite, add_settings
 from flocsim.ensembles.cli import continuing
-from flocsim.ensembles.config.loader import nested, parse_setting
+from flocsim.ensembles.config.loader import parse_setting, settings_in
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.errors import UsageError
-from flocsim.io.outputs import OVERWRITE_HELP
 from flocsim.io.terminal import tell
 from flocsim.process import STOPPED, handle
-
-DESCRIPTION = """\
-Run a study at every value of a key, or of several (all combinations), and join the results in
-one file whose tables have the keys as their first dimensions. The results of each value lie in
-NAME.parts beside it; --resume goes on there. On a cluster, --dry-run prints a command for each
-value to be run by itself; --resume then joins what they made."""
 
 COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
 """Commas outside quotes and brackets."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
+    """Run a study at every value of a key, or of several (all combinations), and join the results
+    in one file whose tables have the keys as their first dimensions. The results of each value
+    lie in NAME.parts beside it; --resume goes on there. On a cluster, --dry-run prints a command
+    for each value to be run by itself; --resume then joins what they made.
+
+    config: config file (TOML)
+    --over KEY=VALUE,…: a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be
+        repeated
+    --output FILE: joined file (default: NAME-sweep.h5)
+    --jobs N: processes on this machine
+    --resume: continue a sweep, extend it, or join its parts
+    --dry-run: print a command for each value, and stop
+    """
     add = parser.add_argument
-    add("config", help="config file (TOML)")
-    add(
-        "--over", action="append", default=[], metavar="KEY=VALUE,…",
-        help="a key and its values, e.g. forces.van_der_waals.hamaker=1e-20,1e-19; may be repeated",
-    )  # fmt: skip
-    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="override any value of the config; may be repeated")  # fmt: skip
-    add("-o", "--output", metavar="FILE", help="joined file (default: NAME-sweep.h5)")
-    add("--jobs", type=int, default=1, metavar="N", help="processes on this machine")
-    add("--resume", action="store_true", help="continue a sweep, extend it, or join its parts")
-    add("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    add("--dry-run", action="store_true", help="print a command for each value, and stop")
+    add("config")
+    add("--over", action="append", default=[])
+    add_settings(parser)
+    add("-o", "--output")
+    add("--jobs", type=int, default=1)
+    add("--resume", action="store_true")
+    add_overwrite(parser)
+    add("--dry-run", action="store_true")
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:
@@ -76,7 +79,7 @@ def run_study(args: Namespace) -> int:
         raise UsageError("sweep needs --over KEY=VALUE,VALUE")
     if len(over) < len(pairs):
         raise UsageError("--over names the same key twice: give all its values at once")
-    study = Study(args.config).with_(nested(map(parse_setting, args.settings)))
+    study = Study(args.config).with_(settings_in(args.settings))
     output = args.output or f"{Path(args.config).stem}-sweep.h5"
     if args.dry_run:
         for path, part in planned(study, over, Path(output)).items():

@@ -2,20 +2,20 @@
 what commands show of a file of motion."""
 
 from argparse import ArgumentParser, Namespace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flocsim.commands import add_overwrite, add_settings
-from flocsim.ensembles.config.loader import load_config, nested, parse_setting
+from flocsim.ensembles.config.loader import load_config, settings_in
 from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
-from flocsim.errors import UsageError
 from flocsim.io.arguments import number
 from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.io.plots.style import checked_format, save
+from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
     StoredTrajectory,
@@ -79,7 +79,7 @@ def outcome_line(name: str, vertices: int, share: float, replicate: int, row: di
 
 def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
-    over = nested(map(parse_setting, args.settings))
+    over = settings_in(args.settings)
     config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
     place = place_of(config, args.type, args.vertices, args.delta, "--")
     check_study(config)
@@ -87,15 +87,13 @@ def run(args: Namespace) -> int:
     shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
     args.output = args.output or [f"{Path(args.config).stem}-{shows}.png"]
     asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
-    figures = [path for paths in asked.values() for path in paths]
-    # What could not be written is reported now, not after the run.
-    for path in figures:
-        checked_format(path)
-    if args.animation and Path(args.animation).suffix.lower() != ".gif":
-        raise UsageError(f"--animation {args.animation} must end in .gif")
     rule = data_rule(args.overwrite)
-    outputs = [*figures, *filter(None, [args.animation, args.save])]
-    check_outputs([Output(path, rule) for path in outputs], inputs_of(config, args.config))
+    # What could not be written is reported now, not after the run.
+    figures = chain(*asked.values())
+    outputs = [Output(path, rule, endings=FIGURE_ENDINGS) for path in figures]
+    outputs += [Output(args.animation, rule, endings=(".gif",))] if args.animation else []
+    outputs += [Output(args.save, rule)] if args.save else []
+    check_outputs(outputs, inputs_of(config, args.config))
     study = one_count_study(config, place[1])
     found = replicate_of(args.replicate, place, study)
     assert found.row is not None, "a replicate of a study"
@@ -115,7 +113,7 @@ def run(args: Namespace) -> int:
         write_trajectory(
             args.save, found.t, found.position, found.velocity, found.shapes, facts, rule
         )
-    print("\n".join(map(str, outputs)))
+    print("\n".join(each.path for each in outputs))
     return 0
 
 

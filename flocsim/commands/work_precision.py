@@ -25,7 +25,7 @@ from flocsim.io.arguments import whole
 from flocsim.io.confidence import Z, wilson
 from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.plots.accuracy import error_against_time
-from flocsim.io.plots.style import checked_format, save
+from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import source_line
 from flocsim.io.terminal import tell
 
@@ -148,10 +148,10 @@ def run(args: Namespace) -> int:
     if args.vertices is not None or alone:
         config = with_one_count(config, chosen[1])
     check_study(config)
-    outputs, rule = [args.output] if args.output else [], data_rule(args.overwrite)
-    for path in outputs:
-        checked_format(path)
-    check_outputs([Output(path, rule) for path in outputs], inputs_of(config, args.config))
+    rule = data_rule(args.overwrite)
+    if args.output:
+        figure = Output(args.output, rule, endings=FIGURE_ENDINGS)
+        check_outputs([figure], inputs_of(config, args.config))
     study = study_of(config)
     ladders: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for tasks in tasks_of(config, chosen, args):
@@ -167,7 +167,7 @@ def run(args: Namespace) -> int:
     # Half of Wilson's 95 % interval of a probability of ½.
     error = 50.0 * Z / math.sqrt(expected_replicates(config) + Z * Z)
     tell(f"\nto compare with flips: the sampling error of the study is {error:.2g} %")
-    for path in outputs:
-        save(error_against_time(ladders), path, rule, source_line(study.source))
-        tell(path)
+    if args.output:
+        save(error_against_time(ladders), args.output, rule, source_line(study.source))
+        tell(args.output)
     return 0

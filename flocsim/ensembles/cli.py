@@ -23,8 +23,8 @@ from flocsim.ensembles.parallel.processes import (
     start_processes,
 )
 from flocsim.errors import FileError, FlocsimError, UsageError
-from flocsim.io.arguments import Parser
-from flocsim.io.outputs import OVERWRITE_HELP, Output, check_outputs, data_rule
+from flocsim.io.arguments import Parser, document
+from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
@@ -55,56 +55,50 @@ class Options:
     @property
     def overrides(self) -> dict[str, Any]:
         """The command line's values as a nested dict over the config's."""
-        from flocsim.ensembles.config.loader import nested, parse_setting
+        from flocsim.ensembles.config.loader import settings_in
 
         file = None if self.output is None else {"file": self.output}
         given = {"seed": self.seed, "replicates": self.replicates, "output": file}
-        return nested(map(parse_setting, self.settings)) | {
+        return settings_in(self.settings) | {
             name: value for name, value in given.items() if value is not None
         }
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "config",
-        help="config file (TOML), - for standard input; `flocsim init` writes an example",
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="override any value of the config, e.g. --set 'scene.delta=[0.0, 0.5]' or --set "
-        "forces.contact.k_n='10 N/m'; may be repeated",
-    )  # fmt: skip
-    parser.add_argument("--seed", type=int, help="seed, overriding the config's")
-    parser.add_argument("--replicates", type=int, help="replicates, overriding the config's")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", help="results file, overriding the config's"
-    )
-    parser.add_argument(
-        "--jobs", type=int, default=1, metavar="N", help="processes on this machine, without MPI"
-    )
-    begin = parser.add_mutually_exclusive_group()
-    begin.add_argument(
-        "--resume", action="store_const", const="resume", default="new", dest="mode",
-        help="continue an unfinished run, or extend a finished one; starts one if there is none",
-    )  # fmt: skip
-    begin.add_argument(
-        "--restart", action="store_const", const="restart", dest="mode",
-        help="start over; an unfinished run is kept under another name (finished results: "
-        "--overwrite)",
-    )  # fmt: skip
-    parser.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    parser.add_argument(
-        "--dry-run", action="store_true",
-        help="show what would be run, and what is doubtful, and stop: nothing is compiled or run",
-    )  # fmt: skip
-    parser.add_argument(
-        "--pilot", action=argparse.BooleanOptionalAction, default=False,
-        help="with --dry-run: run some replicates for some seconds, to estimate the core-hours of "
-        "the study and the size of its file, and to find which forces matter",
-    )  # fmt: skip
-    parser.add_argument("--quiet", action="store_true", help="print warnings and errors only")
+    """Run the study of a config file, on one process or, under mpirun, on all ranks.
+
+    config: config file (TOML), - for standard input; `flocsim init` writes an example
+    --set KEY=VALUE: override any value of the config, e.g. --set 'scene.delta=[0.0, 0.5]' or --set
+        forces.contact.k_n='10 N/m'; may be repeated
+    --seed: seed, overriding the config's
+    --replicates: replicates, overriding the config's
+    --output FILE: results file, overriding the config's
+    --jobs N: processes on this machine, without MPI
+    --resume: continue an unfinished run, or extend a finished one; starts one if there is none
+    --restart: start over; an unfinished run is kept under another name (finished results:
+        --overwrite)
+    --overwrite: replace files that exist; each is kept, study.h5 as study.1.h5
+    --dry-run: show what would be run, and what is doubtful, and stop: nothing is compiled or run
+    --pilot: with --dry-run: run some replicates for some seconds, to estimate the core-hours of the
+        study and the size of its file
+    --quiet: print warnings and errors only
+    """
+    add = parser.add_argument
+    add("config")
+    add("--set", action="append", default=[], dest="settings")
+    add("--seed", type=int)
+    add("--replicates", type=int)
+    add("-o", "--output")
+    add("--jobs", type=int, default=1)
+    begin = parser.add_mutually_exclusive_group().add_argument
+    begin("--resume", action="store_const", const="resume", default="new", dest="mode")
+    begin("--restart", action="store_const", const="restart", dest="mode")
+    add("--overwrite", action="store_true")
+    add("--dry-run", action="store_true")
+    add("--pilot", action="store_true")
+    add("--quiet", action="store_true")
     # What Study.run says to its own process: with whom it is to end.
-    parser.add_argument("--parent", type=int, help=argparse.SUPPRESS)
+    add("--parent", type=int, help=argparse.SUPPRESS)
 
 
 def read_config(options: Options, sources: Any, first: bool) -> Any:
@@ -314,10 +308,9 @@ def silent_unless_first():
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry of `python -m flocsim.ensemble`; the exit code."""
-    parser = Parser(
-        prog="flocsim.ensemble", description="run the ensemble of a config file, also under mpirun"
-    )
+    parser = Parser(prog="flocsim.ensemble")
     add_arguments(parser)
+    document(parser, add_arguments.__doc__)
     with plain_streams():
         with silent_unless_first():
             arguments = parser.parse_args(argv)

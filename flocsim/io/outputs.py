@@ -9,14 +9,13 @@
 import contextlib
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import attrs
 
 from flocsim.errors import UsageError
 from flocsim.io.files import Old, Rule, check_writable, keep, ordinary_target
-
-OVERWRITE_HELP = "replace files that exist; each is kept, study.h5 as study.1.h5"
 
 
 def data_rule(overwrite: bool = False) -> Rule:
@@ -47,24 +46,34 @@ SCRIPT_WAYS = "give overwrite=True, which keeps the old one under another name"
 
 @attrs.frozen
 class Output:
-    """A file to be written: its rule, and the longest ending that a name made from it gets."""
+    """A file to be written: its rule, the longest ending that a name made from it gets, and the
+    ``endings`` of which it must have one, as (".png", ".pdf")."""
 
     path: str | os.PathLike
     rule: Rule = keep
     suffix: str = ""
     ways: str = WAYS
+    endings: Sequence[str] = ()
+
+
+def check_ending(path: str | os.PathLike, endings: Sequence[str]) -> None:
+    """Raise UsageError for a name that has none of these endings, capital or not."""
+    if Path(path).suffix.lower() not in endings:
+        raise UsageError(f"{path}: its name must end in {' or '.join(endings)}")
 
 
 def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]) -> None:
     """Raise now what would keep these from being written later, before anything is run.
 
-    UsageError for an output that is one of the ``inputs`` or of the other outputs, and for a file
-    in the way; FileError for what cannot be written.
+    UsageError for another ending, for an output that is one of the ``inputs`` or of the other
+    outputs, and for a file in the way; FileError for what cannot be written.
     """
     sources = {mark_of(source): source for source in inputs}
     sources.pop(None, None)
     seen: dict[object, Output] = {}
     for output in outputs:
+        if output.endings:
+            check_ending(output.path, output.endings)
         target = ordinary_target(output.path)
         for name in (target, target.with_name(target.name + output.suffix)):
             if (source := sources.get(mark_of(name))) is not None:

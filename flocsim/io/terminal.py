@@ -108,7 +108,6 @@ class PlainStream:
 def plain_streams() -> Iterator[None]:
     """Make standard output and error PlainStreams, also where they were closed; as before after."""
     before = sys.stdout, sys.stderr
-    fill_descriptors()
     if not isinstance(sys.stdout, PlainStream):
         sys.stdout, sys.stderr = PlainStream(sys.stdout), PlainStream(sys.stderr)
     try:
@@ -120,14 +119,6 @@ def plain_streams() -> Iterator[None]:
         # Closed ones stay what they became: the interpreter flushes them once more.
         if None not in before:
             sys.stdout, sys.stderr = before
-
-
-def fill_descriptors() -> None:
-    """Put nothing in the place of streams that are closed: else a file takes it, and the prints."""
-    with contextlib.suppress(OSError):
-        while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
-            os.set_inheritable(number, True)
-        os.close(number)
 
 
 def output_problem() -> str:

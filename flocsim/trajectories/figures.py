@@ -12,6 +12,7 @@ from flocsim.fields import is_whole
 from flocsim.geometry.contact.points import placed_contacts
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.io.files import Rule, keep
+from flocsim.io.outputs import check_ending
 from flocsim.io.plots import collision
 from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
 from flocsim.io.trajectory import centre_distance
@@ -131,8 +132,7 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
 
 def animated(trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule = keep) -> None:
     """Write the animation of a pair; ``rule`` says what becomes of a file that is there."""
-    if path.suffix.lower() != ".gif":
-        raise UsageError(f"{path}: an animation's name must end in .gif")
+    check_ending(path, (".gif",))
     check_pair(trajectory)
     seen = frames_of(trajectory, frames)
     _, zone = touch_and_zone(trajectory)

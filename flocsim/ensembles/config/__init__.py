@@ -8,9 +8,6 @@ once, with the lines that ``toml_text`` knows; ``own_classes`` finds a user's fo
 shape. May import forces, integrators, geometry and body, and nothing else of
 ``ensembles``.
 
-The readers are our own, not cattrs: that would replace one loop of twelve lines, while units,
-dimensions and every message stayed ours and its exceptions had to be turned back into places.
-
 All that a kind of study is lies in one file or folder, whose modules are loaded by name when
 something of the kind is there: `scene` has the class of its [scene] as SCENE, where that has a
 `kind` of its own; `study` what runs it as KINDS, classes of `flocsim.ensembles.kind.StudyKind`;

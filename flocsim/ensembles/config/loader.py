@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import attrs
-import cattrs
-from cattrs.gen import make_dict_structure_fn_from_attrs, override
 
 from flocsim.body import Fluid
 from flocsim.ensembles.config.own_classes import FORCE, load_class
@@ -109,74 +107,28 @@ def nested(settings: Iterable[tuple[list[str], Any]]) -> dict[str, Any]:
     return table
 
 
-CONVERTER = cattrs.Converter()
-"""Makes the classes of the schema, and a user's own, of dicts."""
+def settings_in(texts: Iterable[str]) -> dict[str, Any]:
+    """Return the nested dict that texts such as "scene.delta=[0.0, 0.5]" give."""
+    return nested(map(parse_setting, texts))
 
 
-@CONVERTER.register_structure_hook_factory(attrs.has)
-def table_hook(some_class: type) -> Any:
-    """Return cattrs' function that makes an attrs class of a dict, its fields read as declared."""
-    hooks: dict[str, Any] = {
-        field.name: override(rename=key, struct_hook=value_hook(field))
-        for key, field in keys_of(some_class).items()
-    }
-    # Without the types of a user's class, which need not be importable: the hooks read all values.
-    fields = [field.evolve(type=Any) for field in attrs.fields(some_class)]
-    return make_dict_structure_fn_from_attrs(
-        fields, some_class, CONVERTER, _cattrs_forbid_extra_keys=True, **hooks
-    )
+def read_value(value: Any, field: attrs.Attribute) -> Any:
+    """Return the value of a field as its reader has it.
 
-
-def value_hook(field: attrs.Attribute) -> Any:
-    """Return cattrs' function that reads the value of a field."""
-
-    def structure(value: Any, _: Any) -> Any:
-        if isinstance(value, dict) and "table" in field.metadata:
-            return CONVERTER.structure(value, field.metadata["table"])
-        if "reader" in field.metadata:
-            return field.metadata["reader"].read(value, field.name)
-        return value if "own" in field.metadata else plain_value(value, field)
-
-    return structure
-
-
-def plain_value(value: Any, field: attrs.Attribute) -> Any:
-    """Return the value of a field that declares nothing: a number, a text, a flag or numbers."""
-    is_float = field.type in (float, "float")
+    A field that declares none, of a user's own class, takes a number, a text, a flag or numbers.
+    """
+    if "reader" in field.metadata:
+        return field.metadata["reader"].read(value, field.name)
     if isinstance(value, list):
         return several(number(), distinct=False).read(value, field.name)
-    if isinstance(value, str | bool) and not is_float:
+    is_float = field.type in (float, "float")
+    if "own" in field.metadata or (isinstance(value, str | bool) and not is_float):
         return value
     if not is_number(value):
         hint = " (the field declares no unit: see flocsim.fields.quantity)"
         allowed = "a finite number in SI units"
         raise refused(field.name, allowed, value, hint if isinstance(value, str) else "")
     return float(value) if is_float else value
-
-
-def problems_of(error: Exception, some_class: type, place: str) -> Iterator[Problem]:
-    """Yield what cattrs, or the class itself, found wrong with a table."""
-    keys = keys_of(some_class)
-    names = {field.name: key for key, field in keys.items()}
-    if isinstance(error, cattrs.ClassValidationError):
-        inside, others = error.group_exceptions()
-        lacking = [names[note.name] for each, note in inside if isinstance(each, KeyError)]
-        if lacking:
-            yield place, f": needs {', '.join(lacking)}"
-        for each, note in inside:
-            key = names[note.name]
-            if isinstance(each, cattrs.ClassValidationError):
-                yield from problems_of(each, keys[key].metadata["table"], f"{place}.{key}")
-            elif not isinstance(each, KeyError):
-                yield problem(f"{place}.{key}", each)
-        for each in others:
-            yield from problems_of(each, some_class, place)
-    elif isinstance(error, cattrs.ForbiddenExtraKeysError):
-        yield from (unknown(f"{place}.{key}", keys) for key in sorted(error.extra_fields))
-    else:
-        # What a class says of its values together may begin with a key.
-        word = str(error).partition(" ")[0]
-        yield problem(f"{place}.{word}" if word in keys else place, error)
 
 
 def problem(place: str, error: Exception) -> Problem:
@@ -269,10 +221,30 @@ class Reading:
                     if value != elsewhere:
                         text = f": applies only with {other} = {list_words(words)}: remove it"
                         self.note(f"{place}.{key}", text)
+        # All keys are read before the class is made, so that all problems are reported at once.
+        count, values = len(self.found), {}
+        needed = [key for key, field in keys.items() if field.default is attrs.NOTHING]
+        if lacking := [key for key in needed if key not in given]:
+            self.note(place, f": needs {', '.join(lacking)}")
+        for key, value in given.items():
+            inner = f"{place}.{key}"
+            if key not in keys:
+                self.found.append(unknown(inner, keys))
+            elif isinstance(value, dict) and "table" in keys[key].metadata:
+                values[keys[key].alias] = self.made(keys[key].metadata["table"], value, inner)
+            else:
+                try:
+                    values[keys[key].alias] = read_value(value, keys[key])
+                except ValueError as error:
+                    self.found.append(problem(inner, error))
+        if len(self.found) > count:
+            return None
         try:
-            return CONVERTER.structure(given, some_class)
-        except Exception as error:
-            self.found.extend(problems_of(error, some_class, place))
+            return some_class(**values)
+        except Exception as error:  # of a class of the user's own, too
+            # What a class says of its values together may begin with a key.
+            word = str(error).partition(" ")[0]
+            self.found.append(problem(f"{place}.{word}" if word in keys else place, error))
 
     def own_object(self, bases: tuple[type, ...], table: dict[str, Any], place: str) -> Any:
         """Return an object of the user's class that a table names; None if something is wrong."""

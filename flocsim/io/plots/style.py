@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.errors import UsageError, visible
+from flocsim.errors import visible
 from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.outputs import check_ending
 
 Figure = Any
 """A matplotlib Figure: no hint may load matplotlib."""
@@ -90,6 +91,8 @@ CLASS_WORDS = {
 """What the classes of outcome are."""
 
 FORMATS = tuple(METADATA)
+
+FIGURE_ENDINGS = tuple(f".{name}" for name in FORMATS)
 
 
 @contextlib.contextmanager
@@ -343,15 +346,6 @@ def dodge(number, count):
     return (number - 0.5 * (count - 1)) * step
 
 
-def checked_format(path: str | Path, option: str = "") -> str:
-    """The format that a figure's name asks for; UsageError, which names the option, for another."""
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in FORMATS:
-        known = ", ".join(f".{name}" for name in FORMATS)
-        raise UsageError(f"{option}{path}: a figure's name must end in one of {known}")
-    return suffix
-
-
 def save(figure: Figure, path: str | Path, rule: Rule = keep, foot: str = "") -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
@@ -359,7 +353,8 @@ def save(figure: Figure, path: str | Path, rule: Rule = keep, foot: str = "") ->
     all panels. The same figure gives
     the same bytes. Raises UsageError for another suffix, FileError if the file cannot be written.
     """
-    suffix = checked_format(path)
+    check_ending(path, FIGURE_ENDINGS)
+    suffix = Path(path).suffix.lower().removeprefix(".")
     picture = io.BytesIO()
     add_foot(figure, foot)
     with house_style():
