@@ -23,7 +23,7 @@ SUMMARIES = {
     "init": "write an example config file",
     "fit": "fit spheropolygons to the flocs in pictures",
     "shapes": "list, select and merge the flocs of shape libraries",
-    "check": "check a study's scene at the extremes of its sizes, stiffness and tolerance",
+    "check": "check a study's scene at the extremes of its sizes and tolerance",
     "ensemble": "run the ensemble of a config file",
     "kernel": 'compute rates of encounters by size classes (scene.kind = "kernel"): collision '
     "kernels and efficiencies for population balances",

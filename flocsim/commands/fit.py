@@ -16,7 +16,6 @@ from flocsim.commands.fit_pictures import (
     fit_pictures,
     list_pictures,
     overlay_paths,
-    pictures_beneath,
     report,
     titles_of,
 )
@@ -83,8 +82,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         FILE-picture.png
     --fits FOLDER: draw every fit at the largest N: mask, core, the outline swept by the disk, and
         the pixels that differ
-    --pictures FOLDER: with --masks: folder of the pictures of the same names, so that the overlay
-        is drawn over them and not over the masks
     --masks-out FOLDER: write a label image of every picture, 0 outside and the number of each floc
         inside it (16-bit PNG), which can be edited and read back by --masks
     --memory GB: memory that a picture may take; larger ones are refused before the work begins
@@ -128,7 +125,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add(flag, action="store_true")
     add("--jobs", type=whole, default=1)
     add("-o", "--output", default="shapes.h5")
-    for name in ("--summary", "--overlay", "--fits", "--pictures", "--masks-out"):
+    for name in ("--summary", "--overlay", "--fits", "--masks-out"):
         add(name)
     add("--memory", type=lambda text: 1e9 * positive(text), default="1.3")
     add_overwrite(parser)
@@ -190,8 +187,6 @@ def check(args: argparse.Namespace) -> None:
         (not paper and args.cutoff is not None, "--cutoff applies to --finder paper only"),
         (args.band and (args.masks or args.holes),
          "--band excludes --masks, which do not show where else an outline might be, and --holes"),
-        (args.pictures and not (args.masks and args.overlay),
-         "--pictures is for overlays of masks: give --masks and --overlay too"),
     ):  # fmt: skip
         if wrong:
             raise UsageError(message)
@@ -216,7 +211,6 @@ def run(args: argparse.Namespace) -> int:
             "--pixel-size is missing, and only OME-TIFF and ImageJ files give the size of a "
             "pixel; give the length of its side, for example --pixel-size '0.95 um'"
         )
-    beneath = pictures_beneath(args.pictures, paths)
     rule = data_rule(args.overwrite)
     outputs = [args.output, summary]
     if args.overlay is not None:
@@ -226,7 +220,7 @@ def run(args: argparse.Namespace) -> int:
     if args.masks_out is not None:
         make_folder(args.masks_out, "--masks-out ")
         outputs += label_paths(args.masks_out, titles).values()
-    check_outputs([Output(path, rule) for path in outputs], [*paths, *beneath.values()])
+    check_outputs([Output(path, rule) for path in outputs], paths)
     try:
         pictures, lost = fit_pictures(paths, args)
     except KeyboardInterrupt:
@@ -255,7 +249,7 @@ def run(args: argparse.Namespace) -> int:
     write_library(args.output, entries, settings, rule)
     write_file(summary, table, rule)
     if args.overlay is not None:
-        lost += draw_overlays(pictures, args, rule, len(paths) > 1, beneath)
+        lost += draw_overlays(pictures, args, rule, len(paths) > 1)
     if args.fits is not None:
         draw_fits(args.fits, pictures, rule)
     print("\n".join([format_errors(entries), *population_lines(entries)]))

@@ -7,7 +7,7 @@ import os
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -280,36 +280,6 @@ def find_background(paths: Sequence[Path], options: Namespace) -> np.ndarray | N
     return np.median(np.stack(frames), axis=0)
 
 
-def pictures_beneath(folder: str | None, paths: Sequence[Path]) -> dict[Path, Path]:
-    """Return {path of a mask: the picture of its name in a folder}."""
-    if folder is None:
-        return {}
-    if not Path(folder).is_dir():
-        raise UsageError(f"--pictures takes a folder, found {folder!r}")
-    pictures = {
-        path.stem: path
-        for path in sorted(Path(folder).iterdir())
-        if path.suffix.lower() in SUFFIXES
-    }
-    missing = [path.name for path in paths if path.stem not in pictures]
-    if missing:
-        report(f"warning: --pictures {folder} has no picture of {', '.join(missing)}")
-    return {path: pictures[path.stem] for path in paths if path.stem in pictures}
-
-
-def grey_beneath(picture: Picture, beneath: Mapping[Path, Path], options: Namespace) -> np.ndarray:
-    """Return what the overlay of a picture is drawn over: of a mask its picture, or itself."""
-    if not options.masks:
-        return read_grey(picture.path, picture.plane or Plane(), options.memory)
-    mask = picture.found.foreground
-    if picture.path in beneath:
-        grey = read_grey(beneath[picture.path], memory=options.memory)
-        if grey.shape == mask.shape:
-            return grey
-        report(f"warning: {beneath[picture.path]} is not of the size of its mask, and not drawn")
-    return mask
-
-
 def overlay_paths(overlay: str, names: Sequence[str], several: bool) -> list[Path]:
     """Return a path for the overlay of each of the pictures with these names."""
     path = Path(overlay)
@@ -331,9 +301,8 @@ def draw_fits(folder: str, pictures: Sequence[Picture], rule: Rule) -> None:
 
 
 def draw_overlays(
-    pictures: Sequence[Picture], options: Namespace, rule: Rule, several: bool,
-    beneath: Mapping[Path, Path],
-) -> list[str]:  # fmt: skip
+    pictures: Sequence[Picture], options: Namespace, rule: Rule, several: bool
+) -> list[str]:
     """Write each picture with the outlines at the largest N and the smallest spheroradius.
 
     Returns what could not be drawn because its picture cannot be read any more.
@@ -344,8 +313,10 @@ def draw_overlays(
     for picture, path in zip(pictures, paths, strict=True):
         flocs = [(region, picture.finest(region)) for region in picture.regions]
         title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
+        grey = picture.found.foreground
         try:
-            grey = grey_beneath(picture, beneath, options)
+            if not options.masks:
+                grey = read_grey(picture.path, picture.plane or Plane(), options.memory)
         except (ImageError, MemoryError) as error:
             report(str(error) or f"{picture.name}: not enough memory to draw its overlay")
             lost.append(str(path))

@@ -6,7 +6,7 @@ from typing import Any
 
 from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.config.sources import read_sources
-from flocsim.ensembles.contents import file_kind, text_of, unfinished_text
+from flocsim.ensembles.contents import file_kind, info_of, unfinished_text
 from flocsim.errors import FileError
 from flocsim.io.journal import journal_of
 from flocsim.io.seals import held
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         kind = file_kind(source := held(args.results))
         print_inputs(args, getattr(kind.read(source), "run", {}))
     else:
-        print(text_of(args.results))
+        print(info_of(args.results))
     return 0
 
 

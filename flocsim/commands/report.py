@@ -12,7 +12,7 @@ import base64
 import io
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.ensembles.contents import Contents, Example, file_kind, summary_of
+from flocsim.ensembles.contents import Contents, Example, file_kind, text_of
 from flocsim.errors import visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import Output, check_outputs, data_rule
@@ -50,7 +50,6 @@ TEMPLATES = Path(__file__).with_name("templates")
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """Nothing is loaded from anywhere, whatever the file says of itself."""
 
-MOST_FAILURES = 20
 FRAMES = 150
 
 IN_MOTION = (
@@ -61,9 +60,9 @@ IN_MOTION = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Write one HTML page on a file that needs no other file: the figures of flocsim plot, the
-    numbers with their errors, warnings, and where it came from; of pairs one replicate of each
-    class (A to D) to watch, which is run again for it.
+    """Write one HTML page on a file that needs no other file: what flocsim info prints of it, the
+    figures of flocsim plot, and its config; of pairs one replicate of each class (A to D) to
+    watch, which is run again for it.
 
     results: file that flocsim wrote
     --output FILE.html: page to write (default: r.html for r.h5, in the current folder)
@@ -95,32 +94,23 @@ def run(args: argparse.Namespace) -> int:
 
 
 def report_page(path: str, kind: Contents, found: Any, examples: Sequence[Example]) -> str:
-    """Return the HTML of a file; FileError as `summary_of` raises it."""
-    about, source = summary_of(path, kind, found), kind.source(found)
-    failed = about.failed[:MOST_FAILURES]
-    if len(about.failed) > MOST_FAILURES:
-        failed.append(f"and {len(about.failed) - MOST_FAILURES} more in run/failed")
+    """Return the HTML of a file; FileError as `text_of` raises it."""
     # Outcomes and the figure of everything come first.
-    figures, first = kind.figures(found), ("outcomes", "overview")
+    figures, first, source = kind.figures(found), ("outcomes", "overview"), kind.source(found)
     names = sorted(figures, key=lambda name: first.index(name) if name in first else len(first))
     config = str(getattr(found, "run", {}).get("config", ""))
     motions = "\n".join(map(motion_of, examples))
     sections = {
-        "Study and results": facts_of(about.facts),
-        "Warnings": list_of(about.warnings, "warnings") + list_of(failed, "failed"),
+        "Results": verbatim(text_of(path, kind, found)),
         "Figures": "\n".join(figure_of(name, figures[name], found, source) for name in names),
-        "Numbers": verbatim(kind.table(found)),
-        "In motion": motions and f"{IN_MOTION}<div class='motions'>{motions}</div>",
-        "Origin": (facts_of(about.origin) if about.origin else "")
-        + (f"<h3>Config</h3>{verbatim(config)}" if config else ""),
+        "Motion": motions and f"{IN_MOTION}<div class='motions'>{motions}</div>",
+        "Config": config and verbatim(config),
     }
-    shown = {
-        head: (head.split()[-1].lower(), content) for head, content in sections.items() if content
-    }
-    links = " ".join(f"<a href='#{anchor}'>{head}</a>" for head, (anchor, _) in shown.items())
+    shown = {head: content for head, content in sections.items() if content}
+    links = " ".join(f"<a href='#{head.lower()}'>{head}</a>" for head in shown)
     body = "\n".join(
-        f"<section id='{anchor}'><h2>{head}</h2>\n{content}</section>"
-        for head, (anchor, content) in shown.items()
+        f"<section id='{head.lower()}'><h2>{head}</h2>\n{content}</section>"
+        for head, content in shown.items()
     )
     title = text(f"{path}: {kind.title}")
     style, script = ((TEMPLATES / name).read_text("utf-8") for name in ("page.css", "motion.js"))
@@ -150,18 +140,6 @@ def verbatim(words: str) -> str:
     """Return lines as they are."""
     lines = "\n".join(map(text, words.splitlines()))
     return f"<pre>{lines}</pre>"
-
-
-def facts_of(facts: Iterable[tuple[str, object]]) -> str:
-    """Return a table of names and values."""
-    rows = (f"<tr><th>{text(name)}</th><td>{text(value)}</td></tr>" for name, value in facts)
-    return "<table class='facts'>" + "\n".join(rows) + "</table>"
-
-
-def list_of(lines: Iterable[str], kind: str) -> str:
-    """Return a list of lines; nothing for none."""
-    items = "".join(f"<li>{text(line)}</li>" for line in lines)
-    return f"<ul class='{kind}'>{items}</ul>" if items else ""
 
 
 def data_of(figure: Figure) -> str:

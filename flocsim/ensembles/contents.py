@@ -204,10 +204,8 @@ def summary_of(path: object, kind: Contents, found: Any) -> Summary:
         raise FileError(f"{path} has no readable {kind.title}: {error}") from error
 
 
-def text_of(path: str | os.PathLike) -> str:
-    """What `flocsim info` prints of a file."""
-    kind = file_kind(source := held(path))
-    found = kind.read(source)
+def text_of(path: object, kind: Contents, found: Any) -> str:
+    """Return what `flocsim info` prints of a file, and its page shows."""
     said, mark = summary_of(path, kind, found), kind.mark(found)
     title = f"{kind.title}; {mark}" if mark else kind.title
     lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]
@@ -220,6 +218,12 @@ def text_of(path: str | os.PathLike) -> str:
         lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
     table = kind.table(found)
     return "\n".join([*lines, *(["", table] if table else [])])
+
+
+def info_of(path: str | os.PathLike) -> str:
+    """Return what `flocsim info` prints of the file at a path."""
+    kind = file_kind(source := held(path))
+    return text_of(path, kind, kind.read(source))
 
 
 def unfinished_text(found: Any) -> str:

@@ -84,29 +84,20 @@ def graze_lines(delta: Sequence[float] | np.ndarray) -> list[str]:
     return [GRAZE] if 1.0 in np.asarray(delta) else []
 
 
-def efficiency_rows(results: Results) -> list[tuple[object, ...]]:
-    """Return (type, N, in the plane, axially) of efficiencies with their 95 % intervals: the
-    aggregations per approach integrated over delta; none where it does not reach from 0 to 1."""
+def efficiency_lines(results: Results) -> list[str]:
+    """Return lines on efficiencies with their 95 % intervals: the aggregations per approach
+    integrated over delta; none where it does not reach from 0 to 1."""
     table, delta = results.probabilities, results.delta
     planar, axial = efficiency(table, delta, False), efficiency(table, delta, True)
     if planar is None or axial is None:
         return []
-    rows = []
+    lines = []
     for t, v in np.ndindex(results.shape[:2]):
         if np.isfinite(planar[0][t, v]):
-            words = [
+            first, second = (
                 f"{e[t, v]:.3f} [{lo[t, v]:.3f}, {hi[t, v]:.3f}]" for e, lo, hi in (planar, axial)
-            ]
-            rows.append((str(results.types[t]), int(results.vertices[v]), *words))
-    return rows
-
-
-def efficiency_lines(results: Results) -> list[str]:
-    """Return the efficiency_rows as a table of text."""
-    lines = [
-        f"type {name}, N = {count}: {planar}   {axial}"
-        for name, count, planar, axial in efficiency_rows(results)
-    ]
+            )
+            lines.append(f"type {results.types[t]}, N = {results.vertices[v]}: {first}   {second}")
     return [f"efficiency: {EFFICIENCY}", *lines] if lines else []
 
 

@@ -16,10 +16,6 @@ from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
 from flocsim.io.images.regions import Region
 from flocsim.io.shape_library import MEASURE_COLUMNS, ShapeEntry
-from flocsim.io.terminal import aligned
-
-CLASS_LIMIT = 5.0
-"""r_eq [px] that parts the two size classes of the table (the paper's 5 µm at 1 µm a pixel)."""
 
 MOST_ERROR = 5.0
 """RE [%] above which the form of a floc is lost on its outline of so few vertices."""
@@ -108,23 +104,16 @@ def errors_of(entries: Sequence[ShapeEntry]) -> dict[str, dict[int, float]]:
 
 
 def format_errors(entries: Sequence[ShapeEntry]) -> str:
-    """A table of the mean relative error [%] of ShapeEntries by N and size class, for each r."""
+    """Return the mean relative error [%] of ShapeEntries at every N, a line for each r."""
     lines = []
     for radius in sorted({entry.spheroradius for entry in entries}):
         members = [entry for entry in entries if entry.spheroradius == radius]
-        small = [entry for entry in members if entry.equivalent_radius <= CLASS_LIMIT]
-        large = [entry for entry in members if entry.equivalent_radius > CLASS_LIMIT]
-        below, above = (f"r_eq {sign} {CLASS_LIMIT:g} px" for sign in ("<=", ">"))
-        classes = {below: small, above: large, "all": members}
-        rows = [["N", *(f"{name} ({len(flocs)})" for name, flocs in classes.items())]]
-        for count in members[0].fits:
-            errors = ([e.fits[count].relative_error for e in each] for each in classes.values())
-            means = (f"{sum(each) / len(each):.2f}" if each else "-" for each in errors)
-            rows.append(["1 (circle)" if count == 1 else str(count), *means])
-        lines += [
-            "mean relative error [%] by vertices and size class (number of flocs), "
-            f"r = {radius:g} px", *aligned(rows),
-        ]  # fmt: skip
+        means = [
+            f"{np.mean([each.fits[count].relative_error for each in members]):.2f} at N = {count}"
+            for count in members[0].fits
+        ]
+        flocs = plural(len(members), "floc")
+        lines.append(f"mean relative error [%], {flocs}, r = {radius:g} px: {', '.join(means)}")
     return "\n".join(lines)
 
 

@@ -3,14 +3,12 @@
 import math
 from itertools import product
 
-import attrs
 import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands import check
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.diagnose.accuracy import Comparison
-from flocsim.forces import Contact
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import write_small
@@ -31,15 +29,13 @@ def test_every_combination_of_ends_is_run_and_judged(folder, capsys, types):
     code, rows, last = call(capsys, "--count", "1", "--set", f"scene.types={types}")
     assert code == 0
     found = [row.split() for row in rows]
-    assert {(row[0], row[2], row[4]) for row in found} == set(
-        product(types, ("2", "200"), ("1e-09", "1e-11"))
-    )
-    assert len(rows) == 4 * len(types) and all(
+    assert {(row[0], row[3]) for row in found} == set(product(types, ("1e-09", "1e-11")))
+    assert len(rows) == 2 * len(types) and all(
         row.endswith(("right", "stated error")) for row in rows
     )
     for row in found:
-        steps, error, stated = int(row[8]), float(row[10]), float(row[11])
-        assert steps > 10 and error <= max(stated, float(row[4]))
+        steps, error, stated = int(row[7]), float(row[9]), float(row[10])
+        assert steps > 10 and error <= max(stated, float(row[3]))
     assert last.endswith(", 0 failed")
     assert [path.name for path in folder.iterdir()] == ["small.toml"]
 
@@ -103,26 +99,6 @@ def test_a_graze_and_the_border_of_the_zone_are_close_calls(one, two, kind):
 def test_without_a_reference_nothing_is_right():
     found = Comparison(end("A"), why="no reference: it ends undecided (step budget)")
     assert check.verdict_on(found, Implicit(1e-9)) == (check.WRONG, found.why)
-
-
-def test_the_stiffness_takes_the_tangential_one_with_it(folder):
-    law = check.contact_of(check.stiff(load_config("small.toml"), 500.0))
-    assert (law.k_n, law.k_t) == (500.0, 50.0)
-
-
-def test_an_end_of_the_stiffness_is_none_that_is_refused_anyway(folder):
-    write_small(folder, vertices="[4]")
-    config = load_config("small.toml", {"bodies": {"surface_density": 8.0}})
-    assert check.stiffnesses(config) == (20.0, 200.0)
-    assert check.stiffnesses(load_config("small.toml")) == (2.0, 200.0)
-
-
-def test_a_law_without_k_n_is_run_as_it_is(folder):
-    config = load_config("small.toml")
-    others = tuple(force for force in config.forces if not isinstance(force, Contact))
-    bare = attrs.evolve(config, forces=others)
-    assert all(map(math.isnan, check.stiffnesses(bare)))
-    assert check.stiff(bare, math.nan) is bare
 
 
 def test_the_extremes_of_sizes_and_vertices(folder):

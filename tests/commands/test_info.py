@@ -3,7 +3,7 @@
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.ensembles.contents import text_of
+from flocsim.ensembles.contents import info_of
 from flocsim.io.shape_library import SHIPPED
 from tests.helpers.results_files import write_results
 from tests.helpers.small_rates import mixed
@@ -13,7 +13,7 @@ from tests.helpers.synthetic_results import make_results
 def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
     results = make_results(types=("I",), vertices=(1, 8), delta=(0.0, 0.7))
     write_results(tmp_path / "r.h5", results)
-    lines = text_of(tmp_path / "r.h5").splitlines()
+    lines = info_of(tmp_path / "r.h5").splitlines()
     (told,) = [line for line in lines if line.startswith("bonds")]
     held = [int((results.replicates["bond"] == code).sum()) for code in (1, 2, 3)]
     assert min(held) > 0
@@ -30,7 +30,7 @@ def test_how_many_stick_and_how_many_hang_is_told(tmp_path):
 def test_strengths_are_told_and_whether_they_are_complete(tmp_path, complete):
     found = mixed(complete)
     found.write(tmp_path / "s.h5")
-    text = text_of(tmp_path / "s.h5")
+    text = info_of(tmp_path / "s.h5")
     assert ("unfinished" in text.splitlines()[0]) is not complete
     told = "4 doublets" if complete else "4 doublets so far; continue with --resume"
     assert f"tested     {told}\n" in text

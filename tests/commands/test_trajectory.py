@@ -138,8 +138,8 @@ WRONG = [
     (["--delta", "nan"], 2, "--delta must be one of 0.0, 1.0, found nan"),
     (["--replicate", -1], 2, "replicate must be a whole number of at least 0, found -1"),
     (["--seed", -3], 2, "seed must be an integer from 0"),
-    (["-o", "strip.gif"], 2, "strip.gif: a figure's name must end in one of .png, .pdf, .svg"),
-    (["--distance", "d"], 2, "d: a figure's name must end in one of .png"),
+    (["-o", "strip.gif"], 2, "strip.gif: its name must end in .png or .pdf or .svg"),
+    (["--distance", "d"], 2, "d: its name must end in .png"),
     (["-o", "no/folder.png"], 74, "no/folder.png could not be written"),
     (["--save", "no/folder.h5"], 74, "no/folder.h5 could not be written"),
     (["--save", "small.toml"], 2, "writing small.toml would replace small.toml"),
@@ -171,7 +171,7 @@ def test_wrong_configs_are_one_line(folder, capsys, changes, said):
 def test_an_animation_is_a_gif(folder, capsys):
     code, output, errors = call(capsys, "small.toml", "--animation", "a.mp4")
     assert (code, output) == (2, [])
-    assert errors == ["flocsim: --animation a.mp4 must end in .gif"]
+    assert errors == ["flocsim: a.mp4: its name must end in .gif"]
 
 
 def test_numbers_of_the_line_are_finite_and_in_order(folder, capsys):

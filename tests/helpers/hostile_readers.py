@@ -15,11 +15,11 @@ from tests.helpers.hostile_files import hdf5_file
 
 def read_results_file(path):
     """Read it in all ways."""
-    from flocsim.ensembles.contents import text_of
+    from flocsim.ensembles.contents import info_of
     from flocsim.io.results.file import read_results
 
     dict(read_results(path).replicates)
-    text_of(path)
+    info_of(path)
 
 
 def read_kernel_file(path):
@@ -47,7 +47,7 @@ def read_strengths_file(path):
 
 def read_library_file(path):
     """Read it, and make the shapes."""
-    from flocsim.ensembles.contents import text_of
+    from flocsim.ensembles.contents import info_of
     from flocsim.io.shape_library import read_library
 
     entries = read_library(path)
@@ -56,7 +56,7 @@ def read_library_file(path):
             assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
             assert math.isfinite(fit.shape.area)
         assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
-    text_of(path)
+    info_of(path)
 
 
 def read_picture_file(path):
@@ -88,7 +88,7 @@ def read_masks_file(path):
 
 def read_swarm_file(path):
     """Read it, describe it, and make the shapes."""
-    from flocsim.ensembles.contents import text_of
+    from flocsim.ensembles.contents import info_of
     from flocsim.io.plots.swarm import shape_of
     from flocsim.io.results.swarm_file import read_swarm
 
@@ -97,16 +97,16 @@ def read_swarm_file(path):
     for replicate in range(min(replicates, 3)):
         for body in range(min(bodies, 5)):
             assert math.isfinite(shape_of(found, replicate, body).area)
-    text_of(path)
+    info_of(path)
 
 
 def read_sweep_file(path):
     """Read it, and describe it."""
-    from flocsim.ensembles.contents import text_of
+    from flocsim.ensembles.contents import info_of
     from flocsim.ensembles.sweep import read_joined
 
     read_joined(path)
-    text_of(path)
+    info_of(path)
 
 
 def read_trajectory_file(path):

@@ -5,7 +5,6 @@
 
 import math
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES
-from flocsim.errors import FlocsimError, PlausibilityWarning
+from flocsim.errors import FlocsimError
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import OUTCOMES
@@ -132,14 +131,6 @@ class Bench:
         if math.isfinite(method.tolerance):
             stated = run.error
         return attrs.evolve(found, exact=exact, error=error, stated=stated, slack=reference.error)
-
-    def amplification(self, task: Task, until: float) -> float:
-        """Return how many times a displacement of the start grows to a time [s]: a factor above 10
-        makes a sum of stated errors meaningless."""
-        system = self.study.draw(*task[0], task[1]).system()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlausibilityWarning)
-            return system.run(until, record=False, amplification=True).amplification
 
 
 def setting_of(method: Integrator) -> str:

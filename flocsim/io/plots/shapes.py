@@ -12,7 +12,6 @@ import numpy as np
 
 from flocsim.geometry.shapes.outline import swept_rings
 from flocsim.io.fit_report import (
-    CLASS_LIMIT,
     SHARES,
     diameters_at,
     measures_in,
@@ -26,6 +25,9 @@ from flocsim.io.shape_library import ShapeEntry
 
 if TYPE_CHECKING:
     from flocsim.geometry.fit.fit import Fit
+
+CLASS_LIMIT = 5.0
+"""r_eq [px] that separates the two size classes of Fig. 3 (the paper's 5 µm at 1 µm a pixel)."""
 
 BAR_COLOUR = "#56B4E9"
 CLASS_STYLES = (("≤", "#D55E00", "o"), (">", "#0072B2", "s"))

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from flocsim.ensembles import cli
 from flocsim.ensembles.collision.equivalent import sphere_pairs
 from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.contents import text_of
+from flocsim.ensembles.contents import info_of
 from flocsim.ensembles.diagnose.dry_run import dry_run
 from flocsim.ensembles.diagnose.preflight import (
     IMPLIED,
@@ -252,6 +252,6 @@ def test_a_run_tells_them_once_and_keeps_them(folder, capsys):
     heavier = small_config(folder, {"bodies": {"surface_density": 3.0}})
     assert stored(run, "settling") == settling_facts(heavier)
     assert json.loads(run["settling"])[1]["reynolds"] > 4.0
-    text = text_of(folder / "small.h5")
+    text = info_of(folder / "small.h5")
     assert line.removeprefix("flocsim: ") in text.splitlines()
     assert "I: i Re 3.3 St " in text
