@@ -1,12 +1,11 @@
 """`flocsim plot`: the figures of a file."""
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from flocsim.commands import add_overwrite
-from flocsim.ensembles.config import FILES, contents_of
+from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.contents import Contents, file_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
@@ -16,26 +15,17 @@ from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.seals import held
 
 
-def listed(figures: Mapping[str, Any]) -> str:
-    """Return a line for every figure: its name and the first line of its docstring."""
-    first = {name: (draw.__doc__ or "").partition("\n")[0] for name, draw in figures.items()}
-    return "\n".join(f"  {name:<8}  {text.removesuffix('.')}" for name, text in first.items())
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """results: file written by flocsim ensemble or flocsim fit
+    """Draw the figures of a file, each to its own file; figures with a number are those of Tang et
+    al. (2014). Of a running study, the figures of the replicates so far are drawn, marked as
+    unfinished.
+
+    results: file written by flocsim ensemble or flocsim fit
     --output-dir DIR: folder for the figures, created if missing (default: the current one)
     --format: default: %(default)s
-    --figures LIST: figures, separated by commas (default: all that the file has)
+    --figures LIST: figures, separated by commas, as overview,4 (default: all that the file has)
     --animation FILE.gif: for a swarm study: also write its first swarm as an animation
     """
-    kinds = map(contents_of, FILES)
-    parser.description = "\n".join([
-        "Draw the figures of a file, each to its own file.",
-        *(f"Of {kind.title}:\n{listed(kind.figures())}" for kind in kinds),
-        "Of a running study, the figures of the replicates so far are drawn, marked as unfinished.",
-        "Figures are numbered as in Tang et al. (2014).",
-    ])  # fmt: skip
     add = parser.add_argument
     add("results")
     add("--output-dir", default=".")

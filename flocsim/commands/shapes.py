@@ -198,19 +198,13 @@ def selected(entries: list[ShapeEntry], args: argparse.Namespace, source: str) -
 
 
 def named(source: str, text: str | None, known: set[str]) -> set[str]:
-    """Return the names in a list, all of which flocs have; a comma may be part of a name.
+    """Return the names in a list separated by commas, all of which flocs have.
 
     A name may stand for a floc at all of its spheroradii: 023.png#7 for "023.png#7 r=2".
     """
-    rest, names = f",{text or ''},", set()
-    for name in sorted(known, key=len, reverse=True):
-        if f",{name}," in rest:
-            names.add(name)
-            rest = rest.replace(f",{name},", ",,")
-    if rest.strip(","):
-        raise UsageError(
-            f"{source} has no floc {rest.strip(',')!r}; flocsim shapes list names them"
-        )
+    names = set(filter(None, (text or "").split(",")))
+    if unknown := sorted(names - known):
+        raise UsageError(f"{source} has no floc {unknown[0]!r}; flocsim shapes list names them")
     return names
 
 
@@ -281,7 +275,7 @@ class LibraryFiles(Contents):
         """Return the errors of the fits."""
         return format_errors(found.entries)
 
-    def figures(self, found: Library | None = None) -> Figures:
+    def figures(self, found: Library) -> Figures:
         """Return the figures of a population."""
         return FIGURES
 

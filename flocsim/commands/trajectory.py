@@ -32,6 +32,11 @@ STRIP_FRAMES = 7
 def add_arguments(parser: ArgumentParser) -> None:
     """Run one replicate of a config and draw it as a strip of frames.
 
+    config: config file (TOML)
+    --replicate K: default: 0
+    --type NAME: collision type (default: the first)
+    --vertices N: vertices of the bodies (default: the last)
+    --delta F: default: the first
     --seed: seed, overriding the config's
     --frames K: default: %(default)s
     --output FILE: strip of frames: .png, .pdf or .svg, or several files (default: a .png named
@@ -41,8 +46,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     --animation FILE.gif: also write an animation
     --save FILE.h5: also write the motion to HDF5
     """
-    add_replicate(parser)
     add = parser.add_argument
+    add("config")
+    add("--replicate", type=int, default=0)
+    add("--type")
+    add("--vertices", type=int)
+    add("--delta", type=float)
     add("--seed", type=int)
     add("--frames", type=lambda text: int(number("2 to 500", 2, MOST_FRAMES)(text)), default=6)
     add("-o", "--output", nargs="+", default=[])
@@ -52,16 +61,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_settings(parser)
     add("--save")
     add_overwrite(parser)
-
-
-def add_replicate(parser: ArgumentParser) -> None:
-    """Add the arguments that name a replicate of a config."""
-    add = parser.add_argument
-    add("config", help="config file (TOML)")
-    add("--replicate", type=int, default=0, metavar="K", help="default: 0")
-    add("--type", metavar="NAME", help="collision type (default: the first)")
-    add("--vertices", type=int, metavar="N", help="vertices of the bodies (default: the last)")
-    add("--delta", type=float, metavar="F", help="default: the first")
 
 
 def outcome_line(name: str, vertices: int, share: float, replicate: int, row: dict) -> str:
@@ -157,10 +156,9 @@ class TrajectoryFiles(Contents):
                 facts.append((name.replace("_", " "), told))
         return Summary(facts)
 
-    def figures(self, found: StoredTrajectory | None = None) -> Figures:
+    def figures(self, found: StoredTrajectory) -> Figures:
         """Return the figures of a motion: distances are those of two bodies."""
-        two = found is None or len(found.shapes) == 2
-        return MOTION_FIGURES if two else {"strip": strip}
+        return MOTION_FIGURES if len(found.shapes) == 2 else {"strip": strip}
 
     def source(self, found: StoredTrajectory) -> str:
         """Return of which flocs, preset and version it is."""

@@ -8,18 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flocsim.commands import add_overwrite
-from flocsim.commands.trajectory import add_replicate
-from flocsim.ensembles.config.loader import load_config
-from flocsim.ensembles.config.schema import Config
+from flocsim.commands import add_overwrite, add_settings
+from flocsim.ensembles.config.loader import load_config, settings_in
 from flocsim.ensembles.diagnose.accuracy import Bench, Task, number, setting_of, table_line
 from flocsim.ensembles.diagnose.pilot import expected_replicates, sample_of
 from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.kind import study_of
-from flocsim.ensembles.pairs.opened import Place, place_of, with_one_count
 from flocsim.ensembles.study import Study
-from flocsim.errors import UsageError
-from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
+from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.arguments import whole
 from flocsim.io.confidence import Z, wilson
@@ -32,17 +28,14 @@ from flocsim.io.terminal import tell
 DECADES = 6
 """Of the tolerance; the reference has a tenth of the tightest."""
 
-STEP_COUNTS = (1_000, 10_000, 100_000)
-"""Numbers of equal steps that VelocityVerlet makes of a collision."""
-
 CORE = 0.25
 """Length of an equivalent sphere, which has no spheroradius, over r_eq."""
 
 COUNT = 60
 """Replicates of each type, by default."""
 
-PATIENCE, MOST_STEPS = 20, 1_000_000
-"""Steps of an explicit run at most: times those of the references, of a single replicate in all."""
+PATIENCE = 20
+"""Steps of an explicit run at most, over those of the references."""
 
 COLUMNS = {
     "method": -18, "setting": 11, "flips": 7, "[%]": 7, "95 %": 14, "error [m]": 11,
@@ -54,17 +47,19 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Run some replicates of a study by both adaptive methods over six decades of tolerance, and
     print how many outcomes flip, the error against a ten times tighter reference at the time when
     the first of the two is decided, and the CPU time. Tolerances begin at the smallest length of
-    the outlines, rounded to a decade: at 1e-6 m, a spheroradius, for tang2014. With --replicate:
-    run one replicate, also at fixed steps.
+    the outlines, rounded to a decade: at 1e-6 m, a spheroradius, for tang2014. Conditions are
+    chosen by --set, as --set 'scene.types=["III"]' --set shapes.vertices=[16].
 
-    --count K: without --replicate: replicates of each type (default: 60)
-    -o FIGURE: also draw the error against the CPU time: .png, .pdf or .svg
+    config: config file (TOML)
+    --count K: replicates of each type (default: %(default)s)
+    --output FIGURE: also draw the error against the CPU time: .png, .pdf or .svg
     """
-    add_replicate(parser)
+    add = parser.add_argument
+    add("config")
+    add("--count", type=whole, default=COUNT)
+    add("-o", "--output")
+    add_settings(parser)
     add_overwrite(parser)
-    parser.add_argument("--count", type=whole)
-    parser.add_argument("-o", "--output", metavar="FIGURE")
-    parser.set_defaults(replicate=None)
 
 
 class Rung(NamedTuple):
@@ -75,11 +70,8 @@ class Rung(NamedTuple):
     point: tuple[float, float]
 
 
-def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[Rung]:
-    """Run replicates of a collision type at every setting, the loosest first.
-
-    ``alone``: of a single replicate, also by fixed steps.
-    """
+def climb(study: Study, tasks: Sequence[Task]) -> Iterator[Rung]:
+    """Run replicates of a collision type by every method at every tolerance, the loosest first."""
     shapes = [
         shape for place, replicate in tasks
         for shape in study.draw(*place, replicate).encounter.shapes
@@ -90,13 +82,10 @@ def climb(study: Study, tasks: Sequence[Task], alone: bool) -> Iterator[Rung]:
     bench = Bench(study, Implicit(0.1 * tolerances[-1]))
     references = [bench.reference(task) for task in tasks]
     patience = int(PATIENCE * np.mean([run.steps for run, _ in references]))
-    budget = MOST_STEPS if alone else patience
     for tolerance in tolerances:
         yield rung(bench, tasks, Implicit(tolerance))
     for tolerance in tolerances:
-        yield rung(bench, tasks, DormandPrince54(tolerance), budget)
-    for count in STEP_COUNTS if alone else ():
-        yield rung(bench, tasks, VelocityVerlet(references[0][0].time / count), budget)
+        yield rung(bench, tasks, DormandPrince54(tolerance), patience)
 
 
 def rung(
@@ -122,46 +111,22 @@ def rung(
     return Rung(name, line, (cpu, error))
 
 
-def tasks_of(config: Config, chosen: Place, args: Namespace) -> list[list[Task]]:
-    """Return the replicates that the arguments choose, a list for each collision type."""
-    if args.replicate is not None:
-        return [[(chosen, args.replicate)]]
-    given = args.type, args.vertices, args.delta
-    scene, vertices = config.scene, config.shapes.vertices
-    places = [
-        place for place in product(range(len(scene.names)), vertices, scene.delta)
-        if all(each is None or a == b for each, a, b in zip(given, place, chosen, strict=True))
-    ]  # fmt: skip
-    types = sorted({place[0] for place in places})
-    mine = [[place for place in places if place[0] == each] for each in types]
-    return [list(islice(sample_of(config, each), args.count or COUNT)) for each in mine]
-
-
 def run(args: Namespace) -> int:
     """Run the ladders of all types and print them; the exit code."""
-    config, alone = load_config(args.config), args.replicate is not None
-    if alone and args.count is not None:
-        raise UsageError("--count is for the whole study: leave out either it or --replicate")
-    if alone and args.replicate < 0:
-        raise UsageError(f"--replicate must be at least 0, found {args.replicate}")
-    chosen = place_of(config, args.type, args.vertices, args.delta, "--")
-    if args.vertices is not None or alone:
-        config = with_one_count(config, chosen[1])
+    config, rule = load_config(args.config, settings_in(args.settings)), data_rule(args.overwrite)
     check_study(config)
-    rule = data_rule(args.overwrite)
     if args.output:
         figure = Output(args.output, rule, endings=FIGURE_ENDINGS)
         check_outputs([figure], inputs_of(config, args.config))
     study = study_of(config)
     ladders: dict[str, dict[str, list[tuple[float, float]]]] = {}
-    for tasks in tasks_of(config, chosen, args):
-        (condition, n, delta), replicate = tasks[0]
+    for condition, name in enumerate(config.scene.names):
+        places = [*product([condition], config.shapes.vertices, config.scene.delta)]
+        tasks = list(islice(sample_of(config, places), args.count))
         about = f"{len(tasks)} replicates over all N and delta"
-        if alone:
-            about = f"N = {n}, delta = {delta:g}, replicate {replicate}"
-        tell(f"\ntype {config.scene.names[condition]}, {about}\n{table_line(COLUMNS)}")
-        lines = ladders.setdefault(config.scene.names[condition], {})
-        for each in climb(study, tasks, alone):
+        tell(f"\ntype {name}, {about}\n{table_line(COLUMNS)}")
+        lines = ladders.setdefault(name, {})
+        for each in climb(study, tasks):
             lines.setdefault(each.method, []).append(each.point)
             tell(each.line)
     # Half of Wilson's 95 % interval of a probability of ½.

@@ -119,8 +119,8 @@ class Contents:
         """Return its numbers as text."""
         return ""
 
-    def figures(self, found: Any = None) -> Figures:
-        """Return the figures that a file has; without one, those of all files of the kind."""
+    def figures(self, found: Any) -> Figures:
+        """Return the figures that a file has."""
         return {}
 
     def source(self, found: Any) -> str:

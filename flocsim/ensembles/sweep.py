@@ -286,10 +286,9 @@ class SweepFiles(Contents):
         kind = joined_in(found)
         return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
 
-    def figures(self, found: SweepResults | None = None) -> Figures:
+    def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""
-        kinds = kinds_joined() if found is None else [joined_in(found)]
-        return {name: draw for each in kinds for name, draw in each.figures().items()}
+        return joined_in(found).figures()
 
 
 CONTENTS = SweepFiles()

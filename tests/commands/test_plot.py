@@ -14,7 +14,6 @@ from flocsim.ensembles.report import format_table
 from flocsim.errors import FileError, UsageError
 from flocsim.io.plots import results as drawings
 from flocsim.io.plots.results import FIGURES
-from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.results.run_group import provenance
 from tests.helpers.results_files import write_results
 from tests.helpers.synthetic_results import make_results
@@ -71,15 +70,6 @@ def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkey
 def test_unknown_figures_are_refused(study, figures):
     with pytest.raises(UsageError, match=f"no figure '.*', only {', '.join(FIGURES)}"):
         call("plot", study, "--figures", figures)
-
-
-def test_the_command_knows_the_figures_that_exist(capsys):
-    with pytest.raises(SystemExit):
-        call("plot", "--help")
-    lines = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
-    told = {words[0]: words[1] for words in lines if len(words) == 2}
-    for name in (*FIGURES, *POPULATION_FIGURES):
-        assert len(told[name]) > 10
 
 
 @pytest.mark.parametrize("command", ["plot", "info"])

@@ -9,6 +9,8 @@ from flocsim.commands import work_precision
 from flocsim.integrators import Implicit
 from tests.helpers.small_study import write_small
 
+WORDS = ["work-precision", "small.toml", "--set", "shapes.vertices=[4]"]
+
 
 @pytest.fixture
 def implicit_alone(monkeypatch, tmp_path):
@@ -17,7 +19,6 @@ def implicit_alone(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(work_precision, "DormandPrince54", Implicit)
     monkeypatch.setattr(work_precision, "DECADES", 2)
-    monkeypatch.setattr(work_precision, "STEP_COUNTS", ())
 
 
 def rows_of(text):
@@ -28,7 +29,7 @@ def rows_of(text):
 
 
 def test_a_row_for_every_type_and_setting(implicit_alone, capsys):
-    assert main(["work-precision", "small.toml", "--vertices", "4", "--count", "6"]) == 0
+    assert main([*WORDS, "--count", "6"]) == 0
     text = capsys.readouterr().out
     assert "type I, 6 replicates" in text and "type III, 6 replicates" in text
     rows = rows_of(text)
@@ -40,7 +41,7 @@ def test_a_row_for_every_type_and_setting(implicit_alone, capsys):
 
 
 def test_the_figure_is_written_once(implicit_alone, capsys):
-    words = ["work-precision", "small.toml", "--vertices", "4", "--count", "2", "-o", "error.png"]
+    words = [*WORDS, "--count", "2", "-o", "error.png"]
     assert main(words) == 0
     assert Path("error.png").read_bytes().startswith(b"\x89PNG")
     assert capsys.readouterr().out.endswith("error.png\n")
@@ -48,23 +49,12 @@ def test_the_figure_is_written_once(implicit_alone, capsys):
     assert "error.png" in capsys.readouterr().err
 
 
-def test_one_replicate(implicit_alone, capsys):
-    words = "work-precision small.toml --type III --vertices 4 --replicate 2"
-    assert main(words.split()) == 0
-    text = capsys.readouterr().out
-    assert text.startswith("\ntype III, N = 4, delta = 0, replicate 2\n")
-    loose, tight = rows_of(text)[:2]
-    assert loose["error"] == loose["most"]
-    assert float(tight["error"]) < float(loose["error"]) < 1e-5
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--replicate -1", "--replicate must be at least 0, found -1"),
-        ("--replicate 1 --count 3", "--count is for the whole study"),
-        ("--delta 0.3", "--delta must be one of 0.0, 1.0, found 0.3"),
-        ("--type IV", "--type must be one of I, III, found IV"),
+        ("--set seed=x", "seed must be an integer"),
+        ("--set bodies.surface_density=20", "an impact at"),
+        ("-o error.gif", "error.gif: its name must end in .png"),
     ],
 )
 def test_what_is_wrong_is_one_line(implicit_alone, capsys, words, said):

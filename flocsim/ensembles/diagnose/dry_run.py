@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 from flocsim.ensembles.collision.draw import count_checks, exact_method
 from flocsim.ensembles.collision.equivalent import measured_flocs, sphere_pairs
-from flocsim.ensembles.collision.flocs import Floc, read_flocs
+from flocsim.ensembles.collision.flocs import Floc
 from flocsim.ensembles.collision.pairings import class_facts, pairings_of
 from flocsim.ensembles.config.pair_scene import BROWNIAN
 from flocsim.ensembles.config.schema import CUT, Config
@@ -17,7 +17,6 @@ from flocsim.ensembles.diagnose.preflight import study_warnings, warning_lines
 from flocsim.ensembles.diagnose.spheres import settling_facts, sphere_facts
 from flocsim.ensembles.kind import study_of
 from flocsim.explain import force_lines, scale_lines
-from flocsim.io.fit_report import coarse_line
 from flocsim.io.results.run_group import class_words, sphere_words
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.terminal import duration
@@ -35,7 +34,7 @@ def dry_run(config: Config, ranks: int, pilot: bool = False) -> str:
         *(f"  {line}" for line in force_lines(pairs[0][1].system)),
         "stiffness:",
         *(f"  {name}: {line}" for name, pair in pairs for line in scale_lines(pair.system)),
-        *warning_lines([*coarse_lines(config, measured), *study_warnings(config, measured)]),
+        *warning_lines(study_warnings(config, measured)),
         *(["pilot:", *(f"  {line}" for line in pilot_lines(config, ranks))] if pilot else []),
         "only the pilot was run (--dry-run)" if pilot
         else "nothing was run (--dry-run); --pilot runs some replicates, to estimate the cost",
@@ -111,14 +110,6 @@ def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
         ]
         if numbers:
             yield f"  settling alone{', the largest' * own}: {'; '.join(numbers)}"
-
-
-def coarse_lines(config: Config, measured: Sequence[Floc]) -> list[str]:
-    """Return a line where the largest N is too small for flocs of the library."""
-    if config.shapes.source != "library":
-        return []
-    flocs = measured or read_flocs(config.shapes)
-    return list(filter(None, [coarse_line({floc.name: floc.errors for floc in flocs})]))
 
 
 def pilot_lines(config: Config, ranks: int) -> list[str]:

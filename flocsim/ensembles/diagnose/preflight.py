@@ -345,10 +345,4 @@ def trivial_values(config: Config, flocs: Flocs | None = None) -> list[str]:
             "delta_max, at 1 of which the outlines just graze, and the attraction zone ends at "
             f"{max(reaches):.3g} of it: give fractions up to 1, as 0.5 for 50 %"
         )
-    # Ten times as far as the farthest offset: a body that falls past is inside however it moves.
-    if min(reaches) > 10.0 * max(1.0, *scene.delta):
-        lines.append(
-            f"[zone] reaches to {min(reaches):.3g} (r_i + r_j) of the centres at least, farther "
-            "than any offset of scene.delta, so that every pair is inside: give a smaller distance"
-        )
     return lines

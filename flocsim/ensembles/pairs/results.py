@@ -180,13 +180,11 @@ class PairFiles(Contents):
              report.checked_line(results) or "unknown: no replicate was run again yet"),
         ]  # fmt: skip
 
-    def figures(self, found: schema.Results | None = None) -> Figures:
+    def figures(self, found: schema.Results) -> Figures:
         """Return the figures of pairs, or of rates."""
         from flocsim.io.plots.curves import KERNEL_FIGURES
         from flocsim.io.plots.results import FIGURES
 
-        if found is None:
-            return FIGURES | KERNEL_FIGURES
         return FIGURES if found.kernel is None else KERNEL_FIGURES
 
     def water(self, path: Any, allowed: Allowed) -> list[str]:

@@ -34,7 +34,7 @@ class StrengthFiles(Contents):
         """Return what a file says of itself."""
         return Summary(facts_of(found))
 
-    def figures(self, found: Any = None) -> Figures:
+    def figures(self, found: Any) -> Figures:
         """Return the one figure."""
         from flocsim.io.plots.curves import STRENGTH_FIGURES
 

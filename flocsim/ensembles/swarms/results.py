@@ -350,12 +350,10 @@ class SwarmFiles(Contents):
         """Return facts of swarms that still run."""
         return facts_of(found.results)[:-1]
 
-    def figures(self, found: SwarmResults | None = None) -> Figures:
+    def figures(self, found: SwarmResults) -> Figures:
         """Return the figures that swarms have."""
         from flocsim.io.plots.swarm import SWARM_FIGURES
 
-        if found is None:
-            return SWARM_FIGURES
         there = {
             "classes": len(found.scales["class"]) > 1,
             "speed": len(found.groups["clusters"]["cluster_speed"]) > 0,

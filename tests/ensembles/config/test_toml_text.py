@@ -1,12 +1,9 @@
 """What the text of a config may be: all that is valid TOML, up to a size that is told."""
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
 from flocsim.ensembles.config.loader import load_config, parse_setting
 from flocsim.errors import ConfigError
-from tests.helpers.config_texts import MEANT, PLAIN, STUDIES, TABLES
 
 
 @pytest.mark.parametrize(
@@ -39,36 +36,6 @@ def test_a_list_of_decimals_may_be_long(tmp_path, comma, count):
 @pytest.mark.parametrize("value", ["[" * 5000, "b." * 3000, "10 N/m", '"open'])
 def test_a_setting_that_is_no_toml_is_a_word(value):
     assert parse_setting(f"a.b={value}") == (["a", "b"], value)
-
-
-def check_study(path, text):
-    """A study in any notation is the one that its plain text describes."""
-    path.write_text(text)
-    config = load_config(path)
-    path.write_text(PLAIN)
-    meant = load_config(path)
-    assert all(getattr(config, name) == getattr(meant, name) for name in MEANT)
-
-
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(STUDIES)
-def test_a_study_in_any_notation_loads(tmp_path, text):
-    check_study(tmp_path / "c.toml", text)
-
-
-@pytest.mark.slow
-@settings(
-    max_examples=500, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
-@given(st.one_of(STUDIES, TABLES, st.tuples(STUDIES, TABLES).map("\n".join)))
-def test_five_hundred_generated_configs_load_or_say_why(tmp_path, text):
-    path = tmp_path / "c.toml"
-    path.write_text(text)
-    try:
-        load_config(path)
-    except ConfigError as error:
-        lines = str(error).split("\n")
-        assert all(line.startswith(str(path)) and line.isprintable() for line in lines)
 
 
 def test_control_letters_of_keys_and_names_are_written_out(tmp_path):

@@ -31,11 +31,6 @@ def test_offsets_that_attraction_may_bridge_are_not(tmp_path, delta):
     assert doubts(tmp_path, delta) == []
 
 
-def test_a_zone_that_holds_every_pair_is_doubted(tmp_path):
-    [line] = doubts(tmp_path, more='[zone]\ndistance = "1 mm"\n')
-    assert line.startswith("[zone] reaches to") and "every pair is inside" in line
-
-
 def test_a_library_of_spheres_alone_is_doubted(tmp_path):
     library = 'source = "library"\nfile = "synthetic"\nvertices = '
     [line] = doubts(tmp_path, shapes=library + "[1]")
