@@ -58,7 +58,7 @@ def seconds_of(folder, names, before=(), after=()):
         if job.wait():
             raise RuntimeError(f"a run ended with exit code {job.returncode}")
     files = [folder / name.replace(".toml", ".h5") for name in names]
-    return max(read_results(file, replicates=False).run["wall_time"] for file in files)
+    return max(read_results(file).run["wall_time"] for file in files)
 
 
 def compare_ranks(folder, replicates, repeats):

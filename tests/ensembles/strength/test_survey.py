@@ -135,25 +135,12 @@ def test_counts_of_a_condition():
     assert len(lines) == 2 and lines[1].split()[:6] == ["III", "1", "0.5", "6", "4", "2"]
 
 
-def test_the_file_comes_back(tmp_path):
-    found, path = mixed(), tmp_path / "s.h5"
-    found.write(path)
-    back = read_strengths(path)
-    assert back.about == found.about
-    for group in ("doublets", "conditions"):
-        for name, values in found.groups[group].items():
-            np.testing.assert_array_equal(values, back.groups[group][name])
-    assert back.table("quantile").tolist() == list(QUANTILES)
-
-
-def test_a_file_says_whether_it_is_complete(tmp_path, capsys):
+def test_the_file_comes_back_and_says_whether_it_is_complete(tmp_path):
     mixed(complete=False).write(tmp_path / "s.h5")
     back = read_strengths(tmp_path / "s.h5")
+    assert same(mixed(complete=False), back) and back.table("quantile").tolist() == list(QUANTILES)
     assert not back.complete and mixed().complete
     assert plot.read_content(tmp_path / "s.h5")[2] == "unfinished: 4 doublets"
-    words = ["plot", str(tmp_path / "s.h5"), "--output-dir", str(tmp_path)]
-    assert program.main(words) == 0
-    assert (tmp_path / "s-strength.png").exists()
 
 
 def test_the_figure_shows_the_share_that_has_opened():

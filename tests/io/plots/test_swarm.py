@@ -51,15 +51,6 @@ def test_parts_that_cannot_be_are_refused():
         outlines_of(results, 1)
 
 
-def test_bonds_of_bodies_that_are_not_there_are_refused(tmp_path):
-    for name in ("bond_later", "bond_time"):
-        results = make_swarm_results()
-        results.groups["bonds"][name] = np.array([0, 9], "i4")
-        results.write(tmp_path / f"{name}.h5")
-        with pytest.raises(FileError, match=f"bonds/{name} has impossible values"):
-            read_swarm(tmp_path / f"{name}.h5")
-
-
 @pytest.mark.parametrize(
     "results", [compound_results(), pytest.param(make_swarm_results(), marks=pytest.mark.slow)]
 )
