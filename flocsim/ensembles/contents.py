@@ -269,8 +269,8 @@ def in_words(value: object) -> str:
 def open_any(
     path: str | os.PathLike, folder: str | os.PathLike | None = None, own: Collection[str] = ()
 ) -> Any:
-    """What a file of `flocsim ensemble`, `swarm`, `kernel`, `sweep` or `strength` holds, checked;
-    the table of replicates of pairs stays on the disk until it is asked for.
+    """Return what a file that flocsim wrote holds, checked; the table of replicates of pairs stays
+    on the disk until it is asked for.
 
     A file runs no code: for a study with a class of one's own, ``folder`` is where its module
     lies (and the study's shape library; default: that is looked for beside the results, and no
@@ -279,7 +279,7 @@ def open_any(
     """
     own = [own] if isinstance(own, str) else own
     allowed, source = Allowed(folder, own), held(path)
-    return file_kind(source, "opened").opened(source, allowed)
+    return file_kind(source).opened(source, allowed)
 
 
 MEANINGS = {

@@ -88,7 +88,7 @@ def groups_of(parts: Any, times: int, classes: int) -> Groups:
         for place in range(times) if moment_name(place) in parts
     }  # fmt: skip
     groups: Groups = {"bodies": {name: values[np.newaxis] for name, values in bodies.items()}}
-    lengths = {"class": classes, "body": len(bodies["r_eq"]), "component": 3}
+    lengths: dict[Any, int] = {"class": classes, "body": len(bodies["r_eq"]), "component": 3}
     for group in ("counts", "snapshots"):
         groups[group] = {}
         for name, each in swarm_file.GROUPS[group].columns.items():

@@ -233,11 +233,11 @@ def events_between(before: np.ndarray, after: np.ndarray) -> list[tuple[int, ...
     return events
 
 
-def table_of(results: SwarmResults) -> str:
+def table_of(found: SwarmResults) -> str:
     """Return numbers on the clusters over time, means over replicates, as text."""
-    counts, many = results.groups["counts"], len(results.scales["replicate"])
+    counts, many = found.groups["counts"], len(found.scales["replicate"])
     columns = {
-        "time [s]": (results.scales["time"], "{:.4g}"),
+        "time [s]": (found.scales["time"], "{:.4g}"),
         "clusters": (mean(counts["clusters"]), "{:.1f}"),
         "largest": (mean(counts["largest"]), "{:.1f}"),
         "mean size": (mean(counts["mean_size"]), "{:.2f}"),
