@@ -115,7 +115,7 @@ class OneTable(Contents):
         axes = {name: each.values for name, each in table.axes.items()}
         return self.means(table.columns, axes, (*swept.swept, *AXES))
 
-    def figures(self, found: Any = None) -> Figures:
+    def figures(self, found: Any) -> Figures:
         """Return a figure for each column of numbers that are not whole."""
 
         def figure_of(name: str) -> Any:
