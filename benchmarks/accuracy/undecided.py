@@ -16,7 +16,7 @@ from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.estimates.capture import estimate, weighted
 from flocsim.ensembles.estimates.statistics import (
-    pooled_probabilities,
+    clustered_probabilities,
     pooled_sums,
     probabilities,
 )
@@ -68,7 +68,7 @@ def of_pairs(rows):
     """{name: (value, low, high)} of all probabilities, those pooled, and efficiencies."""
     codes = [rows[name] for name in ("outcome", "inside", "bond")]
     table = tabulate(*codes)
-    pooled = pooled_probabilities(pooled_sums(*codes))
+    pooled = clustered_probabilities(pooled_sums(*codes))
     ends = ("", "_low", "_high")
     found = {name: [table[name + end] for end in ends] for name in PROBABILITIES}
     found |= {f"{name}, pooled": [pooled[name + end] for end in ends]

@@ -24,13 +24,14 @@ LEAST_START = 0.01
 def speeds_of(
     forces: Sequence[Force], fluid: Fluid, radii: Sequence[float], mobility: float
 ) -> np.ndarray:
-    """Speeds [m/s] of two bodies against each other by their pair forces at GAPS: (all together,
-    each taken for repulsive; the sum) (2, gaps).
+    """Return speeds [m/s] of two bodies against each other by their pair forces at GAPS: (all
+    together, each taken for repulsive; the sum) (2, gaps).
 
     ``radii``: r_eq [m] of both; ``mobility``: the sum of theirs [s/kg].
     """
     r_i, r_j = radii
     size, found = r_i + r_j, np.zeros((2, len(GAPS)))
+    # Spheres of the bodies' equivalent radii, at rest; Derjaguin's radius r_i r_j/(r_i + r_j).
     pair = sample_pairs(math.inf)[0]._replace(
         gap_rate=0.0, radius_i=r_i, radius_j=r_j, reduced_radius=r_i * r_j / size
     )
@@ -49,15 +50,15 @@ def speeds_of(
 
 
 def far_gap(speeds: np.ndarray, speed: float, share: float, size: float) -> float:
-    """The gap [m] beyond which forces move the bodies at less than a ``share`` of their ``speed``
-    against each other; ``speeds`` as of `speeds_of`, ``size`` = r_i + r_j."""
+    """Return the gap [m] beyond which forces move the bodies at less than a ``share`` of their
+    ``speed`` against each other; ``speeds`` as of `speeds_of`, ``size`` = r_i + r_j."""
     strong = np.flatnonzero(speeds[0] > share * speed)
     gap = GAPS[min(strong[-1] + 1, len(GAPS) - 1)] if len(strong) else 0.0
     return max(float(gap), LEAST_START * size)
 
 
 def attraction_width(speeds: np.ndarray, speed: float, way: float) -> float:
-    """How far beyond where outlines meet anyway attraction can make them meet [m].
+    """Return how far beyond where outlines meet anyway attraction can make them meet [m].
 
     A pair that passes with a least distance e is drawn sideways by at most v(g), the speed of
     attraction at a gap g ≥ what is left of e, for as long as it passes: at half its ``speed``, over
@@ -68,11 +69,13 @@ def attraction_width(speeds: np.ndarray, speed: float, way: float) -> float:
     drawn = np.maximum(-speeds[1], 0.0)
     if not drawn.max() > 0.0:
         return 0.0
+    # Nearer than this attraction outruns the passing, and the pair meets in any case.
     held = np.flatnonzero(drawn >= 0.5 * speed)
     first = held[-1] if len(held) else 0
     passing = way / (0.5 * speed)
     with np.errstate(divide="ignore"):
         slowness = 1.0 / drawn
+    # Trapezoidal rule for ∫ dg/v from there outwards; beyond reach v = 0, and it takes for ever.
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(GAPS)
     taken = np.cumsum(steps[first:]) + (0.0 if len(held) else slowness[0] * GAPS[0])
     beyond = np.flatnonzero(taken > passing + 4.0 * GAPS[first + 1 :] / speed)
@@ -83,22 +86,25 @@ def attraction_width(speeds: np.ndarray, speed: float, way: float) -> float:
 def caged_between(
     speeds: np.ndarray, mobility: float, load: float, barrier: float
 ) -> tuple[float, float]:  # fmt: skip
-    """Between which gaps [m] more than the energy ``barrier`` [J] lies on either side of a pair
-    that has not touched, a ``load`` [N] helping it out, or in; (0, 0) for no such place.
+    """Return the gaps [m] between which more than the energy ``barrier`` [J] lies on either side of
+    a pair that has not touched, a ``load`` [N] helping it out, or in; (0, 0) for no such place.
 
     ``speeds`` as of `speeds_of`, which took this ``mobility``; of several such places the one of
     the highest barriers.
     """
+    # The potential U(g) = −∫ F dg, up to a constant, and with the load's work on either side.
     repulsion = speeds[1] / mobility
     rises = -0.5 * (repulsion[1:] + repulsion[:-1]) * np.diff(GAPS)
     potential = np.append(0.0, np.cumsum(rises))
     outwards, inwards = potential - load * GAPS, potential + load * GAPS
+    # Barriers: the highest place further out, and further in, over that of here.
     above = np.maximum.accumulate(outwards[::-1])[::-1] - outwards
     below = np.maximum.accumulate(inwards) - inwards
     least = np.minimum(above, below)
     best = int(np.argmax(least))
     if not least[best] > barrier:
         return 0.0, 0.0
+    # The run of gaps about the best one where both barriers are high enough.
     outside = np.flatnonzero(~(least > barrier))
     first = int(outside[outside < best].max(initial=-1)) + 1
     last = int(outside[outside > best].min(initial=len(GAPS))) - 1

@@ -79,6 +79,11 @@ LONGEST_REASON = 300
 """Letters of an exception's words in a note."""
 
 
+def generator(seed: int, *key: int) -> np.random.Generator:
+    """Return a generator of random numbers that nothing but these numbers decides."""
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
+
+
 @lru_cache(maxsize=4096)
 def draws(seed: int, replicate: int) -> np.ndarray:
     """Five uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc, and
@@ -88,8 +93,7 @@ def draws(seed: int, replicate: int) -> np.ndarray:
     them, and one replicate has the same orientations and the same flocs at every displacement,
     number of vertices and type.
     """
-    stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
-    found = np.random.Generator(np.random.Philox(stream)).random(5)
+    found = generator(seed, replicate).random(5)
     found.flags.writeable = False
     return found
 
@@ -104,9 +108,7 @@ def points(seed: int, scramble: int, size: int) -> np.ndarray:
     """The first ``size`` points (size, 5) of a scramble, in [0, 1); ``size`` a power of 2."""
     from scipy.stats import qmc
 
-    stream = np.random.SeedSequence(seed, spawn_key=(*POINTS_STREAM, scramble))
-    generator = np.random.Generator(np.random.Philox(stream))
-    sequence = qmc.Sobol(5, scramble=True, seed=generator)
+    sequence = qmc.Sobol(5, scramble=True, seed=generator(seed, *POINTS_STREAM, scramble))
     found = np.asarray(sequence.random_base2(size.bit_length() - 1))
     found.flags.writeable = False
     return found
@@ -289,8 +291,7 @@ def expected_checks(replicates: int, share: float | str, easily: bool = False) -
 @cache
 def beginning(seed: int) -> float:
     """A number in [0, 1) that says where the choice begins."""
-    stream = np.random.SeedSequence(seed, spawn_key=CHOICE_STREAM)
-    return float(np.random.Generator(np.random.Philox(stream)).random())
+    return float(generator(seed, *CHOICE_STREAM).random())
 
 
 def further_runs(seed: int, replicate: int, share: float | str, easily: bool = False) -> int:
@@ -336,5 +337,5 @@ def third_tolerance(second: float) -> float:
 def exact_methods(method: Integrator) -> tuple[Integrator, Integrator] | None:
     """Those of the second and the third run; None where a method cannot be made more exact."""
     second = exact_method(method)
-    third = None if second is None else exact_method(second, third_tolerance)
-    return None if second is None or third is None else (second, third)
+    third = second and exact_method(second, third_tolerance)
+    return (second, third) if second and third else None

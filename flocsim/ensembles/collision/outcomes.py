@@ -132,24 +132,33 @@ CLEARANCE = 0.25
 
 
 def apart(work, column):
-    """By how much j has more of a column than i."""
+    """Return by how much j has more of a column than i."""
     return work.motion[at.NOW, BODY_J, column] - work.motion[at.NOW, BODY_I, column]
 
 
 def outer_of(scene):
-    """R_i + R_j [m]."""
+    """Return R_i + R_j [m]."""
     return scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
 
 
+def rate_of_parting(work, nx, ny):
+    """Return the speed at which j moves away from i along the unit vector between them [m/s]."""
+    return nx * apart(work, at.VX) + ny * apart(work, at.VY)
+
+
+def speed_by_centre_forces(scene, work, observed, time):
+    """Return the speed at which forces between the centres alone push the two apart [m/s]."""
+    if not has(scene, CENTRE_FORCE):
+        return 0.0
+    repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
+    return repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
+
+
 def is_parting(scene, work, observed, time, nx, ny):
-    """Whether body j (1) moves away from i (0), and would at the steady drift of this place."""
-    rate = nx * apart(work, at.VX)
-    rate += ny * apart(work, at.VY)
+    """Return True if j moves away from i, and would at the steady drift of this place."""
     drift = nx * observed[DRIFT_X] + ny * observed[DRIFT_Y]
-    if has(scene, CENTRE_FORCE):
-        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
-        drift += repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
-    return rate > 0.0 and drift > 0.0
+    drift += speed_by_centre_forces(scene, work, observed, time)
+    return rate_of_parting(work, nx, ny) > 0.0 and drift > 0.0
 
 
 def is_away(scene, work, observed, distance, gap):
@@ -163,17 +172,23 @@ def is_away(scene, work, observed, distance, gap):
 
 
 def left_over(scene, work, observed):
-    """How far j may still be carried off the drift against i by its present velocity [m]."""
-    drift_time = 0.0
-    for body, mobility in ((BODY_I, observed[MOBILITY_I]), (BODY_J, observed[MOBILITY_J])):
-        drift_time = max(drift_time, scene.bodies[body, at.MASS] * mobility)
-    x = apart(work, at.VX) - observed[DRIFT_X]
-    y = apart(work, at.VY) - observed[DRIFT_Y]
-    return drift_time * math.hypot(x, y)
+    """Return how far j may still be carried off the drift, or the flow, by its velocity [m]."""
+    ux, uy = apart(work, at.VX) - observed[DRIFT_X], apart(work, at.VY) - observed[DRIFT_Y]
+    if observed[IN_FLOW] != 0.0:
+        x, y = apart(work, at.X), apart(work, at.Y)
+        ux = apart(work, at.VX) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
+        uy = apart(work, at.VY) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
+    # Drag uses a velocity u up over u times the relaxation time m µ.
+    relaxation = max(
+        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
+        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
+    )
+    return relaxation * math.hypot(ux, uy)
 
 
 def turn_left(scene, work, time, body, passing):
-    """How far an outline may still be moved by its turning [m] within the time of passing [s]."""
+    """Return how far an outline may still be moved by its turning [m] within the time of passing
+    [s]."""
     outer = scene.bodies[body, at.BOUNDING_RADIUS]
     spin, damping = work.motion[at.NOW, body, at.SPIN], 0.0
     if not has(scene, VELOCITY_DERIVATIVES) or spin == 0.0:
@@ -183,21 +198,25 @@ def turn_left(scene, work, time, body, passing):
     if not damping > 0.0:
         return outer * abs(spin) * passing
     _, _, torque = body_force(scene, view)
+    # ω → ω_∞ = ω + T/ζ, by exp(−ζ t/I): by |ω − ω_∞| I/ζ in all, and at ω_∞ for as long as it
+    # takes.
     last = spin + torque / damping
     turned = abs(spin - last) * scene.bodies[body, at.INERTIA] / damping + abs(last) * passing
     return outer * turned
 
 
 def can_meet_again(scene, work, observed, time):
-    """Whether the outlines may come together along the drift that is left."""
+    """Return True if the outlines may come together along the drift that is left."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
     x, y = apart(work, at.X), apart(work, at.Y)
     along, aside = x * ux + y * uy, abs(x * uy - y * ux)
     outer = outer_of(scene)
     clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
+    # By the bounding circles first: past i, or beside its shadow along the drift.
     if (math.hypot(x, y) if along >= 0.0 else aside) >= outer + clear:
         return False
+    # Until it is past, both may turn on, so that an arm comes in the way.
     passing = (outer + clear + max(-along, 0.0)) / drift
     clear += turn_left(scene, work, time, BODY_I, passing)
     clear += turn_left(scene, work, time, BODY_J, passing)
@@ -207,6 +226,7 @@ def can_meet_again(scene, work, observed, time):
         math.cos(work.motion[at.NOW, BODY_I, at.ANGLE]),
         math.sin(work.motion[at.NOW, BODY_I, at.ANGLE]),
     )
+    # In the frame of i: sphere tracing of j's outline along the drift.
     ux, uy = c * ux + s * uy, c * uy - s * ux
     for _ in range(MOST_ADVANCES):
         gap = core_distance(scene, BODY_J, BODY_I, (turn_c, turn_s, x, y)) - contact
@@ -221,20 +241,17 @@ def can_meet_again(scene, work, observed, time):
 
 
 def is_carried_away(scene, work, observed, time, nx, ny, distance):
-    """Whether a flow alone draws the bodies apart, beyond where their outlines reach and faster
-    than attraction draws them together."""
+    """Return True if a flow alone draws the bodies apart, beyond where their outlines reach and
+    faster than attraction draws them together."""
     outer = outer_of(scene)
     if distance < outer + observed[ESCAPE]:
         return False
+    # n · ∇u · n, the rate at which the flow stretches the line of centres.
     stretch = nx * (observed[FLOW_XX] * nx + observed[FLOW_XY] * ny)
     stretch += ny * (observed[FLOW_YX] * nx + observed[FLOW_YY] * ny)
-    speed = stretch * distance
-    if has(scene, CENTRE_FORCE):
-        repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
-        speed += min(repulsion, 0.0) * (observed[MOBILITY_I] + observed[MOBILITY_J])
-    rate = nx * apart(work, at.VX)
-    rate += ny * apart(work, at.VY)
-    return speed > 0.0 and rate > 0.0
+    # Attraction counts in full, repulsion not at all.
+    speed = stretch * distance + min(speed_by_centre_forces(scene, work, observed, time), 0.0)
+    return speed > 0.0 and rate_of_parting(work, nx, ny) > 0.0
 
 
 def has_parted(scene, work, observed, time, nx, ny, distance, gap):
@@ -253,7 +270,7 @@ def has_parted(scene, work, observed, time, nx, ny, distance, gap):
 
 
 def load_on(observed):
-    """The Load on the bond of the two."""
+    """Return the Load on the bond of the two."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     x, y = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
     if observed[IN_FLOW] != 0.0:
@@ -262,14 +279,14 @@ def load_on(observed):
 
 
 def start_rest(scene, work, observed, time):
-    """From now on the doublet may be resting as it is."""
+    """Note that the doublet may rest as it is from now on."""
     observed[REST_SINCE] = time
     pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
     observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = pose
 
 
 def rest_of(scene, work, observed, time, load):
-    """How long the doublet has kept its pose without swinging, in rest times."""
+    """Return how long the doublet has kept its pose without swinging, in rest times."""
     before = observed[REST_X], observed[REST_Y], observed[REST_ANGLE]
     pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
     moved = way_between(scene, BODY_I, BODY_J, pose, before)
@@ -298,38 +315,26 @@ RETURN_SHARE = 1e-4
 """Of the pairs that are said to have parted, so many may come back at most."""
 
 
-def drift_from(work, observed, outer):
-    """(how far j is beyond i along the drift [m], the least drift at half of what is more than
-    ``outer`` of that [m/s], the speed of j besides the drift)."""
-    x, y, ux, uy = apart(work, at.X), apart(work, at.Y), apart(work, at.VX), apart(work, at.VY)
-    if observed[IN_FLOW] != 0.0:
-        # An extension draws out along x.
-        ux -= observed[FLOW_XX] * x + observed[FLOW_XY] * y
-        uy -= observed[FLOW_YX] * x + observed[FLOW_YY] * y
-        return abs(x), observed[FLOW_XX] * 0.5 * (abs(x) + outer), math.hypot(ux, uy)
+def return_bound(scene, work, observed, time):
+    """Return a bound of the probability that the two ever come back against the drift.
+
+    exp(−v a/D) over the farther half a of the path, at the least drift v there.
+    """
+    outer, x, y = outer_of(scene), apart(work, at.X), apart(work, at.Y)
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
-    besides = math.hypot(ux - observed[DRIFT_X], uy - observed[DRIFT_Y])
-    return along, drift, besides
-
-
-def return_bound(scene, work, observed, time):
-    """A bound of the probability that the two ever come back against the drift."""
-    outer = outer_of(scene)
-    along, drift, besides = drift_from(work, observed, outer)
+    if observed[IN_FLOW] != 0.0:
+        # An extension draws out along x, the slowest at the near end of the half.
+        along = abs(x)
+        drift = observed[FLOW_XX] * 0.5 * (along + outer)
     if along - outer <= observed[ESCAPE]:
         return 1.0
     half = 0.5 * (along - outer)
     mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
-    drift += mobility * min(
-        repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half),
-        0.0,
-    )
-    relaxation = max(
-        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
-        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
-    )
-    way = half - relaxation * besides
+    repulsion = repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half)
+    drift += mobility * min(repulsion, 0.0)
+    # By Einstein's relation D = k_B T µ.
+    way = half - left_over(scene, work, observed)
     if drift <= 0.0 or way <= 0.0:
         return 1.0
     return math.exp(-drift * way / (observed[KICK_ENERGY] * mobility))

@@ -31,7 +31,7 @@ LARGEST_RATIO = 4.0 / math.e**2
 
 
 def half_extents(shape: Shape, angle: float) -> tuple[float, float]:
-    """(towards −x, towards +x) extents of a turned outline about its centroid [m]."""
+    """Return (towards −x, towards +x) extents of a turned outline about its centroid [m]."""
     across = math.cos(angle), -math.sin(angle)
     parts = [(part.radius, part.points @ across) for part in shape.parts]
     return (
@@ -54,14 +54,15 @@ def half_widths(shape: Shape, angles: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def largest_displacement(
     rule: str, shape_i: Shape, angle_i: float, shape_j: Shape, angle_j: float
 ) -> float:
-    """δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j ("radius")."""
+    """Return δ_max [m]: facing half-extents ("projected", 1 just grazes), or R_i + R_j
+    ("radius")."""
     if rule == "radius":
         return shape_i.bounding_radius + shape_j.bounding_radius
     return half_extents(shape_i, angle_i)[1] + half_extents(shape_j, angle_j)[0]
 
 
 def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
-    """Height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
+    """Return the height of j's centroid over i's [m] at which the outlines are ``gap`` apart.
 
     ``outlines``: those of i and j; ``contact`` = r_i + r_j of the spheroradii; ``reach`` =
     R_i + R_j. From far above, j comes down by the distance that is left (it cannot overshoot);
@@ -71,6 +72,7 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
     height = math.sqrt(max(clear * clear - displacement * displacement, 0.0))
     turn_c, turn_s = math.cos(angle_j - angle_i), math.sin(angle_j - angle_i)
     c, s = math.cos(angle_i), math.sin(angle_i)
+    # Sphere tracing: the distance at a place is free of contact in any direction.
     for _ in range(MOST_ADVANCES):
         x, y = c * displacement + s * height, c * height - s * displacement
         left = core_distance(outlines, 1, 0, (turn_c, turn_s, x, y)) - contact - gap
@@ -91,8 +93,8 @@ def place_pair(
     shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float,
     outlines: Outlines | None = None,
 ) -> np.ndarray:  # fmt: skip
-    """Places (2, 3) [m, m, rad] of i at the origin and j above it; ``outlines``: those of the
-    shapes, where they are at hand."""
+    """Return places (2, 3) [m, m, rad] of i at the origin and j above it; ``outlines``: those of
+    the shapes, where they are at hand."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
     height = compiled_height(any(shape.is_compound for shape in shapes))(
@@ -103,14 +105,15 @@ def place_pair(
 
 
 def attraction_ratio(attraction: VanDerWaals, layer: DoubleLayer) -> float:
-    """S = H_A κ/(24π ε0 ε_r φ_i φ_j) [-]; inf without repulsion."""
+    """Return S = H_A κ/(24π ε0 ε_r φ_i φ_j) [-]; inf without repulsion."""
     if layer.strength <= 0.0:
         return math.inf
     return attraction.hamaker / (6.0 * layer.strength * layer.debye_length**2)
 
 
 def neutral_distance(attraction: VanDerWaals, layer: DoubleLayer, root: str) -> float:
-    """d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is none."""
+    """Return d_0 [m], the ``root`` ("inner" or "outer") of F_A = F_R; ZoneError where there is
+    none."""
     ratio = attraction_ratio(attraction, layer)
     if ratio > LARGEST_RATIO:
         raise ZoneError(
@@ -128,7 +131,7 @@ def neutral_distance(attraction: VanDerWaals, layer: DoubleLayer, root: str) -> 
 
 
 def balance(ratio: float, root: str) -> float:
-    """x [-] at which x² exp(−x) is a ratio up to 4/e², below 2 ("inner") or above ("outer").
+    """Return x [-] at which x² exp(−x) is a ratio up to 4/e², below 2 ("inner") or above ("outer").
 
     Newton's method on 2 ln x − x, which is concave: from outside of a root it comes nearer with
     every step and never passes it.
@@ -155,7 +158,7 @@ def only_one(forces, kind):
 def zone_distance(
     zone: ZoneConfig, forces: Sequence[Force], radius_i: float, radius_j: float
 ) -> float:
-    """D_0 [m], the centre distance within which a pair counts as inside the zone."""
+    """Return D_0 [m], the centre distance within which a pair counts as inside the zone."""
     if zone.centre is not None:
         return zone.centre
     if zone.distance is not None:

@@ -23,7 +23,8 @@ BETWEEN = np.array([0.4, 1.9, 3.3, 5.1])
 
 
 def turning_rates(system: Any, body: Body) -> np.ndarray:
-    """Spins [rad/s] at which the body forces on a lone body put no torque on it, at even angles.
+    """Return the spins [rad/s] at which the body forces on a lone body put no torque on it, at even
+    angles.
 
     Of all body forces together, so that a force under which shapes turn unevenly has its say.
     At ANGLES of them, or a FEW where these are alike; from a FEW to all where a strain turns it,
@@ -43,6 +44,7 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
             if free:
                 found[place] = free_spin(force, view, pieces.parameters, scale)
                 continue
+            # The torque is linear in the spin: its zero from two values.
             less, more = (
                 force(view._replace(spin=spin), pieces.parameters)[2] for spin in (-scale, scale)
             )
@@ -54,6 +56,8 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
     few = rates(few_angles)
     if is_even(few):
         return few
+    # A strain turns a rigid body by a + b cos 2θ + c sin 2θ (Jeffery 1922): fitted to a few angles,
+    # and tested between them; laws of a user's own may be of any form.
     waves, *_ = np.linalg.lstsq(strain_waves(few_angles), few)
     left = strain_waves(BETWEEN) @ waves - rates(BETWEEN)
     if np.abs(left).max() <= 1e-9 * np.abs(few).max():
@@ -62,12 +66,13 @@ def turning_rates(system: Any, body: Body) -> np.ndarray:
 
 
 def strain_waves(angles: np.ndarray) -> np.ndarray:
-    """1, cos 2θ and sin 2θ (k, 3)."""
+    """Return 1, cos 2θ and sin 2θ (k, 3)."""
     return np.column_stack([np.ones_like(angles), np.cos(2.0 * angles), np.sin(2.0 * angles)])
 
 
 def free_spin(force: Callable, view: Any, parameters: Sequence[float], scale: float) -> float:
-    """The spin [rad/s] of a body that no force, and no torque, of linear laws is left on."""
+    """Return the spin [rad/s] of a body on which linear laws leave neither force nor torque."""
+    # Newton's step is exact for a linear law, whose Jacobian are the differences over unit steps.
     steps = np.diag([scale * view.radius, scale * view.radius, scale])
     still = np.array(force(view, parameters))
     changes = [
@@ -78,13 +83,13 @@ def free_spin(force: Callable, view: Any, parameters: Sequence[float], scale: fl
 
 
 def is_even(rates: np.ndarray) -> bool:
-    """Whether a body turns alike at all angles, or not at all."""
+    """Return True if a body turns alike at all angles, or not at all."""
     return bool(np.ptp(rates) <= 1e-6 * np.abs(rates).max())
 
 
 def angles_by_turning(rates: np.ndarray) -> Callable[[float], float]:
-    """From a uniform number in [0, 1) to an angle [rad], as bodies that turn at these rates have
-    it: with a density ∝ 1/|rate|.
+    """Return a function from a uniform number in [0, 1) to an angle [rad], as bodies that turn at
+    these rates have it: with a density ∝ 1/|rate|.
 
     Uniform for even turning or none; bodies that come to lie still have the angles at which they
     do, each as often as angles lead there.
@@ -98,17 +103,20 @@ def angles_by_turning(rates: np.ndarray) -> Callable[[float], float]:
         spent = np.append(0.0, np.cumsum(0.5 * (1.0 / np.abs(rates) + 1.0 / np.abs(ahead))))
         edges = step * np.arange(len(rates) + 1)
         return lambda number: float(np.interp(number * spent[-1], spent, edges))
+    # Somewhere the rate changes its sign: there bodies come to rest, as many as begin in its basin.
     ends = [step * resting_place(rates, place) for place in range(len(rates))]
     return lambda number: ends[int(number * len(ends)) % len(ends)]
 
 
 def resting_place(rates: np.ndarray, place: int) -> float:
-    """Where, in steps between the angles, a body comes to lie still that begins at a place."""
+    """Return where, in steps between the angles, a body comes to lie still that begins at a
+    place."""
     way = 1 if rates[place] > 0.0 else -1
     before = float(rates[place])
     for ahead in range(1, len(rates) + 1):
         after = float(rates[(place + way * ahead) % len(rates)])
         if after * way <= 0.0:
+            # The zero of the straight line between the two angles.
             share = before / (before - after) if before != after else 0.0
             return (place + way * (ahead - 1 + share)) % len(rates)
         before = after

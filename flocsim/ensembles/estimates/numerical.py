@@ -14,7 +14,7 @@ is said by `flips_together`. Each flip counts at most 1/M: the interval of the c
 first part less what may be lost to the first part and what may be gained.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -56,34 +56,36 @@ def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndar
     )
 
 
-def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:
-    """Whole numbers (…, kind, 4): how many of each kind there are, were run a second, and a third
-    time, and were run again without an outcome; ``kinds`` as in kinds_of."""
-    lost_sight = run_so(again) & np.isin(most_exact(again, third)[0], WITHOUT_OUTCOME)
-    parts = True, run_so(again), run_so(third), lost_sight
+def of_each_kind(kinds: np.ndarray, flags: Iterable[np.ndarray]) -> np.ndarray:
+    """Return whole numbers (…, kind, flag): for how many of each of kinds_of a flag is set."""
+    flags = [*flags]
     return np.stack(
-        [np.stack([(kind & each).sum(axis=-1) for each in parts], axis=-1) for kind in kinds],
-        axis=-2,
-    )
+        [np.stack([(along(kind, each) & each).sum(axis=-1) for each in flags], axis=-1)
+         for kind in kinds], axis=-2,
+    )  # fmt: skip
+
+
+def kind_counts(kinds: np.ndarray, again: Codes, third: Codes) -> np.ndarray:
+    """Return whole numbers (…, kind, 4): how many of each kind there are, were run a second, and a
+    third time, and were run again without an outcome."""
+    lost_sight = run_so(again) & np.isin(most_exact(again, third)[0], WITHOUT_OUTCOME)
+    every = np.ones_like(lost_sight)
+    return of_each_kind(kinds, (every, run_so(again), run_so(third), lost_sight))
 
 
 def kind_changes(
     kinds: np.ndarray, runs: Sequence[Codes], counted: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> np.ndarray:
-    """Whole numbers (…, kind, 4): how many of each kind gain and lose by the second run, and by the
-    third one after it.
+    """Return whole numbers (…, kind, 4): how many of each kind gain and lose by the second run, and
+    by the third one after it.
 
     ``runs``: second and third ones; ``counted``: gains_and_losses of each. A run without an outcome
     may have come to either.
     """
-    flags = [
+    return of_each_kind(kinds, (
         (each | along(np.isin(codes[0], WITHOUT_OUTCOME), each)) & along(run_so(codes), each)
         for codes, sides in zip(runs, counted, strict=True) for each in sides
-    ]  # fmt: skip
-    return np.stack(
-        [np.stack([(along(kind, each) & each).sum(axis=-1) for each in flags], axis=-1)
-         for kind in kinds], axis=-2,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 def along(flags: np.ndarray, like: np.ndarray) -> np.ndarray:

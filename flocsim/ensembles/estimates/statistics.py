@@ -103,13 +103,21 @@ def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> di
     return sums
 
 
-def pooled_probabilities(sums: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The arrays of POOLED; NaN where there was no event."""
+def clustered_probabilities(
+    sums: Mapping[str, np.ndarray], scrambles: int = 0
+) -> dict[str, np.ndarray]:
+    """Return probabilities, the ends of their intervals and n_effective_… of clusters; NaN where
+    there was no event.
+
+    ``sums``: those of pooled_sums, or of scrambled_sums where clusters are ``scrambles``.
+    """
     table: dict[str, np.ndarray] = {}
     for name, each in sums.items():
-        share, low, high, effective = confidence.clustered_proportion(each)
-        table |= {name: share, f"{name}_low": low, f"{name}_high": high}
-        table[f"n_effective_{name}"] = effective
+        if scrambles:
+            trials, successes, unknown = each
+            each = confidence.bounded_sums(successes, trials, unknown)
+        names = name, f"{name}_low", f"{name}_high", f"n_effective_{name}"
+        table |= zip(names, confidence.clustered_proportion(each, scrambles), strict=True)
     return table
 
 
@@ -127,25 +135,6 @@ def scrambled_sums(
         name: sums_of_scrambles(np.stack(each), first, scrambles)
         for name, each in events(*codes).items()
     }
-
-
-def scrambled_probabilities(
-    sums: Mapping[str, np.ndarray], pooled: bool = False
-) -> dict[str, np.ndarray]:
-    """Ends of the intervals of replicates that are points of scrambles, from scrambled_sums, in
-    the place of those for independent ones; also n_effective where all displacements are
-    ``pooled``."""
-    table: dict[str, np.ndarray] = {}
-    for name, each in sums.items():
-        if pooled and name not in schema.POOLED_PROBABILITIES:
-            continue
-        trials, successes, unknown = each.sum(axis=3) if pooled else each
-        clusters = confidence.bounded_sums(successes, trials, unknown)
-        _, low, high, effective = confidence.clustered_proportion(clusters, trials.shape[-1])
-        table |= {f"{name}_low": low, f"{name}_high": high}
-        if pooled:
-            table[f"n_effective_{name}"] = effective
-    return table
 
 
 GROWTH = 1.25

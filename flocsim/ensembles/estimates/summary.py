@@ -143,9 +143,14 @@ def tables_of(sums: Sums) -> dict[str, Any]:
     over_delta = {name: values.sum(axis=2) for name, values in counted.items()}
     together = numerical.numerical_of(numerical.change_intervals(over_delta))
     changes = numerical.change_intervals(counted)
-    table = table_from(counted, changes) | statistics.scrambled_probabilities(of_scrambles)
-    pooled = statistics.pooled_probabilities(part_of(sums, "pooled"))
-    pooled |= statistics.scrambled_probabilities(of_scrambles, pooled=True)
+    table, clusters, scrambles = table_from(counted, changes), part_of(sums, "pooled"), 0
+    if of_scrambles:
+        # Points of a scramble depend on each other: these are the clusters, of a condition, too.
+        scrambles = of_scrambles["pr_a"].shape[-1]
+        alone = statistics.clustered_probabilities(of_scrambles, scrambles)
+        table |= {name: each for name, each in alone.items() if name in table}
+        clusters = {name: of_scrambles[name].sum(axis=3) for name in clusters}
+    pooled = statistics.clustered_probabilities(clusters, scrambles)
     return {
         "probabilities": table,
         "pooled": pooled | {k: each for k, each in together.items() if k in schema.POOLED},

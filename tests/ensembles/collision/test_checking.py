@@ -45,11 +45,6 @@ def test_of_the_first_so_many_just_as_many_are_checked_as_are_said_to_be(seed, s
     assert third == math.ceil(chosen[-1] / THIRD_OF) and (share == 0.0 or max(runs[:40]) == 2)
 
 
-def test_the_seed_chooses():
-    chosen = {tuple(further_runs(seed, k, "auto") for k in range(40)) for seed in range(30)}
-    assert len(chosen) > 10
-
-
 @pytest.mark.parametrize("count", [3, 20, 60, 200, 1000, 30_000, 10**6, 10**9])
 def test_auto_makes_the_interval_of_flips_as_narrow_as_the_sampling_one_within_its_cost(count):
     wanted = expected_checks(count, "auto")

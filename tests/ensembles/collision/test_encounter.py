@@ -8,7 +8,7 @@ import pytest
 import flocsim.arrays as at
 from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import Draw, draws, orientations
+from flocsim.ensembles.collision.draw import draws, orientations
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
@@ -137,16 +137,6 @@ def test_a_finer_tolerance_finds_the_same_collision(tmp_path):
     assert coarse["d_c_collision"] == pytest.approx(fine["d_c_collision"], abs=2e-9)
     assert coarse["t_collision"] == pytest.approx(fine["t_collision"], rel=1e-3)
     assert coarse["steps"] < fine["steps"]
-
-
-def test_the_run_starts_anew_from_the_encounter_every_time(study):
-    numbers = draws(1, 0)
-    encounter = study.encounter(0, 16, numbers)
-    rows = [
-        Draw(encounter, orientations(numbers), 0.0).run(study.driver(encounter), 10**5)
-        for _ in range(2)
-    ]
-    assert same_row(*rows)
 
 
 def test_contacts_that_never_pull_come_to_an_end(tmp_path):

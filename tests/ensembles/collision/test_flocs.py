@@ -9,7 +9,7 @@ from flocsim.ensembles.collision import flocs as flocs_module
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.ensembles.storage.identity import shape_numbers
-from flocsim.errors import ConfigError, FileError
+from flocsim.errors import ConfigError
 from flocsim.io.shape_library import read_library
 from tests.helpers.small_study import grown, write_star_library
 
@@ -54,11 +54,6 @@ def test_flocs_of_a_library_have_their_size_in_spheroradii(library):
 def test_a_library_that_lacks_a_number_of_vertices(library):
     with pytest.raises(ConfigError, match=r"asks for N = 16, but .* holds N = 4, 8: fit again"):
         from_library(library, (4, 16))
-
-
-def test_a_library_that_is_gone(tmp_path):
-    with pytest.raises(FileError, match="could not be read"):
-        from_library(tmp_path / "gone.h5", (4,))
 
 
 def flocs_of(ratios):

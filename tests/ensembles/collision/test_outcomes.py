@@ -5,11 +5,9 @@ import math
 import attrs
 import numpy as np
 import pytest
-from shapely.geometry import Polygon
 
 import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import FAILURES, Draw, draws, orientations
@@ -24,7 +22,6 @@ from flocsim.ensembles.collision.outcomes import (
     turn_left,
     watch_pair,
 )
-from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
 from flocsim.geometry.contact.candidates import list_candidates
@@ -119,59 +116,6 @@ def test_all_kinds_of_decision_were_put_to_that_test(study):
     assert {outcome(row) for row in rows} >= {"A", "B", "D"}
 
 
-def mirrored(shape):
-    """The shape with left and right exchanged."""
-    return SpheroPolygon(shape.vertices * [-1.0, 1.0], shape.radius)
-
-
-class Placed:
-    """An encounter that starts at given places, for a Draw."""
-
-    def __init__(self, encounter, places):
-        """The places (2, 3) [m, m, rad] to start at."""
-        self.encounter, self.places = encounter, places
-
-    def __getattr__(self, name):
-        return getattr(self.encounter, name)
-
-    def start(self, angles, share):
-        """Work arrays at the places, at terminal velocity."""
-        velocity = np.zeros((2, 3))
-        for body in range(2):
-            velocity[body, :2] = self.encounter.settling[body][0]
-        return work_of(self.encounter.scene, self.places, velocity)
-
-
-def start_places(encounter, angles, share):
-    """The places at which an encounter starts."""
-    i, j = encounter.shapes
-    largest = largest_displacement("projected", i, angles[0], j, angles[1])
-    return place_pair((i, j), angles, share * largest, encounter.options.start_gap)
-
-
-@pytest.mark.parametrize("condition", [0, 1, 2])
-@pytest.mark.parametrize("image", ["mirror", "full turn"])
-def test_the_same_scene_seen_otherwise_has_the_same_outcome(study, condition, image):
-    driver = study.driver(study.encounter(0, 4, draws(1, 0)))
-    for replicate in range(5):
-        numbers = draws(study.config.seed, replicate)
-        angles = np.array(orientations(numbers))
-        encounter = study.encounter(condition, 16, numbers)
-        row = study.run(condition, 16, 0.5, replicate)
-        places = start_places(encounter, angles, 0.5)
-        if image == "mirror":
-            shapes = [mirrored(shape) for shape in encounter.shapes]
-            encounter = make_encounter(study.config, shapes, encounter.zone_distance)
-            places = places * [-1.0, 1.0, -1.0]
-        else:
-            places = places + [0.0, 0.0, 2.0 * np.pi]
-        other = Draw(Placed(encounter, places), angles, 0.5).run(driver, 10**6)
-        assert outcome(other) == outcome(row)
-        assert other["inside"] == row["inside"]
-        assert other["d_c_collision"] == pytest.approx(row["d_c_collision"], abs=1e-10, nan_ok=True)
-        assert other["t_collision"] == pytest.approx(row["t_collision"], rel=1e-4, nan_ok=True)
-
-
 def test_beyond_the_largest_displacement_all_miss(study):
     for condition in range(3):
         for vertices in (1, 4, 16):
@@ -239,26 +183,6 @@ def test_bodies_of_one_size_meet_where_the_lower_one_is_held(tmp_path):
     assert outcome(study.run(0, 1, 0.0, 0)) == "A"
     encounter = study.encounter(0, 1, draws(1, 0))
     assert encounter.settling[0][1] == 0.0
-
-
-def test_the_gap_of_the_outlines_is_that_of_shapely(study):
-    rng = np.random.default_rng(5)
-    for replicate in range(3):
-        encounter = study.encounter(0, 16, draws(1, replicate))
-        reach = 1.2 * sum(shape.bounding_radius for shape in encounter.shapes)
-        for _ in range(10):
-            way, *angles = rng.uniform(0.0, 2.0 * np.pi, 3)
-            places = np.array(
-                [[0.0, 0.0, angles[0]], [reach * np.cos(way), reach * np.sin(way), angles[1]]]
-            )
-            cores = [
-                Polygon(1e6 * shape.placed_vertices(*place))
-                for shape, place in zip(encounter.shapes, places, strict=True)
-            ]
-            work = work_of(encounter.scene, places, np.zeros((2, 3)))
-            touching = sum(shape.radius for shape in encounter.shapes)
-            expected = 1e-6 * cores[0].distance(cores[1]) - touching
-            assert gap_between(encounter.scene, work, 1, 0) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_pair_apart_and_parting_has_departed(study):

@@ -8,7 +8,6 @@ from shapely.geometry import LineString, Point, Polygon
 from flocsim import Sphere, SpheroPolygon
 from flocsim.ensembles.collision.draw import draws, orientations
 from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
-from flocsim.geometry.shapes.cores import edges_of, from_edges
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import small_study
 
@@ -61,7 +60,7 @@ def facing_heights(shapes, angles):
     return level, np.linspace(-reach, reach, 200)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95, 1.0])
 def test_the_outlines_start_a_gap_apart(share):
     for shapes, angles in pairs(30):
         largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
@@ -90,26 +89,12 @@ def test_one_just_grazes():
         assert slide(shapes, angles, 0.9999 * largest, [level])[0] < 0.0
 
 
-def test_a_displacement_of_one_starts_where_it_still_comes_near():
-    for shapes, angles in pairs(30):
-        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
-        assert gap_of(shapes, place_pair(shapes, angles, largest, GAP)) == pytest.approx(
-            GAP, abs=2e-6 * GAP
-        )
-
-
 def test_a_pair_that_passes_by_starts_clear_above():
     for shapes, angles in pairs(30):
         largest = largest_displacement("radius", shapes[0], angles[0], shapes[1], angles[1])
         places = place_pair(shapes, angles, 2.0 * largest, GAP)
         assert gap_of(shapes, places) >= GAP
         assert places[1, 1] >= largest
-
-
-def test_by_the_radius_rule_two_spheres_just_graze():
-    shapes = (Sphere(4e-6), Sphere(9e-6))
-    assert largest_displacement("radius", shapes[0], 0.3, shapes[1], 0.4) == pytest.approx(13e-6)
-    assert largest_displacement("projected", shapes[0], 0.3, shapes[1], 0.4) == pytest.approx(13e-6)
 
 
 @pytest.mark.parametrize(
@@ -139,76 +124,12 @@ def test_extents_are_those_of_the_outline():
         assert left == pytest.approx(-1e-6 * bounds[0] + shapes[0].radius, rel=1e-12)
 
 
-def test_turning_by_half_swaps_the_extents():
-    for shapes, angles in pairs(20):
-        straight = half_extents(shapes[0], angles[0])
-        turned = half_extents(shapes[0], angles[0] + np.pi)
-        assert turned == pytest.approx(straight[::-1], rel=1e-12)
-
-
-def mirrored(shape):
-    """The shape with left and right exchanged."""
-    if len(shape.vertices) == 1:
-        return shape
-    return SpheroPolygon(shape.vertices * [-1.0, 1.0], shape.radius)
-
-
-def test_the_mirror_image_starts_as_the_mirror_image():
-    for shapes, angles in pairs(30):
-        displacement = 0.4 * sum(shape.bounding_radius for shape in shapes)
-        straight = place_pair(shapes, angles, displacement, GAP)
-        image = place_pair([mirrored(s) for s in shapes], -angles, -displacement, GAP)
-        np.testing.assert_allclose(image, straight * [-1.0, 1.0, -1.0], atol=1e-11)
-
-
-def ends_of(core):
-    """(starts, ends) of a core's edges; for a point, an edge too short to matter."""
-    return edges_of(core) if len(core) > 1 else (core, core + 1e-20)
-
-
-def core_distance(shapes, places):
-    """Smallest distance of a core point of one to the core of the other, by all pairs."""
-    cores = [shape.placed_vertices(*place) for shape, place in zip(shapes, places, strict=True)]
-    tables = [
-        np.linalg.norm(from_edges(points, *ends_of(core)), axis=-1)
-        for points, core in (cores, cores[::-1])
-    ]
-    return min(table.min() for table in tables)
-
-
-def height_by_all_pairs(shapes, angles, displacement):
-    """The same way down, every distance taken from all pairs."""
-    contact = sum(shape.radius for shape in shapes)
-    clear = sum(shape.bounding_radius for shape in shapes) + GAP
-    height = np.sqrt(clear**2 - displacement**2)
-    left = np.inf
-    while left > 1e-6 * GAP:
-        places = np.array([[0.0, 0.0, angles[0]], [displacement, height, angles[1]]])
-        left = core_distance(shapes, places) - contact - GAP
-        if left > 1e-6 * GAP:
-            height -= left
-    return height
-
-
-def test_the_height_is_that_of_all_pairs():
-    for shapes, angles in pairs(40):
-        largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
-        found = place_pair(shapes, angles, 0.6 * largest, GAP)[1, 1]
-        expected = height_by_all_pairs(shapes, angles, 0.6 * largest)
-        assert found == pytest.approx(expected, rel=1e-12)
-
-
 def test_draws_repeat_and_do_not_depend_on_what_was_drawn_before():
     first = draws(5, 17)
     np.random.default_rng(0).random(3)
     draws(5, 18)
     assert draws(5, 17).tolist() == first.tolist()
     assert first.shape == (5,)
-
-
-def test_other_seeds_and_replicates_give_other_numbers():
-    drawn = {tuple(draws(seed, replicate)) for seed in range(20) for replicate in range(20)}
-    assert len(drawn) == 400
 
 
 @pytest.mark.parametrize("seed", [0, 2**63 - 1])

@@ -100,19 +100,6 @@ def test_the_roots_meet_where_they_vanish():
             neutral_distance(*pair_forces(above, *PAPER[1:]), root)
 
 
-def test_stronger_attraction_moves_the_roots_together():
-    pairs = [
-        [
-            neutral_distance(*pair_forces(factor * PAPER[0], *PAPER[1:]), root)
-            for root in ("inner", "outer")
-        ]
-        for factor in (0.01, 0.1, 1.0, 5.0)
-    ]
-    inner, outer = zip(*pairs, strict=True)
-    assert list(inner) == sorted(inner)
-    assert list(outer) == sorted(outer, reverse=True)
-
-
 def forces(count=1):
     """The paper's pair forces, the attraction ``count`` times."""
     return [VanDerWaals(hamaker=1e-18)] * count + [DoubleLayer(potential=15e-3, debye_length=98e-8)]
