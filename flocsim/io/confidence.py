@@ -27,7 +27,7 @@ from flocsim.errors import UsageError
 def wilson(
     successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's score interval (low, high) of a probability, from whole-number counts.
+    """Return Wilson's score interval (low, high) of a probability, from whole-number counts.
 
     With p = successes/trials and z the normal quantile at (1 + confidence)/2:
     (p + z²/2n ± z √(p(1 − p)/n + z²/4n²)) / (1 + z²/n).
@@ -40,7 +40,7 @@ def wilson(
 
 
 def normal_quantile(confidence: float) -> float:
-    """z of a two-sided interval."""
+    """Return z of a two-sided interval."""
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
@@ -50,7 +50,8 @@ Z = normal_quantile(0.95)
 def score_interval(
     share: np.ndarray, trials: np.ndarray, z: ArrayLike = Z
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Wilson's score interval (low, high) of a share among ``trials``, which need not be whole.
+    """Return Wilson's score interval (low, high) of a share among ``trials``, which need not be
+    whole.
 
     ``z``: normal quantile. At the ends 0 and 1, which the formula gives but for rounding.
     """
@@ -65,7 +66,7 @@ def score_interval(
 def proportion(
     successes: ArrayLike, trials: ArrayLike, confidence: float = 0.95, unknown: ArrayLike = 0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(successes/trials, low, high) with Wilson's interval; NaN where there are no trials.
+    """Return (successes/trials, low, high) with Wilson's interval; NaN where there are no trials.
 
     ``unknown``: how many more there are that may be trials, and successes. The interval then holds
     whatever they would have come to, none of them a success or all (C. F. Manski, Am. Econ. Rev. 80
@@ -88,8 +89,9 @@ def between_bounds(
     least: np.ndarray, most: np.ndarray, trials_least: np.ndarray, trials_most: np.ndarray,
     confidence: float = 0.95,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """(low, high) of a share that lies between two, each known from so many trials."""
+    """Return (low, high) of a share between two, each known from so many trials."""
     two_sided = normal_quantile(confidence)
+    # Standard errors, as half the width of a score interval over its quantile.
     error = [
         np.diff(score_interval(share, trials, two_sided), axis=0)[0] / (2.0 * two_sided)
         for share, trials in ((least, trials_least), (most, trials_most))
@@ -100,7 +102,7 @@ def between_bounds(
 
 
 def bounds_quantile(width: np.ndarray, error: np.ndarray, confidence: float = 0.95) -> np.ndarray:
-    """By how many standard errors an interval reaches beyond two bounds ``width`` apart.
+    """Return by how many standard errors an interval reaches beyond two bounds ``width`` apart.
 
     The c of Φ(c + width/error) − Φ(−c) = confidence: that of a two-sided interval where the bounds
     are one, of a one-sided one where they are far apart, as the truth cannot be beyond both.
@@ -114,6 +116,7 @@ def bounds_quantile(width: np.ndarray, error: np.ndarray, confidence: float = 0.
     ratio = width[apart] / error[apart]
     low = np.full(ratio.shape, NormalDist().inv_cdf(confidence))
     high = c[apart]
+    # Bisection between the one-sided and the two-sided quantile; coverage rises with c.
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         enough = ndtr(middle + ratio) - ndtr(-middle) >= confidence
@@ -138,7 +141,8 @@ def checked_counts(successes: ArrayLike, trials: ArrayLike) -> tuple[np.ndarray,
 
 
 def cluster_sums(successes: np.ndarray, trials: np.ndarray) -> np.ndarray:
-    """Σ S, Σ M, Σ S², Σ S M, Σ M² and the number of clusters with trials (6, …), whole numbers.
+    """Return Σ S, Σ M, Σ S², Σ S M, Σ M² and the number of clusters with trials (6, …), whole
+    numbers.
 
     ``successes``, ``trials``: S and M of each cluster, clusters along the last axis.
     """
@@ -147,7 +151,8 @@ def cluster_sums(successes: np.ndarray, trials: np.ndarray) -> np.ndarray:
 
 
 def bounded_sums(successes: np.ndarray, trials: np.ndarray, unknown: np.ndarray) -> np.ndarray:
-    """cluster_sums (3, 6, …): as known, and with all ``unknown`` as trials that fail or succeed."""
+    """Return cluster_sums (3, 6, …): as known, and with all ``unknown`` as trials that fail or
+    succeed."""
     most = trials + unknown
     parts = (successes, trials), (successes, most), (successes + unknown, most)
     return np.stack([cluster_sums(*each) for each in parts])
@@ -217,7 +222,7 @@ def clustered_proportion(
 
 
 def aggregated(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(P, low, high) of every condition (type, vertices, delta): 95 % bounds.
+    """Return (P, low, high) of every condition (type, vertices, delta): 95 % bounds.
 
     Undecided and failed approaches may have come to anything.
     """
@@ -228,11 +233,13 @@ def aggregated(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray,
 
 
 def weights(delta: np.ndarray, axial: bool) -> np.ndarray | None:
-    """What each P counts for in the integral; None unless the offsets reach from 0 to 1."""
+    """Return what each P counts for in the integral; None unless the offsets reach from 0 to 1."""
     order = np.argsort(delta)
     places = np.asarray(delta, dtype=float)[order]
     if len(places) < 2 or places[0] != 0.0 or places[-1] != 1.0:
         return None
+    # P is linear on [a, b]: ∫ P dδ = (b − a)(P_a + P_b)/2, and
+    # ∫ P 2δ dδ = (b − a)((2a + b) P_a + (a + 2b) P_b)/3.
     found = np.zeros(len(places))
     a, b = places[:-1], places[1:]
     found[:-1] += (b - a) * ((2.0 * a + b) / 3.0 if axial else 0.5)
@@ -243,7 +250,7 @@ def weights(delta: np.ndarray, axial: bool) -> np.ndarray | None:
 def efficiency(
     table: Mapping[str, np.ndarray], delta: np.ndarray, axial: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """(E, low, high) (type, vertices); None unless the offsets reach from 0 to 1.
+    """Return (E, low, high) (type, vertices); None unless the offsets reach from 0 to 1.
 
     The bounds are the same sums of the 95 % bounds at each offset: as wide as they come where
     all offsets err together, since they have the flocs and orientations in common.

@@ -86,8 +86,8 @@ def generator(seed: int, *key: int) -> np.random.Generator:
 
 @lru_cache(maxsize=4096)
 def draws(seed: int, replicate: int) -> np.ndarray:
-    """Five uniform numbers in [0, 1) of one replicate: two orientations, two choices of floc, and
-    the direction of j in a brownian meeting.
+    """Return five uniform numbers in [0, 1) of one replicate: two orientations, two choices of
+    floc, and the direction of j in a brownian meeting.
 
     They depend on the seed and the replicate's index alone, so that no number of ranks changes
     them, and one replicate has the same orientations and the same flocs at every displacement,
@@ -99,13 +99,14 @@ def draws(seed: int, replicate: int) -> np.ndarray:
 
 
 def orientations(numbers: Sequence[float] | np.ndarray) -> tuple[float, float]:
-    """Angles θ = 2πn [rad] of bodies i and j."""
+    """Return angles θ = 2πn [rad] of bodies i and j."""
     return 2.0 * np.pi * numbers[0], 2.0 * np.pi * numbers[1]
 
 
 @lru_cache(maxsize=128)
 def points(seed: int, scramble: int, size: int) -> np.ndarray:
-    """The first ``size`` points (size, 5) of a scramble, in [0, 1); ``size`` a power of 2."""
+    """Return the first ``size`` points (size, 5) of a scramble, in [0, 1); ``size`` a power of
+    2."""
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(5, scramble=True, seed=generator(seed, *POINTS_STREAM, scramble))
@@ -115,14 +116,16 @@ def points(seed: int, scramble: int, size: int) -> np.ndarray:
 
 
 def point(seed: int, scrambles: int, replicate: int) -> np.ndarray:
-    """The point (5,) of a replicate."""
+    """Return the point (5,) of a replicate."""
+    # Dealt in turn; the table of points grows by doubling, as Sobol's sequence is even at powers of
+    # 2.
     place, scramble = divmod(replicate, scrambles)
     size = max(FIRST_POINTS, 1 << place.bit_length())
     return points(seed, scramble, size)[place]
 
 
 def points_of(seed: int, scrambles: int, first: int, stop: int) -> np.ndarray:
-    """The points (stop − first, 5) of replicates."""
+    """Return the points (stop − first, 5) of replicates."""
     return np.array([point(seed, scrambles, replicate) for replicate in range(first, stop)])
 
 
@@ -132,7 +135,7 @@ def as_draws(point: np.ndarray) -> np.ndarray:
 
 
 def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, int]:
-    """(outcome code, failure code) of a replicate whose run ended so."""
+    """Return (outcome code, failure code) of a replicate whose run ended so."""
     if status == Status.STOPPED:
         name = APART.get(code) or CLASSES[int(observed[outcomes.INSIDE]), code]
         return OUTCOMES.index(name), 0
@@ -141,7 +144,7 @@ def outcome_of(status: Status, code: int, observed: np.ndarray) -> tuple[int, in
 
 
 def columns_of(run: str) -> dict[str, str]:
-    """{column of a replicate's further run: the same of the first}."""
+    """Return {column of a replicate's further run: the same of the first}."""
     return {f"{run}_{name}": name for name in ("outcome", "inside", "bond")}
 
 
@@ -166,7 +169,7 @@ class Draw:
         self, driver: Callable, max_steps: int, until: float = math.inf, record: bool = False,
         integrator: Integrator | None = None,
     ) -> Run:  # fmt: skip
-        """A Run that has yet to take its first step, to a time [s] at most.
+        """Return a Run that has yet to take its first step, to a time [s] at most.
 
         ``driver``: the compiled one of the encounter's scene; ``integrator``: another one than the
         encounter's, of the driver's method.
@@ -231,7 +234,7 @@ class Draw:
         return row
 
     def system(self) -> System:
-        """The plain System where the replicate starts."""
+        """Return the plain System where the replicate starts."""
         system, bodies = self.encounter.system, []
         starts = self.encounter.start(self.angles, self.share).motion[at.NOW].tolist()
         for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
@@ -271,7 +274,7 @@ CHOICE_STREAM = (0, 0, 1)
 
 
 def expected_checks(replicates: int, share: float | str, easily: bool = False) -> float:
-    """How many of the first so many replicates of a condition are run again, before rounding.
+    """Return how many of the first so many replicates are run again, before rounding.
 
     ``easily``: if all of them were of those that flip easily, EASILY times as many by "auto".
 
@@ -290,17 +293,18 @@ def expected_checks(replicates: int, share: float | str, easily: bool = False) -
 
 @cache
 def beginning(seed: int) -> float:
-    """A number in [0, 1) that says where the choice begins."""
+    """Return a number in [0, 1) that says where the choice begins."""
     return float(generator(seed, *CHOICE_STREAM).random())
 
 
 def further_runs(seed: int, replicate: int, share: float | str, easily: bool = False) -> int:
-    """How often a replicate is run again, up to twice: a systematic sample from a random beginning.
+    """Return how often a replicate is run again, up to twice: a systematic sample.
 
     Of the first n of any condition expected_checks(n) would be, up or down to a whole number, if
     all ended alike, the first of these and one in THIRD_OF twice; ``easily``: whether it is of
     those that flip easily.
     """
+    # One is run wherever the expected number, from a random start, passes a whole number.
     start = beginning(seed)
     before, after = (
         math.floor(expected_checks(n, share, easily) + start) for n in (replicate, replicate + 1)
@@ -309,14 +313,15 @@ def further_runs(seed: int, replicate: int, share: float | str, easily: bool = F
 
 
 def count_checks(seed: int, replicates: int, share: float | str) -> int:
-    """How many of the first so many replicates of a condition are run again."""
+    """Return how many of the first so many replicates of a condition are run again."""
     return math.floor(expected_checks(replicates, share) + beginning(seed))
 
 
 def exact_method(
     method: Integrator, tighter: Callable[[float], float] = lambda value: TIGHTER * value
 ) -> Integrator | None:
-    """The method with a 100 times tighter tolerance, or a quarter of its step; None for neither.
+    """Return the method with a 100 times tighter tolerance, or a quarter of its step; None for
+    neither.
 
     ``tighter`` gives another tolerance. A class of a user's own has them as parameters of these
     names, or cannot be checked.
@@ -330,12 +335,13 @@ def exact_method(
 
 
 def third_tolerance(second: float) -> float:
-    """That of a third run behind a second one [m]."""
+    """Return that of a third run behind a second one [m]."""
     return max(THIRD_TIGHTER * second, min(FINEST, LEAST_TIGHTER * second))
 
 
 def exact_methods(method: Integrator) -> tuple[Integrator, Integrator] | None:
-    """Those of the second and the third run; None where a method cannot be made more exact."""
+    """Return those of the second and the third run; None where a method cannot be made more
+    exact."""
     second = exact_method(method)
     third = second and exact_method(second, third_tolerance)
     return (second, third) if second and third else None

@@ -77,21 +77,18 @@ def grow_floc(shapes, seed, index):
     radius = EQUIVALENT_PIXELS / SYNTHETIC_RATIO
     grown = (seed, index), shapes.primary_particles, shapes.fractal_dimension
 
-    @cache
-    def mask():
-        return synthetic_floc(*grown)
+    mask = cache(partial(synthetic_floc, *grown))
 
     def fitted(vertices):
         fit = fit_mask(mask(), vertices=vertices, radius=radius)
         return json.dumps([fit.shape.core.tolist(), fit.relative_error]).encode()
 
-    found = {}
+    fits, errors = {}, {}
     for n in shapes.vertices:
         if n > 1:
-            told = f"{grown} {radius} {n} {growth_facts()}"
-            found[n] = json.loads(kept("flocsim_floc", told, partial(fitted, n)))
-    fits = {n: SpheroPolygon(core, radius) for n, (core, _) in found.items()}
-    errors = {n: error for n, (_, error) in found.items()}
+            key = f"{grown} {radius} {n} {growth_facts()}"
+            core, errors[n] = json.loads(kept("flocsim_floc", key, partial(fitted, n)))
+            fits[n] = SpheroPolygon(core, radius)
     return Floc(f"synthetic#{index}", SYNTHETIC_RATIO, fits, errors)
 
 
@@ -188,8 +185,8 @@ class FlocPool:
     pool: int
     own_size: bool = False
     by_error: bool = False
-    made: dict[tuple, Shape] = attrs.Factory(dict)
-    orders: dict[float, list[int]] = attrs.Factory(dict)
+    made: dict[tuple, Shape] = attrs.field(init=False, factory=dict)
+    orders: dict[float, list[int]] = attrs.field(init=False, factory=dict)
 
     @cached_property
     def sizes(self) -> list[Any]:
@@ -198,8 +195,7 @@ class FlocPool:
 
     def cut(self, end: str) -> "FlocPool":
         """The pool of the same flocs, cut closer or wider."""
-        flocs = [floc.band[end] for floc in self.flocs]
-        return FlocPool(flocs, self.radius, self.pool, self.own_size, self.by_error)
+        return attrs.evolve(self, flocs=[floc.band[end] for floc in self.flocs])
 
     def by_size(self, radius: float) -> list[int]:
         """Places of all flocs, those nearest in size to a body of that radius [m] first."""

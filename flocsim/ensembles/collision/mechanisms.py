@@ -172,8 +172,8 @@ class InFlow(Weightless):
     flux: ClassVar[float]
     """β₂ over rate · b², of all paths within the offset b."""
 
-    gradient: ClassVar[Callable[..., tuple[float, float, float, float]]]
-    """Gives ∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y [1/s] of a rate."""
+    gradient: ClassVar[tuple[float, float, float, float]]
+    """∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y over the rate."""
 
     upstream: ClassVar[Callable[..., tuple[float, float]]]
     """Gives where j starts [m], i at the origin: on the path of an offset, so far away."""
@@ -262,12 +262,9 @@ class Shear(InFlow):
     """Two bodies in u = (G y, 0)."""
 
     meeting: ClassVar[str] = SHEAR
+    gradient = (0.0, 1.0, 0.0, 0.0)
     strain = 0.5
     flux = 1.0
-
-    @staticmethod
-    def gradient(rate: float) -> tuple[float, float, float, float]:
-        return 0.0, rate, 0.0, 0.0
 
     @staticmethod
     def upstream(offset: float, far: float) -> tuple[float, float]:
@@ -293,12 +290,9 @@ class Extension(InFlow):
     """Two bodies in u = (s x, −s y)."""
 
     meeting: ClassVar[str] = EXTENSION
+    gradient = (1.0, 0.0, 0.0, -1.0)
     strain = 1.0
     flux = 2.0
-
-    @staticmethod
-    def gradient(rate: float) -> tuple[float, float, float, float]:
-        return rate, 0.0, 0.0, -rate
 
     @staticmethod
     def upstream(offset: float, far: float) -> tuple[float, float]:
@@ -421,5 +415,7 @@ def make_encounter(
     if issubclass(kind, Weightless):
         forces = [force for force in forces if not isinstance(force, Gravity)]
     if issubclass(kind, InFlow):
-        fluid = attrs.evolve(fluid, gradient=kind.gradient(scene.rate))
+        rate: Any = scene.rate  # the config refuses a flow without
+        xx, xy, yx, yy = kind.gradient
+        fluid = attrs.evolve(fluid, gradient=(rate * xx, rate * xy, rate * yx, rate * yy))
     return kind(System(bodies, forces, config.integrator.method, fluid=fluid), scene, zone)

@@ -98,7 +98,8 @@ class TwoClasses(Pairing):
 
     def __attrs_post_init__(self):
         sizes, joint = self.distribution()
-        object.__setattr__(self, "radii", tuple(map(median, sizes, joint)))
+        medians = [float(x[quantile(w, 0.5)]) for x, w in zip(sizes, joint, strict=True)]
+        object.__setattr__(self, "radii", tuple(medians))
         spans = [(x[w > 0.0].min(), x[w > 0.0].max()) for x, w in zip(sizes, joint, strict=True)]
         object.__setattr__(self, "spans", tuple(tuple(map(float, each)) for each in spans))
 
@@ -110,7 +111,8 @@ class TwoClasses(Pairing):
         sizes, inverse = np.unique(self.first.sizes, return_inverse=True)
         weights = np.bincount(inverse, self.first.weights)
         below = np.cumsum(weights) - weights
-        # Exactly 0 for the largest, which is nobody's smaller partner.
+        # i is the smaller of two: its weight times that of all that are larger, and the reverse for
+        # j. Exactly 0 for the largest, which is nobody's smaller partner.
         above = np.append(np.cumsum(weights[:0:-1])[::-1], 0.0)
         return [sizes, sizes], [weights * above, weights * below]
 
@@ -120,6 +122,8 @@ class TwoClasses(Pairing):
         chances = own.weights
         if own is other:
             _, inverse = np.unique(own.sizes, return_inverse=True)
+            # Redrawing until sizes differ favours flocs of rare sizes by 1 − the weight of their
+            # own.
             chances = chances * (1.0 - np.bincount(inverse, own.weights)[inverse])
         one = quantile(chances, numbers[2])
         two = quantile(np.where(other.sizes == own.sizes[one], 0.0, other.weights), numbers[3])
@@ -133,10 +137,6 @@ def quantile(weights: np.ndarray, number: float) -> int:
     place = int(np.searchsorted(sums, number * sums[-1], side="right"))
     # A product rounded up to the sum itself would be past the last floc that has a weight.
     return min(place, int(np.flatnonzero(weights)[-1]))
-
-
-def median(values, weights):
-    return float(values[quantile(weights, 0.5)])
 
 
 def within_limits(scene: Any, flocs: Sequence[Floc]) -> np.ndarray:

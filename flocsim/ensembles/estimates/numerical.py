@@ -37,18 +37,20 @@ not run is NOT_APPLICABLE."""
 
 
 def run_so(codes: Codes) -> np.ndarray:
-    """Which replicates were run, flags."""
+    """Return flags of the replicates that were run."""
     return codes[0] != NOT_APPLICABLE
 
 
 def most_exact(again: Codes, third: Codes) -> list[np.ndarray]:
-    """The codes of third runs that say something of the outcome, of second runs elsewhere."""
+    """Return the codes of third runs that say something of the outcome, of second runs
+    elsewhere."""
     says = run_so(third) & ~np.isin(third[0], WITHOUT_OUTCOME)
     return [np.where(says, *pair) for pair in zip(third, again, strict=True)]
 
 
 def gains_and_losses(before: Events, after: Events) -> tuple[np.ndarray, np.ndarray]:
-    """Which replicates raise a probability, and which lower it, counted as ``after``: flags."""
+    """Return flags of replicates that raise a probability, and that lower it, counted as
+    ``after``."""
     fails, fails_after = before.trials & ~before.successes, after.trials & ~after.successes
     return (
         (after.successes & ~before.successes) | (fails & ~after.trials),
@@ -97,8 +99,8 @@ def count_changes(
     first: Codes, again: Codes, third: Codes | None = None,
     of: Callable[..., dict[str, Events]] = events,
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Whole-number counts n_checked, n_flipped, n_third, n_third_flipped and those of CHANGES, over
-    the last axis.
+    """Return whole-number counts n_checked, n_flipped, n_third, n_third_flipped and those of
+    CHANGES, over the last axis.
 
     ``first``, ``again``, ``third``: codes of first, second and third runs, none of the last by
     default; ``of`` gives the Events of codes. And what `change_intervals` follows from:
@@ -132,7 +134,7 @@ def count_changes(
 
 
 def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
-    """[how many more gain at most, and lose] of kind_changes and kind_counts (…).
+    """Return [how many more gain at most, and lose] of kind_changes and kind_counts (…).
 
     Without any third run second ones are taken for exact. NaN where no replicate was run again.
     """
@@ -154,7 +156,8 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
 def change_intervals(
     counts: Mapping[str, np.ndarray], totals: Mapping[str, Events] | None = None
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """{probability: (low, high)}: 95 % interval of its change if all replicates were run exactly.
+    """Return {probability: (low, high)}: 95 % interval of its change if all replicates were run
+    exactly.
 
     ``counts`` of conditions (type, vertices, …), or sums over displacements: see count_changes;
     ``totals``: how many trials and successes there are, by default from the counts of a results
@@ -168,6 +171,7 @@ def change_intervals(
             share = successes / trials
             again = (successes + more_successes) / (trials + more_trials)
             change = np.where(trials + more_trials > 0, again - share, 0.0)
+            # No change leads beyond probabilities of 0 and 1.
             low = np.maximum(change - lost / trials, -share)
             high = np.minimum(change + gained / trials, 1.0 - share)
         found[name] = np.where(trials > 0, low, np.nan), np.where(trials > 0, high, np.nan)
@@ -240,6 +244,8 @@ def further_flips(
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
     rate = (k / m)[:, np.newaxis]
     f_seen, c_seen = seen
+    # log of the negative binomial's Γ(k + f)/Γ(k) (r/(r + c))^k (r + c)^−f, r = k/m: factors of f
+    # and c alone are the same for all (k, m). Summed over conditions, and ½ log m for the prior.
     logs = (
         gammaln(k[:, np.newaxis] + f_seen) - gammaln(k)[:, np.newaxis]
         + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
@@ -249,6 +255,7 @@ def further_flips(
     weights /= weights.sum()
     some = weights > NEGLIGIBLE
     k, rate, weights = k[some], rate[some], weights[some] / weights[some].sum()
+    # Conditions of the same numbers have the same bound: found once.
     cases, places = np.unique(np.stack([f.ravel(), c.ravel(), u.ravel()]), axis=1,
                               return_inverse=True)  # fmt: skip
     f_here, c_here, u_here = cases
@@ -292,7 +299,8 @@ NEGLIGIBLE = 1e-6
 def numerical_of(
     intervals: Mapping[str, tuple[np.ndarray, np.ndarray]],
 ) -> dict[str, np.ndarray]:
-    """{"pr_…_numerical": array} of every probability: the larger side of its change_intervals."""
+    """Return {"pr_…_numerical": array} of every probability: the larger side of its
+    change_intervals."""
     return {
         f"{name}_numerical": np.maximum(np.abs(low), np.abs(high))
         for name, (low, high) in intervals.items()
@@ -302,7 +310,7 @@ def numerical_of(
 def change_columns(
     intervals: Mapping[str, tuple[np.ndarray, np.ndarray]],
 ) -> dict[str, np.ndarray]:
-    """The arrays of NUMERICS."""
+    """Return the arrays of NUMERICS."""
     return {
         f"{name}_change{end}": intervals[name][side]
         for name in PROBABILITIES for side, end in enumerate(("_low", "_high"))

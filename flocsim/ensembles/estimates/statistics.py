@@ -46,12 +46,13 @@ EXACT_RUNS = COUNTED[: 3 * len(CODES)]
 
 
 def by_runs(columns: Sequence[np.ndarray]) -> list[Sequence[np.ndarray]]:
-    """CODES of each run, from columns in the order of COUNTED, all of them or the first ones."""
+    """Return CODES of each run, from columns in the order of COUNTED, all of them or the first
+    ones."""
     return [columns[k : k + len(CODES)] for k in range(0, len(columns), len(CODES))]
 
 
 def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
-    """Whole-number counts over the last axis.
+    """Return whole-number counts over the last axis.
 
     n_total = n_missed + n_held + n_undecided + n_failed + Σ n_class. n_collided counts every
     replicate whose outlines touched, whatever came later: a collision that ended undecided or
@@ -74,7 +75,7 @@ def count(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str
 
 
 def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Probabilities with 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
+    """Return probabilities with 95 % intervals (``_low``, ``_high``) from counts, also pooled ones.
 
     Wilson's, from the low end for none to the high end for all of those that are undecided or have
     failed (`flocsim.io.confidence.proportion`).
@@ -94,8 +95,8 @@ def probabilities(counts: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def pooled_sums(outcome: np.ndarray, inside: np.ndarray, bond: np.ndarray) -> dict[str, np.ndarray]:
-    """{estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is a
-    cluster. Codes are (type, vertices, delta, replicate)."""
+    """Return {estimate: bounded_sums (3, 6, type, vertices)}: a replicate over all displacements is
+    a cluster. Codes are (type, vertices, delta, replicate)."""
     sums, counted = {}, events(outcome, inside, bond)
     for name in schema.POOLED_PROBABILITIES:
         each = Events(*(flags.sum(axis=2, dtype=np.int64) for flags in counted[name]))
@@ -124,7 +125,7 @@ def clustered_probabilities(
 def scrambled_sums(
     codes: Sequence[np.ndarray], first: int, scrambles: int
 ) -> dict[str, np.ndarray]:
-    """{probability: whole numbers (3, type, …, scramble)} of trials, successes and unknown.
+    """Return {probability: whole numbers (3, type, …, scramble)} of trials, successes and unknown.
 
     ``codes``: outcome, inside, bond of replicates from the ``first`` on, replicate k of scramble k
     mod ``scrambles``; nothing for none.
@@ -142,7 +143,8 @@ GROWTH = 1.25
 
 
 def borders(stop: StopConfig, replicates: int) -> list[int]:
-    """The numbers of replicates at which the rule looks; the last is ``replicates``."""
+    """Return the numbers of replicates at which the rule looks; the last is ``replicates``."""
+    # Geometric, so that few looks are wasted, and each has new replicates enough to differ.
     looks = []
     look = stop.least
     while stop.half_width is not None and look < replicates:
@@ -170,12 +172,13 @@ def stop_rule(study: StudyKind, store: RowStore) -> Callable[[int], bool]:
 
 
 def of_each_scramble(first: int, scrambles: int) -> list[slice]:
-    """Where the replicates of every scramble stand among those from the ``first`` on."""
+    """Return where the replicates of every scramble stand among those from the ``first`` on."""
     return [slice((s - first) % scrambles, None, scrambles) for s in range(scrambles)]
 
 
 def sums_of_scrambles(flags: np.ndarray, first: int, scrambles: int) -> np.ndarray:
-    """Whole numbers (…, scramble): how many flags (…, replicate) are set in each scramble."""
+    """Return whole numbers (…, scramble): how many flags (…, replicate) are set in each
+    scramble."""
     parts = [flags[..., part].sum(axis=-1, dtype=np.int64)
              for part in of_each_scramble(first, scrambles)]  # fmt: skip
     return np.stack(parts, axis=-1)
@@ -184,7 +187,7 @@ def sums_of_scrambles(flags: np.ndarray, first: int, scrambles: int) -> np.ndarr
 def joint_counts(
     outcome: np.ndarray, inside: np.ndarray, first: int = 0, scrambles: int = 0
 ) -> np.ndarray:
-    """How often an event happens in both, here only, there only, in neither.
+    """Return how often an event happens in both, here only, there only, in neither.
 
     ``outcome``, ``inside``: codes (type, vertices, delta, replicate) of replicates from the
     ``first`` on, points of ``scrambles``, 0 for independent ones. Returns whole numbers (bound,
@@ -210,13 +213,14 @@ def joint_counts(
 def bounded_cells(
     here: Events, there: Events, itself: np.ndarray | None = None, axis: int = 0
 ) -> np.ndarray:
-    """Whole numbers (3, …, 4) of replicates, the last axis of the flags: in both, here only, there
-    only, in neither.
+    """Return whole numbers (3, …, 4) of replicates, the last axis of the flags: in both, here only,
+    there only, in neither.
 
     First over those that count both times; then with the unknown ones, none of which is a success
     here, all of them there; then the other way round. ``itself``: flags along an ``axis``, where
     here and there are one condition, and what is unknown is so in both.
     """
+    # Against itself nothing is unknown: whatever it comes to, it comes to it both times.
     same = np.zeros(1, dtype=bool) if itself is None else itself
     same = same.reshape(tuple(len(same) if k == axis else 1 for k in range(here.trials.ndim)))
     known = here.trials & there.trials
@@ -233,7 +237,7 @@ def bounded_cells(
 
 
 def paired_differences(joint: np.ndarray, scrambled: bool = False) -> dict[str, np.ndarray]:
-    """The arrays of DIFFERENCES from joint_counts; NaN where no replicate counts."""
+    """Return the arrays of DIFFERENCES from joint_counts; NaN where no replicate counts."""
     joint = np.asarray(joint)
     difference, low, high = bounded_difference(joint, scrambled)
     return {
@@ -247,8 +251,8 @@ def paired_differences(joint: np.ndarray, scrambled: bool = False) -> dict[str, 
 def bounded_difference(
     joint: np.ndarray, scrambled: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(difference, low, high) of bounded_cells: whatever the unknown replicates would have come to
-    is in the interval. ``scrambled``: the last axis but one is that of scrambles."""
+    """Return (difference, low, high) of bounded_cells: whatever the unknown replicates would have
+    come to is in the interval. ``scrambled``: the last axis but one is that of scrambles."""
     known, least, most = (
         scrambled_difference(each) if scrambled else newcombe(*np.moveaxis(each, -1, 0))
         for each in joint
@@ -275,7 +279,7 @@ def scrambled_difference(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.
 def newcombe(
     both: ArrayLike, here: ArrayLike, there: ArrayLike, neither: ArrayLike
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(difference, low, high) of two paired proportions: here minus there, 95 %.
+    """Return (difference, low, high) of two paired proportions: here minus there, 95 %.
 
     ``both``, ``here`` only, ``there`` only, ``neither``: whole-number counts. Wilson's intervals
     of the two, joined by squares with the correlation φ between them. Source: R. G. Newcombe,
@@ -292,7 +296,8 @@ def newcombe(
 def between(
     successes: ArrayLike, trials: ArrayLike, others: ArrayLike, of: ArrayLike, phi: ArrayLike = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(difference, low, high) of successes/trials − others/of, 95 %, of a correlation ``phi``.
+    """Return (difference, low, high) of successes/trials − others/of, 95 %, of a correlation
+    ``phi``.
 
     0 for independent samples: Newcombe, Stat. Med. 17 (1998) 873–890, method 10. NaN where either
     has no trials.
@@ -301,6 +306,7 @@ def between(
         one, other = np.true_divide(successes, trials), np.true_divide(others, of)
         one_low, one_high = wilson(successes, trials)
         other_low, other_high = wilson(others, of)
+        # Each limit is as far from the difference as the two ends that it takes are from theirs.
         down = joined(one - one_low, other_high - other, phi)
         up = joined(one_high - one, other - other_low, phi)
         return one - other, one - other - down, one - other + up
@@ -311,9 +317,11 @@ def joined(one, other, phi):
 
 
 def correlation(both, here, there, neither):
-    """φ of a table of four cells with Newcombe's continuity correction; 0 for an empty margin."""
+    """Return φ of a table of four cells with Newcombe's continuity correction; 0 for an empty
+    margin."""
     n = both + here + there + neither
     excess = both * neither - here * there
+    # n/2 is taken off a positive excess: φ from few replicates is too large on average.
     excess = np.where(excess > 0.0, np.maximum(excess - 0.5 * n, 0.0), excess)
     margins = (both + here) * (there + neither) * (both + there) * (here + neither)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -24,7 +24,7 @@ from flocsim.io.results.kernel_group import Kernel
 def outline_sums(
     first: Sequence[np.ndarray], ends: Sequence[Sequence[np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """{probability: whole numbers (end, 3, type, …, 4)}, bounded_cells of replicates with
+    """Return {probability: whole numbers (end, 3, type, …, 4)}, bounded_cells of replicates with
     outlines cut otherwise, and as they were cut; nothing where none was run so.
 
     ``first``, ``ends``: outcome, inside and bond, codes (type, vertices, delta, replicate).
@@ -48,7 +48,7 @@ def outline_sums(
 def outline_changes(
     sums: Mapping[str, np.ndarray], table: Mapping[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """The arrays of OUTLINES from outline_sums; NaN where no replicate counts.
+    """Return the arrays of OUTLINES from outline_sums; NaN where no replicate counts.
 
     ``table``: the probabilities as cut, which no change takes beyond 0 and 1.
     """
@@ -85,7 +85,7 @@ class Reader:
         return tuple(rows[name] for name in statistics.COUNTED)
 
     def part(self, where: Sequence[slice]) -> np.ndarray:
-        """Rows of a part of the table (type, vertices, delta, replicate)."""
+        """Return rows of a part of the table (type, vertices, delta, replicate)."""
         *outer, replicates = where
         places = np.arange(len(self.store.conditions)).reshape(self.shape[:3])[tuple(outer)]
         parts = [
@@ -95,7 +95,7 @@ class Reader:
         return np.stack(parts).reshape(*places.shape, -1)
 
     def table(self) -> dict[str, np.ndarray]:
-        """{column: array (type, vertices, delta, replicate)} of all rows, in memory."""
+        """Return {column: array (type, vertices, delta, replicate)} of all rows, in memory."""
         rows = self.part([slice(0, length) for length in self.shape])
         return {name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()}
 
@@ -109,7 +109,8 @@ replicates and of others being added up."""
 
 
 def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int = 0) -> Sums:
-    """The Sums of replicates [first, stop) of so many conditions, points of ``scrambles``."""
+    """Return the Sums of replicates [first, stop) of so many conditions, points of
+    ``scrambles``."""
     step = max(BLOCK_ROWS // conditions, 1)
     sums: Sums = {}
     for start in range(first, max(stop, first + 1), step):
@@ -127,7 +128,7 @@ def sums_of(codes: Codes, conditions: int, first: int, stop: int, scrambles: int
 
 
 def added(sums: Sums, more: Sums) -> Sums:
-    """The sum of two Sums; what only one of them has stands for itself."""
+    """Return the sum of two Sums; what only one of them has stands for itself."""
     both = {name: sums[name] + more[name] for name in sums.keys() & more.keys()}
     return {name: both.get(name, values) for name, values in {**more, **sums}.items()}
 
@@ -138,7 +139,8 @@ def part_of(sums: Sums, part: str) -> dict[str, np.ndarray]:
 
 
 def tables_of(sums: Sums) -> dict[str, Any]:
-    """The arrays of the groups of a results file that follow from the Sums of a whole study."""
+    """Return the arrays of the groups of a results file that follow from the Sums of a whole
+    study."""
     counted, of_scrambles = part_of(sums, "counted"), part_of(sums, "scrambles")
     over_delta = {name: values.sum(axis=2) for name, values in counted.items()}
     together = numerical.numerical_of(numerical.change_intervals(over_delta))
@@ -164,7 +166,7 @@ def table_from(
     counted: Mapping[str, np.ndarray],
     changes: dict[str, tuple[np.ndarray, np.ndarray]] | None = None,
 ) -> dict[str, np.ndarray]:
-    """The table of probabilities from what is counted of conditions; ``changes``: its
+    """Return the table of probabilities from what is counted of conditions; ``changes``: its
     change_intervals, where they are there."""
     counts = {name: values for name, values in counted.items() if name.startswith("n_")}
     changes = numerical.change_intervals(counted) if changes is None else changes
@@ -175,7 +177,7 @@ def results_of(
     study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
     kernel: Kernel | None = None,
 ) -> schema.Results:  # fmt: skip
-    """The Results of so many replicates of each condition from their Sums."""
+    """Return the Results of so many replicates of each condition from their Sums."""
     config = study.config
     return schema.Results(
         types=config.scene.names,
