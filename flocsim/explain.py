@@ -93,7 +93,8 @@ def about(system, force):
                 place += ", between charges behind them, for it is thick beside their corners"
                 if force.boundary == "superposition":
                     reach = system.pieces.layer[2]
-        parts = [f"{place}, {reach_words(system, force, reach)}"]
+        far = f"not called at gaps above {reach:.3g} m" if reach < math.inf else "at every gap"
+        parts = [f"{place}, {far}"]
     return [*parts, *force.remarks(system.fluid)]
 
 
@@ -104,33 +105,9 @@ def no_partner(system):
     return "fixed bodies do not act on each other"
 
 
-def reach_words(system, force, reach):
-    """Return how far a pair force reaches [m], and whether it does so at the start."""
-    if not reach < math.inf:
-        return "at every gap"
-    words = f"not called at gaps above {reach:.3g} m"
-    nearest = least_gap(system.bodies, force)
-    if nearest >= reach:
-        words += f" (out of range at the start, where gaps are at least {nearest:.3g} m)"
-    return words
-
-
-def least_gap(bodies, force):
-    """Return the least gap [m] at the start: of equivalent spheres, or of bounding circles."""
-    of_spheres = force.acts_on in ("centres", "orientations")
-    size = "equivalent_radius" if of_spheres else "bounding_radius"
-    return min((gap_between(a, b, size) for a, b in counting(bodies)), default=math.inf)
-
-
 def counting(bodies):
     """Return every two bodies that can act on each other: one of them is free."""
     return [(a, b) for a, b in combinations(bodies, 2) if not (a.fixed and b.fixed)]
-
-
-def gap_between(a, b, size):
-    """Return the distance of two bodies' circles of the given size [m]."""
-    distance = math.dist(a.position, b.position)
-    return distance - getattr(a.shape, size) - getattr(b.shape, size)
 
 
 def sliding(system, force):

@@ -50,14 +50,6 @@ def test_where_forces_act():
     assert "line of centres" in attraction and "between the outlines" in film
 
 
-@pytest.mark.parametrize(("distance", "out"), [(12e-6, False), (40e-6, True)])
-def test_a_force_out_of_range_is_named(distance, out):
-    force = DoubleLayer(debye_length=2e-7)
-    bodies = [BALL, attrs.evolve(BALL, position=(distance, 0.0))]
-    (line,) = lines_of("in:  DoubleLayer", bodies, [force])
-    assert (distance - 1e-5 >= force.reach) == out == ("out of range at the start" in line)
-
-
 def test_sliding():
     for friction, words in ((0.3, "slides at its limit"), ("none", "no sliding")):
         (line,) = lines_of("in:  Contact", FAR, [Contact(friction=friction)])

@@ -373,17 +373,8 @@ def first_identity(tmp_path_factory):
     ("edited", "said"),
     [
         ({"/ 12.0": "/ 12.5"}, "the flocs with 2 "),
-        ({"2.0 * self.length * self.radius +": "2.1 * self.length * self.radius +"}, "the flocs"),
-        ({"return Rod(self.length * factor": "return Rod(1.0001 * self.length * factor"}, None),
         (
             {"length * factor": "length * factor * (1.0 if factor > 0.1 else 1.01)"},
-            "the flocs with 2 ",
-        ),
-        (
-            {
-                "    def core(self)": "    def equivalent_radius(self):\n        return "
-                "0.9 * self.area**0.5\n\n    @property\n    def core(self)"
-            },
             "the flocs with 2 ",
         ),
         (
@@ -396,7 +387,6 @@ def first_identity(tmp_path_factory):
         ({"1.0 * step": "0.9 * step"}, "the compiled code for polygons has changed"),
         ({"largest_step = 1e-7": "largest_step = 2e-7"}, "integrator.largest_step is 1e-07 in the"),
         ({"default=0.5)": "default=0.6)"}, "integrator.factor is 0.5 in the file, 0.6 now"),
-        ({"points: int = 2": "points: int = 3"}, "shapes.points is 2 in the file, 3 now"),
         ({"class Apple": "# nothing that counts\nclass Pear"}, ""),
     ],
 )
@@ -404,10 +394,6 @@ def test_an_edit_makes_it_another_study(tmp_path, own_module, first_identity, ed
     [(old, new)] = edited.items()
     assert OWN_MODULE.count(old) == 1
     own_module.write_text(OWN_MODULE.replace(old, new))
-    if said is None:
-        [line] = problem_lines(tmp_path, OWN_STUDY)
-        assert "scaled(2.0) must return a shape of four times the area" in line
-        return
     found = differences(first_identity, identity_of(Study(load_text(tmp_path, OWN_STUDY))))
     assert bool(found) == bool(said)
     assert all(said in line for line in found[:1])
@@ -474,12 +460,3 @@ def test_a_parameter_that_is_another_each_time_is_refused(tmp_path, own_module):
     )
     with pytest.raises(KernelError, match=r"Mine: kernel .* asks for 'now', which is .* once and"):
         check_study(load_text(tmp_path, WITH_ENUM_STUDY))
-
-
-def test_other_parameters_make_it_another_study(tmp_path, own_module, first_identity):
-    over = {"shapes": {"length": 4}, "integrator": {"factor": 1}}
-    found = identity_of(Study(load_text(tmp_path, OWN_STUDY, over)))
-    assert differences(first_identity, found) == [
-        "integrator.factor is 0.5 in the file, 1.0 now",
-        "shapes.length is 3.0 in the file, 4.0 now",
-    ]
