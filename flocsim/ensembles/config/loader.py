@@ -222,7 +222,8 @@ class Reading:
                         text = f": applies only with {other} = {list_words(words)}: remove it"
                         self.note(f"{place}.{key}", text)
         # All keys are read before the class is made, so that all problems are reported at once.
-        count, values = len(self.found), {}
+        count = len(self.found)
+        values: dict[str, Any] = {}
         needed = [key for key, field in keys.items() if field.default is attrs.NOTHING]
         if lacking := [key for key in needed if key not in given]:
             self.note(place, f": needs {', '.join(lacking)}")
