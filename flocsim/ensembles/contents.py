@@ -81,7 +81,9 @@ def later(module: str, name: str) -> Any:
     """Return a function of a module of flocsim that is loaded when it is called, as a static
     method: what shows a file has no need of the engine."""
     return staticmethod(
-        lambda *args: getattr(importlib.import_module(f"flocsim.{module}"), name)(*args)
+        lambda *args, **more: getattr(importlib.import_module(f"flocsim.{module}"), name)(
+            *args, **more
+        )
     )
 
 
