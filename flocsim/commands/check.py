@@ -109,6 +109,7 @@ def run(args: Namespace) -> int:
     config = load_config(args.config, settings_in(args.settings))
     check_study(config)
     config = of_extremes(config)
+    # The tolerances of the study and of its second runs; the reference is a hundred times tighter.
     method = config.integrator.method
     methods = [method, *filter(None, [exact_method(method)])]
     tightest = methods[-1].tolerance

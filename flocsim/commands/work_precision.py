@@ -80,6 +80,7 @@ def climb(study: Study, tasks: Sequence[Task]) -> Iterator[Rung]:
     length = round(math.log10(least))
     tolerances = [float(f"1e{length - decade}") for decade in range(DECADES)]
     bench = Bench(study, Implicit(0.1 * tolerances[-1]))
+    # An explicit run that takes many times the steps of its reference is stopped.
     references = [bench.reference(task) for task in tasks]
     patience = int(PATIENCE * np.mean([run.steps for run, _ in references]))
     for tolerance in tolerances:

@@ -1,5 +1,5 @@
-"""What is told of flocs: a line on every picture, tables of errors and regions, and of a
-population what is published, D10, D50, D90 and its fractal dimension.
+"""What is printed of flocs: a line on every picture, errors of the fits, the table of all regions,
+and of a population what is published, D10, D50, D90 and its fractal dimension.
 """
 
 import csv
@@ -39,7 +39,7 @@ def plural(count: int, noun: str) -> str:
 
 
 def picture_line(name: str, found: Segmentation, fitted: int) -> str:
-    """One line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
+    """Return a line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
     if fitted < len(found.regions):
         parts.append(f"the {fitted} largest fitted")
@@ -65,7 +65,7 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
 
 
 def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
-    """A line on stderr for every spheroradius not below r_eq of some flocs (paper, section 3.2)."""
+    """Print a line on stderr for every spheroradius not below r_eq of some flocs (section 3.2)."""
     for radius in radii:
         coarse = sum(region.equivalent_radius <= radius for region in regions)
         if coarse:
@@ -94,8 +94,8 @@ def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
 
 
 def errors_of(entries: Sequence[ShapeEntry]) -> dict[str, dict[int, float]]:
-    """{floc: {N: RE [%]}} at the smallest spheroradius, of flocs that are larger than that: what a
-    disk cannot follow, more vertices do not mend."""
+    """Return {floc: {N: RE [%]}} at the smallest spheroradius, of flocs that are larger than that:
+    what a disk cannot follow, more vertices do not mend."""
     least = min((each.spheroradius for each in entries), default=0.0)
     return {
         each.floc_id: {count: fit.relative_error for count, fit in each.fits.items()}
@@ -164,14 +164,14 @@ class Slope(NamedTuple):
 
 
 def one_each(entries: Sequence[ShapeEntry]) -> list[ShapeEntry]:
-    """The entries at the smallest spheroradius: every floc once."""
+    """Return the entries at the smallest spheroradius: every floc once."""
     first = min(entry.spheroradius for entry in entries)
     return [entry for entry in entries if entry.spheroradius == first]
 
 
 def measures_in(entry: ShapeEntry) -> ShapeMeasures:
-    """The measures of a floc [m]: those of its picture, or of its finest fit where a library of
-    before has none."""
+    """Return the measures of a floc [m]: those of its picture, or of its finest fit where a library
+    has none."""
     if entry.measures is None:
         return entry.fits[max(entry.fits)].shape.measures
     lengths = {name: getattr(entry.measures, name) * entry.pixel_size
@@ -182,11 +182,12 @@ def measures_in(entry: ShapeEntry) -> ShapeMeasures:
 def diameters_at(
     diameters: np.ndarray, by_volume: bool, shares: Sequence[float] = SHARES
 ) -> np.ndarray:
-    """Diameters below which these shares of the flocs lie, or of their volume ∝ D³ (k,).
+    """Return diameters below which these shares of the flocs, or of their volume ∝ D³, lie (k,).
 
     Half of a floc counts as smaller than itself, and between flocs D goes linearly with the share:
     by number D50 is the median. Beyond the outermost flocs D is theirs.
     """
+    # Each floc stands at the middle of its own weight in the cumulative distribution.
     ordered = np.sort(np.asarray(diameters, float))
     weights = ordered**3 if by_volume else np.ones(ordered.size)
     below = (np.cumsum(weights) - 0.5 * weights) / weights.sum()
@@ -194,8 +195,8 @@ def diameters_at(
 
 
 def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | None:
-    """The perimeter-based fractal dimension D_f2 of a population: P ∝ A^(D_f2/2), by least squares
-    of ln P on ln A (n,) each; None for fewer than FEWEST flocs of different areas.
+    """Return the perimeter-based fractal dimension D_f2 of a population: P ∝ A^(D_f2/2), by least
+    squares of ln P on ln A (n,) each; None for fewer than FEWEST flocs of different areas.
 
     1 for outlines that are scaled copies of each other, towards 2 where larger ones are the more
     ragged. Source: B. B. Mandelbrot, The Fractal Geometry of Nature (1982), ch. 12.
@@ -205,12 +206,13 @@ def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | No
 
     if len(np.unique(areas)) < FEWEST:
         return None
+    # ln P = D_f2/2 ln A + constant; the interval is Student's t of the slope.
     line = linregress(np.log(areas), np.log(perimeters))
     return Slope(2.0 * line.slope, 2.0 * float(stdtrit(len(areas) - 2, 0.975)) * line.stderr)
 
 
 def population_lines(entries: Sequence[ShapeEntry]) -> list[str]:
-    """D10, D50, D90 and D_f2 of some flocs, in words."""
+    """Return lines on D10, D50, D90 and D_f2 of some flocs."""
     flocs = one_each(entries)
     sizes = np.array([2e6 * each.measured_radius for each in flocs])
     lines = []

@@ -24,7 +24,7 @@ def data_rule(overwrite: bool = False) -> Rule:
 
 
 def extension_rule(path: str | os.PathLike) -> Rule:
-    """The rule for a file that was read, and is written anew with more in it.
+    """Return the rule for a file that was read, and is written anew with more in it.
 
     As long as it is the file that it was when this was called; any other one is kept.
     """
@@ -93,7 +93,7 @@ def check_outputs(outputs: Iterable[Output], inputs: Iterable[str | os.PathLike]
 
 
 def in_the_way(path: str | os.PathLike, ways: str = WAYS) -> UsageError:
-    """The UsageError for a file that exists where another is to be written."""
+    """Return the UsageError for a file that exists where another is to be written."""
     return UsageError(f"{path} already exists and is left as it is: name another output, or {ways}")
 
 
@@ -109,6 +109,6 @@ def mark_of(path):
 
 
 def loaded_sources() -> list[str]:
-    """The files of all modules that are loaded: a user's own force is read as well."""
+    """Return the files of all modules that are loaded: a user's own force is read as well."""
     files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
     return [file for file in files if isinstance(file, str)]

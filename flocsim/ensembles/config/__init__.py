@@ -52,12 +52,12 @@ SCENE_WORDS = tuple(each.scene for each in STUDIES.values() if each.scene)
 
 
 def scenes() -> dict[str, type]:
-    """`[scene] kind` → class of the table, of kinds that have one of their own."""
+    """Return {`[scene] kind`: class of the table} of the kinds that have one of their own."""
     return {each.scene: each.part("scene").SCENE for each in STUDIES.values() if each.scene}
 
 
 def contents_of(file_format: str) -> Any:
-    """The Contents of a kind of file, by what such a file says that it is."""
+    """Return the Contents of a kind of file, by what such a file says that it is."""
     if file_format in STUDIES:
         return STUDIES[file_format].part("results").CONTENTS
     module, _, name = FILES[file_format].partition(":")

@@ -169,6 +169,7 @@ class Reading:
     def parts(self, table: dict[str, Any]) -> dict[str, Any]:
         """Return the arguments of Config that a whole file gives."""
         self.found += [unknown(key, TOP_KEYS) for key in table if key not in TOP_KEYS]
+        # Of two keys that exclude each other the second is reported, and left out of what follows.
         for key, other in EXCLUSIVE:
             if value_at(table, key) is not None and value_at(table, other) is not None:
                 around, _, last = other.rpartition(".")
@@ -210,6 +211,7 @@ class Reading:
             for key in beside & keys_of(type(given["class"])).keys():
                 text = f": {key} is a key of flocsim's own: rename the field"
                 return self.note(f"{place}.class", text)
+        # A key that applies only with another one may be given where it changes nothing.
         for key, field in keys.items():
             other, words, elsewhere = field.metadata.get("only_for", ("", (), None))
             if other and key in given:

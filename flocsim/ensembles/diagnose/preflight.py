@@ -209,6 +209,7 @@ def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
 
     v √(M/k) exp(−ζ acos ζ/√(1 − ζ²)), for critical damping v √(M/k)/e.
     """
+    # Undamped the depth is v/ω; damping by ζ of the critical one lessens it by the exponent.
     omega = math.sqrt(stiffness / mass)
     return speed / omega * math.exp(-impact_exponent(0.5 * damping / (mass * omega)))
 
