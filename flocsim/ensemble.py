@@ -1,13 +1,10 @@
-"""`mpirun -n 2 python -m flocsim.ensemble cfg.toml`: run an ensemble of collisions."""
+"""`mpirun -n 2 python -m flocsim.ensemble cfg.toml`: the same as `flocsim ensemble cfg.toml`."""
 
 import sys
 
-from flocsim.process import check_memory, install
-
 if __name__ == "__main__":
-    install()  # before anything slow is imported
-    check_memory()
+    sys.argv.insert(1, "ensemble")
 
-    from flocsim.ensembles.cli import main
+    from flocsim.__main__ import main
 
     sys.exit(main())

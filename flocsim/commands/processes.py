@@ -10,7 +10,7 @@ import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from typing import Any
@@ -76,52 +76,31 @@ def in_processes(jobs: int, function: Callable, tasks: Iterable[Any]) -> Iterato
     """
     remaining = iter(tasks)
     while True:
-        with new_pool(jobs) as pool:
-            running: deque[tuple[Any, Future]] = deque()
-            while True:
-                for task in islice(remaining, AHEAD * jobs - len(running)):
-                    running.append((task, submitted(pool, function, task)))
-                if not running:
-                    return
-                task, future = running[0]
-                if (result := result_of(future)) is BROKEN:
-                    break
-                running.popleft()
-                yield result
-        for task, future in running:
-            result = result_of(future) if future.done() else BROKEN
-            yield alone(function, task) if result is BROKEN else result
-
-
-BROKEN = Lost("its process was killed, perhaps for lack of memory")
+        running: deque[list[Any]] = deque()  # [task, future], in order
+        try:
+            with new_pool(jobs) as pool:
+                while True:
+                    for task in islice(remaining, AHEAD * jobs - len(running)):
+                        running.append([task, None])  # not lost where the pool breaks just now
+                        running[-1][1] = pool.submit(attempt, function, task)
+                    if not running:
+                        return
+                    result = running[0][1].result()
+                    running.popleft()
+                    yield result
+        except BrokenProcessPool:
+            for task, future in running:
+                is_done = future is not None and future.done() and not future.exception()
+                yield future.result() if is_done else alone(function, task)
 
 
 def alone(function, task):
     """Return the result of a task in a process of its own."""
     with new_pool(1) as pool:
-        return result_of(pool.submit(attempt, function, task))
-
-
-def result_of(future):
-    """Return a future's result; a Lost where it could not even be handed over."""
-    try:
-        return future.result()
-    except BrokenProcessPool:
-        return BROKEN
-    except FlocsimError:
-        raise
-    except Exception as error:
-        return Lost(f"its result could not be passed on: {type(error).__name__}: {error}")
-
-
-def submitted(pool, function, task):
-    """Return the future of a task; where a process of the pool has just died, one that says so."""
-    try:
-        return pool.submit(attempt, function, task)
-    except BrokenProcessPool as error:
-        future: Future = Future()
-        future.set_exception(error)
-        return future
+        try:
+            return pool.submit(attempt, function, task).result()
+        except BrokenProcessPool:
+            return Lost("its process was killed, perhaps for lack of memory")
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""The command `python -m flocsim.ensemble cfg.toml`, with and without mpirun."""
+"""The commands that run a study: `flocsim ensemble cfg.toml`, with and without mpirun."""
 
 import argparse
 import contextlib
@@ -9,59 +9,20 @@ import shlex
 import shutil
 import sys
 import traceback
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import attrs
-
 from flocsim.compiler import units
-from flocsim.ensembles.parallel.communicator import Communicator, RankZeroFailed, StopRequested
+from flocsim.ensembles.parallel.communicator import Communicator, SharedError, StopRequested
 from flocsim.ensembles.parallel.processes import (
     find_communicator,
     launched_rank,
     start_processes,
 )
-from flocsim.errors import FileError, FlocsimError, UsageError
-from flocsim.io.arguments import Parser, document
+from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.outputs import Output, check_outputs, data_rule
-from flocsim.io.terminal import output_problem, plain_streams, plain_warnings, tell
+from flocsim.io.terminal import plain_warnings, tell
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
-
-
-@attrs.frozen
-class Options:
-    """What the command line asks for. All ranks have to be given the same, but for ``quiet``."""
-
-    config: str
-    settings: list[str]
-    seed: int | None
-    replicates: int | None
-    output: str | None
-    mode: str
-    overwrite: bool
-    jobs: int
-    dry_run: bool
-    pilot: bool
-    command: str
-    quiet: bool = attrs.field(eq=False)
-
-    @classmethod
-    def of(cls, arguments: argparse.Namespace) -> "Options":
-        """Return the options that parsed arguments stand for."""
-        values: Any = (getattr(arguments, each.name, "") for each in attrs.fields(cls))
-        return cls(*values)
-
-    @property
-    def overrides(self) -> dict[str, Any]:
-        """The command line's values as a nested dict over the config's."""
-        from flocsim.ensembles.config.loader import settings_in
-
-        file = None if self.output is None else {"file": self.output}
-        given = {"seed": self.seed, "replicates": self.replicates, "output": file}
-        return settings_in(self.settings) | {
-            name: value for name, value in given.items() if value is not None
-        }
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -101,18 +62,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--parent", type=int, help=argparse.SUPPRESS)
 
 
-def read_config(options: Options, sources: Any, first: bool) -> Any:
-    """Return the config of a study; UsageError or FileError on the ``first`` rank where its results
-    could not be written where they should go."""
-    from flocsim.ensembles.config.loader import load_any_config
+def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the command line's values as a nested dict over the config's."""
+    from flocsim.ensembles.config.loader import settings_in
+
+    file = None if options.output is None else {"file": options.output}
+    given = {"seed": options.seed, "replicates": options.replicates, "output": file}
+    return settings_in(options.settings) | {
+        name: value for name, value in given.items() if value is not None
+    }
+
+
+def check_start(options: argparse.Namespace, config: Any, comm: Communicator) -> None:
+    """Raise UsageError or FileError for options or a config that no study can start with, and
+    where its results could not be written where they should go."""
     from flocsim.ensembles.diagnose.preflight import inputs_of
     from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.storage.resume import RESUME, WAYS
     from flocsim.io.journal import SUFFIX
 
-    config = load_any_config(options.config, options.overrides, sources)
-    if not first:
-        return config
+    if options.jobs < 1:
+        raise UsageError(f"--jobs must be at least 1, found {options.jobs}")
+    if options.pilot and not options.dry_run:
+        raise UsageError("--pilot is for --dry-run: leave it out")
+    if options.jobs > 1 and comm.is_launched and not options.dry_run:
+        raise UsageError("--jobs is for runs without an MPI launcher: leave out one or the other")
     if options.command == "kernel" and not config.is_kernel:
         raise UsageError(
             f'{options.config} has scene.kind = "{config.scene.kind}": flocsim kernel needs '
@@ -124,64 +98,40 @@ def read_config(options: Options, sources: Any, first: bool) -> Any:
         rule = data_rule(options.overwrite or options.mode == RESUME)
         results = Output(config.output.file, rule, SUFFIX, WAYS)
         check_outputs([results], inputs_of(config, options.config))
-    return config
 
 
-def agree(comm: Communicator, options: Options) -> tuple[Any, int]:
-    """Return (config, 0) on every rank, made of the text and the modules that rank 0 has read: an
-    edited file is read before or after the edit, by all.
+def agree(comm: Communicator, options: Any) -> tuple[Any, argparse.Namespace]:
+    """Return (config, options) on every rank, made of the command line, the text and the modules
+    that rank 0 has read: an edited file is read before or after the edit, by all.
 
-    (None, exit code) on every rank where one of them was given other options or cannot make it.
+    SharedError on every rank where one of them cannot make it.
     """
+    from flocsim.ensembles.config.loader import load_any_config
     from flocsim.ensembles.config.sources import Sources
 
     config, problem, sources = None, None, Sources()
-    try:
+    with comm.sharing_errors():
         if comm.rank == 0:
-            refuse_options(options, comm)
-            config = read_config(options, sources, True)
-    except FlocsimError as error:
-        problem = str(error), error.exit_code
-    shared = comm.broadcast(None if problem else (options, sources))
+            config = load_any_config(options.config, overrides_of(options), sources)
+            check_start(options, config, comm)
+    options, sources = comm.broadcast((options, sources))
     try:
-        if comm.rank > 0 and shared is not None:
-            if shared[0] != options:
-                raise UsageError("it was given other arguments than rank 0: nothing was run")
-            config = read_config(options, shared[1], False)
+        if comm.rank > 0:
+            config = load_any_config(options.config, overrides_of(options), sources)
     except FlocsimError as error:
-        problem = f"rank {comm.rank}: {error}", error.exit_code
-    problems = [each for each in comm.gather(problem) or [] if each is not None]
-    code = comm.broadcast(problems[0][1] if problems else 0)
-    if problems:
-        tell(problems[0][0], sys.stderr)
-    return (None, code) if code else (config, 0)
+        problem = type(error)(f"rank {comm.rank}: {error}")
+    comm.agree(problem)
+    return config, options
 
 
-def refuse_options(options: Options, comm: Communicator) -> None:
-    """UsageError for options that do not go together."""
-    if options.jobs < 1:
-        raise UsageError(f"--jobs must be at least 1, found {options.jobs}")
-    if options.pilot and not options.dry_run:
-        raise UsageError("--pilot is for --dry-run: leave it out")
-    if options.jobs > 1 and comm.is_launched and not options.dry_run:
-        raise UsageError("--jobs is for runs without an MPI launcher: leave out one or the other")
-
-
-def study(config: Any, comm: Communicator, options: Options) -> int:
+def study(config: Any, comm: Communicator, options: argparse.Namespace) -> int:
     """Run the study and write its results; the exit code."""
     from flocsim.ensembles.config import contents_of
     from flocsim.ensembles.kind import kind_of
-    from flocsim.ensembles.runner import SharedError, run_to_file
+    from flocsim.ensembles.runner import run_to_file
 
     output = config.output.file
-    try:
-        ended = run_to_file(config, comm, output, options.mode, options.quiet,
-                            options.overwrite)  # fmt: skip
-    except RankZeroFailed as error:
-        return error.args[0]
-    except SharedError as error:
-        tell(f"flocsim: {error}", sys.stderr)
-        return error.args[0].exit_code
+    ended = run_to_file(config, comm, output, options.mode, options.quiet, options.overwrite)
     if ended.code == STOPPED:
         if comm.rank == 0:
             tell(INTERRUPTION.farewell(), sys.stderr)
@@ -210,21 +160,33 @@ def end_all(comm: Communicator, text: str, code: int) -> int:
     return code
 
 
-def guarded(comm: Communicator, options: Options) -> int:
-    """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang."""
-    try:
-        config, code = agree(comm, options)
-        if config is not None and not options.dry_run:
-            code = study(config, comm, options)
-        elif config is not None and comm.rank == 0:
-            from flocsim.ensembles.config import contents_of
-            from flocsim.ensembles.kind import kind_of
+def dry_run(config: Any, comm: Communicator, options: argparse.Namespace) -> int:
+    """Say what would be run, on rank 0; the exit code."""
+    from flocsim.ensembles.config import contents_of
+    from flocsim.ensembles.kind import kind_of
 
-            shown = contents_of(kind_of(config).format)
-            text = shown.dry_run(config, max(comm.size, options.jobs), options.pilot)
-            if stop_requested():
-                raise StopRequested(f"stopped by {INTERRUPTION.name}")
-            tell(text)
+    if comm.rank == 0:
+        shown = contents_of(kind_of(config).format)
+        text = shown.dry_run(config, max(comm.size, options.jobs), options.pilot)
+        if stop_requested():
+            raise StopRequested(f"stopped by {INTERRUPTION.name}")
+        tell(text)
+    return 0
+
+
+def guarded(comm: Communicator, options: argparse.Namespace | None = None) -> int:
+    """Do the work; whatever goes wrong on any rank ends the job with a message, never a hang.
+
+    Rank 0's ``options`` are those of all.
+    """
+    try:
+        try:
+            config, options = agree(comm, options)
+            code = (dry_run if options.dry_run else study)(config, comm, options)
+        except SharedError as error:
+            code = error.args[0].exit_code
+            if comm.rank == 0:
+                tell(f"flocsim: {error}", sys.stderr)
         comm.close()
         return code
     except StopRequested:
@@ -245,28 +207,21 @@ def guarded(comm: Communicator, options: Options) -> int:
         return end_all(comm, text, FlocsimError.exit_code)
 
 
-def on_process(comm: Communicator, options: Options) -> int:
-    """Do what a process does that rank 0 has started."""
-    plain_warnings(silent=True)
-    return guarded(comm, options)
-
-
-def run(arguments: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Run what the command line asks for, on all ranks of the job; return the exit code."""
-    if arguments.parent is not None:
-        end_with_parent(arguments.parent)
+    if options.parent is not None:
+        end_with_parent(options.parent)
     comm = Communicator()
     try:
-        options = Options.of(arguments)
         comm = find_communicator()
         ranks = comm.size
         if options.jobs > 1 and comm.size == 1 and not options.dry_run:
-            comm, ranks = start_processes(options.jobs, on_process, options), 0
+            comm, ranks = start_processes(options.jobs, guarded), 0
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
     INTERRUPTION.kept = lambda: "nothing more was finished"
-    if arguments.parent is None and not options.dry_run:  # a parent says how it goes on
+    if options.parent is None and not options.dry_run:  # a parent says how it goes on
         INTERRUPTION.command = continuing(ranks)
     if options.quiet:
         units.show_by(units.silent)
@@ -280,10 +235,9 @@ ANEW = re.compile("--(resu|rest|overw)[a-z]*")
 def continuing(ranks: int = 1) -> str:
     """Return the command line that continues this run, with the launcher where it has ``ranks``."""
     words = [*(word for word in sys.argv[1:] if not ANEW.fullmatch(word)), "--resume"]
-    module = sys.modules["__main__"].__spec__
     program = [on_path(sys.argv[0])]
-    if module is not None:  # python -m flocsim, or flocsim.ensemble
-        program = [sys.orig_argv[0], "-m", module.name.removesuffix(".__main__")]
+    if sys.modules["__main__"].__spec__ is not None:  # python -m flocsim, or flocsim.ensemble
+        program = [sys.orig_argv[0], "-m", "flocsim"]
     launcher = Path(sys.executable).with_name("mpirun")
     launch = [on_path(launcher) if launcher.exists() else "mpirun", "-n", str(ranks)]
     return shlex.join([*(launch if ranks > 1 else []), *program, *words])
@@ -304,18 +258,3 @@ def silent_unless_first():
     nowhere = io.StringIO()
     with contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
         yield
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry of `python -m flocsim.ensemble`; the exit code."""
-    parser = Parser(prog="flocsim.ensemble")
-    add_arguments(parser)
-    document(parser, add_arguments.__doc__)
-    with plain_streams():
-        with silent_unless_first():
-            arguments = parser.parse_args(argv)
-        code = run(arguments)
-        problem = output_problem() if code == 0 else ""
-        if problem:
-            tell(f"flocsim: {problem}", sys.stderr)
-        return FileError.exit_code if problem and arguments.dry_run else code

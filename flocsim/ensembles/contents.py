@@ -20,7 +20,7 @@ from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
 from flocsim.io.groups import UNREADABLE, Group, kind_of
 from flocsim.io.labelled import Column, Labelled, Tables
-from flocsim.io.results.run_group import describe_kind, source_line, stored
+from flocsim.io.results.run_group import source_line, stored
 from flocsim.io.seals import held
 from flocsim.io.terminal import aligned
 
@@ -31,7 +31,7 @@ Figures = Mapping[str, Callable[..., Any]]
 """{name: function that returns a matplotlib Figure}, the first line of whose docstring is its
 help."""
 
-SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history", "cpus",
+SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history",
               "warnings", "modules")  # fmt: skip
 """What the group ``run`` holds, of any kind, besides what is printed as it is."""
 
@@ -258,9 +258,7 @@ def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
         if isinstance(value, float):
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
         facts.append((name.replace("_", " "), str(value)))
-    kinds = stored(run, "cpus")
-    names = [describe_kind(kind, [each for each in kinds if each != kind]) for kind in kinds]
-    return [*facts, ("kind of CPU", "; ".join(names))] if names else facts
+    return facts
 
 
 def in_words(value: object) -> str:

@@ -8,7 +8,6 @@ import contextlib
 import json
 import platform
 import time
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,22 +15,15 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.compiler.processor import cpu_kind, versions
+from flocsim.compiler.processor import versions
 from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
 from flocsim.ensembles.contents import file_kind
 from flocsim.ensembles.diagnose.preflight import IMPLIED
 from flocsim.ensembles.estimates.statistics import borders
-from flocsim.ensembles.kind import (
-    StudyKind,
-    flocs_of,
-    study_of,
-)
-from flocsim.ensembles.parallel.communicator import (
-    Communicator,
-    Failed,
-)
+from flocsim.ensembles.kind import StudyKind, flocs_of, study_of
+from flocsim.ensembles.parallel.communicator import Communicator, SharedError
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator, run_chunks
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
@@ -40,12 +32,7 @@ from flocsim.ensembles.storage.resume import Beginning, begin, claim
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.journal import Journal
-from flocsim.io.results.run_group import (
-    distinct,
-    provenance,
-    source_line,
-    storable,
-)
+from flocsim.io.results.run_group import provenance, source_line, storable
 from flocsim.io.terminal import Progress
 from flocsim.process import INTERRUPTION, STOPPED
 
@@ -65,10 +52,6 @@ class Ended:
     total: int = 0
 
 
-class SharedError(Exception):
-    """An error of rank 0, the argument, of which the other ranks have the exit code."""
-
-
 def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Any:
     """Run a config's study in memory; its results on rank 0, None on the others.
 
@@ -77,11 +60,11 @@ def run(config: Config, comm: Communicator | None = None, quiet: bool = True) ->
     """
     comm = comm or Communicator()
     try:
-        study, identity, cpus = join(config, comm)
+        study, identity = join(config, comm)
         if comm.rank > 0:
             return follow(study, comm).results
         store = RowStore(Journal(), study.conditions, study.row)
-        start = Beginning(store, identity, cpus)
+        start = Beginning(store, identity)
         return lead(
             study, start, comm, Progress(study.size * study.pieces, quiet, noun=study.noun)
         ).results
@@ -102,15 +85,15 @@ def run_to_file(
     """
     if comm.rank > 0:
         return follow(join(config, comm)[0], comm)
-    with sharing_errors(comm):
+    with comm.sharing_errors():
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
         resources.callback(journal.release)
-        study, identity, cpus = join(config, comm)
+        study, identity = join(config, comm)
         progress = Progress(study.size * study.pieces, quiet, noun=study.noun)
-        with sharing_errors(comm):
+        with comm.sharing_errors():
             start = begin(
-                study, identity, output, mode, journal, contents_of(study.format).old_rows, cpus,
+                study, identity, output, mode, journal, contents_of(study.format).old_rows,
                 overwrite,
             )  # fmt: skip
         # Once nothing else stands in the way: what is refused is refused in one line.
@@ -129,35 +112,30 @@ def run_to_file(
     return ended
 
 
-def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict, list[dict]]:
+def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict]:
     """Make the study on every rank, and check that all would compute the same rows.
 
-    Return (study, identity, the kinds of CPU of all ranks); the kinds are known on rank 0 alone.
-    Rank 0 grows or reads the flocs for all. Where any rank would compute something else, or has
-    other versions, none continues: UsageError on rank 0, RankZeroFailed on the others.
+    Return (study, identity). Rank 0 grows or reads the flocs for all. Where any rank would compute
+    something else, or has other versions, none continues: SharedError on all ranks.
     """
-    with sharing_errors(comm):
+    with comm.sharing_errors():
         flocs = flocs_of(config) if comm.rank == 0 else None
     study: Any = study_of(config, comm.broadcast(flocs))
-    facts, line = None, ""
-    with sharing_errors(comm):
+    own, problem = None, None
+    with comm.sharing_errors():
         try:
-            facts = versions() | identity_of(study)
+            own = versions() | identity_of(study)
         except FlocsimError as error:
             if comm.rank == 0:
                 raise
-            line = f"rank {comm.rank}: {error}"
-    leader = comm.broadcast(facts)
-    if facts is not None:
-        line = first_difference(comm.rank, leader, facts)
-    answers = comm.gather((line, cpu_kind())) or []
-    with sharing_errors(comm):
-        if unlike := [line for line, _ in answers if line]:
-            raise UsageError(unlike[0])
-    cpus = distinct([kind for _, kind in answers])
-    with sharing_errors(comm):
+            problem = type(error)(f"rank {comm.rank}: {error}")
+    leader = comm.broadcast(own)
+    if own is not None and (line := first_difference(comm.rank, leader, own)):
+        problem = UsageError(line)
+    comm.agree(problem)
+    with comm.sharing_errors():
         study.prepare()
-    return study, {name: leader[name] for name in leader if name not in versions()}, cpus
+    return study, {name: leader[name] for name in leader if name not in versions()}
 
 
 def first_difference(rank: int, leader: dict, own: dict) -> str:
@@ -193,7 +171,7 @@ def lead(
     They are written into the file ``output`` if given.
     """
     began = time.monotonic()
-    with sharing_errors(comm):
+    with comm.sharing_errors():
         state = make_state(study, start, comm.size)
     if output is not None:
         INTERRUPTION.kept = partial(kept_words, start, state)
@@ -206,7 +184,7 @@ def lead(
         compile_in_turn(study, comm)
     progress.start(state.missing)
     coordinator = Coordinator(comm, state, progress.report)
-    with sharing_errors(comm, coordinator):
+    with comm.sharing_errors(coordinator.give_up):
         coordinator.start()
         run_chunks(study, coordinator)
         coordinator.finish()
@@ -231,26 +209,10 @@ def kept_words(start: Beginning, state: StudyState) -> str:
     return f"{count} finished replicates{others} are in {start.journal.path}"
 
 
-@contextlib.contextmanager
-def sharing_errors(comm: Communicator, coordinator: Coordinator | None = None) -> Iterator[None]:
-    """An error of rank 0 ends the other ranks in good order, so that all have one exit code.
-
-    With a ``coordinator`` they have to be called back from their work first.
-    """
-    try:
-        yield
-    except FlocsimError as error:
-        if coordinator is not None and not coordinator.give_up():
-            raise
-        comm.broadcast(Failed(error.exit_code))
-        raise SharedError(error) from error
-
-
 def compile_in_turn(study, comm):
     """Compile every kind of code on one rank, in a copy of it; then load it on all ranks."""
-    own = study.kinds[comm.rank :: comm.size]
-    in_copies([partial(study.compile, [kind]) for kind in study.uncompiled(own)])
-    study.compile(own)
+    own = study.uncompiled(study.kinds[comm.rank :: comm.size])
+    in_copies([partial(study.compile, [kind]) for kind in own])
     comm.barrier()
     study.compile(study.kinds)
 
@@ -293,7 +255,6 @@ def make_results(
 def facts(study, start, ended, ranks):
     config, identity = study.config, start.identity
     more = contents_of(study.format).facts(study)
-    added = start.cpus_now if ended.computed else []
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
     if config.modules:
@@ -303,7 +264,6 @@ def facts(study, start, ended, ranks):
         "identity": storable(json.dumps(identity, sort_keys=True)),
         "failed": storable(json.dumps(start.store.notes)),
         "ranks": ranks,
-        "cpus": storable(json.dumps(distinct([*start.cpus_found, *added]))),
         "sessions": 1 + len(start.history),
         "history": storable(json.dumps(start.history)),
         "computed": ended.computed,

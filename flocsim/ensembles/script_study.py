@@ -26,7 +26,6 @@ from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
-from flocsim.fields import is_whole
 from flocsim.io.journal import SUFFIX
 from flocsim.io.outputs import Output, check_outputs, data_rule
 from flocsim.process import INTERRUPTED, STOPPED, WITHHELD
@@ -49,8 +48,8 @@ ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = ("site-packages", "dist-packages")
 """Folders in which installed packages lie."""
 
-STACK = 4
-"""From `listen` to the script that called Study.run."""
+STACK = 3
+"""From `run_command` to the script that called Study.run."""
 
 
 def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> None:
@@ -77,8 +76,18 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         cwd=folder, env=environment, encoding="utf-8", errors="replace",
     ) as process:  # fmt: skip
+        said = []
         try:
-            said = listen(process, text, quiet)
+            with contextlib.suppress(BrokenPipeError):  # it says why
+                process.stdin.write(text)
+                process.stdin.close()
+            for line in process.stdout:
+                said.append(line.rstrip("\n"))
+                if not quiet:
+                    print(said[-1])
+                elif said[-1].startswith(WARNING):
+                    warnings.warn(said[-1].removeprefix(WARNING), PlausibilityWarning, STACK)
+            process.wait()
         except BaseException:
             process.send_signal(signal.SIGINT)
             try:
@@ -90,22 +99,6 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
         raise KeyboardInterrupt
     if process.returncode not in (0, WITHHELD):  # that is a warning, said already
         raise error_of(process.returncode, said)
-
-
-def listen(process, text, quiet):
-    """The lines that a process prints until it ends, printed here as well."""
-    with contextlib.suppress(BrokenPipeError):  # it says why
-        process.stdin.write(text)
-        process.stdin.close()
-    said = []
-    for line in process.stdout:
-        said.append(line.rstrip("\n"))
-        if not quiet:
-            print(said[-1])
-        elif said[-1].startswith(WARNING):
-            warnings.warn(said[-1].removeprefix(WARNING), PlausibilityWarning, STACK)
-    process.wait()
-    return said
 
 
 def error_of(code: int, said: Sequence[str]) -> FlocsimError:
@@ -189,8 +182,6 @@ class Study:
         finished is kept when it is interrupted: go on with ``mode="resume"``. UsageError
         for a file in the way, FileError where it cannot be written.
         """
-        if not is_whole(jobs) or jobs < 1:
-            raise UsageError(f"jobs must be a whole number of at least 1, found {jobs!r}")
         if mode not in MODES:
             raise UsageError(f"mode must be one of {', '.join(MODES)}, found {mode!r}")
         in_memory = output is None and mode == "new" and not self.names_output
@@ -202,7 +193,7 @@ class Study:
                 [Output(target, data_rule(overwrite or mode == "resume"), SUFFIX, WAYS)],
                 inputs_of(self.config, str(self.path)),
             )
-            words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(int(jobs))]
+            words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(jobs)]
             words += [f"--{mode}"] if mode != "new" else []
             words += ["--overwrite"] if overwrite else []
             words += ["--quiet"] if quiet else []

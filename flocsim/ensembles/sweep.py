@@ -36,9 +36,8 @@ from flocsim.ensembles.storage.identity import (
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import make_folder
-from flocsim.io.journal import journal_path
 from flocsim.io.labelled import Column, Labelled
-from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule, in_the_way
+from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
 from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import GROUPS
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
@@ -74,9 +73,6 @@ def sweep(
         refuse_other_sweep(read_joined(output), swept)
         rule = extension_rule(output)
     check_outputs([Output(output, rule, ways=ways)], [study.path])
-    for path in parts if mode == "new" and not overwrite else ():
-        for name in filter(os.path.lexists, (path, journal_path(path))):
-            raise in_the_way(name, ways)
     make_folder(parts_folder(output))
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):

@@ -76,11 +76,10 @@ def test_set_changes_the_scene(folder, capsys):
 
 
 def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
-    from flocsim.ensembles.cli import main as ensemble
     from flocsim.io.results.file import read_results
 
     write_small(folder, types='["I"]', vertices="[16]", delta="[0.0]")
-    assert ensemble(["small.toml", "--quiet"]) == 0
+    assert main(["ensemble", "small.toml", "--quiet"]) == 0
     words = ["--replicate", 2, "--type", "I", "--vertices", 16, "--delta", 0, "--save", "m.h5"]
     assert call(capsys, "small.toml", *words)[0] == 0
     table = read_results(folder / "small.h5").replicates

@@ -1,4 +1,4 @@
-"""The command `python -m flocsim.ensemble` without a launcher: options, messages, exit codes."""
+"""The command `flocsim ensemble` without a launcher: options, messages, exit codes."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+from flocsim.__main__ import main
 from flocsim.ensembles import cli
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
@@ -15,7 +16,7 @@ from tests.helpers.waiting import PATIENCE
 
 def call(capsys, *words):
     """(exit code, output, errors) of the command, run in this process."""
-    code = cli.main([*map(str, words)])
+    code = main(["ensemble", *map(str, words)])
     return code, *capsys.readouterr()
 
 
@@ -156,13 +157,13 @@ def test_a_library_that_is_none(folder, capsys):
     write_small(folder, vertices='[4]\nsource = "library"\nfile = "stars.h5"')
     code, line = failure(capsys, "small.toml")
     assert code == 74
-    assert line.startswith("stars.h5 is not an HDF5 file")
+    assert line.startswith("flocsim: stars.h5 is not an HDF5 file")
 
 
 def test_no_config_is_not_a_traceback(folder, capsys):
     assert failure(capsys, "other.toml") == (
         2,
-        "other.toml: no such file; `flocsim init other.toml` writes one",
+        "flocsim: other.toml: no such file; `flocsim init other.toml` writes one",
     )
     code, line = failure(capsys, ".")
     assert code == 2
@@ -172,9 +173,9 @@ def test_no_config_is_not_a_traceback(folder, capsys):
 @pytest.mark.parametrize("words", [[], ["small.toml", "--seed", "x"], ["small.toml", "--bogus"]])
 def test_wrong_arguments_end_with_2(folder, capsys, words):
     with pytest.raises(SystemExit) as caught:
-        cli.main(words)
+        main(["ensemble", *words])
     assert caught.value.code == 2
-    assert "flocsim.ensemble: error: " in capsys.readouterr().err
+    assert "flocsim ensemble: error: " in capsys.readouterr().err
 
 
 def test_an_error_nobody_thought_of_is_an_internal_one(folder, capsys, monkeypatch):
@@ -207,7 +208,7 @@ def test_the_module_is_a_command(folder):
 
 
 def test_help_is_quick_and_loads_no_numba(folder):
-    code = "import sys; from flocsim.ensembles.cli import main\ntry:\n    main(['--help'])\n"
+    code = "import sys; from flocsim.__main__ import main\ntry:\n    main(['ensemble', '--help'])\n"
     code += "finally:\n    print({'numba', 'h5py', 'matplotlib'} & set(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE

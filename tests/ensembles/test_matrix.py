@@ -247,4 +247,4 @@ def test_the_origin_of_rows_is_recorded(home, tmp_path, monkeypatch, kind):
     monkeypatch.chdir(tmp_path / "here")
     cell, file = Cell(KINDS[kind], f"{kind}.h5"), f"{kind}.h5"
     run = cell.kind.read(file).run
-    assert '"features"' in run["cpus"] and run["identity"] and run["history"] == "[]"
+    assert run["processor"] and run["identity"] and run["history"] == "[]"

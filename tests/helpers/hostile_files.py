@@ -78,8 +78,6 @@ def valid_results(folder):
     run = results.run | {
         "config": VALID, "identity": json.dumps({"seed": 1}), "failed": json.dumps(notes),
         "history": json.dumps([{"date": "2020", "command": "x"}]), "overrides": "{}",
-        "cpus": json.dumps([{"cpu": "a", "compiled_for": "a", "features": [], "numpy": [],
-                             "libm": []}]),
     }  # fmt: skip
     write_results(folder / "valid.h5", attrs.evolve(results, flocs=("a", "b", "c", "d"), run=run))
     return read_sealed(folder / "valid.h5")

@@ -18,8 +18,9 @@ def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
     """The state of a study of one condition on one rank, none of it done."""
     schedule = Schedule.of([[]], list(borders), 1)
     study = SimpleNamespace(
-        allowed=allowed, pieces=1, left_of=lambda parts: None, counts_part=lambda name: False
-    )
+        allowed=allowed, pieces=1, left_of=lambda parts: None, counts_part=lambda name: False,
+        has_failed=lambda column: column("outcome") == 6,
+    )  # fmt: skip
     return StudyState(schedule, RowStore(Journal(), (CONDITION,)), study, is_enough)
 
 
@@ -28,4 +29,5 @@ def result_of(chunk, count=None, failed=0):
     count = chunk.stop - chunk.first if count is None else count
     rows = np.zeros(count, ROW)
     rows["steps"] = chunk.first + np.arange(count)
-    return ChunkResult(chunk, rows, failed, (NOTE,) * failed)
+    rows["outcome"][:failed] = 6
+    return ChunkResult(chunk, rows, (NOTE,) * failed)

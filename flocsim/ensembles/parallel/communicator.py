@@ -18,10 +18,11 @@ gone. A rank at work sends Going now and then. A rank without rank 0 is ended by
 """
 
 import collections
+import contextlib
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -81,12 +82,11 @@ class Silence:
 
 @attrs.frozen
 class ChunkResult:
-    """What came of a chunk: the ``rows`` of its first replicates; how many have ``failed``, and
-    ``notes`` on them."""
+    """What came of a chunk: the ``rows`` of its first replicates, and ``notes`` on those that have
+    failed."""
 
     chunk: "Chunk"
     rows: Any
-    failed: int = 0
     notes: tuple[dict, ...] = ()
 
 
@@ -124,15 +124,17 @@ class Halt:
     """Give up the replicate at hand, and hand in what is finished."""
 
 
-@attrs.frozen
-class Failed:
-    """An error has ended rank 0's study, and now ends the other ranks with its exit code."""
+class Failed(FlocsimError):
+    """What the other ranks get of an error of rank 0, which says why: its exit code."""
 
-    code: int
+    def __init__(self, exit_code: int) -> None:
+        super().__init__(exit_code)
+        self.exit_code = exit_code
 
 
-class RankZeroFailed(Exception):
-    """What the other ranks have of an error of rank 0, which says why; the argument is the code."""
+class SharedError(Exception):
+    """An error that has ended the study on all ranks; the argument is the error on rank 0, and a
+    `Failed` with its exit code on the others."""
 
 
 class Communicator:
@@ -175,7 +177,7 @@ class Communicator:
                 yield source, self.inbox[source].popleft()
 
     def receive(self, source: int, heed_signals: bool = True) -> Any:
-        """Return the next message of a rank; RankZeroFailed where rank 0 sends that instead.
+        """Return the next message of a rank; SharedError where an error has ended rank 0 instead.
 
         On rank 0, StopRequested where a signal comes first, and SilentRank where nothing comes for
         too long.
@@ -194,7 +196,7 @@ class Communicator:
             time.sleep(SLEEP)
         message = self.inbox[source].popleft()
         if isinstance(message, Failed):
-            raise RankZeroFailed(message.code)
+            raise SharedError(message)
         return message
 
     def gather(self, value: Any, heed_signals: bool = True) -> list | None:
@@ -214,6 +216,28 @@ class Communicator:
 
     def barrier(self, heed_signals: bool = True) -> None:
         self.broadcast(self.gather(None, heed_signals))
+
+    @contextlib.contextmanager
+    def sharing_errors(self, call_back: Callable[[], bool] = lambda: True) -> Iterator[None]:
+        """Let an error of rank 0 end the other ranks in good order, so that all have one exit code.
+
+        ``call_back`` calls them back from their work first; False where one of them does not come.
+        """
+        try:
+            yield
+        except FlocsimError as error:
+            if not call_back():
+                raise
+            self.broadcast(Failed(error.exit_code))
+            raise SharedError(error) from error
+
+    def agree(self, problem: FlocsimError | None) -> None:
+        """Go on once no rank has a problem; SharedError on all ranks where one has."""
+        with self.sharing_errors():
+            for each in self.gather(problem) or []:
+                if each is not None:
+                    raise each
+        self.broadcast(None)
 
     def close(self) -> None:
         """The work is done: wait for all ranks to say so, and let them go."""

@@ -263,6 +263,4 @@ def run_chunk(
         rows[count] = tuple(row[name] for name in rows.dtype.fields or ())
         notes += [note] if note else []
         count += 1
-    rows, notes = rows[:count], notes[:MOST_NOTES]
-    failed = int(np.sum(study.has_failed(rows.__getitem__)))
-    return ChunkResult(chunk._replace(left=None), rows, failed, tuple(notes))
+    return ChunkResult(chunk._replace(left=None), rows[:count], tuple(notes[:MOST_NOTES]))

@@ -14,6 +14,7 @@ from typing import Any
 
 from flocsim.ensembles.parallel.communicator import Communicator, StopRequested
 from flocsim.errors import FlocsimError, UsageError
+from flocsim.io.terminal import plain_warnings
 from flocsim.process import (
     INTERRUPTION,
     LAUNCHER_RANKS,
@@ -179,18 +180,14 @@ class ProcessCommunicator(Communicator):
         os._exit(code)
 
 
-def start_processes(
-    jobs: int, target: Callable[[Communicator, Any], int], arguments: Any
-) -> ProcessCommunicator:
-    """Start ``jobs`` − 1 processes that call ``target(communicator, arguments)``; rank 0's own."""
+def start_processes(jobs: int, target: Callable[[Communicator], int]) -> ProcessCommunicator:
+    """Start ``jobs`` − 1 processes that call ``target(communicator)``; rank 0's own."""
     context = multiprocessing.get_context("spawn")
     pipes: dict[int, Connection] = {}
     others: list[BaseProcess] = []
     for rank in range(1, jobs):
         pipes[rank], far_end = context.Pipe()
-        process = context.Process(
-            target=join_job, args=(target, rank, jobs, far_end, arguments), daemon=True
-        )
+        process = context.Process(target=join_job, args=(target, rank, jobs, far_end), daemon=True)
         process.start()
         far_end.close()
         others.append(process)
@@ -201,10 +198,12 @@ def start_processes(
 
 def in_copies(works: Sequence[Callable[[], object]]) -> None:
     """Do some works side by side in copies of this process, for what they leave on the disk: what
-    they take of memory is given back. Nothing is done where processes cannot be copied, and nothing
-    fails: who needs what a work leaves does it again. The first one alone says something.
+    they take of memory is given back. Nothing fails: who needs what a work leaves does it again.
+    The first one alone says something. Where processes cannot be copied this one does the work.
     """
     if sys.platform != "linux":
+        for work in works:
+            work()
         return
     context = multiprocessing.get_context("fork")
     copies = [
@@ -232,9 +231,10 @@ def as_copy(work, silent):
         work()
 
 
-def join_job(target, rank, jobs, pipe, arguments):
-    """Where a process that rank 0 has started begins."""
+def join_job(target, rank, jobs, pipe):
+    """Begin as a process that rank 0 has started."""
     install()
     end_with_parent()
     INTERRUPTION.speaks = False
-    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe}), arguments))
+    plain_warnings(silent=True)
+    sys.exit(target(ProcessCommunicator(rank, jobs, {0: pipe})))

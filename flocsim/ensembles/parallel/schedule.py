@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import attrs
+import numpy as np
 
 from flocsim.ensembles.kind import MOST_ROWS, Chunk, Interval, StudyKind, missing, total
 from flocsim.ensembles.parallel.communicator import ChunkResult, Kept
@@ -186,7 +187,7 @@ class StudyState:
                 self.begun.pop((condition, replicate), None)
         self.computed += count
         self.schedule.give_back(result.chunk, count)
-        self.failed += result.failed
+        self.failed += int(np.sum(self.study.has_failed(result.rows.__getitem__)))
         if self.failed > self.study.allowed:
             notes = self.store.notes
             raise TooManyFailures(

@@ -7,7 +7,7 @@ journal or a results file has beyond what is asked for stays where it is, or the
 import os
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from flocsim.io.files import Rule, keep, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import DAMAGED, ROWS, Journal, journal_path
 from flocsim.io.outputs import extension_rule, in_the_way
-from flocsim.io.results.run_group import distinct, now, source_line, stored
+from flocsim.io.results.run_group import now, processor, source_line, stored
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
@@ -34,7 +34,7 @@ WAYS = (
 """What a user can do about a file in the place of the results."""
 
 MOST_DIFFERENCES = 5
-HISTORY = ("date", "command")
+HISTORY = ("date", "command", "processor")
 """What is kept of a run that contributed to a results file."""
 
 
@@ -42,18 +42,14 @@ HISTORY = ("date", "command")
 class Beginning:
     """What a study starts from.
 
-    ``remarks`` are for the user; ``history`` has date and command of the runs before.
-    ``cpus_now`` are the kinds of CPU that this run computes on, ``cpus_found`` those that the found
-    rows are of. ``replacing`` says what becomes of a file at the place of the results when they are
-    written. ``rules`` are the rules that end a study early, by session. ``old`` is the results file
-    that is extended, its rows being in the journal by now, and ``at_least`` how many replicates
-    each condition has there.
+    ``remarks`` are for the user; ``history`` has HISTORY of the runs before. ``replacing`` says
+    what becomes of a file at the place of the results when they are written. ``rules`` are the
+    rules that end a study early, by session. ``old`` is the results file that is extended, its rows
+    being in the journal by now, and ``at_least`` how many replicates each condition has there.
     """
 
     store: RowStore
     identity: dict
-    cpus_now: list[dict] = attrs.Factory(list)
-    cpus_found: list[dict] = attrs.Factory(list)
     remarks: list[str] = attrs.Factory(list)
     history: list[dict] = attrs.Factory(list)
     rules: dict[int, list | None] = attrs.Factory(dict)
@@ -135,10 +131,9 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 
 def begin(
     study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
-    old_rows: Callable[[Any], AbstractContextManager[OldResults]], cpus: Sequence[dict] = (),
-    overwrite: bool = False,
+    old_rows: Callable[[Any], AbstractContextManager[OldResults]], overwrite: bool = False,
 ) -> Beginning:  # fmt: skip
-    """Return the Beginning of a study, run on these kinds of CPU, with results in ``output``.
+    """Return the Beginning of a study with results in ``output``.
 
     ``journal``: as `claim` gave it; ``old_rows`` of the Kind. Raises UsageError where what lies
     there is of another config, of other shapes or other physics, has rows that this study would
@@ -146,14 +141,13 @@ def begin(
     aside.
     """
     store = RowStore(journal, study.conditions, study.row, short(identity))
-    start = Beginning(store, identity, list(cpus))
+    start = Beginning(store, identity)
     for number, session in sessions_of(journal).items():
         refuse_other(start, journal.path, session["identity"])
         if session["layout"] != layout(study.row):
             raise UsageError(f"{journal.path} was written by another version of flocsim: {REMEDY}")
         store.known.add(short(session["identity"]))
         start.history.append({key: session[key] for key in HISTORY})
-        start.cpus_found = distinct([*start.cpus_found, *session.get("cpus", [])])
         start.rules[number] = session.get("rule")
     if mode == RESUME and os.path.lexists(ordinary_target(output)):
         try:
@@ -175,7 +169,7 @@ def begin(
     ends_early = None if stop.half_width is None else [stop.half_width, list(stop.of), stop.least]
     store.session = journal.add_session({
         "kind": study.format, "identity": identity, "layout": layout(study.row), "date": now(),
-        "command": shlex.join(sys.argv), "cpus": start.cpus_now, "rule": ends_early,
+        "command": shlex.join(sys.argv), "processor": processor(), "rule": ends_early,
         "asked": study.asked(), "source": source_line(study.source),
     })  # fmt: skip
     start.rules[store.session] = ends_early
@@ -199,7 +193,7 @@ def take_results(
     try:
         old = resources.enter_context(old_rows(output))
         refuse_other(start, output, stored(old.run, "identity"), ELSEWHERE)
-        failed, cpus, history = (stored(old.run, name) for name in ("failed", "cpus", "history"))
+        failed, history = stored(old.run, "failed"), stored(old.run, "history")
         with start.journal.together():
             start.journal.discard(ROWS, "session IS NULL")
             for condition, first, rows in old.chunks:
@@ -212,7 +206,6 @@ def take_results(
         resources.close()
     start.old = old
     start.store.notes += failed
-    start.cpus_found = distinct([*cpus, *start.cpus_found])
     earlier = {key: old.run[key] for key in HISTORY if key in old.run}
     start.history = [*history, earlier, *start.history]
 

@@ -183,11 +183,8 @@ class RowStore:
 
     def check_record(self, record: Row) -> None:
         """ValueError for a record of another study, or of no replicate."""
-        known = {self.identity, *self.known}
-        first = record["first"]
-        if record["identity"] not in known or not isinstance(first, int):
-            raise ValueError("a record is of no run of this study")
-        if not 0 <= first < LARGEST_REPLICATE:
+        first, known = record["first"], {self.identity, *self.known}
+        if record["identity"] not in known or first not in range(LARGEST_REPLICATE):
             raise ValueError("a record is of no run of this study")
 
     def intervals(self, place: int) -> list[Interval]:

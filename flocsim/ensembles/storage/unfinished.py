@@ -2,7 +2,6 @@
 it goes on. A kind of study makes of its rows what it makes of those of a finished one.
 """
 
-import math
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,6 @@ from flocsim.io.journal import JournalReader, read_journal
 from flocsim.io.json_text import matches
 
 ASKED = {"types": [str], "vertices": [int], "delta": [float], "replicates": int}
-
-MOST_CONDITIONS = 20_000
-"""Of a study that is read while it runs."""
 
 
 @attrs.frozen(eq=False)
@@ -55,12 +51,6 @@ def store_of(journal: JournalReader, sessions: list[dict], row: np.dtype) -> Row
     if last["layout"] != layout(row):
         raise FileError(f"{journal.path} was written by another version of flocsim: use that one")
     axes = [last["asked"][name] for name in ORDER]
-    if math.prod(map(len, axes)) > MOST_CONDITIONS:
-        raise FileError(
-            f"{journal.path} has more than {MOST_CONDITIONS} conditions: wait for the results"
-        )
-    if any(len(set(axis)) < len(axis) for axis in axes):
-        raise FileError(f"{journal.path} has the same condition twice")
     conditions = tuple(Condition(*each) for each in product(*axes))
     known = {short(each["identity"]) for each in sessions}
     store = RowStore(journal, conditions, row, known=known)

@@ -1,11 +1,5 @@
 """The group ``run`` of a results file: where a result came from, config, seed, versions, machine,
 date and command line; what it and a journal have as JSON, the form of each, and in words.
-
-A kind of CPU is all that decides the last digits of rows beside the code. Compiled code is made for
-the CPU at hand (a fused multiply-add rounds once, where two operations round twice), numpy and the
-C library choose among their own variants. On one kind of CPU a replicate is the same bytes always;
-between kinds it may differ in its last digits, and a collision that is close to a decision may end
-otherwise.
 """
 
 import contextlib
@@ -23,12 +17,11 @@ from flocsim.io.json_text import matches, read_json
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
 """What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
-CPU = {"cpu": str, "compiled_for": str, "features": [str], "numpy": [str], "libm": [str]}
-SESSION = {"identity": {}, "layout": str, "date": str, "command": str}
+SESSION = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
 DEFAULTS: dict[str, Any] = {
-    "identity": {}, "failed": [], "history": [], "cpus": [], "overrides": {}, "warnings": [],
+    "identity": {}, "failed": [], "history": [], "overrides": {}, "warnings": [],
     "settling": [], "size_classes": [], "equivalent_spheres": [],
 }  # fmt: skip
 """Names in the group ``run`` of what it has as JSON, and what that is where there is none."""
@@ -48,25 +41,7 @@ def stored(run: Mapping[str, Any], name: str) -> Any:
 
 def is_session(description: dict) -> bool:
     """Return True if a description, whoever wrote it, can be that of a session of a journal."""
-    return matches(description, SESSION) and matches(description.get("cpus", []), [CPU])
-
-
-MOST_FEATURES = 4
-"""Features by which a message tells two kinds apart."""
-
-
-def distinct(kinds: Sequence[dict]) -> list[dict]:
-    """Return each kind once, in the order in which they come."""
-    return [kind for place, kind in enumerate(kinds) if kind not in kinds[:place]]
-
-
-def describe_kind(kind: dict, others: Sequence[dict] = ()) -> str:
-    """Return a kind of CPU in words: its name, and what it has that one of the others has not."""
-    more = [] if kind["compiled_for"] == kind["cpu"] else [f"compiled for {kind['compiled_for']}"]
-    for name in ("features", "numpy", "libm"):
-        own = [each for each in kind[name] if any(each not in other[name] for other in others)]
-        more += own[:MOST_FEATURES]
-    return f"{kind['cpu']} ({', '.join(more)})" if more else str(kind["cpu"])
+    return matches(description, SESSION)
 
 
 def describe_note(note: dict) -> str:

@@ -6,7 +6,7 @@ import attrs
 import pytest
 
 from flocsim import Sphere
-from flocsim.ensembles.cli import main
+from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import nested, parse_setting
 from flocsim.ensembles.config.schema import FORCES
 from flocsim.errors import ConfigError
@@ -159,6 +159,6 @@ def test_settings_lie_over_the_file_and_are_kept(tmp_path):
 def test_a_wrong_setting_is_one_line(tmp_path, monkeypatch, capsys, setting, said):
     monkeypatch.chdir(tmp_path)
     write_small(tmp_path)
-    assert main(["small.toml", "--set", setting]) == 2
+    assert main(["ensemble", "small.toml", "--set", setting]) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert said in line

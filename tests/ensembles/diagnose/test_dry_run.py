@@ -58,7 +58,7 @@ def test_a_signal_ends_the_pilot(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pilot, "stop_requested", lambda: True)
     monkeypatch.setattr(cli, "stop_requested", lambda: True)
-    assert cli.main(["small.toml", "--dry-run", "--pilot"]) == 75
+    assert main(["ensemble", "small.toml", "--dry-run", "--pilot"]) == 75
     assert capsys.readouterr().out == ""
 
 
@@ -78,6 +78,6 @@ def test_a_dry_run_compiles_nothing(tmp_path, monkeypatch, kind):
 def test_a_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
     write_small(tmp_path, vertices="[1]")
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["small.toml", "--pilot"]) == 2
-    assert capsys.readouterr().err == "--pilot is for --dry-run: leave it out\n"
+    assert main(["ensemble", "small.toml", "--pilot"]) == 2
+    assert capsys.readouterr().err == "flocsim: --pilot is for --dry-run: leave it out\n"
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]

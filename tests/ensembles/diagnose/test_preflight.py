@@ -8,7 +8,7 @@ import attrs
 import pytest
 from scipy.integrate import solve_ivp
 
-from flocsim.ensembles import cli
+from flocsim.__main__ import main
 from flocsim.ensembles.collision.equivalent import sphere_pairs
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.contents import info_of
@@ -146,7 +146,7 @@ def test_the_command_refuses_before_it_runs(tmp_path, monkeypatch, capsys):
     write_small(tmp_path)
     monkeypatch.chdir(tmp_path)
     for words in ((), ("--dry-run",)):
-        assert cli.main(["small.toml", "--set", "bodies.surface_density=20", *words]) == 2
+        assert main(["ensemble", "small.toml", "--set", "bodies.surface_density=20", *words]) == 2
         said = capsys.readouterr()
         assert said.out == "" and "forces.contact.k_n 90 N/m or more" in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
@@ -244,7 +244,7 @@ def test_a_dry_run_tells_numbers_and_doubts(tmp_path):
 
 def test_a_run_tells_them_once_and_keeps_them(folder, capsys):
     write_small(folder, name="small.toml", vertices="[1]", replicates=1, delta="[0.0]")
-    assert cli.main(["small.toml", "--set", "bodies.surface_density=3"]) == 0
+    assert main(["ensemble", "small.toml", "--set", "bodies.surface_density=3"]) == 0
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith("flocsim: warning: a body of r_eq = 23.02 um settles at 126.9 mm/s")
     run = read_results(folder / "small.h5").run

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from flocsim.ensembles.cli import main
+from flocsim.__main__ import main
 from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
@@ -37,7 +37,7 @@ def serial(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mpi")
     write_small(folder, vertices="[1, 4]")
     words = [str(folder / "small.toml"), "--output", str(folder / "serial.h5"), "--quiet"]
-    assert main(words) == 0
+    assert main(["ensemble", *words]) == 0
     return folder
 
 
@@ -60,8 +60,8 @@ def test_any_number_of_ranks_gives_the_same_bytes(serial, ranks):
 
 PROBE = """\
 import sys
-from flocsim.ensembles.cli import main
-code = main(["small.toml", "--output", "probe.h5", "--dry-run"])
+from flocsim.__main__ import main
+code = main(["ensemble", "small.toml", "--output", "probe.h5", "--dry-run"])
 print("modules of mpi4py:", sorted(name for name in sys.modules if name.split(".")[0] == "mpi4py"))
 sys.exit(code)
 """
@@ -255,9 +255,9 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, monkeypatch
     assert not (serial / f"late{ranks}.h5").exists()
     again = ["small.toml", "--output", f"late{ranks}.h5"]
     monkeypatch.chdir(serial)
-    assert main(again) == 2
+    assert main(["ensemble", *again]) == 2
     assert "holds an unfinished run: continue it with --resume" in capsys.readouterr().err
-    assert main([*again, "--resume"]) == 0
+    assert main(["ensemble", *again, "--resume"]) == 0
     # What was computed beyond the three replicates that are asked for now is not thrown away.
     beyond = "has more rows than were asked for, and is kept"
     lines = unexpected(capsys.readouterr().err)

@@ -7,8 +7,8 @@ import shutil
 import h5py
 import pytest
 
-from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.parallel.communicator import Communicator, SharedError
+from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FlocsimError
@@ -83,7 +83,7 @@ def put(name, value):
 
 CHANGES = (
     [put("identity", text) for text in ("[]", "{", "[" * 10**5, "NaN", 7, "")]
-    + [put(name, text) for name in ("failed", "history", "cpus")
+    + [put(name, text) for name in ("failed", "history")
        for text in ("{}", "[1]", '[{"a": ' * 50, 1.5)]
     + [lambda file: file["replicates/failure"].attrs.modify("flag_meanings", "a b c")]
 )  # fmt: skip

@@ -4,10 +4,10 @@ import shutil
 
 import pytest
 
-from flocsim.ensembles import cli
+from flocsim.__main__ import main
 from flocsim.ensembles.pairs import study as pairs
-from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.parallel.communicator import Communicator, SharedError
+from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.errors import FileError, UsageError
 from flocsim.io.results.file import read_results
@@ -155,7 +155,7 @@ def test_the_results_have_the_name_of_the_config(tmp_path, monkeypatch, capsys):
     for folder in ("", "sub/"):
         (tmp_path / folder).mkdir(exist_ok=True)
         path = path.replace(tmp_path / folder / "weather.toml")
-        assert cli.main([f"{folder}weather.toml", "--quiet", "--overwrite"]) == 0
+        assert main(["ensemble", f"{folder}weather.toml", "--quiet", "--overwrite"]) == 0
     assert {each.name for each in tmp_path.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
-    assert cli.main(["sub/weather.toml", "-o", "sub/other.h5", "--quiet"]) == 0
+    assert main(["ensemble", "sub/weather.toml", "-o", "sub/other.h5", "--quiet"]) == 0
     assert (tmp_path / "sub/other.h5").exists()

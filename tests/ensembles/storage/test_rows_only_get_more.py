@@ -9,8 +9,8 @@ import pytest
 
 from flocsim.ensembles import runner
 from flocsim.ensembles.parallel import coordinator
-from flocsim.ensembles.parallel.communicator import Communicator
-from flocsim.ensembles.runner import SharedError, run_to_file
+from flocsim.ensembles.parallel.communicator import Communicator, SharedError
+from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, KernelError, UsageError

@@ -19,11 +19,11 @@ RESULTS = make_results(types=("I", "III"), vertices=(1, 8), delta=(0.0, 1.0), co
 ASKED = {"types": ["I", "III"], "vertices": [1, 8], "delta": [0.0, 1.0], "replicates": 40}
 
 
-def write_journal(path, asked=ASKED):
+def write_journal(path):
     """A locked journal: all of type I, of type III replicates 10 to 25 at N = 8, delta = 0."""
     session = {
         "kind": "flocsim results", "identity": {}, "layout": layout(), "date": "2020",
-        "command": "x y", "asked": asked,
+        "command": "x y", "processor": "z", "asked": ASKED,
     }  # fmt: skip
     journal = Journal(path)
     journal.add_session(session)
@@ -96,22 +96,6 @@ def test_finished_results_are_read_themselves(tmp_path):
     assert journal_of(tmp_path / "r.h5") == tmp_path / "r.h5.journal"
     (tmp_path / "r.h5").write_bytes(b"")
     assert journal_of(tmp_path / "r.h5") is None
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (
-            {"types": ["I", *map(str, range(300))], "delta": [*range(300)]},
-            "has more than 20000 conditions",
-        ),
-        ({"types": ["I"] * 300}, "the same condition twice"),
-    ],
-)
-def test_a_journal_of_too_many_conditions_is_refused_at_once(tmp_path, asked, said):
-    write_journal(tmp_path / "r.h5.journal", asked=ASKED | asked).release()
-    with pytest.raises(FileError, match=said):
-        read_unfinished(tmp_path / "r.h5.journal")
 
 
 def test_what_is_read_grows_with_the_rows_and_not_with_their_numbers(tmp_path, monkeypatch):
