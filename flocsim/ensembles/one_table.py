@@ -62,9 +62,7 @@ class OneTable(Contents):
         found: Stored = self.file.stored({ROWS: columns}, axes, run)
         return found
 
-    def results(
-        self, study: Any, start: Any, count: int, run: dict, output: Any, in_memory: bool
-    ) -> Stored:
+    def results(self, study: Any, start: Any, count: int, run: dict, output: Any) -> Stored:
         """Return the results of a study, written to the output if there is one."""
         found = self.stored(start.store, study.asked(), count, run)
         if output is not None:
@@ -85,7 +83,7 @@ class OneTable(Contents):
 
     def so_far(self, store: Any, asked: dict[str, Any]) -> tuple[Stored, int, int]:
         """Return as many replicates as there are of each condition."""
-        runs = [store.intervals(place)[:1] for place in range(len(store.conditions))]
+        runs = [store.runs[place][:1] for place in range(len(store.conditions))]
         there = min(each[0][1] if each and each[0][0] == 0 else 0 for each in runs)
         if there == 0:
             raise FileError(f"{store.journal.path} lacks some condition yet: try again later")

@@ -176,7 +176,10 @@ def lead(
     if output is not None:
         INTERRUPTION.kept = partial(kept_words, start, state)
     remaining = state.schedule.remaining
-    progress.say(announcement(study, comm.size, study.size - remaining))
+    ranks, existing = comm.size, study.size - remaining
+    line = f"{study.title}, on {ranks} rank{'s' * (ranks > 1)}"
+    line += f"; {existing} of them exist already" if existing else ""
+    progress.say(f"{line}; {source_line(study.source)}")
     if study.remark:
         progress.say(study.remark)
     comm.broadcast(remaining)
@@ -188,7 +191,7 @@ def lead(
         coordinator.start()
         run_chunks(study, coordinator)
         coordinator.finish()
-        start.journal.sync()
+        start.store.journal.sync()
         progress.finish()
         final = state.schedule.final
         ended = Ended(STOPPED if final < 0 else 0, None, state.computed, count=final)
@@ -206,7 +209,7 @@ def kept_words(start: Beginning, state: StudyState) -> str:
     if not count and not begun:
         return "no replicate was finished"
     others = f" and the states of {begun} others" if begun else ""
-    return f"{count} finished replicates{others} are in {start.journal.path}"
+    return f"{count} finished replicates{others} are in {start.store.journal.path}"
 
 
 def compile_in_turn(study, comm):
@@ -243,13 +246,11 @@ def make_results(
     output: str | Path | None,
 ) -> Any:  # fmt: skip
     """The results of a finished study; written to ``output``, where there is one."""
-    count, in_memory = state.schedule.final, output is None
-    if output and (old := start.old) is not None and start.is_covered(count):
-        if (tuple(old.conditions), old.count) == (study.conditions, count):
-            return file_kind(output).read(output)  # as it is: nothing has been added
-        output = None  # it has more than was asked for, and keeps it
+    count = state.schedule.final
+    if output and start.is_covered(count):
+        return file_kind(output).read(output)  # it has all that was asked for, and stays
     run = facts(study, start, ended, ranks)
-    return contents_of(study.format).results(study, start, count, run, output, in_memory)
+    return contents_of(study.format).results(study, start, count, run, output)
 
 
 def facts(study, start, ended, ranks):
@@ -272,9 +273,3 @@ def facts(study, start, ended, ranks):
         "warnings": storable(json.dumps(study.doubts())),
         **{k: storable(v) if isinstance(v, str) else v for k, v in more.items()},
     }
-
-
-def announcement(study: StudyKind, ranks: int, existing: int = 0) -> str:
-    line = f"{study.title}, on {ranks} rank{'s' if ranks > 1 else ''}"
-    line += f"; {existing} of them exist already" if existing else ""
-    return f"{line}; {source_line(study.source)}"

@@ -7,7 +7,7 @@ from flocsim.ensembles.estimates.statistics import EXACT_RUNS
 from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.schedule import Phase
-from flocsim.ensembles.runner import announcement, lead, make_state, run
+from flocsim.ensembles.runner import lead, make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import Study
@@ -136,10 +136,3 @@ def test_run_is_the_whole_way(tmp_path, capsys):
     for name, part in (("a.h5", results), ("b.h5", run(config))):
         write_results(tmp_path / name, part)
     assert same_data(tmp_path / "a.h5", tmp_path / "b.h5") == []
-
-
-def test_the_run_is_announced_in_one_line(study):
-    line = "36 replicates: 2 types x 3 vertex counts x 2 displacements x 3, on "
-    source = "; 2 synthetic flocs grown by flocsim · preset tang2014 · flocsim "
-    assert announcement(study, 1).startswith(line + "1 rank" + source)
-    assert announcement(study, 4, 7).startswith(line + "4 ranks; 7 of them exist already" + source)

@@ -52,14 +52,13 @@ def old_rows(output: str | Path) -> Iterator[OldResults]:
 
 
 def results(
-    study: Study, start: Beginning, count: int, run: dict, output: str | Path | None,
-    in_memory: bool,
-) -> Results:  # fmt: skip
-    """The Results of so many replicates; written to ``output``, if any."""
+    study: Study, start: Beginning, count: int, run: dict, output: str | Path | None
+) -> Results:
+    """The Results of so many replicates; written to ``output``, or with all rows in memory."""
     reader = summary.Reader(start.store, (*study.shape[:3], count))
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
-    rows = reader.table() if in_memory else None
+    rows = reader.table() if output is None else None
     found = summary.results_of(study, count, sums, run, rows, kernel)
 
     def part(where: Sequence[slice]) -> np.ndarray:

@@ -111,7 +111,7 @@ class Coordinator:
         An error is raised by the next `exchange`: here it would count as one of the replicate.
         """
         with self.lock:
-            self.state.store.writer.sync_when_due()
+            self.state.store.journal.sync_when_due()
         if self.comm.size > 1 and self.thread is None:
             self.serve()
         self.look()
@@ -155,7 +155,7 @@ class Coordinator:
         try:
             while self.present and self.state.phase is not Phase.GIVEN_UP:
                 with self.lock:
-                    self.state.store.writer.sync_when_due()
+                    self.state.store.journal.sync_when_due()
                 if not self.serve():
                     time.sleep(SLEEP)
         except BaseException as error:

@@ -118,15 +118,11 @@ def shape_numbers(shape):
         shape.radius, shape.area, shape.second_moment, shape.equivalent_radius,
         shape.bounding_radius,
     )  # fmt: skip
+    rings = point_columns(shape) if shape.is_compound else ()
     placed = [shape.placed_vertices(angle=angle) for angle in SAMPLE_ANGLES]
     return np.concatenate(
-        [np.ravel(shape.vertices), *map(np.ravel, placed), numbers, ring_numbers(shape)]
+        [np.ravel(shape.vertices), *map(np.ravel, placed), numbers, np.ravel(rings)]
     )
-
-
-def ring_numbers(shape):
-    """What rings and parts a shape has; nothing of one of a single ring."""
-    return np.ravel(point_columns(shape)) if shape.is_compound else np.zeros(0)
 
 
 SAMPLE_ANGLES = (0.0, 1.0, 4.0)
@@ -214,7 +210,10 @@ def differences(stored: dict, current: dict) -> list[str]:
         if kind in EXPLAINED:
             lines.append(EXPLAINED[kind].format(rest))
         else:
-            there, here = show(stored.get(name)), show(current.get(name))
+            there, here = (
+                json.dumps(each[name]) if each.get(name) is not None else "nothing"
+                for each in (stored, current)
+            )
             lines.append(f"{name} is {there} in the file, {here} now")
     return lines
 
@@ -230,7 +229,3 @@ EXPLAINED = {
     "own, Python, numba or numpy)",
 }
 """First part of a name → words in place of two hashes."""
-
-
-def show(value):
-    return "nothing" if value is None else json.dumps(value)

@@ -57,11 +57,6 @@ class Beginning:
     replacing: Rule = keep
     old: OldResults | None = None
 
-    @property
-    def journal(self) -> Journal:
-        """Where finished chunks go."""
-        return self.store.writer
-
     def is_covered(self, count: int) -> bool:
         """Return True if the older results file has so many replicates of all conditions."""
         return (
@@ -91,7 +86,7 @@ class Beginning:
         return any(
             condition not in self.store.indices
             or (stop > count and (rule is None or self.rules.get(session) != rule))
-            for condition, session, stop in self.journal.db.execute(query)
+            for condition, session, stop in self.store.journal.db.execute(query)
         )
 
 
@@ -194,8 +189,8 @@ def take_results(
         old = resources.enter_context(old_rows(output))
         refuse_other(start, output, stored(old.run, "identity"), ELSEWHERE)
         failed, history = stored(old.run, "failed"), stored(old.run, "history")
-        with start.journal.together():
-            start.journal.discard(ROWS, "session IS NULL")
+        with start.store.journal.together():
+            start.store.journal.discard(ROWS, "session IS NULL")
             for condition, first, rows in old.chunks:
                 start.store.copy(condition, first, rows)
     except FlocsimError:
@@ -213,7 +208,7 @@ def take_results(
 def take_journal(start: Beginning, study: StudyKind) -> None:
     """Take the rows and parts that a journal has; what is damaged is deleted, so that it is
     computed again."""
-    journal, store = start.journal, start.store
+    store, journal = start.store, start.store.journal
     store.load(study.check_whole, start.old is not None)
     for table, number in store.refused:
         journal.discard(table, "id=?", number)

@@ -29,7 +29,6 @@ from flocsim.io.journal import (
     PART,
     ROWS,
     SESSION,
-    Journal,
     JournalReader,
     as_text,
 )
@@ -76,8 +75,8 @@ class Parts:
 
 @attrs.define(eq=False)
 class RowStore:
-    """The rows of a study's ``conditions`` in a journal, and its ``parts`` {(index of the
-    condition, replicate): Parts}.
+    """The rows of a study's ``conditions`` in a ``journal`` (a Journal, or a JournalReader where
+    nothing is added), and its ``parts`` {(index of the condition, replicate): Parts}.
 
     ``identity`` is a digest of what new rows follow from, and ``session`` the run that computes
     them; rows with an identity among ``known`` agree with it. ``runs``: of each condition the
@@ -86,7 +85,7 @@ class RowStore:
     records that are damaged, or that no run of this study can have written.
     """
 
-    journal: JournalReader
+    journal: Any
     conditions: tuple[Condition, ...]
     row: np.dtype = ROW
     identity: str = ""
@@ -104,12 +103,6 @@ class RowStore:
         self.indices = {key_of(condition): k for k, condition in enumerate(self.conditions)}
         self.runs = [[] for _ in self.conditions]
 
-    @property
-    def writer(self) -> Journal:
-        """The journal of a study that runs."""
-        assert isinstance(self.journal, Journal), "opened to be written"
-        return self.journal
-
     def add(self, place: int, first: int, rows: np.ndarray, notes: Sequence[dict] = ()) -> None:
         """Write down the rows of replicates from the ``first`` on, and notes on failed ones."""
         self.write(key_of(self.conditions[place]), first, rows, notes, self.session)
@@ -125,7 +118,7 @@ class RowStore:
         self, key: str, first: int, rows: np.ndarray, notes: Sequence[dict], session: int | None
     ) -> None:
         data = np.ascontiguousarray(rows, self.row).tobytes()
-        self.writer.add(
+        self.journal.add(
             ROWS, self.identity, session, key, first, len(rows), as_text(list(notes)), data
         )
 
@@ -134,7 +127,7 @@ class RowStore:
     ) -> None:
         """Write down what is saved of a replicate, in the place of an earlier part of that name."""
         key = key_of(self.conditions[place])
-        self.parts[place, replicate].ids[name] = self.writer.add(
+        self.parts[place, replicate].ids[name] = self.journal.add(
             PART, self.identity, self.session, key, replicate, name, as_text(dict(about)), data
         )
 
@@ -186,10 +179,6 @@ class RowStore:
         first, known = record["first"], {self.identity, *self.known}
         if record["identity"] not in known or first not in range(LARGEST_REPLICATE):
             raise ValueError("a record is of no run of this study")
-
-    def intervals(self, place: int) -> list[Interval]:
-        """Return the replicates of a condition that exist."""
-        return self.runs[place]
 
     def there(self) -> int:
         """Return how many replicates exist."""

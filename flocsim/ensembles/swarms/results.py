@@ -268,9 +268,8 @@ class SwarmFiles(Contents):
     animate = later("io.plots.swarm", "write_swarm_animation")
 
     def results(
-        self, study: Any, start: Any, count: int, run: dict, output: str | Path | None,
-        in_memory: bool,
-    ) -> SwarmResults:  # fmt: skip
+        self, study: Any, start: Any, count: int, run: dict, output: str | Path | None
+    ) -> SwarmResults:
         """Return the results of so many replicates; written to ``output`` where there is one."""
         store, asked = start.store, study.asked()
         old = [first_of(start.old.found, count)] if start.old else []
