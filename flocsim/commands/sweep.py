@@ -47,7 +47,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def values_of(text: str) -> tuple[str, list[Any]]:
-    """(key, values) of "forces.contact.k_n=1,2" or "…='10 N/m','20 N/m'"."""
+    """Return (key, values) of "forces.contact.k_n=1,2" or "…='10 N/m','20 N/m'"."""
     key, equals, values = text.partition("=")
     if not equals or not key.strip() or not values.strip():
         raise UsageError(f"--over {text!r}: write KEY=VALUE,VALUE")

@@ -182,7 +182,10 @@ def guarded(comm: Communicator, options: argparse.Namespace | None = None) -> in
     try:
         try:
             config, options = agree(comm, options)
-            code = (dry_run if options.dry_run else study)(config, comm, options)
+            if options.dry_run:
+                code = dry_run(config, comm, options)
+            else:
+                code = study(config, comm, options)
         except SharedError as error:
             code = error.args[0].exit_code
             if comm.rank == 0:
@@ -207,25 +210,25 @@ def guarded(comm: Communicator, options: argparse.Namespace | None = None) -> in
         return end_all(comm, text, FlocsimError.exit_code)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Run what the command line asks for, on all ranks of the job; return the exit code."""
-    if options.parent is not None:
-        end_with_parent(options.parent)
+    if arguments.parent is not None:
+        end_with_parent(arguments.parent)
     comm = Communicator()
     try:
         comm = find_communicator()
         ranks = comm.size
-        if options.jobs > 1 and comm.size == 1 and not options.dry_run:
-            comm, ranks = start_processes(options.jobs, guarded), 0
+        if arguments.jobs > 1 and comm.size == 1 and not arguments.dry_run:
+            comm, ranks = start_processes(arguments.jobs, guarded), 0
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
     INTERRUPTION.kept = lambda: "nothing more was finished"
-    if options.parent is None and not options.dry_run:  # a parent says how it goes on
+    if arguments.parent is None and not arguments.dry_run:  # a parent says how it goes on
         INTERRUPTION.command = continuing(ranks)
-    if options.quiet:
+    if arguments.quiet:
         units.show_by(units.silent)
-    return guarded(comm, options)
+    return guarded(comm, arguments)
 
 
 ANEW = re.compile("--(resu|rest|overw)[a-z]*")

@@ -129,6 +129,7 @@ def join(config: Config, comm: Communicator) -> tuple[StudyKind, dict]:
             if comm.rank == 0:
                 raise
             problem = type(error)(f"rank {comm.rank}: {error}")
+    # Every rank compares its own table with rank 0's; a difference anywhere stops all.
     leader = comm.broadcast(own)
     if own is not None and (line := first_difference(comm.rank, leader, own)):
         problem = UsageError(line)
@@ -154,7 +155,7 @@ def first_difference(rank: int, leader: dict, own: dict) -> str:
 
 
 def follow(study: StudyKind, comm: Communicator) -> Ended:
-    """What every rank but 0 does: run chunks for rank 0 until there are no more."""
+    """Run chunks for rank 0 until there are no more, as every other rank does."""
     if comm.broadcast(None):
         compile_in_turn(study, comm)
     # From here on a signal is rank 0's business, which waits for all ranks to report.
@@ -166,7 +167,7 @@ def lead(
     study: StudyKind, start: Beginning, comm: Communicator, progress: Progress,
     output: str | Path | None = None,
 ) -> Ended:  # fmt: skip
-    """What rank 0 does: run what is missing, with the others; make the Results.
+    """Run what is missing, together with the other ranks, and make the results, as rank 0 does.
 
     They are written into the file ``output`` if given.
     """
@@ -221,9 +222,10 @@ def compile_in_turn(study, comm):
 
 
 def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
-    """The StudyState of what is missing, for so many ranks."""
+    """Return the StudyState of what is missing, for so many ranks."""
     replicates, stop = study.config.replicates, study.config.stop
     found, store = start.found(replicates), start.store
+    # Failed replicates of earlier runs count towards stop.failed as well.
     failed = sum(
         int(np.sum(study.has_failed(rows.__getitem__)))
         for place in range(len(study.conditions)) for rows in store.all_rows(place)
@@ -233,6 +235,7 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     is_enough = contents_of(study.format).stop_rule(study, store)
     schedule = Schedule.of(found, looks, ranks, study.most_rows)
     state = StudyState(schedule, store, study, is_enough, failed)
+    # Saved parts of replicates that are still missing: progress counts them.
     for task, parts in store.parts.items():
         place, replicate = task
         there = any(first <= replicate < end for first, end in found[place])
@@ -245,7 +248,7 @@ def make_results(
     study: StudyKind, start: Beginning, state: StudyState, ended: Ended, ranks: int,
     output: str | Path | None,
 ) -> Any:  # fmt: skip
-    """The results of a finished study; written to ``output``, where there is one."""
+    """Return the results of a finished study; they are written to ``output`` if it is given."""
     count = state.schedule.final
     if output and start.is_covered(count):
         return file_kind(output).read(output)  # it has all that was asked for, and stays
@@ -254,6 +257,7 @@ def make_results(
 
 
 def facts(study, start, ended, ranks):
+    """Return the scalars of the group ``run`` of the results file."""
     config, identity = study.config, start.identity
     more = contents_of(study.format).facts(study)
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]

@@ -102,7 +102,7 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
 
 
 def error_of(code: int, said: Sequence[str]) -> FlocsimError:
-    """The error that an exit code stands for, with the last words in a script's terms."""
+    """Return the error that an exit code stands for, with the last line in a script's terms."""
     last = next((line for line in reversed(said) if line.strip()), "without output")
     for word, meant in WORDS.items():
         last = last.replace(word, meant)
@@ -150,7 +150,7 @@ class Study:
         self.config: Config = load_any_config(path, overrides, self.sources)
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **keys: Any) -> "Study":
-        """A new Study with other values: a nested dict, dotted keys, or top-level keys by name.
+        """Return a Study with other values: a nested dict, dotted keys, or top-level keys by name.
 
         ``study.with_({"forces.contact.k_n": "10 N/m"}, seed=3, scene={"delta": [0.0]})``. Checked
         like the file; a force is left out by False, as ``{"forces.double_layer": False}``. Modules
@@ -210,7 +210,7 @@ class Study:
 
     @property
     def names_output(self) -> bool:
-        """Whether the config says where its results go."""
+        """Return True if the config says where its results go."""
         return "file" in lay_over(parse(self.path, self.text), self.overrides).get("output", {})
 
     def check(self) -> None:

@@ -74,6 +74,7 @@ def sweep(
         rule = extension_rule(output)
     check_outputs([Output(output, rule, ways=ways)], [study.path])
     make_folder(parts_folder(output))
+    # A part that is whole already is taken as it is; any other is run as a study of its own.
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):
         tell(f"{number} of {len(parts)}: {path}")
@@ -129,12 +130,12 @@ def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None
 
 
 def parts_folder(output: Path) -> Path:
-    """Where the results of the single values lie."""
+    """Return the folder of the results of the single values."""
     return output.with_name(f"{output.stem}.parts")
 
 
 def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Path, Study]:
-    """{its results file: Study} of every value; UsageError for keys that cannot be swept."""
+    """Return {its results file: Study} of every value; UsageError for keys that cannot be swept."""
     values = {key: list(each) for key, each in over.items()}
     if not values or not all(values.values()):
         raise UsageError("a sweep needs at least one key and one value: --over KEY=VALUE,VALUE")
@@ -176,7 +177,7 @@ def wanted_of(parts: Mapping[Path, Study]) -> dict[Path, tuple[Facts, Facts]]:
 
 
 def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[str, Swept]:
-    """{name of the dimension: Swept}: the key's last part, or all of it where two are alike.
+    """Return {name of the dimension: Swept}: the key's last part, or all of it where two are alike.
 
     Values are those that the configs have, in SI, where they are numbers; else as they were given.
     """
@@ -199,7 +200,7 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
 
 
 def value_of(config: Config, key: str) -> tuple[Any, str]:
-    """(value, unit) of a dotted key in a config; (None, "1") where it has none by itself."""
+    """Return (value, unit) of a dotted key of a config; (None, "1") where it has none by itself."""
     table, *rest = key.split(".")
     owner: Any = config
     if table == "forces" and rest and rest[0] in config.force_names:
@@ -217,7 +218,7 @@ def value_of(config: Config, key: str) -> tuple[Any, str]:
 
 
 def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]:
-    """The groups of all parts with the swept keys as first axes."""
+    """Return the groups of all parts, stacked along the swept keys as first axes."""
     kind = joined_of(parts[0])
     assert kind is not None, "results of a kind that sweeps can run"
     lengths = [len(each.values) for each in swept.values()]
@@ -240,12 +241,12 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
 
 
 def kinds_joined() -> list[Joined]:
-    """What is joined of each kind that sweeps can run."""
+    """Return what is joined of each kind that sweeps can run."""
     return [each.joined for each in studies() if each.joined is not None]
 
 
 def joined_of(results: Any) -> Joined | None:
-    """What is joined of results; None for those of a kind that sweeps cannot run."""
+    """Return what is joined of results; None for those of a kind that sweeps cannot run."""
     name = getattr(results, "format", "")
     found: Joined | None = contents_of(name).joined if name in STUDIES else None
     return found
@@ -258,7 +259,7 @@ def read_joined(path: str | os.PathLike) -> SweepResults:
 
 
 def joined_in(found: SweepResults) -> Joined:
-    """What was joined in a file."""
+    """Return what was joined in a file."""
     return next(each for each in kinds_joined() if each.groups.keys() == found.groups.keys())
 
 

@@ -74,6 +74,7 @@ def journal_of(path: str | Path) -> Path | None:
 
 
 def beside(path: Path, suffix: str) -> Path:
+    """Return the name of a file that belongs to a journal."""
     return path.with_name(path.name + suffix)
 
 
@@ -207,6 +208,7 @@ class Journal(JournalReader):
                 make_tables(db)
             # A commit is safe from a kill at once, and from a power cut with the next sync.
             db.execute("PRAGMA synchronous=NORMAL")
+            # Records have checksums of their own; this is about the pages between them.
             whole = db.execute("PRAGMA integrity_check(1)").fetchone()[0]
             self.is_damaged = whole != "ok"
         except sqlite3.OperationalError:

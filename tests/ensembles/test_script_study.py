@@ -1,9 +1,7 @@
 """Study: from a file or a dict, changed, run as the command runs it, refused in one line."""
 
 import os
-import signal
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from flocsim.ensembles.config.toml_text import settings_of
 from flocsim.errors import ConfigError, PlausibilityWarning, UsageError
 from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
-from tests.helpers.waiting import PATIENCE, wait_until
+from tests.helpers.waiting import PATIENCE
 
 TABLES = {
     "preset": "tang2014", "seed": 1, "replicates": 3,
@@ -187,48 +185,6 @@ def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
 
 
 ENV = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
-SCRIPT = """\
-import flocsim
-if __name__ == "__main__":
-    flocsim.Study("small.toml").run({jobs}, output="run.h5", mode="resume")
-"""
-SWEEP = ["small.toml", "--over", "forces.van_der_waals.hamaker=1e-20,1e-19", "-o", "sweep.h5"]
-
-
-def members(group):
-    """Numbers of the processes of a group that still run."""
-    said = subprocess.run(["ps", "-eo", "pid,pgid,stat"], capture_output=True, text=True).stdout
-    rows = [line.split() for line in said.splitlines()[1:]]
-    return [int(pid) for pid, of, state in rows if int(of) == group and state[0] != "Z"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("what", ["script", "sweep"])
-def test_nobody_outlives_a_kill_and_the_run_goes_on(tmp_path, what, jobs):
-    write_small(tmp_path, replicates=30_000, vertices="[1]")
-    (tmp_path / "run.py").write_text(SCRIPT.format(jobs=jobs))
-    words, journal = [sys.executable, "run.py"], tmp_path / "run.h5.journal"
-    if what == "sweep":
-        words = command("sweep", *SWEEP, "--jobs", jobs, "--resume", module="flocsim")
-        journal = tmp_path / "sweep.parts" / "0000.h5.journal"
-    killed_after(words, tmp_path, journal)
-    killed_after(words, tmp_path, journal)  # where the first has stopped
-
-
-def killed_after(words, folder, journal):
-    """Start a command, kill it once it has written to its journal; nobody is left soon after."""
-    size = journal.stat().st_size if journal.exists() else 0
-    running = subprocess.Popen(words, cwd=folder, env=ENV, start_new_session=True)
-    try:
-        grown = wait_until(lambda: journal.exists() and journal.stat().st_size > size + 5000)
-        assert grown and running.poll() is None
-        running.kill()
-        running.wait()
-        assert wait_until(lambda: not members(running.pid))
-    finally:
-        for pid in members(running.pid):
-            os.kill(pid, signal.SIGKILL)
 
 
 @pytest.mark.slow

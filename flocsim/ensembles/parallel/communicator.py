@@ -156,7 +156,7 @@ class Communicator:
         self.inbox: dict[int, collections.deque] = collections.defaultdict(collections.deque)
 
     def send(self, to: int, message: Any) -> None:
-        """There is nobody."""
+        """Send nothing: there is no other rank."""
 
     def arrived(self) -> Iterable[tuple[int, Any]]:
         return ()
@@ -170,7 +170,7 @@ class Communicator:
             self.inbox[source].append(message)
 
     def messages(self) -> Iterator[tuple[int, Any]]:
-        """(source, message) of all that is here."""
+        """Yield (source, message) of all that has arrived."""
         self.take_in()
         for source in [source for source, queue in self.inbox.items() if queue]:
             while self.inbox[source]:
@@ -200,14 +200,14 @@ class Communicator:
         return message
 
     def gather(self, value: Any, heed_signals: bool = True) -> list | None:
-        """The values of all ranks, on rank 0."""
+        """Return the values of all ranks on rank 0, None on the others."""
         if self.rank > 0:
             self.send(0, value)
             return None
         return [value, *(self.receive(rank, heed_signals) for rank in range(1, self.size))]
 
     def broadcast(self, value: Any) -> Any:
-        """Rank 0's value, on all ranks."""
+        """Return rank 0's value on all ranks."""
         if self.rank > 0:
             return self.receive(0)
         for rank in range(1, self.size):
@@ -240,5 +240,5 @@ class Communicator:
         self.broadcast(None)
 
     def close(self) -> None:
-        """The work is done: wait for all ranks to say so, and let them go."""
+        """Wait until all ranks have finished their work, and let them end."""
         self.barrier(heed_signals=False)

@@ -64,7 +64,7 @@ class Coordinator:
 
     @property
     def present(self) -> int:
-        """How many of the other ranks have not been dismissed yet."""
+        """Return how many of the other ranks have not been dismissed yet."""
         return len(self.silence.seconds) + len(self.waiting)
 
     def start(self) -> None:
@@ -130,6 +130,7 @@ class Coordinator:
             raise self.error
 
     def wait_a_little(self):
+        """Sleep for a moment, or serve where no thread does; raise what has gone wrong."""
         self.look()
         self.raise_error()
         if self.thread is not None or not self.serve():
@@ -152,6 +153,7 @@ class Coordinator:
             self.report(self.state.missing, message.words if isinstance(message, Going) else "")
 
     def serve_on(self):
+        """Serve the other ranks until all are dismissed: the thread's work."""
         try:
             while self.present and self.state.phase is not Phase.GIVEN_UP:
                 with self.lock:
@@ -174,6 +176,7 @@ class Coordinator:
                 self.computing.discard(rank)
                 self.waiting.append(rank)
                 self.take_in(message.result, message.interrupted)
+            # Ranks that have waited longest get their chunks first.
             while self.waiting:
                 chunk = self.state.next_chunk()
                 if chunk is None and self.state.is_running:
@@ -183,6 +186,7 @@ class Coordinator:
                     self.computing.add(rank)
                     self.silence.seconds[rank] = 0.0
                 self.comm.send(rank, chunk)  # None: home
+            # Once no more is needed, those at work are called back.
             while self.computing and not self.state.is_running:
                 self.comm.send(self.computing.pop(), Halt())
         return bool(messages)

@@ -39,7 +39,7 @@ LAST_SECONDS = 5.0
 
 
 def launched_size() -> int | None:
-    """Number of ranks that the launcher started: None where it does not say, 0 without one."""
+    """Return how many ranks the launcher has started; None where it does not say, 0 without one."""
     for name in LAUNCHER_SIZES:
         if os.environ.get(name, "").isdigit():
             return int(os.environ[name])
@@ -47,13 +47,13 @@ def launched_size() -> int | None:
 
 
 def launched_rank() -> int:
-    """This process's rank according to its launcher, 0 without one; needs no MPI library."""
+    """Return this process's rank by its launcher's variables, 0 without one; needs no MPI."""
     said = [os.environ.get(name, "") for name in (*LAUNCHER_RANKS, "SLURM_PROCID")]
     return next((int(rank) for rank in said if rank.isdigit()), 0)
 
 
 def find_communicator() -> Communicator:
-    """The ranks of this job: MPI only where a launcher started more than one."""
+    """Return the ranks of this job: MPI's only where a launcher has started more than one."""
     try:
         size = launched_size()
         return Communicator() if size in (0, 1) else MpiCommunicator(size)
@@ -139,7 +139,7 @@ class ProcessCommunicator(Communicator):
             self.lose(to)
 
     def arrived(self) -> Iterator[tuple[int, Any]]:
-        """(source, message) of all that has come; LostRank where a process has gone."""
+        """Yield (source, message) of all that has come; LostRank where a process has gone."""
         ranks = {pipe: rank for rank, pipe in self.pipes.items()}
         ready: Any = wait(list(ranks), timeout=0)
         for pipe in ready:
@@ -149,7 +149,7 @@ class ProcessCommunicator(Communicator):
                 self.lose(ranks[pipe])
 
     def lose(self, rank):
-        """A process has gone: without rank 0 there is nobody to tell."""
+        """End where rank 0 has gone; on rank 0 raise the error for a process that has gone."""
         if self.rank > 0:
             os._exit(FlocsimError.exit_code)
         process = self.others[rank - 1]

@@ -32,7 +32,7 @@ SHARE = 3
 
 
 def chunk_seconds(size: int) -> float:
-    """How long a chunk may take [s] on one of ``size`` ranks."""
+    """Return how long a chunk may take [s] on one of ``size`` ranks."""
     return max(SHORTEST_SECONDS, SECONDS_PER_RANK * size)
 
 
@@ -70,7 +70,7 @@ class Schedule:
         cls, done: Sequence[Sequence[Interval]], borders: Sequence[int], size: int,
         most: int = MOST_ROWS,
     ) -> "Schedule":  # fmt: skip
-        """The Schedule of what is missing.
+        """Return the Schedule of what is missing.
 
         ``done``: of every condition the intervals that exist already; ``borders``: where stages
         end, [100, 125, …]; ``most``: replicates of a chunk.
@@ -85,10 +85,11 @@ class Schedule:
         return cls(size, stages, sum(stage.unfinished for stage in stages), most=most)
 
     def take(self) -> Chunk | None:
-        """The next Chunk, None where all is handed out."""
+        """Return the next Chunk, None where all is handed out."""
         stage = next((stage for stage in self.stages if stage.todo), None)
         if stage is None:
             return None
+        # Guided self-scheduling: the less is left, the shorter are the chunks.
         count = min(self.most, max(1, stage.waiting // (SHARE * self.size)))
         condition, first, stop = stage.todo.pop()
         if stop - first > count:
@@ -151,7 +152,7 @@ class StudyState:
 
     @property
     def missing(self) -> int:
-        """How many pieces are."""
+        """Return how many pieces are missing, saved parts of unfinished replicates not counted."""
         return self.schedule.remaining * self.study.pieces - self.begun.total()
 
     @property

@@ -52,7 +52,7 @@ def comparable(value):
 
 
 def config_facts(config: Config, tables: Sequence[str]) -> dict:
-    """What a config of any kind says: these tables, the method, the forces."""
+    """Return what a config of any kind says: these tables, the method, the forces."""
     facts: dict = {"seed": config.seed}
     for table in tables:
         facts |= settings(table, getattr(config, table))
@@ -81,7 +81,7 @@ def method_facts(config):
 
 
 def settings(table, values):
-    """The fields of an attrs object under the names that the config file has for them."""
+    """Return the fields of an attrs object under the names of their keys in the config file."""
     return {
         f"{table}.{field.name}": plain(getattr(values, field.name))
         for field in attrs.fields(type(values))
@@ -90,7 +90,7 @@ def settings(table, values):
 
 
 def plain(value):
-    """A value that JSON gives back as it was: floats exactly, infinite ones as words."""
+    """Return a value that JSON gives back as it was: floats exactly, infinite ones as words."""
     if isinstance(value, tuple | list):
         return [plain(each) for each in value]
     if isinstance(value, float) and not np.isfinite(value):
@@ -113,7 +113,7 @@ def floc_facts(flocs):
 
 
 def shape_numbers(shape):
-    """What bodies, laws and starts read of a shape."""
+    """Return all numbers that bodies, laws and starts read of a shape."""
     numbers = (
         shape.radius, shape.area, shape.second_moment, shape.equivalent_radius,
         shape.bounding_radius,
@@ -131,8 +131,7 @@ SAMPLE_ANGLES = (0.0, 1.0, 4.0)
 
 @functools.cache
 def arithmetic_digest():
-    """A hash of how this machine rounds sin, exp and their like, and what is made of them; the same
-    as long as a process lives.
+    """Return a hash of how this machine rounds sin, exp and their like, and what is made of them.
 
     numpy, its linear algebra and the C library choose their code by the processor: on another kind
     of it rows differ in their last digits, and so do the flocs.
@@ -159,7 +158,7 @@ SAMPLES = 4000
 
 
 def star_numbers(points):
-    """What becomes of a star of so many points until a replicate can start with it."""
+    """Return the numbers of a star of so many points, made into a body as flocs are."""
     turn = 2.0 * np.pi * np.arange(points) / points
     rays = 5.0 + np.sin(3.0 * turn + 0.4)
     star = SpheroPolygon(np.column_stack([rays * np.cos(turn), rays * np.sin(turn)]), 0.3)
@@ -176,7 +175,7 @@ def physics_digest(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> str:
 
 
 def physics_files(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> Iterator[Path]:
-    """The files of PHYSICS in the package's folder, in an order that is always the same."""
+    """Yield the files of PHYSICS in the package's folder, in an order that is always the same."""
     for name in names:
         place = root / name
         yield from sorted(place.rglob("*.py")) if place.is_dir() else [place]
@@ -192,7 +191,7 @@ def short(identity: dict) -> str:
 
 
 def differences(stored: dict, current: dict) -> list[str]:
-    """Lines on what differs between two identities; none where rows of both agree."""
+    """Return lines on what differs between two identities; none where rows of both agree."""
     names = sorted(stored.keys() | current.keys())
     apart = [name for name in names if stored.get(name) != current.get(name)]
     both = [

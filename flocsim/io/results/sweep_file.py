@@ -33,11 +33,11 @@ class Swept:
 
     @property
     def words(self) -> bool:
-        """Whether the values are words, not numbers."""
+        """Return True if the values are words, not numbers."""
         return any(isinstance(value, str) for value in self.values)
 
     def column(self, name: str) -> Column:
-        """The coordinate of its dimension."""
+        """Return the coordinate of its dimension."""
         values = np.array(self.values, dtype=object if self.words else "f8")
         return Column((name,), values, {"units": self.unit, "long_name": self.key})
 
@@ -54,11 +54,11 @@ class SweepResults(Tables):
 
     @property
     def indices(self) -> dict[str, list[str]]:  # type: ignore[override]
-        """{group: axes of its rows}, the swept keys first."""
+        """Return {group: axes of its rows}, the swept keys first."""
         return {name: group.shared_axes for name, group in self.groups.items()}
 
     def labelled(self, group: str) -> Labelled:
-        """The arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
+        """Return the arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
         return self.groups[self.known(group)]
 
     def __repr__(self) -> str:

@@ -17,7 +17,6 @@ from tests.helpers.own_force import write_own
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import (
     SMALL,
-    command,
     problems,
     run_command,
     small_config,
@@ -25,7 +24,6 @@ from tests.helpers.small_study import (
     write_star_library,
 )
 from tests.helpers.tiers import rest_slow
-from tests.helpers.waiting import PATIENCE
 
 HERE = versions() | {"seed": 1, "kernels.spheres": "ab", "code": "cd"}
 
@@ -157,25 +155,6 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     assert not list(tmp_path.glob("small.h5*"))
 
 
-DEPENDS = """\
-import os
-FIRST = "0" in map(os.environ.get, ("PMI_RANK", "OMPI_COMM_WORLD_RANK"))
-FACTOR = -1.0 if FIRST else -2.0
-"""
-
-
-@pytest.mark.slow
-def test_a_kernel_that_depends_on_the_rank_is_refused(tmp_path):
-    write_own(tmp_path)
-    (tmp_path / "neighbour.py").write_text(DEPENDS)
-    done = run_command(tmp_path, "small.toml", ranks=2)
-    assert done.returncode == 2
-    [line] = done.stderr.splitlines()
-    assert "rank 1 on " in line
-    assert "differs from rank 0 in kernels.spheres" in line
-    assert not list(tmp_path.glob("small.h5*"))
-
-
 def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monkeypatch):
     library = tmp_path / "stars.h5"
     write_star_library(library)
@@ -186,20 +165,6 @@ def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monk
     study, *_ = runner.join(config, comm)
     assert len(study.flocs) == 3
     assert not library.exists()
-
-
-@pytest.mark.slow
-def test_two_short_jobs_at_once_end_with_results_and_one_refusal(tmp_path):
-    write_small(tmp_path, vertices="[1]")
-    words = command("small.toml", "--quiet")
-    jobs = [
-        subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) for _ in range(2)
-    ]
-    errors = [job.communicate(timeout=PATIENCE)[1] for job in jobs]
-    assert sorted(job.returncode for job in jobs) == [0, 2]
-    [line] = [line for each in errors for line in problems(each)]
-    assert "already exists and is left as it is" in line
-    assert read_results(tmp_path / "small.h5").count == 3
 
 
 SPHERES = {"shapes": {"vertices": [1]}, "scene": {"types": ["I"], "delta": [0.0]}, "replicates": 2}

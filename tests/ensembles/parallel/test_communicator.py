@@ -12,11 +12,9 @@ from flocsim.__main__ import main
 from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.processes import find_communicator, launched_rank, launched_size
-from flocsim.ensembles.storage.identity import arithmetic_digest
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import (
-    BESIDE_PYTHON,
     SMALL,
     command,
     launcher_kind,
@@ -171,19 +169,6 @@ def test_a_rank_that_fails_half_way_ends_the_whole_job(tmp_path):
     assert not (tmp_path / "small.h5").exists()
 
 
-FAILS_SOON = FAILS_LATE.replace("if more:", "if True:")
-"""A rank 1 that fails at once, while rank 0 compiles."""
-
-
-@pytest.mark.slow
-def test_a_rank_that_fails_while_another_compiles_ends_the_job(tmp_path):
-    with_force(tmp_path, FAILS_SOON, "Late")
-    write_small(tmp_path, (tmp_path / "small.toml").read_text(), vertices="[1, 4]")
-    done = run_command(tmp_path, "small.toml", ranks=2)
-    assert done.returncode == 70
-    assert "flocsim: rank 1: out of memory" in done.stderr
-
-
 @pytest.mark.slow
 def test_a_config_that_one_rank_cannot_load_stops_all(tmp_path):
     with_force(tmp_path, FAILS_EARLY + YUKAWA, "Yukawa")
@@ -197,9 +182,7 @@ def test_a_config_that_one_rank_cannot_load_stops_all(tmp_path):
 
 WRONG = [
     (["nowhere.toml"], {}, 2, "nowhere.toml: no such file"),
-    (["small.toml"], {"seed": "="}, 2, "small.toml:2: not valid TOML"),
     (["small.toml"], {"types": '["IV"]'}, 2, "scene.types"),
-    (["small.toml"], {"preset": '"tang2014-literal"'}, 2, "no attraction zone"),
     (["small.toml", "--output", "no/folder.h5"], {}, 74, "no/folder.h5 could not be written"),
 ]
 
@@ -357,31 +340,3 @@ def test_a_communicator_of_one():
     with pytest.raises(SystemExit) as caught:
         alone.abort(70)
     assert caught.value.code == 70
-
-
-def test_the_launcher_beside_this_python_is_the_one_that_is_tested():
-    assert mpirun() == str(BESIDE_PYTHON / "mpirun")
-
-
-@pytest.mark.slow
-def test_ranks_that_round_otherwise_are_refused_before_the_first_replicate(serial):
-    other = ["env", "OPENBLAS_CORETYPE=Prescott", "GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2,-FMA"]
-    words = ["small.toml", "--output", "mixed.h5", "--set", "shapes.vertices=[1]"]
-    first = command(*words, ranks=1)
-    second = command(*words)
-    done = subprocess.run(
-        [*first, ":", "-n", "1", *other, *second],
-        cwd=serial, capture_output=True, text=True, timeout=PATIENCE,
-    )  # fmt: skip
-    lines = [line for line in done.stderr.splitlines() if line.startswith("flocsim: ")]
-    if digest_under(other) == arithmetic_digest():
-        pytest.skip("this machine rounds the same under that setting")
-    assert done.returncode == 2
-    assert len([line for line in lines if "rounding" in line or "rounds" in line]) == 1
-    assert not (serial / "mixed.h5").exists()
-
-
-def digest_under(words):
-    code = "from flocsim.ensembles.storage.identity import arithmetic_digest as a; print(a())"
-    done = subprocess.run([*words, sys.executable, "-c", code], capture_output=True, text=True)
-    return done.stdout.strip()

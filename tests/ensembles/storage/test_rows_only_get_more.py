@@ -13,7 +13,7 @@ from flocsim.ensembles.parallel.communicator import Communicator, SharedError
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
 from flocsim.ensembles.study import Study
-from flocsim.errors import FileError, KernelError, UsageError
+from flocsim.errors import FileError, UsageError
 from flocsim.io import journal as locked_file
 from flocsim.io.journal import Journal
 from flocsim.process import INTERRUPTION, STOPPED
@@ -190,16 +190,6 @@ def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, whole, monkeypatch, 
     assert go_on(tmp_path, mode).computed == 80
     assert same_data(tmp_path / "r.h5", whole) == []
     assert names(tmp_path) == ["r.h5"]
-
-
-def test_a_kernel_that_does_not_compile_leaves_no_journal(tmp_path, monkeypatch):
-    def compile(study, kinds):
-        raise KernelError("brush.py:3: no")
-
-    monkeypatch.setattr(Study, "compile", compile)
-    with pytest.raises(KernelError):
-        go_on(tmp_path, NEW)
-    assert names(tmp_path) == []
 
 
 def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, monkeypatch):
