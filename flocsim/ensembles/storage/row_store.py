@@ -177,7 +177,8 @@ class RowStore:
     def check_record(self, record: Row) -> None:
         """ValueError for a record of another study, or of no replicate."""
         first, known = record["first"], {self.identity, *self.known}
-        if record["identity"] not in known or first not in range(LARGEST_REPLICATE):
+        is_replicate = isinstance(first, int) and 0 <= first < LARGEST_REPLICATE
+        if record["identity"] not in known or not is_replicate:
             raise ValueError("a record is of no run of this study")
 
     def there(self) -> int:
