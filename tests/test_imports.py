@@ -20,9 +20,9 @@ ROOT = Path(__file__).resolve().parents[1]
 # From the top of the house to its ground: a room may import from the rows below it, never from
 # above, and not from a sibling in its row. `flocsim` is the package's own __init__.
 ROWS = [
+    ["ensemble"],
     ["__main__"],
     ["commands"],
-    ["ensemble"],
     ["flocsim"],
     ["ensembles"],
     ["brownian", "swarms"],
