@@ -76,7 +76,8 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         cwd=folder, env=environment, encoding="utf-8", errors="replace",
     ) as process:  # fmt: skip
-        said = []
+        assert process.stdin is not None and process.stdout is not None
+        said: list[str] = []
         try:
             with contextlib.suppress(BrokenPipeError):  # it says why
                 process.stdin.write(text)
