@@ -68,7 +68,7 @@ class Pair(Communicator):
 
 
 def test_a_disagreement_ends_rank_0_with_one_line_and_the_others_with_its_code(tmp_path):
-    comm = Pair(lambda own: (UsageError("rank 1 on n1 has seed 2"), own[1]))
+    comm = Pair(lambda own: UsageError("rank 1 on n1 has seed 2"))
     config = small_config(tmp_path, {"shapes": {"vertices": [1]}})
     with pytest.raises(SharedError, match="rank 1 on n1 has seed 2"):
         run_to_file(config, comm, tmp_path / "r.h5", "new")
