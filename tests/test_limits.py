@@ -37,7 +37,7 @@ def test_too_little_to_load_the_libraries_is_one_line(size, words):
 def test_enough_to_load_them_is_enough():
     done = limited(int(process.LOADING), "-m", "flocsim.ensemble", "none.toml")
     assert done.returncode == 2
-    assert done.stderr.startswith("none.toml: no such file")
+    assert done.stderr.startswith("flocsim: none.toml: no such file")
 
 
 def entry(x):
