@@ -4,9 +4,9 @@ A `valid_…` gives the HDF5 data of a file. Each maker `…_file` takes a ``ran
 folder and returns the path of a new, changed file; checksums are right, as anyone can make them.
 """
 
+import contextlib
 import io
 import json
-import zipfile
 from functools import cache
 
 import attrs
@@ -153,11 +153,6 @@ def valid_trajectory(folder):
 # Changed HDF5 files ----------------------------------------------------------------------------
 
 
-def odd_text(rng):
-    """Return a text that HDF5 can hold."""
-    return rng.choice(ODD_TEXTS).encode("utf-8", "replace").decode()
-
-
 def change_json(rng, value):
     """Return a JSON value with something odd somewhere in it."""
     if isinstance(value, dict) and value and rng.random() < 0.85:
@@ -183,45 +178,15 @@ def change_values(rng, file, path):
         try:
             changed = json.dumps(change_json(rng, json.loads(dataset.asstr()[()])))
         except (ValueError, RecursionError):
-            changed = odd_text(rng)
+            changed = rng.choice(ODD_TEXTS)
         dataset[()] = changed
     elif dataset.dtype.kind == "O":
-        dataset[rng.randrange(dataset.shape[0])] = odd_text(rng)
+        dataset[rng.randrange(dataset.shape[0])] = rng.choice(ODD_TEXTS)
     else:
         with np.errstate(all="ignore"):
             flat = np.array(dataset[()]).reshape(-1).astype(float)
             flat[rng.randrange(flat.size) :: rng.choice([1, 2, 10**9])] = rng.choice(ODD_NUMBERS)
             dataset[...] = flat.reshape(dataset.shape).astype(dataset.dtype)
-
-
-def replace_dataset(rng, file, path):
-    """Put another dataset in its place: of another type or shape, packed, a group, or a link."""
-    found = file[path]
-    group, name = found.parent, path.rpartition("/")[2]
-    values = found[()] if isinstance(found, h5py.Dataset) else np.zeros(3)
-    number = np.zeros(np.shape(values)) if np.asarray(values).dtype.kind == "O" else values
-    del file[path]
-    kind = rng.randrange(5)
-    if kind == 0:
-        group[name] = np.asarray(number).astype(rng.choice(["i1", "f4", ">f8", "c16", "u8"]))
-    elif kind == 1:
-        group[name] = np.zeros((*np.shape(values), 2))
-    elif kind == 2:
-        group.create_dataset(name, (2**20, 2**20), "u1", chunks=(2**10, 2**10), compression="gzip")
-    elif kind == 3:
-        group[name] = h5py.SoftLink("/" + rng.choice(["replicates", "fits", name, "."]))
-    else:
-        group.create_group(name)
-
-
-def change_attributes(rng, file, path):
-    """Add, change or delete an attribute."""
-    attributes = file[path].attrs
-    name = rng.choice([*attributes, "extra", "format", "kind", "schema_version", "units"])
-    if rng.random() < 0.2 and name in attributes:
-        del attributes[name]
-    else:
-        attributes[name] = rng.choice([1, -1, 0.5, "x", "\x1b[2J", [1, 2], b"x", "y" * 30_000])
 
 
 def changed_hdf5(rng, data):
@@ -232,14 +197,13 @@ def changed_hdf5(rng, data):
             paths: list = []
             file.visit(paths.append)
             path = rng.choice(paths)
-            work = rng.choice([change_values, change_values, replace_dataset, change_attributes])
-            try:
-                if rng.random() < 0.1:
-                    del file[path]
-                else:
-                    work(rng, file, path)
-            except (ValueError, TypeError, KeyError, OSError, OverflowError, RuntimeError):
-                pass  # h5py itself refuses to write it
+            # What h5py itself refuses to write stays as it is.
+            with contextlib.suppress(ValueError, TypeError, KeyError, OSError, RuntimeError):
+                if rng.random() < 0.7:
+                    change_values(rng, file, path)
+                    continue
+                del file[path]
+                file[path] = rng.choice([np.zeros((3, 2)), np.arange(5), h5py.SoftLink("/run")])
     return image.getvalue()
 
 
@@ -264,56 +228,24 @@ def hdf5_file(valid):
 
 def picture_file(rng, folder):
     """Return a picture of some format and mode with a floc or two, changed in its bytes."""
-    height, width = rng.choice([(1, 1), (1, 40), (40, 1), (2, 3), (40, 50), (60, 30)])
+    height, width = rng.choice([(1, 1), (1, 40), (40, 50), (60, 30)])
     y, x = np.mgrid[:height, :width]
     grey = (40.0 + 10 * np.sin(x) + 150 * (np.hypot(x - 20, y - 20) < 9)).astype("u1")
     suffix, file = rng.choice(["png", "jpeg", "bmp", "tiff"]), io.BytesIO()
-    mode = rng.choice(["L", "1", "P", "RGB", "RGBA", "I;16", "F", "I", "CMYK", "LA"])
-    packing = rng.choice([None, "tiff_lzw", "tiff_deflate", "packbits", "jpeg"])
-    image = Image.fromarray(grey.astype("u2")) if mode == "I;16" else None
-    image = image or Image.fromarray(grey).convert(mode)
-    try:
-        image.save(file, suffix, **({"compression": packing} if suffix == "tiff" else {}))
-    except (OSError, ValueError, KeyError):
-        Image.fromarray(grey).save(file, suffix)
+    mode = rng.choice(["L", "1"] if suffix == "bmp" else ["L", "1", "RGB", "CMYK"])
     if suffix == "tiff" and rng.random() < 0.4:
         # Of kinds that Pillow does not read: 16-bit colours, floats of half size, planes.
         import tifffile
 
+        kind = rng.choice(["u2", "f2", "f4", "i2", "c8", "u8"])
         shape = rng.choice([(20, 30, 3), (20, 30), (3, 20, 30), (2, 20, 30, 3)])
-        values = (np.arange(np.prod(shape)).reshape(shape) % 250).astype(
-            rng.choice(["u2", "f2", "f4", "i2", "c8", "u8"])
-        )
-        tifffile.imwrite(file := io.BytesIO(), values, photometric="minisblack")
-    data = file.getvalue()
-    return written(folder, f"p.{suffix}", flip(rng, data, 3) if rng.random() < 0.9 else data)
-
-
-def npy_bytes(rng):
-    """Return a .npy file of some type and shape, now and then with a head that lies."""
-    kind = rng.choice(["?", "u1", "i8", "u8", "f8", "f4", "c16", "S3", "U2", "O", "i4,f8", ">i4"])
-    shape = rng.choice([(0,), (0, 5), (), (7,), (1, 1), (12, 9), (3, 4, 5)])
-    values = np.zeros(shape, kind)
-    if values.size and values.dtype.kind in "iuf":
-        with np.errstate(all="ignore"):
-            picked = [rng.choice(ODD_NUMBERS) for _ in range(values.size)]
-            values = np.array(picked, float).astype(values.dtype).reshape(shape)
-    np.save(file := io.BytesIO(), values, allow_pickle=True)
-    if rng.random() < 0.6:
-        return file.getvalue()
-    size = rng.choice(["(1000000, 1000000)", "(-1, 5)", "([],)", "(1.5, 2)", "(" * 300])
-    head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {size}, }}".encode()
-    return b"\x93NUMPY\x01\0" + len(head).to_bytes(2, "little") + head + file.getvalue()[80:]
+        tifffile.imwrite(file, np.zeros(shape, kind), photometric="minisblack")
+    else:
+        Image.fromarray(grey).convert("RGB" if suffix == "png" else mode).save(file, suffix)
+    return written(folder, f"p.{suffix}", flip(rng, file.getvalue(), 3))
 
 
 def masks_file(rng, folder):
-    """Return a changed .npy or .npz file of masks."""
-    data, name = npy_bytes(rng), "m.npy"
-    if rng.random() < 0.6:
-        file, name = io.BytesIO(), "m.npz"
-        names = ["a.npy", "b", "../../x.npy", "\x1b[31m.npy", "shapes.npy", "d/", "x" * 300]
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as zip:
-            for each in rng.sample(names, rng.randint(0, 3)):
-                zip.writestr(each, npy_bytes(rng))
-        data = file.getvalue()
-    return written(folder, name, flip(rng, data) if rng.random() < 0.4 else data)
+    """Return a .npz file of two masks, changed in its bytes."""
+    np.savez_compressed(file := io.BytesIO(), a=np.eye(20, dtype=bool), b=np.arange(60) // 30)
+    return written(folder, "m.npz", flip(rng, file.getvalue()))
