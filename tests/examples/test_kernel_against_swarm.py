@@ -72,18 +72,6 @@ def test_an_interval_is_students(example):
     assert example.ratio(3.0 * values, values) == (pytest.approx(3.0), pytest.approx(0.0))
 
 
-def test_compositions_make_each_other(example):
-    parts = example.compositions(2, 3)
-    assert parts[:3].tolist() == [[1, 0], [0, 1], [2, 0]]
-    assert len(parts) == 2 + 3 + 4
-    made = example.made_of(parts)
-    for a, b in np.ndindex(made.shape):
-        if parts[[a, b]].sum() <= 3:
-            assert parts[made[a, b]].tolist() == (parts[a] + parts[b]).tolist()
-        else:
-            assert made[a, b] == len(parts)
-
-
 def test_a_constant_kernel_halves_the_number_in_its_time(example):
     # dN/dt = −½ β N²: N = N₀/(1 + ½ β N₀ t), whatever the classes.
     parts = example.compositions(2)

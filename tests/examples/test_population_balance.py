@@ -29,10 +29,3 @@ def test_a_constant_kernel_halves_the_number_in_its_time(balance):
     n = balance.grow(np.full((len(volume), len(volume)), beta), volume, start, times)
     assert n.sum(axis=1) == pytest.approx(number / (1.0 + 0.5 * beta * number * times), rel=1e-4)
     assert n @ volume == pytest.approx(np.full(len(times), number), rel=1e-9)
-
-
-def test_the_mean_radius_is_that_of_the_volume_mean(balance):
-    volume = 4.0 / 3.0 * np.pi * np.array([1.0, 2.0]) ** 3
-    assert balance.mean_radius(np.array([[3.0, 0.0], [0.0, 2.0]]), volume) == pytest.approx(
-        [1.0, 2.0]
-    )

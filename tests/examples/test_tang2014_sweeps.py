@@ -39,20 +39,6 @@ def test_a_transition_is_where_the_replicates_change(example):
         assert high / low < 2.0
 
 
-def test_a_transition_downwards_is_found_as_well(example):
-    sweeps = example("sweeps")
-    values = np.linspace(0.0, 1.0, 11)
-    found = step_sweep(sweeps, -values, np.full(50, -0.45))
-    value, _, _ = sweeps.transition(sweeps.attrs.evolve(found, values=values), 0, 0.5, False)
-    assert value == pytest.approx(0.45, abs=0.01)
-
-
-def test_what_does_not_change_has_no_transition(example):
-    sweeps = example("sweeps")
-    found = step_sweep(sweeps, [1.0, 2.0, 3.0], np.zeros(50))
-    assert np.isnan(sweeps.transition(found, 0, 0.5)).all()
-
-
 def test_open_replicates_are_told_apart(example):
     sweeps = example("sweeps")
     outcomes = iter(np.array([[0, 1, 4, 5], [2, 3, 6, 6]])[:, None, None, None])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kendalltau
 
-from examples.tang2014.claims.resampling import counts_of, weights
+from examples.tang2014.claims.resampling import counts_of
 from examples.tang2014.claims.trends import kendall
 from examples.tang2014.claims.verdicts import above, always, below, occurs, within
 
@@ -55,11 +55,6 @@ def test_rank_correlation_is_kendalls():
     assert np.allclose(kendall(values), expected)
 
 
-def test_rank_correlation_leaves_out_what_is_missing():
-    rising = np.array([1.0, np.nan, 2.0, 3.0])[:, None]
-    assert kendall(rising) == [1.0]
-
-
 def test_the_first_sample_is_the_ensemble_itself():
     from tests.helpers.synthetic_results import make_results
 
@@ -70,10 +65,3 @@ def test_the_first_sample_is_the_ensemble_itself():
     assert np.array_equal(counts.inside[..., 0], table["n_inside"])
     assert np.array_equal(np.moveaxis(counts.classes[..., 0], 0, -1), table["n_class"])
     assert np.allclose(counts.pr_inside[..., 0], table["pr_inside"], equal_nan=True)
-
-
-def test_resamples_draw_whole_ensembles():
-    drawn = weights(50, 30)
-    assert drawn.shape == (50, 31)
-    assert np.all(drawn.sum(axis=0) == 50)
-    assert np.all(drawn[:, 0] == 1)

@@ -71,9 +71,3 @@ def test_pictures_without_a_bar_stay_as_they_are(dark, noise):
 )
 def test_nothing_of_real_pictures_is_taken_for_a_bar(name):
     assert not without_annotations(read_grey(real_image(name)))[1].any()
-
-
-def test_a_square_and_a_saturated_background_are_no_bars():
-    grey = np.full((60, 80), 1.0)
-    grey[20:40, 20:40] = 0.0
-    assert not without_annotations(grey)[1].any()

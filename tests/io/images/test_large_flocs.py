@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from flocsim.io.images.background import smooth_surface
 from flocsim.io.images.pictures import segment
 
 SHAPE = 180, 240
@@ -36,10 +35,3 @@ def test_a_large_floc_stays_whole_and_is_taken_for_the_floc(share, options, dark
     top, left, bottom, right = found.regions[0].bbox
     seen[top:bottom, left:right] = found.regions[0].mask[1:-1, 1:-1]
     assert (seen & mask).sum() / (seen | mask).sum() > 0.93
-
-
-def test_the_light_of_a_picture_without_large_flocs_is_that_of_all_of_it():
-    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
-    light = 0.7 - 0.3 * ((x / SHAPE[1] - 0.5) ** 2 + (y / SHAPE[0] - 0.3) ** 4)
-    noise = np.random.default_rng(6).standard_normal(SHAPE)
-    np.testing.assert_allclose(smooth_surface(light + 0.02 * noise, 6), light, atol=0.01)

@@ -36,12 +36,6 @@ def test_they_are_those_of_regionprops(mask):
     assert found.feret_min < found.feret_max
 
 
-def test_an_ellipse_has_its_axes():
-    found = mask_measures(ellipse(60, 20, 0.5))
-    assert found.aspect_ratio == pytest.approx(3.0, rel=0.01)
-    assert (found.feret_max, found.feret_min) == pytest.approx((120, 40), abs=1.5)
-
-
 def test_a_row_of_pixels_is_a_rectangle():
     """Nothing of a floc is infinite, or a library could not be read back."""
     found = mask_measures(np.pad(np.ones((1, 7), bool), 1))

@@ -116,16 +116,6 @@ def test_blurred_flocs_are_rejected_with_the_reason():
     assert len(segment(sharp + soft, max_blur=np.inf).regions) == 2
 
 
-def test_a_sharp_speck_does_not_vouch_for_the_halo_around_it():
-    """The mean edge would: a tenth of the outline has most of the gradient."""
-    halo = 1.2 * blurred(disks((70, 70, 22), shape=(140, 140)), 8.0)
-    speck = disks((93, 70, 5), shape=(140, 140))
-    found = segment(np.maximum(halo, speck), background=np.zeros((140, 140)), threshold=0.5)
-    assert found.rejected_by_reason() == {"out of focus": 1}
-    (alone,) = segment(speck, background=np.zeros((140, 140)), threshold=0.5).regions
-    assert alone.blur < 2 < found.rejected[0].blur
-
-
 @pytest.mark.parametrize("scale", [1.0, 2.0, 4.0])
 def test_focus_is_relative_to_the_size(scale):
     """The same floc, the same blur: what is soft is soft at any magnification."""
@@ -220,17 +210,6 @@ def test_layers_stay_together(noise):
     assert agreement(found, layers > 0) >= 0.95
 
 
-def test_a_sharp_floc_is_cut_out_of_its_halo():
-    halo = 0.5 * blurred(disks((100, 100, 30), shape=(200, 200)), 14.0)
-    sharp = disks((110, 95, 10), shape=(200, 200))
-    (region,) = segment(
-        blurred(np.maximum(halo, sharp), 0.8), background=np.zeros((200, 200))
-    ).regions
-    assert region.equivalent_radius == pytest.approx(10, rel=0.1)
-    low, high = region.radius_band
-    assert low <= 10 <= high
-
-
 @pytest.mark.parametrize(
     ("sigma", "noise"),
     rest_slow(
@@ -254,16 +233,6 @@ def test_focus_does_not_select_by_size_and_bands_hold_the_size(sigma, noise):
     bands = np.array([found.regions[k].radius_band for k in order])
     assert sizes.mean() == pytest.approx(true.mean(), rel=0.02)
     assert ((bands[:, 0] <= true) & (true <= bands[:, 1])).mean() >= 0.93
-
-
-def test_aggregates_with_narrow_necks_stay_whole():
-    rng = np.random.default_rng(6)
-    points = [(0.0, 0.0)]
-    while len(points) < 14:
-        (x, y), angle = points[rng.integers(len(points))], rng.uniform(0, 2 * np.pi)
-        points.append((x + 15 * np.cos(angle), y + 15 * np.sin(angle)))
-    picture = disks(*((x + 110, y + 110, 8.5) for x, y in points), shape=(220, 220))
-    assert len(segment(np.minimum(picture, 0.9)).regions) == 1
 
 
 def test_what_speaks_against_an_outline_is_said():
@@ -367,16 +336,3 @@ def test_every_real_picture_gives_flocs(name, flocs, least, most):
     assert found.flocs == flocs
     assert least <= len(found.regions) <= most
     assert found.foreground_share < 0.2
-
-
-def test_a_floc_where_the_light_is_brighter_than_the_surface_keeps_its_size():
-    rows, columns = np.mgrid[:300, :300]
-    cover, radius = wavy_disk(150, 150, 15, (300, 300))
-    bright = 1.0 + 0.12 * np.exp(-0.5 * (np.hypot(rows - 150, columns - 150) / 40.0) ** 2)
-    grey = 0.7 * bright * (1.0 - 0.4 * blurred(cover, 1.0))
-    surface = np.full(grey.shape, 0.7)
-    (region,) = segment(grey, background=surface, flocs="dark").regions
-    assert region.base < -0.05
-    assert region.equivalent_radius == pytest.approx(radius, rel=0.01)
-    low, high = region.radius_band
-    assert low < radius < high

@@ -17,7 +17,6 @@ from flocsim.io.plots.collision import (
     time_unit,
     write_animation,
 )
-from flocsim.io.plots.style import add_foot
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * 1e-5
 
@@ -36,17 +35,6 @@ def test_a_strip_shows_bodies_contacts_and_distances():
     assert "µm" in " ".join(text.get_text() for text in figure.axes[0].texts)
     rings = [line.get_xydata() for line in figure.axes[1].lines if line.get_marker() == "o"]
     np.testing.assert_array_equal(rings, [[[0.0, 1e-5]]])
-
-
-def test_a_line_at_the_foot_stands_below_the_legend():
-    frames = [[[SQUARE], [SQUARE + [0.0, 2e-5]]]] * 6
-    figure = draw_strip(Frames(np.arange(6.0), frames, [()] * 6, [], [2e-5] * 6), "A")
-    add_foot(figure, "12 flocs of shapes.h5")
-    figure.canvas.draw()
-    foot, [legend] = figure._supxlabel.get_window_extent(), figure.legends
-    assert 0.0 <= foot.y0 < foot.y1 <= legend.get_window_extent().y0
-    panels = [axes.get_tightbbox().y0 for axes in figure.axes]
-    assert legend.get_window_extent().y1 <= min(panels)
 
 
 def test_frames_share_one_scale_and_hold_their_bodies():
@@ -85,13 +73,6 @@ def test_plotting_loads_no_window_system():
     code += "p.draw_distance([0, 1], [1e-5, 1e-5]); print('matplotlib.pyplot' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["False", "False"]
-
-
-def test_the_name_of_the_zone_keeps_clear_of_the_curve():
-    times = np.linspace(0.0, 1.0, 50)
-    for distance, side in ((times, "left"), (1.0 - times, "right")):
-        label = draw_distance(times, 50e-6 - 9e-6 * distance**4, 45e-6).axes[0].texts[0]
-        assert label.get_ha() == side
 
 
 def test_what_pushes_is_solid_and_what_pulls_is_dashed():
@@ -154,18 +135,3 @@ def test_a_strip_names_bodies_lines_and_contacts():
     assert [text.get_text() for text in figure.axes[0].texts[-2:]] == ["i", "j"]
     rings = [line for line in figure.axes[2].lines if line.get_marker() == "o"]
     assert [len(ring.get_xdata()) for ring in rings] == [2]
-
-
-def test_no_title_is_cut(tmp_path):
-    title = (
-        "type 12.5 um, 44.1 um of a long name, N = 64, delta = 0.75, replicate 1234567: undecided"
-    )
-    for figure in (
-        draw_distance([0.0, 1.0], [1e-5, 2e-5], title=title),
-        draw_strip(Frames([0.0, 1.0], [[[SQUARE]]] * 2, [()] * 2, [], [0.0] * 2), title),
-    ):
-        figure.canvas.draw()
-        texts = [figure._suptitle] if figure._suptitle else [figure.axes[0]._left_title]
-        assert texts[0].get_text().replace("\n", " ") == title
-        assert texts[0].get_window_extent().x1 <= figure.bbox.x1
-        assert texts[0].get_window_extent().y1 <= figure.bbox.y1 + 1.0

@@ -90,15 +90,6 @@ def test_every_value_is_on_the_axis_whatever_has_no_value(values, scale, tmp_pat
     assert "h: held" in title and "missed" not in title
 
 
-@pytest.mark.slow
-def test_words_and_one_value_alone_have_an_axis(tmp_path):
-    results = make_results(types=("I",), vertices=(4,), delta=(0.0,))
-    for values in (("inner", "outer"), (5.0,), (0.0,)):
-        figure = against_key(held_at_last(results, values, "1"))
-        save(figure, tmp_path / f"{values[0]}.png")
-        assert len(figure.axes[0].get_xticks()) == len(values)
-
-
 def test_an_empty_denominator_has_its_cause():
     # held | undecided, mostly | missed | inside, all of them | decided outside
     outcome = [[HELD, HELD, 4], [5, 5, 4], [4, 4, 4], [0, 1, 0], [2, 3, 4]]

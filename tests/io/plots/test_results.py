@@ -8,7 +8,7 @@ import pytest
 
 from flocsim.io.confidence import wilson
 from flocsim.io.plots.outcomes import FEW
-from flocsim.io.plots.results import FIGURES, against_size, figure_4, figure_6, figure_8
+from flocsim.io.plots.results import FIGURES, against_size, figure_4, figure_8
 from flocsim.io.plots.style import save
 from flocsim.io.results.schema import POOLED
 from tests.helpers.synthetic_results import bonds_of, make_results
@@ -147,35 +147,12 @@ def test_replicates_that_agree_at_all_displacements_count_once():
         np.testing.assert_allclose((low[0], high[0]), once, rtol=0.02)
 
 
-def test_order_of_vertex_counts_does_not_matter():
-    results = make_results(vertices=(1, 4, 16))
-    turned = {name: array[:, ::-1] for name, array in results.probabilities.items()}
-    rows = {name: array[:, ::-1] for name, array in results.replicates.items()}
-    backwards = attrs.evolve(
-        results, vertices=results.vertices[::-1], probabilities=turned, replicates=rows
-    )
-    for one, other in zip(figure_8(results).axes, figure_8(backwards).axes, strict=True):
-        for a, b in zip(inner(one), inner(other), strict=True):
-            np.testing.assert_array_equal(a.lines[0].get_xydata(), b.lines[0].get_xydata())
-
-
-def test_a_panel_without_events_says_so():
-    panels = figure_6(make_results()).axes
-    assert "outside the zone" in texts(panels[2])
-    assert texts(panels[0]) == ""
-
-
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", rest_slow(OF_COLLISIONS, lambda name: name == "4"))
 def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
     figure = FIGURES[name](with_outcomes(make_results(), 4, 255))
     assert name == "outcomes" or all("no " in texts(axes) for axes in figure.axes)
     save(figure, tmp_path / "empty.png")
-
-
-def test_the_sphere_is_called_sphere():
-    labels = [text.get_text() for text in figure_4(make_results()).axes[0].get_xticklabels()]
-    assert labels == ["sphere", "4", "16", "64"]
 
 
 def test_many_vertex_counts_are_thinned_but_keep_both_ends():
@@ -232,13 +209,6 @@ def test_sizes_are_a_numeric_axis():
     lines = [container.lines[0].get_xydata() for container in eight.containers]
     np.testing.assert_allclose(lines[0], [[6.0, 0.4], [8.0, 0.2]])
     np.testing.assert_allclose(lines[1], [[10.0, 0.8], [20.0, 0.6]])
-
-
-def test_a_single_size_is_on_its_axis_beside_a_tick():
-    made = pooled_sizes()
-    radii = made.radii | {"r_j": np.full(4, 23.02e-6)}
-    low, high = against_size(attrs.evolve(made, radii=radii)).axes[0].get_xlim()
-    assert low < 20.0 < 23.02 < high
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.io.confidence import explained_share
-from flocsim.io.plots.outcomes import PAIR_MEASURES, bins_of, shape_effect
+from flocsim.io.plots.outcomes import shape_effect
 from flocsim.io.results.schema import BLANKS, OUTCOMES, REPLICATES
 
 
@@ -77,12 +77,6 @@ def test_equal_groups_share_nothing_and_apart_all():
     assert np.isnan(explained_share(np.arange(5), np.arange(5.0))).all()
 
 
-def test_bins_have_about_as_many_each():
-    places = bins_of(np.random.default_rng(1).random(1000))
-    assert np.all(np.abs(np.bincount(places) - 200) <= 1)
-    assert bins_of(np.array([3.0, np.nan, 1.0, 3.0])).tolist() == [1, -1, 0, 1]
-
-
 def test_replicates_without_an_outcome_or_a_shape_are_left_out():
     rows = drawn([0.5, 0.5], 50)
     failed = OUTCOMES.index("failed")
@@ -93,13 +87,6 @@ def test_replicates_without_an_outcome_or_a_shape_are_left_out():
         rows[name] = np.where(np.arange(50) < 3, np.nan, rows[name])
     found = shape_effect(rows, "circularity")
     assert np.isfinite(found.pr_a).all()
-
-
-def test_nothing_known_is_no_bin():
-    rows = rows_of(np.full((2, 4), OUTCOMES.index("missed")))
-    for name in PAIR_MEASURES:
-        found = shape_effect(rows, name)
-        assert found.measure.size == 0 and np.isnan(found.explained).all()
 
 
 def test_the_share_of_a_large_study_has_an_interval():

@@ -62,13 +62,3 @@ def test_a_floc_counts_once_whatever_its_spheroradii():
     assert [panel.get_title(loc="left") for panel in figure_3(entries).axes] == [
         "spheroradius r = 1 px", "spheroradius r = 2 px"
     ]  # fmt: skip
-
-
-def test_legends_stand_above_all_lines():
-    entries = [entry(r, {1: 35.0, 4: 9.0, 64: 1.0}) for r in (4.0, 8.0, 20.0)]
-    for figure in (sizes(entries), figure_3(entries)):
-        figure.draw_without_rendering()
-        for axes in figure.axes:
-            below = axes.get_legend().get_window_extent().y0
-            lines = [line.get_transform().transform(line.get_xydata()) for line in axes.lines]
-            assert all(line[:, 1].max() < below for line in lines)

@@ -168,24 +168,3 @@ def test_words_of_a_file_are_drawn_whatever_they_are_and_leave_the_panels_room(n
         keep_titles_whole(figure)
     for axes in figure.axes:
         assert not axes.get_visible() or axes.get_window_extent().height > 60.0
-
-
-def test_a_figure_grows_by_the_lines_of_its_title():
-    figures = [draw_distance([0.0, 1.0], [1e-5, 2e-5], title="W" * n) for n in (20, 60, 300)]
-    lines = [each.axes[0]._left_title.get_text().count("\n") + 1 for each in figures]
-    heights = [each.axes[0].get_window_extent().height for each in figures]
-    assert lines[0] == 1 < lines[1] < lines[2]
-    assert heights[1:] == pytest.approx([heights[0]] * 2, abs=3.0)
-
-
-@pytest.mark.parametrize("figure", ["outcomes", "swarms"])
-def test_a_figure_grows_by_a_long_legend(figure):
-    many = [round(k / 29, 3) for k in range(30)]
-    if figure == "outcomes":
-        made = figure_4(make_results(types=("I",), vertices=(1, 4), delta=tuple(many), count=4))
-    else:
-        made = over_time(swept_over(make_swarm_results(), "counts", Swept("a.b", many)))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        made.canvas.draw()
-    assert min(axes.get_window_extent().width for axes in made.axes) > 100.0
