@@ -113,10 +113,3 @@ def test_what_is_saved_is_loaded(tmp_path):
     assert np.allclose(found.at(5e-4).position, run.at(5e-4).position, rtol=0.0, atol=1e-9)
     with pytest.raises(flocsim.errors.UsageError, match="only its motion"):
         found.go_on(2e-3)
-
-
-def test_what_is_no_trajectory_is_refused_in_one_line(tmp_path):
-    (tmp_path / "no.h5").write_bytes(b"nothing")
-    for name in ("no.h5", "absent.h5"):
-        with pytest.raises(flocsim.errors.FileError, match=name):
-            flocsim.Trajectory.load(tmp_path / name)

@@ -78,13 +78,6 @@ def test_time_scales_are_those_of_closed_forms():
     assert found["centre forces at their steepest"] == pytest.approx(wanted, rel=0.02)
 
 
-def test_a_fixed_body_counts_as_infinitely_heavy():
-    held = [attrs.evolve(FAR[0], fixed=True), FAR[1]]
-    ratio = scales_of(held, [Contact()])["contact 1/omega0"]
-    ratio /= scales_of(FAR, [Contact()])["contact 1/omega0"]
-    assert ratio == pytest.approx(math.sqrt(2.0))
-
-
 def test_nothing_to_scale():
     assert System([BALL]).explain().splitlines()[-1].startswith("time scales: none")
 

@@ -68,13 +68,6 @@ def test_nohup_is_heeded():
     assert (process.returncode, output) == (75, "SIGTERM\n")
 
 
-def test_a_process_that_does_not_answer_is_ended():
-    process = started(DEAF)
-    process.send_signal(signal.SIGTERM)
-    _, errors = process.communicate(timeout=PATIENCE)
-    assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")
-
-
 def test_a_process_that_another_speaks_for_is_silent_and_goes_after_it():
     words = "import flocsim.process as i\ni.INTERRUPTION.speaks, i.HEAD_START = False, {}\n"
     speaker, silent, later = (

@@ -1,6 +1,5 @@
 """What of a scene is doubted, in which words, and that what is usual is not."""
 
-import math
 import warnings
 
 import attrs
@@ -17,7 +16,7 @@ from flocsim.forces import (
     Thermal,
     VanDerWaals,
 )
-from flocsim.plausibility import PIXEL_SIZE, USUAL, all_settled, plausibility_warnings, settled
+from flocsim.plausibility import USUAL, plausibility_warnings
 from tests.helpers.trial_scenes import hook
 
 WATER = Fluid(buoyancy=True)
@@ -54,14 +53,6 @@ def test_every_range_has_its_ends_and_says_value_range_source_and_remedy(kind, f
         else:
             scene["forces"] = [kind(**{field: value}), Gravity(), StokesDrag(), Contact()]
         assert usual.warning(f"{kind.__name__}.{field}", value) in doubts(**scene)
-
-
-def test_words_and_absent_values_have_no_range():
-    assert USUAL[Body]["density"].warning("x", None) == ""
-    assert USUAL[Body]["density"].warning("x", "sphere") == ""
-    assert PIXEL_SIZE.warning("--pixel-size", 8.6) and not PIXEL_SIZE.warning(
-        "--pixel-size", 9.5e-7
-    )
 
 
 def test_a_force_that_subclasses_is_held_to_the_same_range():
@@ -139,26 +130,6 @@ def test_reynolds_numbers_against_the_drag_law():
     assert big(5e-4, "schiller_naumann") == []
     [line] = big(2e-3, "schiller_naumann")
     assert "only up to Re = 800 " in line and "smaller or lighter" in line
-
-
-def test_the_numbers_are_those_of_closed_forms():
-    r, fluid = 2e-5, attrs.evolve(WATER, velocity=(0.0, 1e-3))
-    system = System([Body(Sphere(r), density=2650.0)], [Gravity(), StokesDrag()], fluid=fluid)
-    speed = 2.0 / 9.0 * (2650.0 - fluid.density) * 9.81 * r * r / fluid.viscosity
-    found = settled(system, system.bodies[0])
-    assert found.speed == pytest.approx(speed, rel=1e-9)
-    assert found.reynolds == pytest.approx(2.0 * r * fluid.density * speed / fluid.viscosity)
-    tau = 2.0 / 9.0 * 2650.0 * r * r / fluid.viscosity
-    assert found.stokes == pytest.approx(tau * speed / r, rel=1e-6)
-    assert math.isclose(found.radius, r)
-
-
-def test_bodies_alike_are_told_once_and_held_ones_not():
-    held = attrs.evolve(QUARTZ, position=(1e-4, 0.0), fixed=True)
-    large = attrs.evolve(QUARTZ, shape=Sphere(9e-6), position=(2e-4, 0.0))
-    system = System([*PAIR, held, large], USUAL_FORCES, fluid=WATER)
-    assert [each.radius for each in all_settled(system)] == [5e-6, 9e-6]
-    assert all_settled(System(PAIR, [Gravity()])) == []
 
 
 def test_explain_tells_numbers_and_doubts():

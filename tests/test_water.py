@@ -62,12 +62,6 @@ def test_a_fluid_of_which_nothing_is_said_is_as_before():
     assert fluid.words == ""
 
 
-def test_what_is_given_wins_over_what_follows():
-    fluid = Fluid(temperature="15 degC", salinity="35 g/kg", viscosity=2e-3)
-    assert fluid.viscosity == 2e-3
-    assert fluid.density == water.density(288.15, 35.0)
-
-
 def test_salt_alone_is_at_room_temperature():
     assert Fluid(salinity=35.0).density == pytest.approx(1023.343, abs=1e-3)
     assert Fluid(salinity=0.0).debye_length is None

@@ -63,17 +63,6 @@ def test_bad_input_is_refused(bodies, forces, release, words):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", [1e-7, 5e-8])
-def test_half_of_them_touch_but_for_the_known_shift(way):
-    """ln(b/r)/ln(b/a) for (a, r, b) = (1, 2, 4) µm, a and b shifted; within 3.3 standard errors."""
-    found, shift = run(way, 3000, seed=1), SHIFT * way * 1e6
-    wanted = math.log((4.0 + shift) / 2.0) / math.log((4.0 + shift) / (1.0 - shift))
-    low, high = found.interval(0.999)
-    assert found.undecided == 0
-    assert low <= wanted <= high
-
-
-@pytest.mark.slow
 def test_a_colloid_of_100_nm_touches_as_often_as_its_potential_says():
     forces = [VanDerWaals(1e-20), DoubleLayer(14e-3, 3.04e-9)]
     body = Body(Sphere("100 nm"), density=1050.0)

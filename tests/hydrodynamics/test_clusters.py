@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flocsim.hydrodynamics import SpherePair, rigid_bodies
-from flocsim.hydrodynamics.rigid_bodies import LESS_ACROSS, LESS_ALONG, mobilities, push
+from flocsim.hydrodynamics.rigid_bodies import LESS_ACROSS, LESS_ALONG, mobilities
 from tests.helpers.tiers import rest_slow
 
 RADIUS = 2.0e-6
@@ -111,22 +111,3 @@ def test_cells_of_many_bodies_count_as_the_bodies_do(monkeypatch):
     by_cells = mobility(places, radii)
     monkeypatch.setattr(rigid_bodies, "FEW", 1000)
     assert by_cells == pytest.approx(mobility(places, radii), rel=1e-2, abs=1e-3)
-
-
-def test_clusters_do_not_see_each_other(drawn):
-    places, radii = drawn
-    own = np.column_stack([ALONE / radii, 0.0 * radii, ALONE / radii])
-    label = np.arange(40) % 3
-    found = mobilities(label, places, radii, own)
-    for each in range(3):
-        chosen = label == each
-        alone = mobilities(label[chosen] * 0, places[chosen], radii[chosen], own[chosen])
-        assert found[each] == pytest.approx(alone[0], rel=1e-12)
-
-
-@pytest.mark.parametrize("b", [1.0, 0.4])
-def test_pushes_have_no_jump(b):
-    for edge in (1.0 + b, 1.0 - b):
-        if edge > 0.0:
-            inside, outside = (push(edge * by, 0.0, 1.0, b) for by in (1.0 - 1e-9, 1.0 + 1e-9))
-            assert inside == pytest.approx(outside, rel=1e-7, abs=1e-12)

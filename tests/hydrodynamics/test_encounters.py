@@ -71,16 +71,6 @@ def test_without_water_and_forces_all_of_the_kernel_touches(flow, rate):
 
 
 @pytest.mark.slow
-def test_a_small_one_goes_round_a_large_one(long_steps):
-    # Of spheres of one density that do not attract each other, the more is left the nearer they
-    # may come; in Stokes's flow around the large one all are fewer than ½ p² (Fuchs).
-    weights = 6.0 * np.pi * 0.05**3, 6.0 * np.pi
-    caught = [Meeting(SpherePair((0.05, 1.0)), np.zeros_like, touch).settling(weights)
-              for touch in (1e-5, 1e-4, 1e-3)]  # fmt: skip
-    assert np.all(np.diff(caught) > 0.0) and caught[-1] < 0.5 * (0.05 / 1.05) ** 2
-
-
-@pytest.mark.slow
 def test_in_shear_small_ones_come_round_before_they_meet():
     # Closed ways around the large one let no small one near (Wang, Zinchenko and Davis 1994).
     def share(ratio, flow):
@@ -95,26 +85,6 @@ def test_repulsion_keeps_all_apart():
     meeting = Meeting(SpherePair((0.5, 1.0)), lambda gap: 1e3 * np.exp(-gap / 0.1), 1e-4)
     assert meeting.settling((0.1, 1.0)) == 0.0
     assert meeting.in_flow("shear", 1.0) == 0.0
-
-
-@pytest.mark.slow
-def test_spheres_change_places_in_shear():
-    found = [Meeting(SpherePair(radii), attraction(radii, 1e-3), 1e-6).in_flow("shear", 1.0)
-             for radii in ((0.5, 1.0), (1.0, 0.5))]  # fmt: skip
-    assert found[0] == pytest.approx(found[1], rel=1e-4)
-
-
-@pytest.mark.slow
-def test_units(long_steps):
-    unit_force = attraction((0.5, 1.0), 1e-3)
-
-    def force(gap):
-        # µ G a² of 1 mPa s, 5/s and 1 µm.
-        return 5e-15 * unit_force(1e6 * gap)
-
-    small = Meeting(SpherePair((0.5e-6, 1e-6), 1e-3), force, 1e-12)
-    unit = Meeting(SpherePair((0.5, 1.0)), unit_force, 1e-6)
-    assert small.in_flow("shear", 5.0) == pytest.approx(unit.in_flow("shear", 1.0), rel=1e-3)
 
 
 def test_a_force_that_gives_no_number_is_refused():

@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import SpherePair, TwoSpheres
-from flocsim.hydrodynamics.two_spheres import FAMILIES, functions_of, lubrication
 from tests.helpers.tiers import rest_slow
 from tests.reference.stokeslets import resistances
 
@@ -140,34 +139,6 @@ def test_spheres_change_places(ratio):
     assert first.shear == pytest.approx(second.shear, rel=1e-9)
 
 
-@pytest.mark.parametrize("ratio", rest_slow([0.1, *RATIOS], lambda ratio: ratio == 0.5))
-def test_turning_as_one_squeezes_nothing(ratio):
-    pair = SpherePair((1.0, ratio))
-    gap = np.array([1e-8, 1e-5])
-    arm = 0.5 * (1.0 + ratio + gap)
-    as_one = np.stack([-arm, arm, np.ones(2), np.ones(2)], axis=1)
-    loads = np.einsum("kij,kj->ki", pair.across(gap)[0], as_one)
-    assert loads[0] == pytest.approx(loads[1], rel=1e-4, abs=1e-3)
-
-
-@pytest.mark.slow
-def test_more_terms_change_nothing():
-    few, many = functions_of(0.2, 150), functions_of(0.2, 300)
-    for xi in (1e-6, 1e-2, 1.0):
-        for key, each in many.items():
-            assert few[key](xi) == pytest.approx(each(xi), rel=2e-4, abs=2e-4), key
-
-
-def test_the_leading_terms_near_touching():
-    two = TwoSpheres(0.5)
-    known = lubrication(0.5)
-    assert set(FAMILIES) == {name.removesuffix("even").removesuffix("odd") for name in known}
-    low, high = two.function("XA", 1, 1, [1e-6, 1e-8])
-    assert high - low == pytest.approx(known["XAeven"][0] * (1e8 - 1e6), rel=1e-6)
-    low, high = two.function("YA", 1, 1, [1e-6, 1e-8])
-    assert high - low == pytest.approx(known["YAeven"][1] * np.log(100.0), rel=1e-4)
-
-
 @pytest.mark.parametrize("ratio", [0.01, 60.0, 0.0, -1.0, float("nan")])
 def test_other_ratios_are_refused(ratio):
     assert SpherePair((1e-6, 5e-5)).functions.ratio == pytest.approx(50.0)
@@ -186,14 +157,3 @@ def test_what_are_no_two_spheres_in_water(given):
 def test_spheres_that_touch_are_refused(gap):
     with pytest.raises(UsageError, match="gaps above 0 m"):
         EQUAL.along(gap)
-
-
-@pytest.mark.slow
-def test_units():
-    pair, unit = SpherePair((3e-6, 6e-6), 1e-3), SpherePair((1.0, 2.0))
-    resistance, strain = pair.across(3e-7)
-    without, without_strain = unit.across(0.1)
-    powers = np.array([1.0, 1.0, 2.0, 2.0])
-    scale = 1e-3 * 3e-6 ** (powers[:, None] + powers - 1.0)
-    assert resistance[0] == pytest.approx(scale * without[0], rel=1e-9, abs=0.0)
-    assert strain[0] == pytest.approx(1e-3 * 3e-6 ** (powers + 1.0) * without_strain[0], rel=1e-9)

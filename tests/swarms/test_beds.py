@@ -66,20 +66,6 @@ def test_steps_across_switches_are_taken_and_change_no_bit_with_threads():
     assert runs[0] == runs[1]
 
 
-@pytest.mark.slow
-def test_a_bed_goes_on_from_a_state_to_the_same_bytes():
-    swarm, _ = falling(30, 2)
-    progress = swarm.begin(1.0)
-    while progress.advance(0.5) == Status.PAUSED:
-        pass
-    other = falling(30, 2)[0].begin(1.0)
-    other.restore(progress.state())
-    for each in (progress, other):
-        while each.advance(1.0) == Status.PAUSED:
-            pass
-    assert progress.swarm.motion.tobytes() == other.swarm.motion.tobytes()
-
-
 def test_bodies_that_bounce_are_not_stopped_by_long_steps():
     """Without damping, drag and weight energy stays: no step across switches is taken."""
     rng = np.random.default_rng(3)

@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim import Body, Sphere
 from flocsim.compiler.composer import compose
@@ -14,9 +13,8 @@ from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.grouping import have_met
 from flocsim.swarms.placement import floor
-from flocsim.swarms.runner import Runner
 from flocsim.swarms.swarm import Swarm
-from tests.helpers.swarm_scenes import WATER, R, crowd, forces
+from tests.helpers.swarm_scenes import WATER, R
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -58,42 +56,6 @@ def test_who_follows_one_that_lands_is_of_its_island_from_the_first():
     progress = swarm.begin(1.0)
     reached = progress.runner.reached(progress.swarm, 1.5 * R / 1e-4, progress.reach, progress.box)
     assert reached.labels[1:].tolist() == [1, 1, 1]
-
-
-def test_no_two_of_different_islands_have_been_near(monkeypatch):
-    """What makes a window right; in windows so long that bodies meet whom straight paths miss."""
-    bodies, side = crowd(30, 2)
-    swarm = Swarm(bodies, forces(), fluid=WATER, box=(side, side))
-    progress, seen = swarm.begin(0.05), 0
-    take_over, reached = progress.take_over, Runner.reached
-    labels = None
-
-    def known(*arguments):
-        nonlocal labels
-        found = reached(*arguments)
-        labels = found.labels
-        return found
-
-    def watched(finished):
-        nonlocal seen
-        low, high = progress.swarm.ways[:, :, ::2], progress.swarm.ways[:, :, 1::2]
-        centres, widths = 0.5 * (low + high), high - low
-        radii = progress.swarm.bodies[:, at.BOUNDING_RADIUS]
-        for a, b in itertools.combinations(range(len(labels)), 2):
-            if labels[a] != labels[b]:
-                between = centres[a] - centres[b]
-                between -= side * np.round(between / side)
-                gaps = np.maximum(np.abs(between) - 0.5 * (widths[a] + widths[b]), 0.0)
-                assert np.hypot(*gaps.T).min() >= radii[a] + radii[b] + progress.reach
-        seen += 1
-        take_over(finished)
-
-    progress.take_over = watched
-    monkeypatch.setattr(Runner, "reached", known)
-    progress.span *= 300.0
-    while progress.advance(0.05).name == "PAUSED":
-        pass
-    assert seen > 3
 
 
 def cradle():

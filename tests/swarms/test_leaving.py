@@ -108,20 +108,6 @@ def test_a_crowded_top_puts_it_further_out():
     assert progress.swarm.motion[0, 1] > HIGH + 3.9 * R
 
 
-def test_runs_with_removal_end_as_without_until_then():
-    """Those that stay are not touched by what has left: far apart they fall alike."""
-    places = [(4.0 * R, 1.0 * R), (12.0 * R, 20.0 * R), (20.0 * R, 24.0 * R)]
-    swarm = swarm_at(places)
-    kept, left = swarm.begin(0.12), progress_of(swarm_at(places), REMOVE, 0.12)
-    for progress in (kept, left):
-        while progress.advance(0.12) == Status.PAUSED:
-            pass
-    _, one, error = kept.seen()
-    _, other, _ = left.seen()
-    assert left.gone.tolist() == [True, False, False] and np.isnan(other[0]).all()
-    assert np.abs(one - other)[1:, :2].max() < 1e-9 + error
-
-
 def test_a_state_with_bodies_gone_goes_on_to_the_same_bytes():
     places = [(4.0 * R, 1.0 * R), (12.0 * R, 3.0 * R), (14.1 * R, 9.0 * R), (20.0 * R, 24.0 * R)]
 

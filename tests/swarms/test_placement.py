@@ -12,7 +12,7 @@ from flocsim.errors import UsageError
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators import Status
-from flocsim.swarms.placement import floor, place_at_random, wall
+from flocsim.swarms.placement import place_at_random, wall
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.swarm_scenes import WATER, R
 from tests.helpers.tiers import rest_slow
@@ -132,32 +132,6 @@ def test_walls_that_meet_or_cross_share_a_weight_evenly(slope, apart, extra, tog
     found = loads(bodies, run.position[-1])
     assert found[:2] == pytest.approx(expected, rel=1e-4)
     assert not found[2:].any()
-
-
-def test_a_corner_is_the_same_wherever_it_is_and_however_bodies_are_numbered():
-    walls, disc = pit(math.radians(45.0), 0.0, above=1e-5)
-    bodies = [*walls, disc]
-    there = Swarm(bodies, laws(), fluid=WATER).run(2.0)
-    shift = np.array([3.1e-3, -1.7e-3])
-    moved = [attrs.evolve(body, position=tuple(body.position + shift)) for body in bodies]
-    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
-        here = Swarm([moved[each] for each in order], laws(), fluid=WATER).run(2.0)
-        assert here.status == Status.FINISHED
-        back = here.position[-1, :, :2] - shift
-        assert np.abs(back - there.position[-1, order, :2]).max() < 1e-9
-
-
-def test_a_disc_is_pushed_into_the_corner_of_a_floor_and_a_wall_that_cross():
-    level = floor(1e-3, beyond=1e-4)
-    upright = wall((0.0, -1e-4), (0.0, 1e-3), radius=THIN)
-    disc = Body(Sphere(DISC), (DISC + 3e-5, DISC + 2e-5), velocity=(-1e-2, 0.0), density=2650.0)
-    for bodies in ([level, upright, disc], [disc, upright, level]):
-        run = Swarm(bodies, laws(), fluid=WATER).run(2.0)
-        x, y, _ = run.position[-1, bodies.index(disc)]
-        assert run.status == Status.FINISHED
-        weight = 9.81 * disc.buoyant_mass(WATER)
-        assert STIFFNESS * (DISC - y) == pytest.approx(weight, rel=1e-3)
-        assert x >= DISC + THIN - 1e-8
 
 
 @pytest.mark.parametrize("count", rest_slow([5, 11, 40], lambda count: count == 5))

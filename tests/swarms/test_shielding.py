@@ -17,7 +17,7 @@ from flocsim.swarms.placement import floor
 from flocsim.swarms.together.clusters import Shielding
 from tests.forces.test_shape_drag import STRAINED
 from tests.helpers.small_study import small_config
-from tests.helpers.swarm_scenes import WATER, R, crowd
+from tests.helpers.swarm_scenes import WATER, R
 
 TOUCHING = 1.9999 * R
 LAWS = ("stokes", "schiller_naumann", "shape")
@@ -120,23 +120,6 @@ def test_a_drag_in_a_cluster_is_that_alone_or_less_and_takes_energy(law, fluid):
         )
         fx, fy, torque = still.laws["body_force"](view, still.parameters)
         assert fx * vx + fy * vy + torque * spin < 0.0
-
-
-@pytest.mark.slow
-def test_a_run_goes_on_from_its_state_to_the_same_bytes():
-    bodies, side = crowd(20, 1, fraction=0.45)
-    swarm = Swarm(bodies, FORCES, fluid=WATER, box=(side, side))
-    whole, half = swarm.begin(0.02), swarm.begin(0.02)
-    half.advance(0.02)
-    half.advance(0.02)
-    other = swarm.begin(0.02)
-    other.restore(half.state())
-    for each in (whole, other):
-        while each.time < 0.02:
-            each.advance(0.02)
-    assert other.swarm.motion.tobytes() == whole.swarm.motion.tobytes()
-    # Clusters have come about, or this shows nothing.
-    assert (whole.swarm.bodies[:, at.SHIELDING] < 1.0).any()
 
 
 @pytest.mark.slow

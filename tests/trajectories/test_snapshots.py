@@ -21,13 +21,6 @@ def fall(count=101):
 SIZES = (1e-6, 1e-6)
 
 
-@pytest.mark.parametrize("count", [2, 3, 6, 50])
-def test_start_and_end_are_among_the_instants(count):
-    times, position = fall()
-    found = instants_along(times, position, SIZES, count)
-    assert (found[0], found[-1], len(found)) == (times[0], times[-1], count)
-
-
 @pytest.mark.parametrize("collision", [0.0131, 0.333, 0.5, 0.98])
 def test_the_collision_is_among_the_instants(collision):
     times, position = fall(1001)

@@ -96,19 +96,6 @@ def test_a_disk_rests_in_the_hole_of_a_frame():
     )
 
 
-def test_disks_of_a_chain_push_as_their_radii_say():
-    """Each part keeps its radius: where a small disk comes to lie on beads of two sizes."""
-    row = Composite([(Sphere(UNIT), (0.0, 0.0)), (Sphere(2.0 * UNIT), (3.0 * UNIT, 0.0))])
-    [low, high] = [part.points[0] for part in row.parts]
-    at = [low + (0.0, 1.6 * UNIT), high + (0.0, 2.6 * UNIT)]
-    bodies = [Body(row, density=2650.0, fixed=True)]
-    bodies += [Body(Sphere(0.5 * UNIT), tuple(each), density=2650.0) for each in at]
-    forces = [Gravity(), StokesDrag(), CONTACT]
-    found = finished(System(bodies, forces, fluid=WATER), 0.1)
-    heights = found.position[-1, 1:, 1] - [low[1], high[1]]
-    assert heights == pytest.approx([1.5 * UNIT, 2.5 * UNIT], abs=1e-10)
-
-
 @pytest.mark.slow
 def test_swarms_of_compounds_end_as_one_run_does():
     shapes = [framed(UNIT), beads(1.5 * UNIT), Sphere(2.0 * UNIT), Sphere(5.0 * UNIT)]

@@ -69,17 +69,6 @@ def test_to_pass_an_arm_is_not_to_have_departed():
     assert outcome in "ABCD" and np.isfinite(row["t_collision"])
 
 
-@pytest.mark.slow
-def test_to_pass_an_arm_is_not_to_have_departed_whatever_the_steps():
-    (implicit, one), (explicit, other) = (
-        replicate(1640, TYPE_I, 8, 0.883, integrator={"name": name})
-        for name in ("implicit", "dormand_prince54")
-    )
-    assert implicit == explicit != "missed"
-    assert one["d_c_collision"] == pytest.approx(other["d_c_collision"], abs=1e-8)
-    assert one["t_collision"] == pytest.approx(other["t_collision"], rel=1e-3)
-
-
 def test_a_floc_of_a_stable_colloid_is_decided():
     layer = {"double_layer": {"debye_length": 30e-9, "potential": 0.03}}
     outcome, row = replicate(3, TYPE_III, 32, 0.043, "si", forces=layer)

@@ -68,16 +68,6 @@ def test_doublet_stays_in_its_well(name, tolerance):
     assert gaps[-1] < 0.0
 
 
-@pytest.mark.parametrize("name", PAIRS)
-def test_bodies_of_a_doublet_neither_part_nor_close_in(name):
-    """They may still roll on each other, on one contact point."""
-    _, found = doublet(name, 1e-10, 10.0)
-    (lower, upper), arm = found.velocity[-1, :, :2], np.diff(found.position[-1, :, :2], axis=0)[0]
-    rate = arm @ (upper - lower) / np.hypot(*arm)
-    assert abs(rate) < 1e-2 * np.hypot(*lower)
-    assert lower[1] < 0.0
-
-
 def test_spheres_rest_where_contact_balances_attraction():
     """k_n Δ = F_A − F_R at contact; the weights change that by less than a per cent."""
     shapes, found = doublet("spheres", 1e-12, 1.0)

@@ -76,12 +76,6 @@ def test_restitution_and_contact_time_with_tension(z, integrator, allowed):
 
 
 @by_method
-def test_critical_damping_with_tension_never_parts(integrator, allowed):
-    restitution, _, _ = bounce(1.0, True, integrator)
-    assert abs(restitution) < 1e-3
-
-
-@by_method
 def test_bounce_off_a_fixed_body_is_one_of_its_own_mass(integrator, allowed):
     restitution, lasted, _ = bounce(0.3, True, integrator, fixed=True)
     root = math.sqrt(1.0 - 0.3**2)

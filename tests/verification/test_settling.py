@@ -1,13 +1,11 @@
 """Settling alone: MODEL section 7's terminal velocities, relaxation and table of speeds."""
 
-import attrs
 import numpy as np
 import pytest
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
-from tests.helpers.methods import by_adaptive
 from tests.helpers.trial_scenes import WATER_VISCOSITY, hook
 from tests.reference.closed_forms import relaxation_time, terminal_velocity
 
@@ -65,17 +63,6 @@ def speed_in_closed_form(body):
 )
 def test_relaxation_follows_the_exponential(integrator, allowed):
     assert relaxation_error(Body(Sphere(RADIUS), density=2650.0), integrator) < allowed
-
-
-@by_adaptive
-def test_distance_fallen_keeps_to_the_tolerance(integrator):
-    body = Body(Sphere(RADIUS), density=2650.0)
-    tau, terminal = relaxation_of(body)
-    for tolerance in (1e-9, 1e-11, 1e-13):
-        end = settle(body, attrs.evolve(integrator, tolerance=tolerance), 3.0 * tau)
-        fallen = terminal * (end.t - tau * (1.0 - np.exp(-end.t / tau)))
-        assert np.abs(end.position[:, 0, 1] + fallen).max() < tolerance
-        assert end.error < end.steps * tolerance
 
 
 def test_drag_stops_a_spin_and_only_where_it_is_rotational():

@@ -96,18 +96,6 @@ def test_bodies_swapped(integrator, allowed):
 
 
 @by_method
-@pytest.mark.parametrize("order", ["rolled", "reversed"])
-def test_vertices_renumbered(order, integrator, allowed):
-    def renumbered(body):
-        vertices = body.shape.vertices
-        vertices = np.roll(vertices, 5, axis=0) if order == "rolled" else vertices[::-1]
-        return attrs.evolve(body, shape=SpheroPolygon(vertices, body.shape.radius))
-
-    expected = end_of(encounter(), integrator)
-    assert_same(end_of([renumbered(b) for b in encounter()], integrator), expected, allowed)
-
-
-@by_method
 def test_lengths_scaled_with_time_kept(integrator, allowed):
     """Twice the lengths at an equal mass per area: mass × 4, so stiffnesses × 4 keep the time."""
     bodies = [
