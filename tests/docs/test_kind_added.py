@@ -3,15 +3,11 @@ flocs that settle past a wall, and a line, all commands run it and show it, or s
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-
-from tests.helpers.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 KIND = ROOT / "tests/helpers/lone_flocs.py"
@@ -119,27 +115,6 @@ def test_it_is_extended_by_processes_and_run_by_a_script(home):
     with python(home, "-c", script) as process:
         assert process.communicate()[0] == ""
     assert flocs(home, "script.h5") == flocs(home, "a.h5")
-
-
-@pytest.mark.slow
-def test_what_it_has_when_killed_is_shown_and_continued(home):
-    words = "ensemble s.toml --replicates 60 -o long.h5"
-    until = time.monotonic() + PATIENCE
-    with python(home, "-m", "flocsim", *words.split(), start_new_session=True) as process:
-        while time.monotonic() < until and process.poll() is None:
-            # Until there are flocs of 8 vertices.
-            if any(b'"lone", 8,' in each.read_bytes() for each in home.glob("long.h5.journal*")):
-                break
-            time.sleep(0.002)
-        process.send_signal(signal.SIGKILL)
-    code, said = run(home, "info long.h5")
-    assert code == 0 and "of 120 flocs so far" in said, said
-    code, said = run(home, "plot long.h5")
-    assert code == 0 and "long-speed.png" in said, said
-    code, said = run(home, f"{words} --resume")
-    assert code == 0 and "of them exist already" in said, said
-    code, said = run(home, "ensemble s.toml --replicates 60 -o at_once.h5")
-    assert code == 0 and flocs(home, "long.h5") == flocs(home, "at_once.h5")
 
 
 @pytest.mark.slow

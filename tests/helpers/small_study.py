@@ -185,9 +185,9 @@ def command(*words, ranks=None, module="flocsim.ensemble"):
     return [*launch, sys.executable, "-m", module, *map(str, words)]
 
 
-def run_command(folder, *words, ranks=None, module="flocsim.ensemble", env=None):
+def run_command(folder, *words, ranks=None, module="flocsim.ensemble", **options):
     """Run a command in the folder; the finished process with its output as text."""
     return subprocess.run(
         command(*words, ranks=ranks, module=module),
-        cwd=folder, env=env, capture_output=True, text=True, timeout=PATIENCE,
+        cwd=folder, capture_output=True, text=True, timeout=PATIENCE, **options,
     )  # fmt: skip
