@@ -9,7 +9,6 @@ import io
 from pathlib import Path
 
 from flocsim.io.files import write_file
-from flocsim.io.outputs import data_rule
 
 FORMATS = ("png", "pdf")
 
@@ -23,7 +22,7 @@ def save_all(figure, stem):
 
     paths = paths_of(stem)
     for path in paths:
-        save(figure, path, data_rule(overwrite=True))
+        save(figure, path, True)
     return paths
 
 
@@ -31,7 +30,7 @@ def write(path, text):
     """Write a text; a file that says the same already stays."""
     data = text.encode()
     if not (path.is_file() and path.read_bytes() == data):
-        write_file(path, data, data_rule(overwrite=True))
+        write_file(path, data, True)
 
 
 def write_page(path, text):

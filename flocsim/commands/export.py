@@ -13,7 +13,7 @@ from flocsim.commands import add_allowed, add_overwrite, allowed_by
 from flocsim.ensembles.contents import file_kind
 from flocsim.errors import UsageError
 from flocsim.io.files import unfinished, write_file
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.results import kernel_tables
 from flocsim.io.results.file import read_results
 from flocsim.io.seals import held
@@ -67,12 +67,12 @@ def run(args: argparse.Namespace) -> int:
 
 def export_motion(args: argparse.Namespace) -> int:
     """Write a motion for a program that shows it."""
-    suffix, rule = SUFFIXES[args.format], data_rule(args.overwrite)
+    suffix = SUFFIXES[args.format]
     path = Path(args.output or f"{Path(args.source).stem}{suffix}")
-    check_outputs([Output(path, rule, endings=(suffix,))], [args.source])
+    check_outputs([path], args.overwrite, [args.source], endings=(suffix,))
     kind = file_kind(source := held(args.source), "motion")
     t, position, velocity, shapes = kind.motion(kind.read(source))
-    WRITERS[suffix](path, t, position, velocity, shapes, rule)
+    WRITERS[suffix](path, t, position, velocity, shapes, args.overwrite)
     print(path)
     return 0
 
@@ -85,11 +85,10 @@ def export_tables(args: argparse.Namespace) -> int:
     found = {f"{Path(args.source).stem}-{name}.csv": name for name in names}
     if args.output:
         found = {args.output: names[0]}
-    rule = data_rule(args.overwrite)
-    check_outputs([Output(path, rule) for path in found], [args.source])
+    check_outputs(found, args.overwrite, [args.source])
     for path, name in found.items():
         labelled = tables.labelled(name)
-        with unfinished(path, rule) as (_, file):
+        with unfinished(path, args.overwrite) as file:
             text = io.TextIOWrapper(file, "utf-8", newline="")
             labelled.write_csv(text, tables.indices[name])
             text.detach()  # which writes what it still holds
@@ -116,7 +115,6 @@ def water_factors(path: Any, allowed: Any) -> dict[str, np.ndarray]:
 def export_matrices(args: argparse.Namespace) -> int:
     """Write a matrix for each mechanism, that the model and the factor have, and N."""
     kernel = read_results(args.source).kernel
-    rule = data_rule(args.overwrite)
     if kernel is None:
         raise UsageError(
             f"{args.source} is not from a kernel study and has no rates: run flocsim kernel with a "
@@ -146,8 +144,8 @@ def export_matrices(args: argparse.Namespace) -> int:
         raise UsageError(without[0])
     for words in dict.fromkeys(without):
         print(f"flocsim: left out: {words}", file=sys.stderr)
-    check_outputs([Output(path, rule) for path in texts], [args.source])
+    check_outputs(texts, args.overwrite, [args.source])
     for path, text in texts.items():
-        write_file(path, text.encode(), rule)
+        write_file(path, text.encode(), args.overwrite)
         print(path)
     return 0

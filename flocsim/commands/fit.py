@@ -35,7 +35,7 @@ from flocsim.io.images.masks import MASK_SUFFIXES
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image, read_names
 from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL, TIFF_SUFFIXES
-from flocsim.io.outputs import Output, check_ending, check_outputs, data_rule
+from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FIGURE_ENDINGS
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
@@ -211,7 +211,7 @@ def run(args: argparse.Namespace) -> int:
             "--pixel-size is missing, and only OME-TIFF and ImageJ files give the size of a "
             "pixel; give the length of its side, for example --pixel-size '0.95 um'"
         )
-    rule = data_rule(args.overwrite)
+    rule = args.overwrite
     outputs = [args.output, summary]
     if args.overlay is not None:
         outputs += overlay_paths(args.overlay, titles, len(paths) > 1) or [args.overlay]
@@ -220,7 +220,7 @@ def run(args: argparse.Namespace) -> int:
     if args.masks_out is not None:
         make_folder(args.masks_out, "--masks-out ")
         outputs += label_paths(args.masks_out, titles).values()
-    check_outputs([Output(path, rule) for path in outputs], paths)
+    check_outputs(outputs, rule, paths)
     try:
         pictures, lost = fit_pictures(paths, args)
     except KeyboardInterrupt:

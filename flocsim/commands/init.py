@@ -8,7 +8,7 @@ from pathlib import Path
 from flocsim.commands import add_overwrite
 from flocsim.errors import UsageError
 from flocsim.io.files import write_file
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 
 TEMPLATES = Path(__file__).with_name("templates")
 """The folder of what is written: NAME.toml of each kind, and force.py."""
@@ -72,7 +72,7 @@ def run(args: Namespace) -> int:
         raise UsageError(
             "--kind pictures needs --shapes FILE, your flocs as `flocsim fit` wrote them"
         )
-    rule, path = data_rule(args.overwrite), Path(args.file)
+    rule, path = args.overwrite, Path(args.file)
     module = re.sub(r"\W", "_", f"{path.stem}_force")
     module = f"_{module}" if module[0].isdigit() else module
     names = {"{module}": module, "{file}": path.name, "{stem}": path.stem}
@@ -85,7 +85,7 @@ def run(args: Namespace) -> int:
     files = {path: text}
     if args.kind == "force":
         files[path.with_name(f"{module}.py")] = (TEMPLATES / "force.py").read_text("utf-8")
-    check_outputs([Output(each, rule) for each in files], [])
+    check_outputs(files, rule, [])
     for each, content in files.items():
         write_file(each, content.encode(), rule)
     wrote = " and ".join(map(str, files))

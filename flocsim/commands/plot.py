@@ -10,7 +10,7 @@ from flocsim.ensembles.contents import Contents, file_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_of
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FORMATS, mark_figure, save
 from flocsim.io.seals import held
 
@@ -46,15 +46,15 @@ def run(args: argparse.Namespace) -> int:
     foreign = [name for name in names if name not in figures]
     if foreign:
         raise UsageError(f"{args.results} has no figure {foreign[0]!r}, only {', '.join(figures)}")
-    folder, rule = Path(args.output_dir), data_rule(args.overwrite)
+    folder, rule = Path(args.output_dir), args.overwrite
     make_folder(folder, "--output-dir ")
     paths = {
         name: folder / f"{Path(args.results).stem}-{label(name)}.{args.format}" for name in names
     }
     animation = animation_of(args, kind)
-    outputs = [Output(path, rule) for path in paths.values()]
-    outputs += [Output(path, rule, endings=(".gif",)) for path in animation]
-    check_outputs(outputs, [args.results])
+    for path in animation:
+        check_ending(path, (".gif",))
+    check_outputs((*paths.values(), *animation), rule, [args.results])
     for name, path in paths.items():
         figure = figures[name](content)
         if remark:

@@ -23,7 +23,7 @@ from flocsim.commands import add_allowed, add_overwrite, allowed_by
 from flocsim.ensembles.contents import Contents, Example, file_kind, text_of
 from flocsim.errors import visible
 from flocsim.io.files import write_file
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.collision import (
     CONTACT_COLOUR,
     MICRO,
@@ -79,13 +79,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the page and print its path; returns the exit code."""
     path = Path(args.output or f"{Path(args.results).stem}.html")
-    rule = data_rule(args.overwrite)
-    check_outputs([Output(path, rule, endings=(".html",))], [args.results])
+    check_outputs([path], args.overwrite, [args.results], endings=(".html",))
     source = held(args.results)
     kind = file_kind(source)
     found = kind.read(source)
     examples = [] if args.no_motion else kind.examples(source, allowed_by(args))
-    write_file(path, report_page(str(args.results), kind, found, examples).encode(), rule)
+    write_file(path, report_page(str(args.results), kind, found, examples).encode(), args.overwrite)
     for example in examples:
         if example.reason:
             print(f"class {example.outcome} not animated: {example.reason}")

@@ -27,7 +27,7 @@ from flocsim.io.fit_report import (
     population_lines,
 )
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
 from flocsim.io.plots.style import Figure
 from flocsim.io.shape_library import (
@@ -133,8 +133,8 @@ def run_list(args: argparse.Namespace) -> int:
 
 def run_write(args: argparse.Namespace) -> int:
     """Write the flocs of all libraries to one, or those of them that meet all that is asked."""
-    rule, source = data_rule(args.overwrite), ", ".join(args.libraries)
-    check_outputs([Output(args.output, rule)], args.libraries)
+    rule, source = args.overwrite, ", ".join(args.libraries)
+    check_outputs([args.output], rule, args.libraries)
     libraries = {path: read_library(path) for path in args.libraries}
     every = merged_entries(libraries)
     entries = selected(every, args, source) if args.action == "select" else every

@@ -13,7 +13,8 @@ from flocsim.commands.sweep import interrupt
 from flocsim.ensembles.cli import continuing
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.arguments import whole
-from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
+from flocsim.io.outputs import check_outputs
+from flocsim.io.seals import held
 from flocsim.io.terminal import tell
 from flocsim.process import STOPPED, handle
 
@@ -60,9 +61,10 @@ def run(args: Namespace) -> int:
 
     output = Path(args.output or f"{Path(args.results).stem}-strength.h5")
     figure, resumed = output.with_suffix(".png"), args.resume and output.exists()
-    rule = extension_rule(output) if resumed else data_rule(args.overwrite)
-    drawn = data_rule(args.overwrite or args.resume)
-    check_outputs([Output(output, rule, ways=WAYS), Output(figure, drawn)], [args.results])
+    rule = held(output) if resumed else args.overwrite
+    drawn = args.overwrite or args.resume
+    check_outputs([output], rule, [args.results], WAYS)
+    check_outputs([figure], drawn, [args.results, output])
     survey = Survey(args.results, args.flow, args.count, args.precision, allowed_by(args))
     say = (lambda line: None) if args.quiet else tell
     tested = earlier(survey, output) if resumed else {}
@@ -76,7 +78,7 @@ def run(args: Namespace) -> int:
         nonlocal rule, saved
         found = gathered(survey, tested, complete)
         found.write(output, rule)
-        rule, saved = extension_rule(output), time.monotonic()
+        rule, saved = held(output), time.monotonic()
         return found
 
     def take(doublet: Any, opening: Any) -> None:

@@ -14,7 +14,7 @@ from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.ensembles.diagnose.preflight import check_study, inputs_of
 from flocsim.ensembles.pairs.opened import one_count_study, place_of, replicate_of
 from flocsim.io.arguments import number
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import SOURCE, source_line
 from flocsim.io.trajectory import (
@@ -86,13 +86,15 @@ def run(args: Namespace) -> int:
     shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
     args.output = args.output or [f"{Path(args.config).stem}-{shows}.png"]
     asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
-    rule = data_rule(args.overwrite)
+    rule = args.overwrite
     # What could not be written is reported now, not after the run.
-    figures = chain(*asked.values())
-    outputs = [Output(path, rule, endings=FIGURE_ENDINGS) for path in figures]
-    outputs += [Output(args.animation, rule, endings=(".gif",))] if args.animation else []
-    outputs += [Output(args.save, rule)] if args.save else []
-    check_outputs(outputs, inputs_of(config, args.config))
+    figures = [*chain(*asked.values())]
+    for path in figures:
+        check_ending(path, FIGURE_ENDINGS)
+    if args.animation:
+        check_ending(args.animation, (".gif",))
+    outputs = [*figures, *filter(None, [args.animation, args.save])]
+    check_outputs(outputs, rule, inputs_of(config, args.config))
     study = one_count_study(config, place[1])
     found = replicate_of(args.replicate, place, study)
     assert found.row is not None, "a replicate of a study"

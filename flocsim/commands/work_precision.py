@@ -19,7 +19,7 @@ from flocsim.integrators import DormandPrince54, Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.arguments import whole
 from flocsim.io.confidence import Z, wilson
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.accuracy import error_against_time
 from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import source_line
@@ -114,11 +114,11 @@ def rung(
 
 def run(args: Namespace) -> int:
     """Run the ladders of all types and print them; the exit code."""
-    config, rule = load_config(args.config, settings_in(args.settings)), data_rule(args.overwrite)
+    config, rule = load_config(args.config, settings_in(args.settings)), args.overwrite
     check_study(config)
     if args.output:
-        figure = Output(args.output, rule, endings=FIGURE_ENDINGS)
-        check_outputs([figure], inputs_of(config, args.config))
+        sources = inputs_of(config, args.config)
+        check_outputs([args.output], rule, sources, endings=FIGURE_ENDINGS)
     study = study_of(config)
     ladders: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for condition, name in enumerate(config.scene.names):

@@ -20,7 +20,7 @@ from flocsim.ensembles.parallel.processes import (
     start_processes,
 )
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.terminal import plain_warnings, tell
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
@@ -79,7 +79,6 @@ def check_start(options: argparse.Namespace, config: Any, comm: Communicator) ->
     from flocsim.ensembles.diagnose.preflight import inputs_of
     from flocsim.ensembles.kind import kind_of
     from flocsim.ensembles.storage.resume import RESUME, WAYS
-    from flocsim.io.journal import SUFFIX
 
     if options.jobs < 1:
         raise UsageError(f"--jobs must be at least 1, found {options.jobs}")
@@ -95,9 +94,8 @@ def check_start(options: argparse.Namespace, config: Any, comm: Communicator) ->
     kind_of(config).check(config)
     if not options.dry_run:
         # What is to be extended is looked at when the run begins.
-        rule = data_rule(options.overwrite or options.mode == RESUME)
-        results = Output(config.output.file, rule, SUFFIX, WAYS)
-        check_outputs([results], inputs_of(config, options.config))
+        rule = options.overwrite or options.mode == RESUME
+        check_outputs([config.output.file], rule, inputs_of(config, options.config), WAYS)
 
 
 def agree(comm: Communicator, options: Any) -> tuple[Any, argparse.Namespace]:

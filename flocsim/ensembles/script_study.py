@@ -26,8 +26,7 @@ from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
-from flocsim.io.journal import SUFFIX
-from flocsim.io.outputs import Output, check_outputs, data_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.process import INTERRUPTED, STOPPED, WITHHELD
 from flocsim.trajectories.trajectory import Trajectory
 
@@ -190,10 +189,8 @@ class Study:
             target = Path(self.config.output.file if output is None else output)
             target = Path(scratch, target.name) if scratch else target
             # The command reads the text from a pipe, and cannot know the file.
-            check_outputs(
-                [Output(target, data_rule(overwrite or mode == "resume"), SUFFIX, WAYS)],
-                inputs_of(self.config, str(self.path)),
-            )
+            sources = inputs_of(self.config, str(self.path))
+            check_outputs([target], overwrite or mode == "resume", sources, WAYS)
             words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(jobs)]
             words += [f"--{mode}"] if mode != "new" else []
             words += ["--overwrite"] if overwrite else []

@@ -35,12 +35,13 @@ from flocsim.ensembles.storage.identity import (
 )
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
-from flocsim.io.files import make_folder
+from flocsim.io.files import Rule, make_folder
 from flocsim.io.labelled import Column, Labelled
-from flocsim.io.outputs import Output, check_outputs, data_rule, extension_rule
+from flocsim.io.outputs import check_outputs
 from flocsim.io.results.run_group import SOURCE
 from flocsim.io.results.schema import GROUPS
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
+from flocsim.io.seals import held
 from flocsim.io.terminal import aligned
 
 Facts = dict[str, Any]
@@ -68,11 +69,11 @@ def sweep(
     parts = planned(study, over, output)
     swept = swept_keys(over, [part.config for part in parts.values()])
     wanted = wanted_of(parts)
-    rule = data_rule(overwrite)
+    rule: Rule = overwrite
     if mode == "resume" and output.exists():
         refuse_other_sweep(read_joined(output), swept)
-        rule = extension_rule(output)
-    check_outputs([Output(output, rule, ways=ways)], [study.path])
+        rule = held(output)
+    check_outputs([output], rule, [study.path], ways)
     make_folder(parts_folder(output))
     # A part that is whole already is taken as it is; any other is run as a study of its own.
     found = []

@@ -1,7 +1,6 @@
 """Files written whole or not at all."""
 
 import contextlib
-import enum
 import errno
 import itertools
 import os
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from flocsim.errors import FileError
-from flocsim.io.seals import digest_of
+from flocsim.io.seals import Held, digest_of, held
 
 UNFINISHED = ".unfinished"
 """How the name of a file that is still being written ends."""
@@ -25,42 +24,40 @@ NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.E
 """What a file system answers that has no locks, or whose lock server is away."""
 
 
-class Old(enum.Enum):
-    """What becomes of a file that lies at the place of a new one."""
+Rule = bool | str | os.PathLike
+"""What becomes of a file that lies at the place of a new one.
 
-    KEPT = "kept"
-    SET_ASIDE = "set aside"
-    REPLACED = "replaced"
-
-
-Rule = Callable[[Path], Old]
-"""Says what becomes of the file at a path, asked at the moment in which the new one is placed."""
+It is kept (False), it gets another name (True), or it is replaced, if it still is the file that was
+pinned (`flocsim.io.seals.held`); any other one is kept.
+"""
 
 
-def keep(_: Path) -> Old:
-    """Return the default rule: no file is ever replaced."""
-    return Old.KEPT
+def is_kept(target: Path, rule: Rule) -> bool:
+    """Return True if a file that exists must not be moved or replaced."""
+    if isinstance(rule, Held):
+        return getattr(held(target), "end", None) != rule.end
+    return rule is not True
 
 
 @contextlib.contextmanager
-def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[tuple[Path, BinaryIO]]:
+def unfinished(path: str | os.PathLike, rule: Rule = False) -> Iterator[BinaryIO]:
     """Open a fresh file beside ``path`` that takes its place, whole and synced, after the block.
 
-    Yields the path and the open file. A reader meets the old file or the new one, never a part.
+    A reader meets the old file or the new one, never a part.
     ``rule`` says what becomes of a file that lies at the place; one that is kept ends the block
     before it begins, with a FileError. If it has come meanwhile, the new one is called name.1.h5,
     and the FileError says so. Raises FileError as well if the folder is missing or unwritable, the
     disk is full, or the path names something that is not an ordinary file; then nothing is left.
     """
     target = ordinary_target(path)
-    if target.exists() and rule(target) is Old.KEPT:
+    if target.exists() and is_kept(target, rule):
         raise FileError(f"{path} already exists and is left as it is: name another place")
     try:
         temporary = fresh_beside(target)
         try:
             # Exclusively: nothing that has the name already is followed or opened.
             with open(temporary, "x+b") as file:
-                yield temporary, file
+                yield file
                 file.flush()
                 os.fsync(file.fileno())
             place(path, temporary, target, rule)
@@ -73,9 +70,9 @@ def unfinished(path: str | os.PathLike, rule: Rule = keep) -> Iterator[tuple[Pat
         raise unwritable(path, error) from error
 
 
-def write_file(path: str | os.PathLike, data: bytes, rule: Rule = keep) -> None:
+def write_file(path: str | os.PathLike, data: bytes, rule: Rule = False) -> None:
     """Put ``data`` at ``path``, whole or not at all; FileError and ``rule`` as in `unfinished`."""
-    with unfinished(path, rule) as (_, file):
+    with unfinished(path, rule) as file:
         file.write(data)
 
 
@@ -105,20 +102,16 @@ def fresh_beside(target: Path) -> Path:
 def place(path: str | os.PathLike, temporary: Path, target: Path, rule: Rule) -> None:
     """Give the finished file its name; FileError if it could only have another one."""
     why = "has meanwhile been written by another program, and is left as it is"
-    while True:
-        try:
-            return give_name(temporary, target)
-        except FileExistsError:
-            old = rule(target)
-        try:
-            if old is Old.REPLACED:
+    try:
+        while not ((there := target.exists()) and is_kept(target, rule)):
+            if there and isinstance(rule, Held):
                 return os.replace(temporary, target)
-            if old is Old.KEPT:
-                break
-            set_aside(target)
-        except OSError as error:  # a FileError is one
-            why = f"could not be replaced ({error.strerror or error})"
-            break
+            if there:
+                set_aside(target)
+            with contextlib.suppress(FileExistsError):  # written since
+                return give_name(temporary, target)
+    except OSError as error:  # a FileError is one
+        why = f"could not be replaced ({error.strerror or error})"
     free = numbered(target, lambda name: give_name(temporary, name))
     raise FileError(f"{path} {why}: what was computed is in {free}")
 

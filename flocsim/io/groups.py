@@ -30,7 +30,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import FileError, UsageError
-from flocsim.io.files import Rule, keep, unfinished
+from flocsim.io.files import Rule, unfinished
 from flocsim.io.hdf5 import File, Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.seals import seal_file
@@ -194,7 +194,7 @@ class Stored(Tables):
         name = self.known(group)
         return self.kind.groups[name].labelled(self.groups[name])
 
-    def write(self, path: str | os.PathLike, rule: Rule = keep) -> None:
+    def write(self, path: str | os.PathLike, rule: Rule = False) -> None:
         """Write the file, whole or not at all; FileError if that is impossible."""
         groups = {name: self.labelled(name) for name in self.groups}
         self.kind.write(path, groups, self.run, self.attributes, rule)
@@ -264,7 +264,7 @@ class FileFormat:
     def write(
         self, path: str | os.PathLike, groups: Mapping[str, Labelled],
         run: Mapping[str, Any] | None = None, attributes: Mapping[str, Any] | None = None,
-        rule: Rule = keep, fill: Mapping[str, Callable[[Any], None]] | None = None,
+        rule: Rule = False, fill: Mapping[str, Callable[[Any], None]] | None = None,
     ) -> None:  # fmt: skip
         """Write a file with its checksum, whole or not at all.
 
@@ -291,7 +291,7 @@ class FileFormat:
         import h5py
 
         fill = fill or {}
-        with unfinished(path, rule) as (_, target):
+        with unfinished(path, rule) as target:
             # HDF5 can crash where a write fails, as on a full disk: the error is raised afterwards.
             steady = Unfailing(target)
             try:

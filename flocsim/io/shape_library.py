@@ -29,7 +29,7 @@ from flocsim.geometry.shapes.cores import Part, PointTable, is_compound, parts_i
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.groups import Dataset, FileFormat, Group, Stored, declared, facts_of
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.results.schema import BAND_ENDS
@@ -257,7 +257,7 @@ def write_library(
     path: str | Path,
     entries: Iterable[ShapeEntry],
     settings: Mapping[str, Any] | None = None,
-    rule: Rule = keep,
+    rule: Rule = False,
 ) -> None:
     """Write entries, all with fits at the same N, to `path`, whole or not at all.
 

@@ -17,7 +17,7 @@ from flocsim.errors import UsageError
 from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
-from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.files import Rule, write_file
 from flocsim.io.groups import FileFormat, Group, declared, facts_of
 from flocsim.io.hdf5 import File
 from flocsim.io.labelled import Labelled, Tables
@@ -79,7 +79,7 @@ def write_trajectory(
     velocity: np.ndarray,
     shapes: Sequence[Shape],
     facts: Mapping[str, str | float],
-    rule: Rule = keep,
+    rule: Rule = False,
 ) -> None:
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
@@ -164,7 +164,7 @@ ROOM = 1.05
 
 def write_gsd(
     path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
-    shapes: Sequence[Shape], rule: Rule = keep,
+    shapes: Sequence[Shape], rule: Rule = False,
 ) -> None:  # fmt: skip
     """Write a motion, ``times`` (k,) [s], ``position`` and ``velocity`` (k, n, 3), as GSD.
 
@@ -283,7 +283,7 @@ def write_outlines(
 
 def write_vtkhdf(
     path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
-    shapes: Sequence[Shape], rule: Rule = keep,
+    shapes: Sequence[Shape], rule: Rule = False,
 ) -> None:  # fmt: skip
     """Write a motion as `write_gsd` does, but as a file of moving outlines for ParaView, without
     velocities; FileError where the file cannot be written."""

@@ -11,7 +11,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import is_whole
 from flocsim.geometry.contact.points import placed_contacts
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.outputs import check_ending
 from flocsim.io.plots import collision
 from flocsim.io.plots.style import CLASS_WORDS, MOST_OF_TITLE, Figure, plain
@@ -130,7 +130,7 @@ def drawn(trajectory: Any, figure: str, frames: int, title: str | None = None) -
     return collision.draw_forces(trajectory.t, along, touch, title)
 
 
-def animated(trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule = keep) -> None:
+def animated(trajectory: Any, path: Path, frames: int, title: str = "", rule: Rule = False) -> None:
     """Write the animation of a pair; ``rule`` says what becomes of a file that is there."""
     check_ending(path, (".gif",))
     check_pair(trajectory)

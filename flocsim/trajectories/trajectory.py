@@ -246,23 +246,21 @@ class Trajectory:
         another name. UsageError for an unknown figure, and where there are not two bodies but for
         the strip and the energies; FileError for a file in the way.
         """
-        from flocsim.io.outputs import data_rule
         from flocsim.io.plots.style import save
         from flocsim.trajectories.figures import drawn
 
         made = drawn(self, figure, frames)
         if file is not None:
-            save(made, Path(file), data_rule(overwrite))
+            save(made, Path(file), overwrite)
         return made
 
     def animate(
         self, file: str | os.PathLike, frames: int = ANIMATION_FRAMES, *, overwrite: bool = False
     ) -> None:
         """Write an animation of a pair as a GIF; UsageError where there are not two bodies."""
-        from flocsim.io.outputs import data_rule
         from flocsim.trajectories.figures import animated
 
-        animated(self, Path(file), frames, rule=data_rule(overwrite))
+        animated(self, Path(file), frames, rule=overwrite)
 
     def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
         """Write the motion to HDF5, which `flocsim info`, `flocsim plot`, xarray and ParaView read.
@@ -270,17 +268,17 @@ class Trajectory:
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.
         """
-        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, check_outputs
         from flocsim.io.trajectory import write_trajectory
 
-        check_outputs([Output(file, data_rule(overwrite), ways=SCRIPT_WAYS)], [])
+        check_outputs([file], overwrite, [], SCRIPT_WAYS)
         facts: dict[str, str | float] = {
             "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
             "error": self.error,
         }  # fmt: skip
         write_trajectory(
             Path(file), self.t, self.position, self.velocity, self.shapes, facts,
-            data_rule(overwrite),
+            overwrite,
         )  # fmt: skip
 
     @classmethod
@@ -310,14 +308,14 @@ class Trajectory:
         that is there is left alone, unless ``overwrite``. UsageError for another ending, and where
         gsd is not installed (``pip install 'flocsim[formats]'``).
         """
-        from flocsim.io.outputs import SCRIPT_WAYS, Output, check_outputs, data_rule
+        from flocsim.io.outputs import SCRIPT_WAYS, check_outputs
         from flocsim.io.trajectory import WRITERS
 
-        path, rule = Path(file), data_rule(overwrite)
+        path, rule = Path(file), overwrite
         write = WRITERS.get(path.suffix.lower())
         if write is None:
             raise UsageError(f"{path}: an exported file must end in {' or '.join(WRITERS)}")
-        check_outputs([Output(path, rule, ways=SCRIPT_WAYS)], [])
+        check_outputs([path], rule, [], SCRIPT_WAYS)
         write(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 

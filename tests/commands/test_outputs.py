@@ -66,7 +66,7 @@ def refused(folder, capsys, *words, code=2):
     return line
 
 
-INPUTS = ["small.toml", "lib.h5", "spring_of_mine.py", "./link", "hard"]
+INPUTS = ["small.toml", "lib.h5", "spring_of_mine.py", "./link"]
 MORE = [[], ["--overwrite"], ["--resume", "--overwrite"]]
 
 
@@ -78,16 +78,8 @@ MORE = [[], ["--overwrite"], ["--resume", "--overwrite"]]
 )
 def test_inputs_of_a_study_are_never_its_output(folder, capsys, name, more):
     (folder / "link").symlink_to("lib.h5")
-    os.link(folder / "small.toml", folder / "hard")
     line = refused(folder, capsys, "ensemble", "small.toml", "-o", name, *more)
     assert f"writing {name} would replace " in line and "which is an input: name another" in line
-
-
-def test_a_config_with_the_name_of_the_journal_is_not_written_to(folder, capsys):
-    (folder / "small.toml").rename(folder / "x.h5.journal")
-    for mode in ("--resume", "--restart", "--overwrite"):
-        line = refused(folder, capsys, "ensemble", "x.h5.journal", "-o", "x.h5", mode)
-        assert "would replace x.h5.journal" in line
 
 
 IN_THE_WAY = ["thesis.txt", "other.h5", "photo.png", "empty"]

@@ -14,7 +14,6 @@ import numpy as np
 
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
-from flocsim.io.files import keep
 from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED, ShapeEntry, StoredFit, write_library
 
 FLOCS, VERTICES = 24, (4, 8, 16, 32, 64, 128)
@@ -46,7 +45,7 @@ def entry(index: int) -> ShapeEntry:
 def write(path: str | Path = SHIPPED) -> None:
     """Grow and fit the flocs and write the library; FileError where there is one already."""
     about = {"primary_particles": PARTICLES, "fractal_dimension": DIMENSION, "seed": SEED}
-    write_library(path, [entry(index) for index in range(FLOCS)], about, keep)
+    write_library(path, [entry(index) for index in range(FLOCS)], about)
 
 
 if __name__ == "__main__":

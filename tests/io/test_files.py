@@ -9,7 +9,6 @@ import pytest
 from flocsim.errors import FileError
 from flocsim.io import files
 from flocsim.io.files import (
-    Old,
     check_writable,
     fresh_beside,
     ordinary_target,
@@ -17,16 +16,9 @@ from flocsim.io.files import (
     unfinished,
     write_file,
 )
+from flocsim.io.seals import held
 
 needs_fcntl = pytest.mark.skipif(os.name == "nt", reason="needs POSIX")
-
-
-def aside(_):
-    return Old.SET_ASIDE
-
-
-def replace(_):
-    return Old.REPLACED
 
 
 def content(folder):
@@ -46,16 +38,16 @@ def test_a_file_that_exists_is_kept_unless_a_rule_says_otherwise(tmp_path):
     with pytest.raises(FileError, match=r"a\.h5 already exists and is left as it is"):
         write_file(tmp_path / "a.h5", b"new")
     assert content(tmp_path) == {"a.h5": b"old"}
-    write_file(tmp_path / "a.h5", b"second", aside)
-    write_file(tmp_path / "a.h5", b"third", aside)
+    write_file(tmp_path / "a.h5", b"second", True)
+    write_file(tmp_path / "a.h5", b"third", True)
     assert content(tmp_path) == {"a.h5": b"third", "a.1.h5": b"old", "a.2.h5": b"second"}
-    write_file(tmp_path / "a.h5", b"fourth", replace)
+    write_file(tmp_path / "a.h5", b"fourth", held(tmp_path / "a.h5"))
     assert content(tmp_path) == {"a.h5": b"fourth", "a.1.h5": b"old", "a.2.h5": b"second"}
 
 
 def test_what_appears_while_a_file_is_written_is_kept_and_so_is_the_work(tmp_path):
     said = r"a\.h5 has meanwhile been written.* computed is in .*a\.2\.h5"
-    with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as (_, file):
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "a.h5") as file:
         file.write(b"work")
         (tmp_path / "a.h5").write_bytes(b"other")
         (tmp_path / "a.1.h5").write_bytes(b"older")
@@ -70,7 +62,7 @@ def test_work_is_kept_where_the_old_file_cannot_be_moved(tmp_path, monkeypatch):
 
     monkeypatch.setattr(files, "set_aside", refuse)
     with pytest.raises(FileError, match=r"could not be replaced.*computed is in .*a\.1\.h5"):
-        write_file(tmp_path / "a.h5", b"new", aside)
+        write_file(tmp_path / "a.h5", b"new", True)
     assert content(tmp_path) == {"a.h5": b"old", "a.1.h5": b"new"}
 
 
@@ -82,7 +74,7 @@ def test_without_hard_links_nothing_is_replaced_either(tmp_path, monkeypatch):
     write_file(tmp_path / "a.h5", b"new")
     assert content(tmp_path) == {"a.h5": b"new"}
     said = r"computed is in .*b\.1\.h5"
-    with pytest.raises(FileError, match=said), unfinished(tmp_path / "b.h5") as (_, file):
+    with pytest.raises(FileError, match=said), unfinished(tmp_path / "b.h5") as file:
         file.write(b"work")
         (tmp_path / "b.h5").write_bytes(b"other")
     assert content(tmp_path) == {"a.h5": b"new", "b.h5": b"other", "b.1.h5": b"work"}
@@ -92,7 +84,7 @@ def test_many_at_once_lose_none(tmp_path):
     """Whoever sets aside what whom has just written: every content is there in the end."""
     texts = [f"{number}".encode() for number in range(24)]
     threads = [
-        threading.Thread(target=write_file, args=(tmp_path / "a.h5", text, aside)) for text in texts
+        threading.Thread(target=write_file, args=(tmp_path / "a.h5", text, True)) for text in texts
     ]
     for thread in threads:
         thread.start()
@@ -149,7 +141,7 @@ def test_only_ordinary_files_are_written_to(tmp_path, kind):
     ends = os.pipe()
     (tmp_path / "stdout").symlink_to(f"/proc/self/fd/{ends[1]}")
     before = sorted(os.listdir(tmp_path))
-    for call in (check_writable, lambda path: write_file(path, b"new", aside), set_aside):
+    for call in (check_writable, lambda path: write_file(path, b"new", True), set_aside):
         with pytest.raises(FileError, match=rf"{kind}\b.*(not an ordinary|many levels)"):
             call(tmp_path / kind)
     assert sorted(os.listdir(tmp_path)) == before
@@ -165,7 +157,7 @@ def test_links_are_written_through(tmp_path):
     (tmp_path / "there/old.h5").write_bytes(b"old")
     assert ordinary_target(tmp_path / "new.h5") == tmp_path / "there/new.h5"
     write_file(tmp_path / "new.h5", b"new")
-    write_file(tmp_path / "old.h5", b"newer", aside)
+    write_file(tmp_path / "old.h5", b"newer", True)
     assert (tmp_path / "new.h5").is_symlink() and (tmp_path / "old.h5").is_symlink()
     found = content(tmp_path / "there")
     assert found == {"new.h5": b"new", "old.h5": b"newer", "old.1.h5": b"old"}
@@ -175,7 +167,7 @@ def test_a_full_disk_leaves_the_old_file_and_nothing_else(tmp_path):
     (tmp_path / "a.h5").write_bytes(b"old")
     with (
         pytest.raises(FileError, match=r"a\.h5 could not be written: No space left"),
-        unfinished(tmp_path / "a.h5", aside) as (_, file),
+        unfinished(tmp_path / "a.h5", True) as file,
     ):
         file.write(b"half")
         raise OSError(errno.ENOSPC, "No space left on device")

@@ -7,6 +7,7 @@ scene has. Measured flocs are judged by the largest of each collision type, whic
 
 import itertools
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -33,7 +34,6 @@ from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import impact_exponent
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.integrators.loop.driver import advance
-from flocsim.io.outputs import loaded_sources
 from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
 from flocsim.run import wrong_answer
 from flocsim.system import System
@@ -51,7 +51,9 @@ PARTS = 16
 def inputs_of(config: Config, path: str) -> list[str]:
     """Return the files of a study: the config at ``path``, its library, its own classes."""
     library = [str(config.shapes.file)] if config.shapes.file else []
-    return [path, *library, *loaded_sources()]
+    # A class of the user's own is read from the file of a module that is loaded.
+    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    return [path, *library, *(file for file in files if isinstance(file, str))]
 
 
 def check_study(config: Config) -> None:

@@ -28,7 +28,6 @@ from flocsim.errors import ConfigError, FileError, FlocsimError, UsageError
 from flocsim.fields import is_whole
 from flocsim.integrators.base import Integrator
 from flocsim.io.labelled import Labelled, Tables
-from flocsim.io.outputs import data_rule
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import FORMAT, first_of_each, read_results
@@ -217,7 +216,7 @@ class StudyResults(Tables):
         drawn = FIGURES[figure](self.results)
         add_foot(drawn, source_line(self.run))
         if file is not None:
-            save(drawn, Path(file), data_rule(overwrite))
+            save(drawn, Path(file), overwrite)
         return drawn
 
     def replicate(

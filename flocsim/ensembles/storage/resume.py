@@ -18,11 +18,12 @@ from flocsim.ensembles.kind import Interval, OldResults, StudyKind, layout
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import RowStore, sessions_of
 from flocsim.errors import FileError, FlocsimError, UsageError
-from flocsim.io.files import Rule, keep, ordinary_target, set_aside
+from flocsim.io.files import Rule, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
 from flocsim.io.journal import DAMAGED, ROWS, Journal, journal_path
-from flocsim.io.outputs import extension_rule, in_the_way
+from flocsim.io.outputs import in_the_way
 from flocsim.io.results.run_group import now, processor, source_line, stored
+from flocsim.io.seals import held
 
 NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
@@ -54,7 +55,7 @@ class Beginning:
     history: list[dict] = attrs.Factory(list)
     rules: dict[int, list | None] = attrs.Factory(dict)
     at_least: int = 0
-    replacing: Rule = keep
+    replacing: Rule = False
     old: OldResults | None = None
 
     def is_covered(self, count: int) -> bool:
@@ -146,7 +147,7 @@ def begin(
         start.rules[number] = session.get("rule")
     if mode == RESUME and os.path.lexists(ordinary_target(output)):
         try:
-            rule = extension_rule(output)
+            rule = held(output)
             take_results(start, study, output, old_rows)
             start.replacing = rule
         except (FileError, UsageError) as error:

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.plots import style
 from flocsim.io.plots.style import CONTACT_COLOUR, Figure, drawing, plain
 
@@ -229,7 +229,7 @@ def largest_of(curves):
 
 def write_animation(
     path: str | Path, frames: Frames, motion: tuple[Sequence[float], Sequence[float]],
-    zone_distance: float = math.nan, title: str = "", rule: Rule = keep,
+    zone_distance: float = math.nan, title: str = "", rule: Rule = False,
 ) -> None:  # fmt: skip
     """Write Frames as a GIF that loops.
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.errors import visible
-from flocsim.io.files import Rule, keep, write_file
+from flocsim.io.files import Rule, write_file
 from flocsim.io.outputs import check_ending
 
 Figure = Any
@@ -346,7 +346,7 @@ def dodge(number, count):
     return (number - 0.5 * (count - 1)) * step
 
 
-def save(figure: Figure, path: str | Path, rule: Rule = keep, foot: str = "") -> None:
+def save(figure: Figure, path: str | Path, rule: Rule = False, foot: str = "") -> None:
     """Write ``figure`` as PNG, PDF or SVG, told by the suffix, whole or not at all.
 
     ``rule`` says what becomes of a file that is there (flocsim.io.outputs); ``foot`` stands below
@@ -371,7 +371,7 @@ def frame_of(figure: Figure) -> Any:
     return Image.fromarray(np.ascontiguousarray(pixels)).quantize(64)
 
 
-def save_gif(path: str | Path, frames: Sequence[Any], each: int, rule: Rule = keep) -> None:
+def save_gif(path: str | Path, frames: Sequence[Any], each: int, rule: Rule = False) -> None:
     """Write frames as a GIF that loops, ``each`` shown for so many milliseconds and the last for
     LAST; FileError if it cannot be written."""
     lasting = [each] * (len(frames) - 1) + [LAST]

@@ -13,7 +13,7 @@ from flocsim.errors import FileError
 from flocsim.geometry.shapes.cores import PointTable, parts_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.plots.collision import rings_path
 from flocsim.io.plots.style import (
     Figure,
@@ -257,7 +257,7 @@ def shifts(place, reach, side, repeats):
 
 
 def write_swarm_animation(
-    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = keep
+    path: str | Path, results: SwarmResults, replicate: int = 0, rule: Rule = False
 ) -> None:
     """Write a swarm at all its times as a GIF that loops; FileError if it cannot be written."""
     outlines, pictures = outlines_of(results, replicate), []

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.groups import Dataset, File, Unfit
 from flocsim.io.labelled import Labelled
 from flocsim.io.results.kernel_group import kernel_in
@@ -35,7 +35,7 @@ Part = Callable[[Sequence[slice]], Any]
 
 
 def write_results(
-    path: str | os.PathLike, results: Results, rule: Rule = keep, part: Part | None = None
+    path: str | os.PathLike, results: Results, rule: Rule = False, part: Part | None = None
 ) -> None:
     """Write results, whole or not at all; FileError if that is impossible.
 

@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.io.files import Rule, keep
+from flocsim.io.files import Rule
 from flocsim.io.groups import Dataset, FileFormat, Group
 from flocsim.io.hdf5 import File
 from flocsim.io.json_text import matches, read_json
@@ -66,7 +66,7 @@ class SweepResults(Tables):
         return f"SweepResults({str(self.path)!r}: {over})"
 
 
-def write_sweep(results: SweepResults, rule: Rule = keep) -> None:
+def write_sweep(results: SweepResults, rule: Rule = False) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
     about = {name: {"key": each.key, "unit": each.unit} for name, each in results.swept.items()}
     SWEEP.write(results.path, results.groups, results.run, {"swept": json.dumps(about)}, rule)

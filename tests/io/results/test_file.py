@@ -23,11 +23,6 @@ from tests.helpers.synthetic_results import FAILURES, make_results
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
 
 
-def replace(_):
-    """A rule: whatever is there is replaced."""
-    return files.Old.REPLACED
-
-
 @pytest.fixture(scope="module")
 def once(tmp_path_factory):
     """A small results file."""
@@ -47,7 +42,7 @@ def reseal(path, change):
     image = io.BytesIO(read_sealed(path))
     with h5py.File(image, "r+") as file:
         change(file)
-    files.write_file(path, seals.seal(image.getvalue()), replace)
+    files.write_file(path, seals.seal(image.getvalue()), seals.held(path))
 
 
 def test_what_is_written_is_read(written):
@@ -99,7 +94,7 @@ def test_differing_coordinates_and_shapes_are_named(written, tmp_path):
 def test_same_data_tells_nan_payloads_and_zero_signs(written, tmp_path):
     path, results = written
     results.replicates["error"][...] = 0.0
-    write_results(path, results, rule=replace)
+    write_results(path, results, rule=seals.held(path))
     results.replicates["error"][...] = -0.0
     write_results(tmp_path / "other.h5", results)
     assert same_data(path, tmp_path / "other.h5") == ["replicates/error"]
@@ -146,7 +141,9 @@ def test_no_temporary_file_stays_and_the_mode_is_the_usual_one(written):
 def test_a_link_is_written_through(tmp_path, written):
     path, results = written
     (tmp_path / "link.h5").symlink_to(path)
-    write_results(tmp_path / "link.h5", attrs.evolve(results, run={"new": 1}), rule=replace)
+    write_results(
+        tmp_path / "link.h5", attrs.evolve(results, run={"new": 1}), rule=seals.held(path)
+    )
     assert (tmp_path / "link.h5").is_symlink()
     assert read_results(path).run == {"new": 1}
 
@@ -185,7 +182,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_rest(written, monkeypatch, fa
     monkeypatch.setattr(files.os, "fsync", fail)
     expected = FileError if isinstance(failure, OSError) else KeyboardInterrupt
     with pytest.raises(expected):
-        write_results(path, attrs.evolve(results, run={}), rule=replace)
+        write_results(path, attrs.evolve(results, run={}), rule=seals.held(path))
     assert path.read_bytes() == before
     assert [entry.name for entry in path.parent.iterdir()] == ["results.h5"]
 
