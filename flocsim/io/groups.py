@@ -41,9 +41,6 @@ Schema = Mapping[str, tuple[str, str, str]]
 UNREADABLE = OSError, LookupError, ValueError, TypeError, AttributeError, UsageError
 """What reading a file raises that does not hold what it should."""
 
-LONGEST_NAME = 80
-"""Characters of the name of a kind of file."""
-
 
 @attrs.frozen
 class Dataset:
@@ -340,8 +337,8 @@ class FileFormat:
         Versions below ``oldest`` were never released, so there is nothing to migrate them by: who
         raises a version adds what makes a file of before one of now.
         """
-        if text_of(file, self.attribute) != self.name:
-            other = text_of(file, "format") or text_of(file, "kind") or "file of another kind"
+        if file.kind != self.name:
+            other = file.kind or "file of another kind"
             raise FileError(f"{path} holds a {other}: name a file with {self.title}")
         found = file.attributes.get("schema_version")
         if not isinstance(found, int):
@@ -458,24 +455,13 @@ class Unfailing(io.FileIO):
         return len(data)
 
 
-def text_of(file: File, name: str) -> str:
-    """Return a short printable attribute of an open file; "" where it has none."""
-    found = file.attributes.get(name)
-    if not isinstance(found, str) or not found.isprintable() or len(found) > LONGEST_NAME:
-        return ""
-    return found
-
-
 def kind_of(path: str | os.PathLike) -> str:
     """Return the kind of a file, its attribute ``kind`` or ``format``.
 
-    "" where HDF5 cannot read it: the reader that is tried then says what is wrong. FileError for
-    an absent file or a wrong checksum.
+    "" where it holds what flocsim does not write: the reader that is tried then says what is wrong.
+    FileError for an absent file, a wrong checksum, and what the HDF5 library fails on.
     """
     try:
-        file = open_hdf5(path)
-    except FileError:
-        raise
-    except UNREADABLE:
+        return open_hdf5(path).kind
+    except Unfit:
         return ""
-    return text_of(file, "kind") or text_of(file, "format")

@@ -66,8 +66,14 @@ class File(dict[str, Node]):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The attributes of the root."""
+        """Return the attributes of the root."""
         return self[""].attributes
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of file that it says it is, to be shown; "" where it says none."""
+        found = self.attributes.get("kind", self.attributes.get("format", ""))
+        return visible(str(found)[:LONGEST], "")
 
     def names(self, group: str) -> list[str]:
         """Return the names of what is in a group."""

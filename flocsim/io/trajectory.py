@@ -1,9 +1,8 @@
-"""Motions in files: one replicate's in HDF5, which is read back, with moving outlines for ParaView;
-GSD, for OVITO and HOOMD's tools. Outlines are found once and then moved.
+"""Motions in files: one replicate's in HDF5, which is read back; GSD, for OVITO and HOOMD's tools;
+VTKHDF, for ParaView. Outlines are found once and then moved.
 """
 
 import io
-import json
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,8 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import PointTable, parts_in, table_of
+from flocsim.geometry.shapes.outline import swept_geometry
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
 from flocsim.io.files import Rule, write_file
@@ -25,7 +25,7 @@ from flocsim.io.labelled import Labelled, Tables
 TRAJECTORY = FileFormat(
     "flocsim trajectory", 2, "trajectory", {}, attribute="kind", remedy="write it again"
 )
-"""Its arrays are those of `motion_group`, without a group; ``VTKHDF`` is for ParaView."""
+"""Its arrays are those of `motion_group`, without a group."""
 
 COMPONENTS = ("x", "y", "angle")
 """Of a place and of its rate."""
@@ -85,9 +85,8 @@ def write_trajectory(
 
     Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],
     their spheroradii in the attribute ``radius``, of bodies with holes or parts also what part,
-    ring and radius belongs to a point (``part_0``, ``ring_0``, ``point_radius_0``), and moving
-    outlines for ParaView in the group ``VTKHDF``; ``rule`` says what becomes of a file that is
-    there. Raises FileError if it cannot be written.
+    ring and radius belongs to a point (``part_0``, ``ring_0``, ``point_radius_0``); ``rule`` says
+    what becomes of a file that is there. Raises FileError if it cannot be written.
     """
     values: dict[str, Any] = {
         "time": times, "body": np.arange(len(shapes)), "component": COMPONENTS,
@@ -103,51 +102,34 @@ def write_trajectory(
     motion = motion_group([shape.is_compound for shape in shapes]).labelled(values)
     for body, shape in enumerate(shapes):
         motion.columns[f"vertices_{body}"].about["radius"] = shape.radius
-    TRAJECTORY.write(
-        path, {"": motion, "VTKHDF": Labelled({}, {})}, attributes=facts, rule=rule,
-        fill={"VTKHDF": lambda group: write_outlines(group, times, position, shapes)},
-    )  # fmt: skip
+    TRAJECTORY.write(path, {"": motion}, attributes=facts, rule=rule)
 
+
+QUADRANT = 16
+"""Points of an outline in a quarter of a circle."""
 
 MOST_FRAMES = 400
-"""Instants that are drawn; a file's own arrays have all of them."""
+"""Instants that are drawn, spread evenly; a file of motion has all of them."""
 
 
-def frames_of(count: int) -> np.ndarray:
-    """The rows of a motion of so many instants that are drawn: all, or 400 spread evenly."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_FRAMES)).round().astype(int))
+def ring_points(ring: Any, hole: bool) -> np.ndarray:
+    """Return the points (k, 2) of a closed ring of shapely, the last left out: counter-clockwise,
+    or clockwise around a hole."""
+    points = np.asarray(ring.coords)[:-1]
+    return points if ring.is_ccw != hole else points[::-1]
 
 
-def rings_of(shape: Shape) -> list[np.ndarray]:
-    """The rings (k, 2) [m] of an outline about its centroid, outer ones first, then holes.
+def rings_of(shape: Shape) -> list[tuple[np.ndarray, bool]]:
+    """Return the rings (k, 2) [m] of an outline about its centroid, and whether they are holes.
 
-    Open (the first point is not said twice), outer ones counter-clockwise, holes clockwise. Most
-    outlines have one outer ring; parts that touch in a point have several.
+    Most outlines have one outer ring; parts that touch in a point have several.
     """
-    rings = [np.asarray(ring, dtype=float) for ring in shape.outline(0.0, 0.0, 0.0)]
-    rings = [ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring for ring in rings]
-    if not shape.is_compound:
-        outer, *holes = sorted(rings, key=lambda ring: -abs(area_of(ring)))
-        return [oriented(outer, 1.0), *(oriented(hole, -1.0) for hole in holes)]
-    # shapely's outer rings go round in one sense, those of holes in the other.
-    sense = 1.0 if area_of(rings[0]) > 0.0 else -1.0
-    return [ring if sense > 0.0 else ring[::-1] for ring in rings]
-
-
-def oriented(ring: np.ndarray, sense: float) -> np.ndarray:
-    """A ring that goes round counter-clockwise for a sense above 0, else clockwise."""
-    return ring if area_of(ring) * sense > 0.0 else ring[::-1]
-
-
-def is_hole(ring: np.ndarray) -> bool:
-    """Whether a ring of `rings_of` is that of a hole, where it is not the first."""
-    return area_of(ring) <= 0.0
-
-
-def area_of(ring: np.ndarray) -> float:
-    """The area [m²] that a ring encloses, above 0 where it goes round counter-clockwise."""
-    x, y = ring.T
-    return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    whole = swept_geometry(shape.parts, QUADRANT)
+    return [
+        (ring_points(ring, number > 0), number > 0)
+        for polygon in getattr(whole, "geoms", [whole])
+        for number, ring in enumerate((polygon.exterior, *polygon.interiors))
+    ]
 
 
 def placed(points: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -208,90 +190,78 @@ def write_gsd(
 
 
 def outer_ring(shape: Shape) -> np.ndarray:
-    """The outer ring of an outline (k, 2) [m]. GSD has one for each body: disks of parts that touch
-    in a point only are drawn a little wider."""
-    for wider in WIDER:
-        parts = [Part(part.rings, part.radius * wider) for part in shape.parts]
-        known = shape if wider == 1.0 else shape_of_parts(parts)
-        rings = rings_of(known)
-        if len(rings) == 1 or is_hole(rings[1]):
-            break
-    return rings[0] + known.centroid * (known is not shape)
+    """Return the outer ring (k, 2) [m] of an outline.
 
-
-WIDER = (1.0, 1.01, 1.03, 1.1, 1.3)
-"""Factors of radii that are tried until there is one outer ring."""
+    GSD has one for each body: parts that touch in a point only are drawn a little wider.
+    """
+    whole = swept = swept_geometry(shape.parts, QUADRANT)
+    wider = 0.01 * shape.radius
+    while whole.geom_type != "Polygon":
+        whole, wider = swept.buffer(wider), 3.0 * wider
+    return ring_points(whole.exterior, False)
 
 
 def shape_of(shape: Shape) -> dict:
-    """What GSD says of a shape: a sphere, or the outer ring of the outline as a polygon."""
+    """Return a shape as GSD has it: a sphere, or the outer ring of the outline as a polygon."""
     if len(shape.vertices) == 1:
         return {"type": "Sphere", "diameter": 2.0 * MICRO * shape.radius}
     ring = (MICRO * outer_ring(shape)).tolist()
-    # As numbers of JSON, which is how the file holds them.
-    return json.loads(json.dumps({"type": "Polygon", "rounding_radius": 0, "vertices": ring}))
+    return {"type": "Polygon", "rounding_radius": 0, "vertices": ring}
 
 
 KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 """Of cells, in the order of the columns of the offsets; all but Polygons are empty."""
 
 
-def write_outlines(
-    group: Any, times: np.ndarray, position: np.ndarray, shapes: Sequence[Shape]
-) -> None:
-    """Fill the open group VTKHDF of a file: ``times`` (k,) [s], ``position`` (k, n, 3).
-
-    A polygon for every ring: its cell data are ``body``, the number, and ``hole``, 1 for the rings
-    of holes. Points are in m.
-    """
-    rows = frames_of(len(times))
-    rings = [rings_of(shape) for shape in shapes]
-    points = np.concatenate(
-        [placed(np.concatenate(each), position[rows, n]) for n, each in enumerate(rings)], axis=1
-    )
-    frames, count = points.shape[:2]
-    lengths = [len(ring) for each in rings for ring in each]
-    owners = [n for n, each in enumerate(rings) for _ in each]
-    holes = [int(place > 0 and is_hole(ring)) for each in rings for place, ring in enumerate(each)]
-
-    group.attrs["Version"] = np.array([2, 0], "i8")
-    group.attrs["Type"] = np.bytes_("PolyData")
-    group["NumberOfPoints"] = np.array([count], "i8")
-    flat = np.zeros((frames * count, 3), "f8")
-    flat[:, :2] = points.reshape(-1, 2)
-    group["Points"] = flat
-    for kind in KINDS:
-        own = lengths if kind == "Polygons" else []
-        cells = group.create_group(kind)
-        cells["NumberOfCells"] = np.array([len(own)], "i8")
-        cells["NumberOfConnectivityIds"] = np.array([sum(own)], "i8")
-        cells["Offsets"] = np.concatenate([[0], np.cumsum(own)]).astype("i8")
-        cells["Connectivity"] = np.arange(sum(own), dtype="i8")
-    data = group.create_group("CellData")
-    data["body"], data["hole"] = np.array(owners, "i4"), np.array(holes, "i4")
-
-    steps = group.create_group("Steps")
-    steps.attrs["NSteps"] = np.int64(frames)
-    steps["Values"] = np.asarray(times, "f8")[rows]
-    steps["PointOffsets"] = count * np.arange(frames, dtype="i8")
-    steps["NumberOfParts"] = np.ones(frames, "i8")
-    for name in ("PartOffsets", "CellDataOffsets/body", "CellDataOffsets/hole"):
-        steps[name] = np.zeros(frames, "i8")
-    for name in ("CellOffsets", "ConnectivityIdOffsets"):
-        steps[name] = np.zeros((frames, len(KINDS)), "i8")
-
-
 def write_vtkhdf(
     path: str | Path, times: np.ndarray, position: np.ndarray, velocity: np.ndarray,
     shapes: Sequence[Shape], rule: Rule = False,
 ) -> None:  # fmt: skip
-    """Write a motion as `write_gsd` does, but as a file of moving outlines for ParaView, without
-    velocities; FileError where the file cannot be written."""
+    """Write a motion as `write_gsd` does, but as moving outlines for ParaView, without velocities.
+
+    A polygon for every ring: its cell data are ``body``, the number, and ``hole``, 1 for the rings
+    of holes. Points are in m. FileError where the file cannot be written.
+    """
     import h5py
+
+    rows = np.linspace(0, len(times) - 1, min(len(times), MOST_FRAMES)).round().astype(int)
+    rings = [rings_of(shape) for shape in shapes]
+    points = np.concatenate(
+        [placed(np.concatenate([ring for ring, _ in own]), position[rows, body])
+         for body, own in enumerate(rings)], axis=1,
+    )  # fmt: skip
+    frames, count = points.shape[:2]
+    lengths = [len(ring) for own in rings for ring, _ in own]
+    flat = np.zeros((frames * count, 3), "f8")
+    flat[:, :2] = points.reshape(-1, 2)
 
     buffer = io.BytesIO()
     with h5py.File(buffer, "w") as file:
-        write_outlines(file.create_group("VTKHDF"), times, position, shapes)
+        group = file.create_group("VTKHDF")
+        group.attrs["Version"] = np.array([2, 0], "i8")
+        group.attrs["Type"] = np.bytes_("PolyData")
+        group["NumberOfPoints"] = np.array([count], "i8")
+        group["Points"] = flat
+        for kind in KINDS:
+            own = lengths if kind == "Polygons" else []
+            group[f"{kind}/NumberOfCells"] = np.array([len(own)], "i8")
+            group[f"{kind}/NumberOfConnectivityIds"] = np.array([sum(own)], "i8")
+            group[f"{kind}/Offsets"] = np.concatenate([[0], np.cumsum(own)]).astype("i8")
+            group[f"{kind}/Connectivity"] = np.arange(sum(own), dtype="i8")
+        owners = [body for body, own in enumerate(rings) for _ in own]
+        group["CellData/body"] = np.array(owners, "i4")
+        group["CellData/hole"] = np.array([hole for own in rings for _, hole in own], "i4")
+
+        # All instants have the same cells: only the points move.
+        steps = group.create_group("Steps")
+        steps.attrs["NSteps"] = np.int64(frames)
+        steps["Values"] = np.asarray(times, "f8")[rows]
+        steps["PointOffsets"] = count * np.arange(frames, dtype="i8")
+        steps["NumberOfParts"] = np.ones(frames, "i8")
+        for name in ("PartOffsets", "CellDataOffsets/body", "CellDataOffsets/hole"):
+            steps[name] = np.zeros(frames, "i8")
+        for name in ("CellOffsets", "ConnectivityIdOffsets"):
+            steps[name] = np.zeros((frames, len(KINDS)), "i8")
     write_file(path, buffer.getvalue(), rule)
 
 

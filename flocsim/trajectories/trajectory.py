@@ -263,7 +263,7 @@ class Trajectory:
         animated(self, Path(file), frames, rule=overwrite)
 
     def save(self, file: str | os.PathLike, *, overwrite: bool = False) -> None:
-        """Write the motion to HDF5, which `flocsim info`, `flocsim plot`, xarray and ParaView read.
+        """Write the motion to HDF5, which `flocsim info`, `flocsim plot` and xarray read.
 
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.

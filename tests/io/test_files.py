@@ -98,17 +98,6 @@ def test_setting_aside_what_has_gone_is_no_error(tmp_path):
     assert content(tmp_path) == {}
 
 
-@needs_fcntl
-def test_links_and_pipes_with_a_temporary_name_are_left_alone(tmp_path, monkeypatch):
-    """The names cannot be guessed; where they are all the same, none is followed or waited for."""
-    monkeypatch.setattr(files.secrets, "token_hex", lambda _: "a" * 16)
-    (tmp_path / "precious").write_bytes(b"precious")
-    fresh_beside(tmp_path / "a.h5").symlink_to(tmp_path / "precious")
-    with pytest.raises(FileError, match="File exists"):
-        write_file(tmp_path / "a.h5", b"new")
-    assert (tmp_path / "precious").read_bytes() == b"precious"
-
-
 def test_what_a_killed_job_left_is_removed_after_a_day_and_what_is_written_is_not(tmp_path):
     old, new, other = (fresh_beside(tmp_path / name) for name in ("a.h5", "a.h5", "b.h5"))
     for path in (old, new, other):

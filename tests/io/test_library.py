@@ -146,21 +146,6 @@ def test_unknown_content_is_refused(tmp_path, entries, change):
     assert "\n" not in str(caught.value)
 
 
-def test_damage_and_absence_are_told(tmp_path, entries):
-    path = tmp_path / "s.h5"
-    write_library(path, entries)
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 1
-    path.write_bytes(data)
-    with pytest.raises(FileError, match="damaged"):
-        read_library(path)
-    path.write_text("no HDF5")
-    with pytest.raises(FileError, match="not an HDF5 file"):
-        read_library(path)
-    with pytest.raises(FileError, match="absent"):
-        read_library(tmp_path / "absent.h5")
-
-
 def test_what_cannot_be_written_is_refused(tmp_path, entries):
     with pytest.raises(FileError):
         write_library(tmp_path / "no folder" / "s.h5", entries)

@@ -7,7 +7,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.errors import UsageError
 from flocsim.io.groups import Group, declared
 from flocsim.io.labelled import Labelled
 
@@ -102,23 +101,6 @@ class Kernel:
             "mechanism": self.mechanisms, "vertices": self.vertices, "i": self.labels,
             "j": self.labels, "r_eq": self.radii, **self.arrays,
         })  # fmt: skip
-
-    def place_of(
-        self, mechanism: str | None = None, vertices: int | None = None
-    ) -> tuple[int, int]:
-        """Return the places of a mechanism and of N, by default the first and the last one."""
-        first, last = self.mechanisms[0], int(self.vertices[-1])
-        places = []
-        wanted: Any = (
-            ("mechanism", first if mechanism is None else mechanism, self.mechanisms),
-            ("vertices", last if vertices is None else vertices, self.vertices.tolist()),
-        )
-        for name, value, known in wanted:
-            if value not in known:
-                words = ", ".join(map(str, known))
-                raise UsageError(f"{name} must be one of {words}, found {value}")
-            places.append(known.index(value))
-        return places[0], places[1]
 
 
 def kernel_in(values: Mapping[str, Any], identity: str) -> Kernel:

@@ -107,7 +107,7 @@ def efficiency_for(
             f"{model} has no kernel for {mechanism}: choose one of {', '.join(known)}, or another "
             "mechanism"
         )
-    m, v = kernel.place_of(mechanism, vertices)
+    m, v = kernel.mechanisms.index(mechanism), kernel.vertices.tolist().index(vertices)
     values = kernel.arrays[OF_MODELS[quantity]][m, v] * known[model][0]
     return np.where(kernel.arrays["beta3_reference"][m, v] == 0.0, 0.0, values)
 
@@ -122,14 +122,13 @@ def kernel_matrix(
     ``curvilinear``: the name of a factor that efficiencies are multiplied by, element by element;
     ``factors`` (i, j): those of "spheres".
     """
-    m, v = kernel.place_of(mechanism, vertices)
-    corrected = curvilinear is not None or factors is not None
-    if corrected and kernel.water:
+    m, v = kernel.mechanisms.index(mechanism), kernel.vertices.tolist().index(vertices)
+    if curvilinear is not None and kernel.water:
         raise UsageError(
             "the study already includes the water between the bodies ([forces.hydrodynamics]): a "
             "curvilinear factor would count it twice; leave it out"
         )
-    if corrected and quantity not in OF_MODELS:
+    if curvilinear is not None and quantity not in OF_MODELS:
         raise UsageError(
             f"a curvilinear factor multiplies the kernels of spheres, not {quantity}: use "
             "efficiency, or leave it out"
@@ -141,14 +140,12 @@ def kernel_matrix(
         values = efficiency_for(kernel, mechanism, vertices, model, quantity)
         title = quantity.replace("_low", ", lower 95 % bound,")
         title = title.replace("_high", ", upper 95 % bound,")
-        if corrected:
+        if curvilinear is not None:
             title += " times curvilinear factor"
-        if factors is not None:
-            values, bound = values * factors, ABOUT_SPHERES
-        elif curvilinear is not None:
-            rows = kernel.radii[:, np.newaxis]
-            values = values * curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
-            bound = about_factor(curvilinear, mechanism)
+            if factors is None:
+                rows = kernel.radii[:, np.newaxis]
+                factors = curvilinear_factor(curvilinear, mechanism, rows, kernel.radii)
+            values, bound = values * factors, about_factor(curvilinear, mechanism)
         lines = [
             f"{title} in {mechanism}: multiplies the kernel {REFERENCES[mechanism][model][1]}",
             "(the product is the kernel of encounters that aggregate, closed for three dimensions)",
@@ -197,21 +194,6 @@ CORRECTIONS: dict[str, dict[str, Factor]] = {
 """{name: {mechanism: (function of p, formula)}}."""
 
 
-def formula(name: str, mechanism: str) -> Factor:
-    """Return (function of p, its formula); UsageError for a name or a mechanism without one."""
-    if name not in CORRECTIONS:
-        raise UsageError(
-            f"the curvilinear factor must be one of {', '.join(CORRECTIONS)}, found {name}"
-        )
-    known = CORRECTIONS[name]
-    if mechanism not in known:
-        raise UsageError(
-            f"{name} has no curvilinear factor for {mechanism}: choose one of {', '.join(known)}, "
-            "or leave it out and keep the upper bound"
-        )
-    return known[mechanism]
-
-
 def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike) -> np.ndarray:
     """Return what the rectilinear kernel of two spheres is multiplied by for the water between.
 
@@ -230,7 +212,13 @@ def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike
     >>> float(curvilinear_factor("hill", "settling", 5e-6, 5e-6))
     0.125
     """
-    factor, _ = formula(name, mechanism)
+    known = CORRECTIONS.get(name, {})
+    if mechanism not in known:
+        raise UsageError(
+            f"{name} has no curvilinear factor for {mechanism}: known are "
+            + "; ".join(f"{each} for {', '.join(CORRECTIONS[each])}" for each in CORRECTIONS)
+        )
+    factor, _ = known[mechanism]
     first, second = np.asarray(r_i, dtype=float), np.asarray(r_j, dtype=float)
     for radii in (first, second):
         if not np.all((radii > 0.0) & np.isfinite(radii)):
@@ -240,7 +228,9 @@ def curvilinear_factor(name: str, mechanism: str, r_i: ArrayLike, r_j: ArrayLike
 
 def about_factor(name: str, mechanism: str) -> list[str]:
     """Return lines for whoever gets numbers with the factor in them."""
-    _, written = formula(name, mechanism)
+    if name == SPHERES:
+        return ABOUT_SPHERES
+    _, written = CORRECTIONS[name][mechanism]
     return [
         f"curvilinear factor '{name}' in {mechanism}: {written}, p = r_small/r_large; "
         f"{SOURCES[name]}",

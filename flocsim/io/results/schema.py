@@ -39,6 +39,19 @@ BAND_ENDS = ("closer", "wider")
 FURTHER_RUNS = ("checked", "third", *BAND_ENDS)
 """What begins the names of columns of a replicate's further runs."""
 
+ENDED = {
+    "outcome": "outcome",
+    "inside": "centre distance below D_0 at the collision",
+    "bond": "what holds an aggregated pair",
+}
+"""What further runs of a replicate say, in columns of their own."""
+
+
+def ended(run: str, words: str) -> dict[str, tuple[str, str, str]]:
+    """Return the columns of a further run."""
+    return {f"{run}_{name}": ("u1", "1", f"{text}, {words}") for name, text in ENDED.items()}
+
+
 REPLICATES = {  # name: (dtype, units, long name)
     "angle_i": ("f8", "rad", "orientation drawn for the receiving body i"),
     "angle_j": ("f8", "rad", "orientation drawn for the approaching body j"),
@@ -49,12 +62,8 @@ REPLICATES = {  # name: (dtype, units, long name)
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
-    "checked_outcome": ("u1", "1", "outcome at the tighter tolerance"),
-    "checked_inside": ("u1", "1", "centre distance below D_0 at the collision, when run again"),
-    "checked_bond": ("u1", "1", "what holds an aggregated pair, when run again"),
-    "third_outcome": ("u1", "1", "outcome of the third run, at a tolerance tighter still"),
-    "third_inside": ("u1", "1", "centre distance below D_0 at the collision, in the third run"),
-    "third_bond": ("u1", "1", "what holds an aggregated pair, in the third run"),
+    **ended("checked", "when run again at a tighter tolerance"),
+    **ended("third", "in the third run, at a tolerance tighter still"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
@@ -71,14 +80,9 @@ REPLICATES = {  # name: (dtype, units, long name)
     f"{name}_{body}": ("f8", "1", f"{text} of body {body}, as run")
     for name, text in SHAPE_MEASURES.items()
     for body in "ij"
-} | {
-    f"{end}_{name}": ("u1", "1", f"{text}, both outlines cut {end}")
-    for end in BAND_ENDS
-    for name, text in {
-        "outcome": "outcome", "inside": "centre distance below D_0 at the collision",
-        "bond": "what holds an aggregated pair",
-    }.items()
-}  # fmt: skip
+}
+for end in BAND_ENDS:
+    REPLICATES |= ended(end, f"both outlines cut {end}")
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
 
@@ -179,20 +183,19 @@ LAST_AXES = {"class": CLASSES, "bond": BONDS}
 """The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
 EVENTS = ("inside", "aggregated")
 """Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
-FLAGS = {
+INSIDE_CODES = (0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")
+BOND_CODES = (1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")
+FLAGS: dict[str, tuple[tuple[int, ...], tuple[str, ...]]] = {
     "outcome": (tuple(range(len(OUTCOMES))), OUTCOMES),
-    "inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
+    "inside": INSIDE_CODES,
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
-    "checked_outcome": ((*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")),
-    "checked_inside": ((0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")),
-    "bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
-    "checked_bond": ((1, 2, 3, NOT_APPLICABLE), (*BONDS, "not_applicable")),
+    "bond": BOND_CODES,
 }
-FLAGS |= {
-    f"{run}_{name}": FLAGS[f"checked_{name}"]
-    for run in ("third", *BAND_ENDS)
-    for name in ("outcome", "inside", "bond")
-}
+for run in FURTHER_RUNS:
+    FLAGS[f"{run}_outcome"] = (
+        (*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")
+    )  # fmt: skip
+    FLAGS |= {f"{run}_inside": INSIDE_CODES, f"{run}_bond": BOND_CODES}
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),

@@ -25,12 +25,6 @@ def test_arrays_have_axes_units_and_meanings():
     assert all(column.about["long_name"] for column in labelled.columns.values())
 
 
-def test_it_opens_as_a_dataset():
-    pytest.importorskip("xarray")
-    data = some_kernel().labelled().to_xarray()
-    assert float(data.alpha.sel(mechanism="shear", vertices=32, i="5um", j="5um")) > 0.0
-
-
 def test_a_matrix_names_what_it_multiplies():
     lines = kernel_matrix(some_kernel(), "shear", 32).splitlines()
     told = [line for line in lines if line.startswith("#")]
@@ -66,8 +60,6 @@ def test_a_factor_multiplies_efficiencies_alone():
     kernel = some_kernel()
     with pytest.raises(UsageError, match="multiplies the kernels of spheres, not alpha"):
         kernel_matrix(kernel, "shear", 32, "alpha", curvilinear="hill")
-    with pytest.raises(UsageError, match="must be one of hill, burd"):
-        kernel_matrix(kernel, "shear", 32, curvilinear="nobody")
 
 
 def test_flocmods_settling_kernel_lacks_an_eighteenth():
@@ -100,11 +92,3 @@ def test_a_matrix_says_what_fractal_flocs_weigh():
     assert "# flocs of n_f = 2.1, D_p = 4e-06 m, solid of 2650 kg/m3" in text
     assert "n_f" not in kernel_matrix(some_kernel(), "shear", 32)
     assert fractal_in('{"bodies.density": 2650.0}') is None
-
-
-def test_what_a_matrix_cannot_hold_is_refused():
-    kernel = some_kernel()
-    with pytest.raises(UsageError, match="mechanism must be one of settling, shear"):
-        kernel_matrix(kernel, "extension", 1, "alpha")
-    with pytest.raises(UsageError, match="vertices must be one of 1, 32"):
-        kernel_matrix(kernel, "shear", 4)
