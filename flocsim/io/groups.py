@@ -312,7 +312,7 @@ class FileFormat:
 
     @contextlib.contextmanager
     def opened(self, path: str | os.PathLike) -> Iterator[File]:
-        """Open a file, once its checksum, format and version were found right.
+        """Open a file, once its checksum, format, version and datasets were found right.
 
         Raises FileError for an absent or damaged file, and for one of another kind or version. So
         do errors of the block that say that the file does not hold what it should (UNREADABLE).
@@ -320,6 +320,8 @@ class FileFormat:
         try:
             file = open_hdf5(path)
             self.check_version(path, file)
+            if self.groups:
+                self.check(file)
             yield file
         except FileError:
             raise

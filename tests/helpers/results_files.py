@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from flocsim.io.results.file import opened, write_results
+from flocsim.io.results.file import write_results
+from flocsim.io.results.schema import RESULTS
 
 __all__ = ["same_data", "write_results"]
 
@@ -21,7 +22,7 @@ def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
             return mine.text == yours.text
         return one.read(path).tobytes() == other.read(path).tobytes()
 
-    with opened(path_a) as a, opened(path_b) as b:
+    with RESULTS.opened(path_a) as a, RESULTS.opened(path_b) as b:
         names = {f"{group}/{name}" for file in (a, b) for group in file.names("")
                  for name in file.names(group) if group != "run"}  # fmt: skip
         return sorted(n for n in names if n not in a or n not in b or not agree(a, b, n))

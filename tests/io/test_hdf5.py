@@ -18,7 +18,8 @@ from flocsim.ensembles.sweep import read_joined
 from flocsim.errors import FileError
 from flocsim.io import hdf5
 from flocsim.io.groups import kind_of
-from flocsim.io.results.file import opened, read_results
+from flocsim.io.results.file import read_results
+from flocsim.io.results.schema import RESULTS
 from flocsim.io.results.strength_file import read_strengths
 from flocsim.io.results.swarm_file import read_swarm
 from flocsim.io.seals import seal
@@ -290,7 +291,7 @@ def test_no_process_and_no_descriptor_stays(results, library):
 
 @pytest.mark.parametrize("part", [slice(1, 4), slice(3, 9), slice(0, 0), slice(0, 5)])
 def test_a_part_of_an_array_is_that_part(results, part):
-    with opened(results) as file:
+    with RESULTS.opened(results) as file:
         whole = file.read("replicates/angle_i")
         assert whole.shape == (2, 2, 2, 5)
         for place in np.ndindex(2, 2, 2):
@@ -388,7 +389,7 @@ def test_a_control_letter_in_a_type_is_refused(results):
 
 
 def test_a_file_is_known_without_reading_its_numbers(results):
-    with opened(results) as file:
+    with RESULTS.opened(results) as file:
         node = file.node("replicates/outcome")
         assert (node.type, node.shape, file["probabilities"].type) == (
             "u1",

@@ -21,8 +21,8 @@ from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.study import KernelStudy, Study
 from flocsim.io.groups import run_of
-from flocsim.io.results.file import failures_of, opened, write_results
-from flocsim.io.results.schema import Results, as_words
+from flocsim.io.results.file import failures_of, write_results
+from flocsim.io.results.schema import RESULTS, Results, as_words
 from flocsim.process import INTERRUPTION, stop_requested
 
 KINDS = (Study, KernelStudy)
@@ -31,7 +31,7 @@ KINDS = (Study, KernelStudy)
 @contextmanager
 def old_rows(output: str | Path) -> Iterator[OldResults]:
     """Open a results file that is to be extended, its rows read a condition at a time."""
-    with opened(output) as file:
+    with RESULTS.opened(output) as file:
         if tuple(failures_of(file)) != as_words(FAILURES):
             raise ValueError("its failure codes have other meanings")
         places = kind.places_in(

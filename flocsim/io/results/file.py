@@ -4,7 +4,6 @@ Its table of replicates may be larger than the memory: rank 0 writes it a part a
 reader takes a column at a time.
 """
 
-import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
@@ -144,11 +143,3 @@ def first_of_each(results: Results) -> dict[str, tuple[int, int, int, int]]:
         v, t, d, row = map(int, np.unravel_index(first, codes.shape))
         found[OUTCOMES[code]] = (t, int(order[v]), d, row)
     return found
-
-
-@contextlib.contextmanager
-def opened(path: str | os.PathLike) -> Iterator[File]:
-    """Open a results file, once checksum and structure were found right."""
-    with RESULTS.opened(path) as file:
-        RESULTS.check(file)
-        yield file
