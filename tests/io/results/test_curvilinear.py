@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from flocsim.errors import UsageError
 from flocsim.io.results import kernel_tables
-from flocsim.io.results.kernel_tables import CORRECTIONS, SOURCES, about_factor, curvilinear_factor
+from flocsim.io.results.kernel_tables import CORRECTIONS, curvilinear_factor
 
 PAIRS = [(name, each) for name in CORRECTIONS for each in CORRECTIONS[name]]
 RATIOS = np.geomspace(1e-6, 1.0, 200)
@@ -69,16 +69,6 @@ def strained(_, place):
     return strain * place * (1.0 - 1.0 / r5) - 2.5 * along * place * (1.0 / r5) * (1.0 - 1.0 / r2)
 
 
-def test_the_water_sticks_to_the_sphere_and_stays_as_much():
-    rng = np.random.default_rng(3)
-    for place in rng.normal(size=(20, 3)):
-        assert np.abs(strained(0.0, place / np.linalg.norm(place))).max() < 1e-15
-        place *= 1.5 / np.linalg.norm(place)
-        step = 1e-5 * np.eye(3)
-        slopes = [(strained(0, place + h) - strained(0, place - h)) @ h / 2e-10 for h in step]
-        assert abs(sum(slopes)) < 1e-9
-
-
 @pytest.mark.parametrize("p", [0.1, 0.5, 1.0])
 def test_points_of_a_strained_flow_reach_burds_share(p):
     # The last way that touches the distance R = 1 + p does so where its radial speed is 0,
@@ -113,14 +103,6 @@ def test_what_has_no_factor_is_refused():
     for wrong in (0.0, -1e-6, np.nan, np.inf):
         with pytest.raises(UsageError, match="must be above 0 and finite"):
             curvilinear_factor("burd", "shear", 1e-6, [1e-6, wrong])
-
-
-@pytest.mark.parametrize(("name", "mechanism"), PAIRS)
-def test_lines_about_it_say_what_it_is(name, mechanism):
-    told = about_factor(name, mechanism)
-    assert f"'{name}'" in told[0] and "p = r_small/r_large" in told[0]
-    assert SOURCES[name] in told[0] and "solid spheres" in told[1]
-    assert all("\n" not in line and line.isascii() for line in told)
 
 
 def test_the_example_of_its_docstring():

@@ -74,17 +74,6 @@ def test_flocmods_settling_kernel_lacks_an_eighteenth():
     assert "1/18" in kernel_matrix(kernel, "settling", 1, model="flocmod")
 
 
-def test_flocmods_kernels_are_these():
-    # Its shear (D_i + D_j)³/6 is 4/3 R³; its settling π/4 (D_i + D_j)² g/µ |Δ(Δρ D²)| is 18 times
-    # π R² |Δw|, w = g Δρ D²/(18 µ).
-    r_i, r_j, density, g, viscosity = 4e-6, 9e-6, 300.0, 9.81, 1e-3
-    size = r_i + r_j
-    assert (2.0 * size) ** 3 / 6.0 == pytest.approx(4.0 / 3.0 * size**3, rel=1e-12, abs=0.0)
-    speed = g * density * 4.0 * (r_j**2 - r_i**2) / (18.0 * viscosity)
-    theirs = np.pi / 4.0 * (2.0 * size) ** 2 * g / viscosity * density * 4.0 * (r_j**2 - r_i**2)
-    assert theirs == pytest.approx(18.0 * np.pi * size**2 * speed, rel=1e-12, abs=0.0)
-
-
 def test_a_matrix_says_what_fractal_flocs_weigh():
     density = FractalDensity("fractal", primary=4e-6, dimension=2.1, solid=2650.0)
     found = fractal_in(f'{{"bodies.density": "{density!r}"}}')
