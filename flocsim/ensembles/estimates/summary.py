@@ -81,22 +81,17 @@ class Reader:
 
     def codes(self, first: int, stop: int) -> tuple[np.ndarray, ...]:
         """Return COUNTED of replicates [first, stop) of all conditions: Codes."""
-        rows = self.part([*(slice(0, length) for length in self.shape[:3]), slice(first, stop)])
+        rows = self.part(first, stop)
         return tuple(rows[name] for name in statistics.COUNTED)
 
-    def part(self, where: Sequence[slice]) -> np.ndarray:
-        """Return rows of a part of the table (type, vertices, delta, replicate)."""
-        *outer, replicates = where
-        places = np.arange(len(self.store.conditions)).reshape(self.shape[:3])[tuple(outer)]
-        parts = [
-            self.store.rows(place, replicates.start, replicates.stop)
-            for place in places.ravel().tolist()
-        ]
-        return np.stack(parts).reshape(*places.shape, -1)
+    def part(self, first: int, stop: int) -> np.ndarray:
+        """Return the rows of replicates [first, stop) (type, vertices, delta, replicate)."""
+        parts = [self.store.rows(place, first, stop) for place in range(len(self.store.conditions))]
+        return np.stack(parts).reshape(*self.shape[:3], -1)
 
     def table(self) -> dict[str, np.ndarray]:
         """Return {column: array (type, vertices, delta, replicate)} of all rows, in memory."""
-        rows = self.part([slice(0, length) for length in self.shape])
+        rows = self.part(0, self.shape[-1])
         return {name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()}
 
 

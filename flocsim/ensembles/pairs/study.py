@@ -1,7 +1,7 @@
 """How the results of studies of pairs and of rates are made of rows, for good or so far."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -61,10 +61,10 @@ def results(
     rows = reader.table() if output is None else None
     found = summary.results_of(study, count, sums, run, rows, kernel)
 
-    def part(where: Sequence[slice]) -> np.ndarray:
+    def part(first: int, stop: int) -> np.ndarray:
         if stop_requested():
             raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
-        return reader.part(where)
+        return reader.part(first, stop)
 
     if output is not None:
         write_results(output, found, start.replacing, part)
