@@ -114,7 +114,7 @@ def run(args: Namespace) -> int:
         write_trajectory(
             args.save, found.t, found.position, found.velocity, found.shapes, facts, rule
         )
-    print("\n".join(str(each.path) for each in outputs))
+    print("\n".join(map(str, outputs)))
     return 0
 
 
