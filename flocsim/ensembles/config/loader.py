@@ -234,10 +234,10 @@ class Reading:
             if key not in keys:
                 self.found.append(unknown(inner, keys))
             elif isinstance(value, dict) and "table" in keys[key].metadata:
-                values[keys[key].alias] = self.made(keys[key].metadata["table"], value, inner)
+                values[str(keys[key].alias)] = self.made(keys[key].metadata["table"], value, inner)
             else:
                 try:
-                    values[keys[key].alias] = read_value(value, keys[key])
+                    values[str(keys[key].alias)] = read_value(value, keys[key])
                 except ValueError as error:
                     self.found.append(problem(inner, error))
         if len(self.found) > count:
