@@ -5,7 +5,7 @@ import itertools
 import attrs
 import numpy as np
 
-from flocsim.io.fit_report import CLASS_LIMIT
+from flocsim.io.plots.shapes import CLASS_LIMIT
 
 from .resampling import RESAMPLES, SEED, resampled_means
 from .trends import kendall
