@@ -168,7 +168,7 @@ def first_replicates(count):
     """The Results of just these, which are as random as all."""
     results = paper_results()
     replicates = {name: array[..., :count] for name, array in results.replicates.items()}
-    return relabelled(results, replicates=replicates)
+    return relabelled(results, replicates=replicates, count=count)
 
 
 def test_few_replicates_leave_weak_effects_open():

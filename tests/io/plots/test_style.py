@@ -51,7 +51,7 @@ def test_saved_pictures_are_whole_equal_and_undated(tmp_path, suffix, start):
 
 @pytest.mark.parametrize("name", ["figure", "figure.jpg", "figure.png.txt"])
 def test_other_suffixes_are_refused(tmp_path, name):
-    with pytest.raises(UsageError, match=r"\.png, \.pdf, \.svg"):
+    with pytest.raises(UsageError, match=r"must end in \.png or \.pdf or \.svg"):
         save(draw_distance([0.0, 1.0], [1e-5, 2e-5]), tmp_path / name)
 
 
