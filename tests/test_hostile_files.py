@@ -7,7 +7,7 @@ from flocsim.__main__ import main
 from tests.helpers.hostile_readers import MAKERS, is_refused, made
 from tests.helpers.tiers import rest_slow
 
-EXAMPLES = settings().max_examples // 2
+EXAMPLES = settings().max_examples // 3
 
 
 @pytest.mark.parametrize("kind", MAKERS)

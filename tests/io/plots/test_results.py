@@ -156,7 +156,7 @@ def test_nothing_but_misses_gives_figures_that_say_so(name, tmp_path):
 
 
 def test_many_vertex_counts_are_thinned_but_keep_both_ends():
-    results = make_results(vertices=(1, *range(4, 65, 4)), count=4)
+    results = make_results(types=("I",), vertices=(1, *range(4, 65, 4)), delta=(0.0,), count=4)
     labels = [text.get_text() for text in figure_4(results).axes[0].get_xticklabels()]
     assert (labels[0], labels[-1]) == ("sphere", "64")
     assert sum(map(bool, labels)) <= 9
