@@ -244,9 +244,10 @@ def test_cheap_checks_come_before_flocs_are_grown(finished, tmp_path, monkeypatc
 def test_a_replicate_that_comes_out_otherwise_is_refused(finished, tmp_path):
     path = Path(shutil.copy(finished / "r.h5", tmp_path))
     found = read_results(path)
-    found.replicates["steps"][:] = 0
-    found.replicates["outcome"][0, 0, 0, 0], found.replicates["bond"][0, 0, 0, 0] = 5, 255
+    rows = dict(found.replicates)
+    rows["steps"][:] = 0
+    rows["outcome"][0, 0, 0, 0], rows["bond"][0, 0, 0, 0] = 5, 255
     path.unlink()
-    write_results(path, found)
+    write_results(path, attrs.evolve(found, replicates=rows))
     with pytest.raises(UsageError, match="cannot be reproduced: outcome is"):
         flocsim.open(path, folder=finished).replicate(0)

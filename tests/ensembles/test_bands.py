@@ -7,11 +7,11 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.draw import columns_of
-from flocsim.ensembles.pairs import results as contents
 from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
+from flocsim.io.plots import results as figures
 from flocsim.io.shape_library import read_library, write_library
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
@@ -79,7 +79,7 @@ def test_first_runs_are_those_of_a_study_without(folder):
 
 def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr(contents, "FIGURES", {"overview": contents.FIGURES["overview"]})
+    monkeypatch.setattr(figures, "FIGURES", {"overview": figures.FIGURES["overview"]})
     (folder / "study.toml").write_text(STUDY.format(outlines="band", scene=SCENES["measured"]))
     assert main(["ensemble", "study.toml"]) == 0
     printed = capsys.readouterr().out
@@ -92,7 +92,7 @@ def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     table = opened.to_xarray("outlines")
     assert (table["pr_a_shape_low"] <= 0.0).all() and (table["pr_a_shape_high"] >= 0.0).all()
     assert main(["report", "study.h5"]) == 0
-    assert "shape −" in (folder / "study.html").read_text("utf-8")
+    assert "shape: with outlines cut closer or wider" in (folder / "study.html").read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ def test_independent_samples_as_published():
 
 def changed(path, results, **columns):
     """The results with other columns of replicates, counted anew, in a file."""
-    rows = results.replicates | columns
+    rows = {**results.replicates, **columns}
     codes = [rows[name] for name in ("outcome", "inside", "bond")]
     again = {name: rows[name] for name in EXACT_RUNS[3:]}
     table = tabulate(*codes, **again)

@@ -6,7 +6,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.config.schema import ShapesConfig
-from flocsim.io.plots.results import FIGURES, OF_ROWS
+from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import add_foot, keep_titles_whole
 from flocsim.io.results.run_group import source_line
 from flocsim.io.shape_library import SHIPPED
@@ -72,7 +72,7 @@ def test_files_without_a_source_are_shown_without(tmp_path, capsys):
     assert (tmp_path / "old-figure-4.png").exists()
 
 
-@pytest.mark.parametrize("name", sorted(FIGURES.keys() - OF_ROWS))
+@pytest.mark.parametrize("name", FIGURES)
 def test_the_line_at_the_foot_touches_nothing(name):
     figure = FIGURES[name](make_results(count=4))
     add_foot(figure, SOURCE)
