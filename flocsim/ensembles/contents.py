@@ -144,8 +144,8 @@ class Contents:
     # What rank 0 asks of a kind of study.
 
     results: Any = None
-    """(study, beginning, count, run, output or None, whether all rows are to be in memory) →
-    results of so many replicates of each condition, written to the output."""
+    """(study, beginning, count, run, output) → results of so many replicates of each condition,
+    written to the output."""
     old_rows: Any = None
     """(path) → context manager of a results file that is to be extended, as OldResults."""
     so_far: Any = None

@@ -63,10 +63,9 @@ class OneTable(Contents):
         return found
 
     def results(self, study: Any, start: Any, count: int, run: dict, output: Any) -> Stored:
-        """Return the results of a study, written to the output if there is one."""
+        """Write the results of a study, and return them."""
         found = self.stored(start.store, study.asked(), count, run)
-        if output is not None:
-            found.write(output, start.replacing)
+        found.write(output, start.replacing)
         return found
 
     @contextmanager

@@ -7,6 +7,7 @@ others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks 
 import contextlib
 import json
 import platform
+import tempfile
 import time
 from functools import partial
 from pathlib import Path
@@ -28,10 +29,8 @@ from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinato
 from flocsim.ensembles.parallel.processes import in_copies
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.identity import identity_of
-from flocsim.ensembles.storage.resume import Beginning, begin, claim
-from flocsim.ensembles.storage.row_store import RowStore
+from flocsim.ensembles.storage.resume import NEW, Beginning, begin, claim
 from flocsim.errors import FlocsimError, UsageError
-from flocsim.io.journal import Journal
 from flocsim.io.results.run_group import provenance, source_line, storable
 from flocsim.io.terminal import Progress
 from flocsim.process import INTERRUPTION, STOPPED
@@ -52,24 +51,23 @@ class Ended:
     total: int = 0
 
 
-def run(config: Config, comm: Communicator | None = None, quiet: bool = True) -> Any:
-    """Run a config's study in memory; its results on rank 0, None on the others.
+def run(config: Config) -> Any:
+    """Run a config's study in this process and return its results, all of them in memory.
 
-    ``comm`` has the ranks of the job (default: this process alone). The arrays of the results are
-    the same whatever the number of ranks.
+    They go through a file in a temporary folder, so that there is one way to run a study. None
+    where a signal has stopped it.
     """
-    comm = comm or Communicator()
-    try:
-        study, identity = join(config, comm)
-        if comm.rank > 0:
-            return follow(study, comm).results
-        store = RowStore(Journal(), study.conditions, study.row)
-        start = Beginning(store, identity)
-        return lead(
-            study, start, comm, Progress(study.size * study.pieces, quiet, noun=study.noun)
-        ).results
-    except SharedError as error:
-        raise error.args[0] from None
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "results.h5")
+        try:
+            if run_to_file(config, Communicator(), path, NEW).code != 0:
+                return None
+        except SharedError as error:
+            raise error.args[0] from None
+        found = file_kind(path).read(path)
+        # A table of replicates is read from its file when asked for, and the file goes.
+        rows = getattr(found, "replicates", None)
+        return found if rows is None else attrs.evolve(found, replicates=dict(rows))
 
 
 def run_to_file(
@@ -92,10 +90,7 @@ def run_to_file(
         study, identity = join(config, comm)
         progress = Progress(study.size * study.pieces, quiet, noun=study.noun)
         with comm.sharing_errors():
-            start = begin(
-                study, identity, output, mode, journal, contents_of(study.format).old_rows,
-                overwrite,
-            )  # fmt: skip
+            start = begin(study, identity, output, mode, journal, overwrite)
         # Once nothing else stands in the way: what is refused is refused in one line.
         doubts = study.doubts()
         said = (f"warning: {line}" for line in doubts if line != IMPLIED)
@@ -165,17 +160,14 @@ def follow(study: StudyKind, comm: Communicator) -> Ended:
 
 def lead(
     study: StudyKind, start: Beginning, comm: Communicator, progress: Progress,
-    output: str | Path | None = None,
+    output: str | Path,
 ) -> Ended:  # fmt: skip
-    """Run what is missing, together with the other ranks, and make the results, as rank 0 does.
-
-    They are written into the file ``output`` if given.
-    """
+    """Run what is missing, together with the other ranks, and write the results into the file
+    ``output``, as rank 0 does."""
     began = time.monotonic()
     with comm.sharing_errors():
         state = make_state(study, start, comm.size)
-    if output is not None:
-        INTERRUPTION.kept = partial(kept_words, start, state)
+    INTERRUPTION.kept = partial(kept_words, start, state)
     remaining = state.schedule.remaining
     ranks, existing = comm.size, study.size - remaining
     line = f"{study.title}, on {ranks} rank{'s' * (ranks > 1)}"
@@ -224,7 +216,7 @@ def compile_in_turn(study, comm):
 def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     """Return the StudyState of what is missing, for so many ranks."""
     replicates, stop = study.config.replicates, study.config.stop
-    found, store = start.found(replicates), start.store
+    store = start.store
     # Failed replicates of earlier runs count towards stop.failed as well.
     failed = sum(
         int(np.sum(study.has_failed(rows.__getitem__)))
@@ -233,12 +225,12 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
     # Where the rule looks, and nowhere below what the results file has of each condition.
     looks = sorted({max(border, start.at_least) for border in borders(stop, replicates)})
     is_enough = contents_of(study.format).stop_rule(study, store)
-    schedule = Schedule.of(found, looks, ranks, study.most_rows)
+    schedule = Schedule.of(store.runs, looks, ranks, study.most_rows)
     state = StudyState(schedule, store, study, is_enough, failed)
     # Saved parts of replicates that are still missing: progress counts them.
     for task, parts in store.parts.items():
         place, replicate = task
-        there = any(first <= replicate < end for first, end in found[place])
+        there = any(first <= replicate < end for first, end in store.runs[place])
         if replicate < replicates and not there:
             state.begun[task] = sum(map(study.counts_part, parts.ids))
     return state
@@ -246,11 +238,11 @@ def make_state(study: StudyKind, start: Beginning, ranks: int) -> StudyState:
 
 def make_results(
     study: StudyKind, start: Beginning, state: StudyState, ended: Ended, ranks: int,
-    output: str | Path | None,
+    output: str | Path,
 ) -> Any:  # fmt: skip
-    """Return the results of a finished study; they are written to ``output`` if it is given."""
+    """Write the results of a finished study to ``output``, and return them."""
     count = state.schedule.final
-    if output and start.is_covered(count):
+    if start.is_covered(count):
         return file_kind(output).read(output)  # it has all that was asked for, and stays
     run = facts(study, start, ended, ranks)
     return contents_of(study.format).results(study, start, count, run, output)

@@ -101,10 +101,6 @@ def connect(database: str) -> sqlite3.Connection:
     return db
 
 
-def make_tables(db: sqlite3.Connection) -> None:
-    db.executescript(f"BEGIN; {'; '.join(SCHEMA)}; COMMIT;")
-
-
 def has_tables(db: sqlite3.Connection) -> bool:
     """Return True if a database has the tables of a journal, False if it is empty."""
     found = db.execute("SELECT sql FROM sqlite_master WHERE sql NOT NULL ORDER BY rowid").fetchall()
@@ -167,7 +163,7 @@ def read_journal(path: Path) -> Iterator[JournalReader]:
 
 
 class Journal(JournalReader):
-    """A journal that this process alone writes; in memory where there is no ``path``.
+    """A journal that this process alone writes.
 
     ``is_damaged`` says that a file that is there is no journal, or not whole: it can only be put
     aside. ``lost`` is how many records were acknowledged and are not there.
@@ -175,13 +171,8 @@ class Journal(JournalReader):
 
     lost, last, synced, is_damaged = 0, 0, 0.0, False
 
-    def __init__(self, path: Path | None = None) -> None:
+    def __init__(self, path: Path) -> None:
         """Open and lock the journal at ``path``, or start one; FileError if impossible."""
-        self.lock: Lock | None = None
-        if path is None:
-            super().__init__(Path("memory"), connect(":memory:"))
-            make_tables(self.db)
-            return
         self.path = ordinary_target(path)
         self.lock = Lock(beside(self.path, LOCK_SUFFIX))
         try:
@@ -191,21 +182,16 @@ class Journal(JournalReader):
             self.lock.close()
             raise
 
-    @property
-    def has_lock(self) -> bool:
-        """False on a file system without locks."""
-        return self.lock is None or self.lock.is_locked
-
     def open(self) -> None:
         """Open the database, and see that it is whole."""
         # Without locks SQLite has no log that others could read meanwhile.
-        options = "" if self.has_lock or os.name == "nt" else "?vfs=unix-none"
+        options = "" if self.lock.is_locked or os.name == "nt" else "?vfs=unix-none"
         db = sqlite3.connect(":memory:")
         try:
             db = connect(f"{self.path.absolute().as_uri()}{options}")
             if not has_tables(db):
                 db.execute("PRAGMA journal_mode=WAL")
-                make_tables(db)
+                db.executescript(f"BEGIN; {'; '.join(SCHEMA)}; COMMIT;")
             # A commit is safe from a kill at once, and from a power cut with the next sync.
             db.execute("PRAGMA synchronous=NORMAL")
             # Records have checksums of their own; this is about the pages between them.
@@ -217,7 +203,7 @@ class Journal(JournalReader):
             self.is_damaged = True
         super().__init__(self.path, db)
         self.stat, self.synced = os.stat(self.path), time.monotonic()
-        if not self.is_damaged and self.lock is not None:
+        if not self.is_damaged:
             (self.last,) = self.db.execute(LAST).fetchone()
             self.lost = max(self.lock.count - self.last, 0)
 
@@ -246,8 +232,7 @@ class Journal(JournalReader):
 
     def acknowledge(self) -> None:
         """Write down how many records there are, outside the database."""
-        if self.lock is not None:
-            self.lock.count = self.last
+        self.lock.count = self.last
 
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
@@ -295,8 +280,6 @@ class Journal(JournalReader):
     def remove(self) -> None:
         """Delete the file, and no other of its name: what was in it is in the results."""
         self.db.close()
-        if self.lock is None:
-            return
         with contextlib.suppress(OSError):
             if os.path.samestat(os.lstat(self.path), self.stat):
                 for suffix in ("", WAL_SUFFIX, INDEX_SUFFIX):
@@ -305,7 +288,7 @@ class Journal(JournalReader):
 
     def release(self) -> None:
         """Close the file; none is left that holds nothing computed."""
-        if self.lock is None or self.lock.descriptor < 0:
+        if self.lock.descriptor < 0:
             return
         with contextlib.suppress(sqlite3.Error):
             if self.is_blank:

@@ -5,17 +5,14 @@ import pytest
 
 from flocsim.ensembles.estimates.statistics import EXACT_RUNS
 from flocsim.ensembles.parallel import coordinator
-from flocsim.ensembles.parallel.communicator import Communicator
 from flocsim.ensembles.parallel.schedule import Phase
-from flocsim.ensembles.runner import lead, make_state, run
+from flocsim.ensembles.runner import make_state, run
 from flocsim.ensembles.storage.resume import Beginning
 from flocsim.ensembles.storage.row_store import RowStore
-from flocsim.ensembles.study import Study
-from flocsim.io.journal import Journal
 from flocsim.io.results.file import read_results
-from flocsim.io.terminal import Progress
 from tests.helpers.results_files import same_data, write_results
-from tests.helpers.small_study import small_study
+from tests.helpers.small_study import small_config, small_study
+from tests.helpers.study_state import scratch_journal
 from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
 
@@ -26,17 +23,6 @@ def study(tmp_path_factory):
     return small_study(tmp_path_factory.mktemp("study"))
 
 
-def beginning(study):
-    """A study's start with nothing."""
-    return Beginning(RowStore(Journal(), study.conditions), {"seed": study.config.seed})
-
-
-def results_of(study):
-    """The Results of a Study that this process runs alone."""
-    comm = Communicator()
-    return lead(study, beginning(study), comm, Progress(study.size, True)).results
-
-
 def same_arrays(table, other):
     """Whether two tables agree byte for byte."""
     return all(table[name].tobytes() == other[name].tobytes() for name in other)
@@ -45,14 +31,14 @@ def same_arrays(table, other):
 @pytest.fixture(scope="module")
 def alone(study):
     """The table of one rank."""
-    return results_of(study).replicates
+    return run(study.config).replicates
 
 
 @pytest.mark.parametrize("size", rest_slow([2, 5, 40], lambda size: size == 5))
 def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone, size):
     from flocsim.ensembles.estimates.summary import Reader
 
-    start = beginning(study)
+    start = Beginning(RowStore(scratch_journal(), study.conditions), {})
     state = make_state(study, start, size)
     held = [state.next_chunk() for _ in range(size)]
     rng = np.random.default_rng(size)
@@ -64,7 +50,7 @@ def test_whoever_runs_what_in_whatever_order_the_table_is_the_same(study, alone,
     assert state.schedule.remaining == 0
     assert state.phase is Phase.FINISHED
     assert state.computed == study.size
-    assert same_arrays(Reader(start.store, study.shape).table(), alone)
+    assert same_arrays(Reader(start.store, study.shape).part(0, 3), alone)
 
 
 def test_angles_are_the_same_in_all_conditions(alone):
@@ -74,23 +60,23 @@ def test_angles_are_the_same_in_all_conditions(alone):
 
 
 def test_more_replicates_leave_the_first_ones_as_they_are(tmp_path, alone):
-    fewer = results_of(small_study(tmp_path, {"replicates": 2})).replicates
+    fewer = run(small_config(tmp_path, {"replicates": 2})).replicates
     assert same_arrays(fewer, {name: array[..., :2] for name, array in alone.items()})
 
 
 def test_fewer_conditions_leave_the_others_as_they_are(tmp_path, alone):
     fewer = {"scene": {"types": ["III"], "delta": [1.0]}}
-    part = results_of(small_study(tmp_path, fewer)).replicates
+    part = run(small_config(tmp_path, fewer)).replicates
     assert same_arrays(part, {name: array[1:, :, 1:] for name, array in alone.items()})
 
 
 def test_another_seed_draws_other_collisions(tmp_path, alone):
-    other = small_study(tmp_path, {"seed": 2, "shapes": {"vertices": [1]}})
-    assert not np.any(results_of(other).replicates["angle_i"] == alone["angle_i"][:, :1])
+    other = run(small_config(tmp_path, {"seed": 2, "shapes": {"vertices": [1]}}))
+    assert not np.any(other.replicates["angle_i"] == alone["angle_i"][:, :1])
 
 
 def test_results_hold_what_was_run(study, alone, tmp_path):
-    results = results_of(study)
+    results = run(study.config)
     assert (results.types, list(results.vertices)) == (("I", "III"), [1, 4, 16])
     table = tabulate(*(alone[name] for name in EXACT_RUNS))
     for name in table:
@@ -110,7 +96,7 @@ def test_results_hold_what_was_run(study, alone, tmp_path):
 def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
-    results = results_of(study)
+    results = run(study.config)
     path = tmp_path / "a.h5"
     write_results(path, results)
     with xarray.open_dataset(path, group="differences", engine="h5netcdf") as table:
@@ -127,10 +113,9 @@ def test_xarray_opens_every_group_that_a_study_makes(study, tmp_path):
 
 def test_run_is_the_whole_way(tmp_path, capsys):
     spheres = {"shapes": {"vertices": [1]}}
-    config = small_study(tmp_path, spheres).config
+    config = small_config(tmp_path, spheres)
     results = run(config)
     assert capsys.readouterr().out == ""
-    assert same_arrays(results.replicates, results_of(Study(config)).replicates)
     assert (results.run["ranks"], results.run["preset"]) == (1, "tang2014")
     assert results.run["wall_time"] > 0.0
     for name, part in (("a.h5", results), ("b.h5", run(config))):

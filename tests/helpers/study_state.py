@@ -1,5 +1,9 @@
 """The state of a made-up study of one condition, and results of its chunks."""
 
+import shutil
+import tempfile
+import weakref
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +18,15 @@ CONDITION = Condition("I", 1, 0.0)
 NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}
 
 
+def scratch_journal():
+    """An empty journal in a folder that goes when the journal does."""
+    folder = tempfile.mkdtemp()
+    journal = Journal(Path(folder, "r.h5.journal"))
+    weakref.finalize(journal, shutil.rmtree, folder, ignore_errors=True)
+    weakref.finalize(journal, journal.lock.close)
+    return journal
+
+
 def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
     """The state of a study of one condition on one rank, none of it done."""
     schedule = Schedule.of([[]], list(borders), 1)
@@ -21,7 +34,7 @@ def make_state(borders=(4,), is_enough=lambda stop: False, allowed=10):
         allowed=allowed, pieces=1, left_of=lambda parts: None, counts_part=lambda name: False,
         has_failed=lambda column: column("outcome") == 6,
     )  # fmt: skip
-    return StudyState(schedule, RowStore(Journal(), (CONDITION,)), study, is_enough)
+    return StudyState(schedule, RowStore(scratch_journal(), (CONDITION,)), study, is_enough)
 
 
 def result_of(chunk, count=None, failed=0):

@@ -89,11 +89,6 @@ class Reader:
         parts = [self.store.rows(place, first, stop) for place in range(len(self.store.conditions))]
         return np.stack(parts).reshape(*self.shape[:3], -1)
 
-    def table(self) -> dict[str, np.ndarray]:
-        """Return {column: array (type, vertices, delta, replicate)} of all rows, in memory."""
-        rows = self.part(0, self.shape[-1])
-        return {name: np.ascontiguousarray(rows[name]) for name in rows.dtype.names or ()}
-
 
 Codes = Callable[[int, int], tuple[np.ndarray, ...]]
 """Gives COUNTED of replicates [first, stop), each (type, vertices, delta, replicate)."""
@@ -169,16 +164,15 @@ def table_from(
 
 
 def results_of(
-    study: Study, count: int, sums: Sums, run: dict, replicates: dict | None = None,
-    kernel: Kernel | None = None,
-) -> schema.Results:  # fmt: skip
+    study: Study, count: int, sums: Sums, run: dict, kernel: Kernel | None = None
+) -> schema.Results:
     """Return the Results of so many replicates of each condition from their Sums."""
     config = study.config
     return schema.Results(
         types=config.scene.names,
         vertices=np.array(config.shapes.vertices),
         delta=np.array(config.scene.delta),
-        replicates=replicates,
+        replicates=None,
         run=run,
         failures=FAILURES,
         flocs=tuple(floc.name for floc in study.flocs),

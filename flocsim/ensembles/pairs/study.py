@@ -51,23 +51,19 @@ def old_rows(output: str | Path) -> Iterator[OldResults]:
         yield OldResults(list(places), count, chunks(), run_of(file))
 
 
-def results(
-    study: Study, start: Beginning, count: int, run: dict, output: str | Path | None
-) -> Results:
-    """The Results of so many replicates; written to ``output``, or with all rows in memory."""
+def results(study: Study, start: Beginning, count: int, run: dict, output: str | Path) -> Results:
+    """Write the results of so many replicates to ``output``, and return all but their rows."""
     reader = summary.Reader(start.store, (*study.shape[:3], count))
     kernel = kernel_of(study, start.store, count) if isinstance(study, KernelStudy) else None
     sums = summary.sums_of(reader.codes, len(study.conditions), 0, count, study.scrambles)
-    rows = reader.table() if output is None else None
-    found = summary.results_of(study, count, sums, run, rows, kernel)
+    found = summary.results_of(study, count, sums, run, kernel)
 
     def part(first: int, stop: int) -> np.ndarray:
         if stop_requested():
             raise StopRequested(f"stopped by {INTERRUPTION.name}; continue with --resume")
         return reader.part(first, stop)
 
-    if output is not None:
-        write_results(output, found, start.replacing, part)
+    write_results(output, found, start.replacing, part)
     return found
 
 

@@ -7,14 +7,13 @@ journal or a results file has beyond what is asked for stays where it is, or the
 import os
 import shlex
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 import attrs
 
-from flocsim.ensembles.kind import Interval, OldResults, StudyKind, layout
+from flocsim.ensembles.config import contents_of
+from flocsim.ensembles.kind import OldResults, StudyKind, layout
 from flocsim.ensembles.storage.identity import differences, short
 from flocsim.ensembles.storage.row_store import RowStore, sessions_of
 from flocsim.errors import FileError, FlocsimError, UsageError
@@ -66,13 +65,6 @@ class Beginning:
             and set(self.store.conditions) <= set(self.old.conditions)
         )
 
-    def found(self, count: int) -> list[list[Interval]]:
-        """Return of every condition the replicates below ``count`` that exist, as intervals."""
-        return [
-            [(first, min(stop, count)) for first, stop in each if first < count]
-            for each in self.store.runs
-        ]
-
     def has_more(self, count: int) -> bool:
         """Return True if the journal has computed rows that results of so many replicates lack.
 
@@ -102,7 +94,7 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
     path = journal_path(output)
     journal, remarks = Journal(path), []
     try:
-        if not journal.has_lock:
+        if not journal.lock.is_locked:
             remarks.append(
                 f"the file system of {path} has no locks: make sure that no two jobs write there"
             )
@@ -127,14 +119,13 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
 
 def begin(
     study: StudyKind, identity: dict, output: str | Path, mode: str, journal: Journal,
-    old_rows: Callable[[Any], AbstractContextManager[OldResults]], overwrite: bool = False,
+    overwrite: bool = False,
 ) -> Beginning:  # fmt: skip
     """Return the Beginning of a study with results in ``output``.
 
-    ``journal``: as `claim` gave it; ``old_rows`` of the Kind. Raises UsageError where what lies
-    there is of another config, of other shapes or other physics, has rows that this study would
-    drop, or is anything but results of this study to be extended; with ``overwrite`` that is set
-    aside.
+    ``journal``: as `claim` gave it. Raises UsageError where what lies there is of another config,
+    of other shapes or other physics, has rows that this study would drop, or is anything but
+    results of this study to be extended; with ``overwrite`` that is set aside.
     """
     store = RowStore(journal, study.conditions, study.row, short(identity))
     start = Beginning(store, identity)
@@ -148,7 +139,7 @@ def begin(
     if mode == RESUME and os.path.lexists(ordinary_target(output)):
         try:
             rule = held(output)
-            take_results(start, study, output, old_rows)
+            take_results(start, study, output)
             start.replacing = rule
         except (FileError, UsageError) as error:
             if not overwrite:
@@ -179,15 +170,12 @@ def check_free(output: str | Path) -> None:
         raise in_the_way(output, WAYS)
 
 
-def take_results(
-    start: Beginning, study: StudyKind, output: str | Path,
-    old_rows: Callable[[Any], AbstractContextManager[OldResults]],
-) -> None:  # fmt: skip
+def take_results(start: Beginning, study: StudyKind, output: str | Path) -> None:
     """Copy the rows of an older results file into the journal; FlocsimError if they are not of
     this study."""
     resources = ExitStack()  # closed by itself: the file would call any error one of its own
     try:
-        old = resources.enter_context(old_rows(output))
+        old = resources.enter_context(contents_of(study.format).old_rows(output))
         refuse_other(start, output, stored(old.run, "identity"), ELSEWHERE)
         failed, history = stored(old.run, "failed"), stored(old.run, "history")
         with start.store.journal.together():

@@ -268,9 +268,9 @@ class SwarmFiles(Contents):
     animate = later("io.plots.swarm", "write_swarm_animation")
 
     def results(
-        self, study: Any, start: Any, count: int, run: dict, output: str | Path | None
+        self, study: Any, start: Any, count: int, run: dict, output: str | Path
     ) -> SwarmResults:
-        """Return the results of so many replicates; written to ``output`` where there is one."""
+        """Write the results of so many replicates to ``output``, and return them."""
         store, asked = start.store, study.asked()
         old = [first_of(start.old.found, count)] if start.old else []
         begun = len(old[0]["bodies"]["box"]) if old else 0
@@ -281,8 +281,7 @@ class SwarmFiles(Contents):
         rows = store.rows(0, 0, count)
         ends = {name: rows[name].copy() for name in swarm_file.ENDS}
         made = results_from(joined([*old, *new]), ends, asked, run, range(count))
-        if output is not None:
-            made.write(output, start.replacing)
+        made.write(output, start.replacing)
         return made
 
     @contextmanager
