@@ -2,8 +2,7 @@
 
 import argparse
 
-from flocsim.ensembles.contents import compare, file_kind, studies
-from flocsim.io.seals import held
+from flocsim.ensembles.contents import compare, open_kind, studies
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,8 +28,8 @@ def run(args: argparse.Namespace) -> int:
     """Print the comparison; returns the exit code."""
     both = []
     for path in (args.first, args.second):
-        kind = file_kind(source := held(path), "compare")
-        both.append(kind.opened(source))
+        kind, file = open_kind(path, "compare")
+        both.append(kind.opened(file))
         print(f"{path}: {kind.source(both[-1]) or 'its source is not stated'}")
     print(compare(*both).table(*filter(None, [args.quantity])))
     return 0

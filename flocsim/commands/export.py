@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.contents import open_kind
 from flocsim.errors import UsageError
 from flocsim.io.files import unfinished, write_file
 from flocsim.io.outputs import check_outputs
 from flocsim.io.results import kernel_tables
 from flocsim.io.results.file import read_results
-from flocsim.io.seals import held
 from flocsim.io.trajectory import WRITERS
 
 SUFFIXES = {suffix[1:]: suffix for suffix in WRITERS}
@@ -70,8 +69,8 @@ def export_motion(args: argparse.Namespace) -> int:
     suffix = SUFFIXES[args.format]
     path = Path(args.output or f"{Path(args.source).stem}{suffix}")
     check_outputs([path], args.overwrite, [args.source], endings=(suffix,))
-    kind = file_kind(source := held(args.source), "motion")
-    t, position, velocity, shapes = kind.motion(kind.read(source))
+    kind, file = open_kind(args.source, "motion")
+    t, position, velocity, shapes = kind.motion(kind.read(file))
     WRITERS[suffix](path, t, position, velocity, shapes, args.overwrite)
     print(path)
     return 0
@@ -79,8 +78,8 @@ def export_motion(args: argparse.Namespace) -> int:
 
 def export_tables(args: argparse.Namespace) -> int:
     """Write tables of a file of any kind as CSV."""
-    kind = file_kind(source := held(args.source))
-    tables = kind.opened(source)
+    kind, file = open_kind(args.source)
+    tables = kind.opened(file)
     names = [tables.known(args.table)] if args.table else tables.exported or list(tables.indices)
     found = {f"{Path(args.source).stem}-{name}.csv": name for name in names}
     if args.output:

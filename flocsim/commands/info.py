@@ -6,10 +6,9 @@ from typing import Any
 
 from flocsim.commands import add_allowed, allowed_by
 from flocsim.ensembles.config.sources import read_sources
-from flocsim.ensembles.contents import file_kind, info_of, unfinished_text
+from flocsim.ensembles.contents import info_of, open_kind, unfinished_text
 from flocsim.errors import FileError
 from flocsim.io.journal import journal_of
-from flocsim.io.seals import held
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,11 +40,11 @@ def run(args: argparse.Namespace) -> int:
 
         print(unfinished_text(read_unfinished(journal)))
     elif args.water:
-        source = held(args.results)
-        print("\n".join(file_kind(source, "water").water(source, allowed_by(args))))
+        kind, file = open_kind(args.results, "water")
+        print("\n".join(kind.water(file, allowed_by(args))))
     elif args.config or args.modules:
-        kind = file_kind(source := held(args.results))
-        print_inputs(args, getattr(kind.read(source), "run", {}))
+        kind, file = open_kind(args.results)
+        print_inputs(args, getattr(kind.read(file), "run", {}))
     else:
         print(info_of(args.results))
     return 0

@@ -6,13 +6,12 @@ from typing import Any
 
 from flocsim.commands import add_overwrite
 from flocsim.ensembles.config import contents_of
-from flocsim.ensembles.contents import Contents, file_kind, studies
+from flocsim.ensembles.contents import Contents, open_kind, studies
 from flocsim.errors import UsageError
 from flocsim.io.files import make_folder
 from flocsim.io.journal import journal_of
 from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FORMATS, mark_figure, save
-from flocsim.io.seals import held
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw the figures asked for, print the path of each; returns the exit code."""
-    source = held(args.results)
-    kind, content, remark, foot = read_content(source)
+    kind, content, remark, foot = read_content(args.results)
     figures = kind.figures(content)
     names = list(figures)
     if args.figures is not None:
@@ -92,6 +90,6 @@ def read_content(path: Any) -> tuple[Contents, Any, str, str]:
         begun = read_unfinished(journal)
         last = begun.sessions[-1]
         return contents_of(begun.kind), begun.results, begun.progress, str(last.get("source", ""))
-    kind = file_kind(path)
-    found = kind.read(path)
+    kind, file = open_kind(path)
+    found = kind.read(file)
     return kind, found, kind.mark(found), kind.source(found)

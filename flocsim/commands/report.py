@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
-from flocsim.ensembles.contents import Contents, Example, file_kind, text_of
+from flocsim.ensembles.contents import Contents, Example, open_kind, text_of
 from flocsim.errors import visible
 from flocsim.io.files import write_file
 from flocsim.io.outputs import check_outputs
@@ -41,7 +41,6 @@ from flocsim.io.plots.style import (
     add_foot,
     house_style,
 )
-from flocsim.io.seals import held
 from flocsim.io.trajectory import centre_distance
 from flocsim.trajectories.figures import frames_of, seen_from_first
 
@@ -80,10 +79,9 @@ def run(args: argparse.Namespace) -> int:
     """Write the page and print its path; returns the exit code."""
     path = Path(args.output or f"{Path(args.results).stem}.html")
     check_outputs([path], args.overwrite, [args.results], endings=(".html",))
-    source = held(args.results)
-    kind = file_kind(source)
-    found = kind.read(source)
-    examples = [] if args.no_motion else kind.examples(source, allowed_by(args))
+    kind, file = open_kind(args.results)
+    found = kind.read(file)
+    examples = [] if args.no_motion else kind.examples(file, allowed_by(args))
     write_file(path, report_page(str(args.results), kind, found, examples).encode(), args.overwrite)
     for example in examples:
         if example.reason:

@@ -6,6 +6,7 @@ table of all. `open_any` is `flocsim.open`, what a script has of a file; `compar
 kind differ in, and Differences what comparisons of all kinds have in common.
 """
 
+import contextlib
 import importlib
 import os
 from collections import Counter
@@ -18,10 +19,10 @@ import numpy as np
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io.groups import UNREADABLE, Group, kind_of
+from flocsim.io.groups import UNREADABLE, Group
+from flocsim.io.hdf5 import Unfit, open_hdf5
 from flocsim.io.labelled import Column, Labelled, Tables
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.seals import held
 from flocsim.io.terminal import aligned
 
 Facts = list[tuple[str, str]]
@@ -179,18 +180,23 @@ class Contents:
         return str(study_of(config, []).title)
 
 
-def file_kind(path: str | os.PathLike, ability: str = "read") -> Contents:
-    """The Contents of a file whose kind has an ability, a field of Contents; FileError for one of
-    another kind, or that is absent or damaged. What does not say its kind is read as the first."""
-    name = kind_of(path)
+def open_kind(path: str | os.PathLike, ability: str = "read") -> tuple[Contents, Any]:
+    """Open a file whose kind has an ability, a field of Contents: return (Contents, open file).
+
+    The open file stands for its path, whatever takes its place meanwhile. FileError for one of
+    another kind, or that is absent or damaged. What does not say its kind is read as the first,
+    whose reader says what is wrong.
+    """
+    file, name = path, ""
+    with contextlib.suppress(Unfit):
+        file = open_hdf5(path)
+        name = file.kind
     if name in FILES and getattr(contents_of(name), ability) is not None:
-        found: Contents = contents_of(name)
-        return found
+        return contents_of(name), file
     able = [each for each in FILES if getattr(contents_of(each), ability) is not None]
     if name:
         raise FileError(f"{path} holds a {name}: name a file of {' or '.join(able)}")
-    first: Contents = contents_of(able[0])
-    return first
+    return contents_of(able[0]), file
 
 
 def studies() -> list[Contents]:
@@ -224,8 +230,8 @@ def text_of(path: object, kind: Contents, found: Any) -> str:
 
 def info_of(path: str | os.PathLike) -> str:
     """Return what `flocsim info` prints of the file at a path."""
-    kind = file_kind(source := held(path))
-    return text_of(path, kind, kind.read(source))
+    kind, file = open_kind(path)
+    return text_of(path, kind, kind.read(file))
 
 
 def unfinished_text(found: Any) -> str:
@@ -278,8 +284,8 @@ def open_any(
     ``own=["mine"]``. FileError for a file that is absent, damaged, or of another kind.
     """
     own = [own] if isinstance(own, str) else own
-    allowed, source = Allowed(folder, own), held(path)
-    return file_kind(source).opened(source, allowed)
+    kind, file = open_kind(path)
+    return kind.opened(file, Allowed(folder, own))
 
 
 MEANINGS = {

@@ -20,7 +20,7 @@ from flocsim.compiler.processor import versions
 from flocsim.ensembles.config import contents_of
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import kept_sources
-from flocsim.ensembles.contents import file_kind
+from flocsim.ensembles.contents import open_kind
 from flocsim.ensembles.diagnose.preflight import IMPLIED
 from flocsim.ensembles.estimates.statistics import borders
 from flocsim.ensembles.kind import StudyKind, flocs_of, study_of
@@ -64,7 +64,8 @@ def run(config: Config) -> Any:
                 return None
         except SharedError as error:
             raise error.args[0] from None
-        found = file_kind(path).read(path)
+        kind, file = open_kind(path)
+        found = kind.read(file)
         # A table of replicates is read from its file when asked for, and the file goes.
         rows = getattr(found, "replicates", None)
         return found if rows is None else attrs.evolve(found, replicates=dict(rows))
@@ -242,10 +243,10 @@ def make_results(
 ) -> Any:  # fmt: skip
     """Write the results of a finished study to ``output``, and return them."""
     count = state.schedule.final
+    kind = contents_of(study.format)
     if start.is_covered(count):
-        return file_kind(output).read(output)  # it has all that was asked for, and stays
-    run = facts(study, start, ended, ranks)
-    return contents_of(study.format).results(study, start, count, run, output)
+        return kind.read(output)  # it has all that was asked for, and stays
+    return kind.results(study, start, count, facts(study, start, ended, ranks), output)
 
 
 def facts(study, start, ended, ranks):

@@ -455,15 +455,3 @@ class Unfailing(io.FileIO):
         except OSError as error:
             self.error = error
         return len(data)
-
-
-def kind_of(path: str | os.PathLike) -> str:
-    """Return the kind of a file, its attribute ``kind`` or ``format``.
-
-    "" where it holds what flocsim does not write: the reader that is tried then says what is wrong.
-    FileError for an absent file, a wrong checksum, and what the HDF5 library fails on.
-    """
-    try:
-        return open_hdf5(path).kind
-    except Unfit:
-        return ""

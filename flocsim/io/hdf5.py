@@ -52,10 +52,10 @@ class File(dict[str, Node]):
     """An open HDF5 file: {path: Node} of all that is in it, "" being its root.
 
     It stays open, so that its numbers can be read whatever takes its place, until nobody refers to
-    it any more; ``path``: its name in messages.
+    it any more. A reader takes it in the place of its path, and opens nothing then.
     """
 
-    def __init__(self, path: object, data: BinaryIO) -> None:
+    def __init__(self, path: str | os.PathLike, data: BinaryIO) -> None:
         self.path, self.data = path, data
         self.seal = check_seal(path, data)
         for name, (kind, shape, *more) in describe(path, data).items():
@@ -63,6 +63,12 @@ class File(dict[str, Node]):
 
     def __del__(self) -> None:
         self.data.close()
+
+    def __fspath__(self) -> str:
+        return os.fspath(self.path)
+
+    def __str__(self) -> str:
+        return str(self.path)
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -108,12 +114,12 @@ class File(dict[str, Node]):
 
 
 def open_hdf5(path: str | os.PathLike) -> File:
-    """Open a file whose checksum is right.
+    """Open a file whose checksum is right, or return one that is open.
 
     Raises Unfit for all that flocsim does not write, and FileError for another checksum and for a
     file that the HDF5 library fails on.
     """
-    return File(path, open_file(path))
+    return path if isinstance(path, File) else File(path, open_file(path))
 
 
 def describe(path: object, data: BinaryIO) -> dict[str, list]:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.io.groups import FileFormat, Group, declared, kind_of
+from flocsim.io.groups import FileFormat, Group, declared
+from flocsim.io.hdf5 import open_hdf5
 from flocsim.io.seals import seal
 from tests.helpers.sealed import read_sealed
 
@@ -47,7 +48,7 @@ def path(tmp_path):
 def test_what_is_written_is_read(path):
     found = LONE.read(path)
     assert found.run == RUN and found.attributes["about"] == "words"
-    assert kind_of(path) == found.format == "lone"
+    assert open_hdf5(path).kind == found.format == "lone"
     for group in LONE.groups:
         for name, values in found.groups[group].items():
             assert values.tolist() == np.asarray(VALUES[name]).tolist()

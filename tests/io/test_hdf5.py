@@ -17,7 +17,7 @@ import pytest
 from flocsim.ensembles.sweep import read_joined
 from flocsim.errors import FileError
 from flocsim.io import hdf5
-from flocsim.io.groups import kind_of
+from flocsim.io.hdf5 import open_hdf5
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import RESULTS
 from flocsim.io.results.strength_file import read_strengths
@@ -233,10 +233,10 @@ def thread():
 @pytest.mark.parametrize("why", ["mpi", "thread"])
 def test_a_process_started_anew_says_the_same(request, results, library, why):
     """Where forking is not safe."""
-    before = read_results(results), read_settings(library), kind_of(library)
+    before = read_results(results), read_settings(library), open_hdf5(library).kind
     with request.getfixturevalue(why):
         assert not hdf5.can_fork()
-        after = read_results(results), read_settings(library), kind_of(library)
+        after = read_results(results), read_settings(library), open_hdf5(library).kind
         assert before[1:] == after[1:]
         for name, values in before[0].replicates.items():
             np.testing.assert_array_equal(values, after[0].replicates[name])
@@ -249,7 +249,7 @@ def test_the_modules_of_the_current_folder_are_not_run(results, tmp_path, monkey
     (tmp_path / "json.py").write_text("raise SystemExit(3)\n", "utf-8")
     (tmp_path / "h5py.py").write_text("raise SystemExit(3)\n", "utf-8")
     monkeypatch.chdir(tmp_path)
-    assert kind_of(results) == "flocsim results"
+    assert open_hdf5(results).kind == "flocsim results"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -306,7 +306,7 @@ def test_all_that_flocsim_writes_is_read(tmp_path, name, monkeypatch):
     monkeypatch.setenv("PMI_RANK", "0")
     started = read(path)
     assert type(forked) is type(started)
-    assert kind_of(path).startswith("flocsim")
+    assert open_hdf5(path).kind.startswith("flocsim")
 
 
 def put(name, place, value):

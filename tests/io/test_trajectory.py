@@ -9,7 +9,7 @@ import pytest
 from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
-from flocsim.io.groups import kind_of
+from flocsim.io.hdf5 import open_hdf5
 from flocsim.io.seals import seal
 from flocsim.io.trajectory import DATASETS, DISTANCE, TRAJECTORY, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
@@ -64,7 +64,7 @@ def test_the_same_motion_gives_the_same_sealed_bytes(tmp_path):
 def test_what_was_written_is_read_back(tmp_path):
     times, position, velocity = written(tmp_path / "m.h5", replicate=17, status="FINISHED")
     found = read_trajectory(tmp_path / "m.h5")
-    assert kind_of(tmp_path / "m.h5") == TRAJECTORY.name
+    assert open_hdf5(tmp_path / "m.h5").kind == TRAJECTORY.name
     for array, again in zip((times, position, velocity), (found.t, found.position, found.velocity),
                             strict=True):  # fmt: skip
         np.testing.assert_array_equal(array, again)

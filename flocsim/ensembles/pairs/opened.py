@@ -34,7 +34,6 @@ from flocsim.io.results.file import FORMAT, first_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
 from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
-from flocsim.io.seals import held
 from flocsim.run import Run
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
@@ -293,8 +292,7 @@ def open_results(
 ) -> StudyResults:
     """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
     modules and libraries."""
-    source = held(path)
-    return StudyResults(read_results(source), source, allowed or Allowed(), sources)
+    return StudyResults(read_results(path), path, allowed or Allowed(), sources)
 
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
