@@ -10,8 +10,6 @@ import attrs
 from flocsim.integrators.parts import (
     NEW,
     NOW,
-    TIME,
-    VELOCITY,
     FixedStep,
     acceleration,
     all_finite,
@@ -27,13 +25,13 @@ class SemiImplicitEuler(FixedStep):
 
     @staticmethod
     def attempt(scene, work, clock, step):
-        evaluate(scene, work, clock[TIME], NOW)
+        evaluate(scene, work, clock.time, NOW)
         for body in range(len(scene.bodies)):
             for axis in range(3):  # x, y, angle
-                velocity = work.motion[NOW, body, VELOCITY + axis]
+                velocity = work.velocity[NOW, body, axis]
                 velocity += step * acceleration(scene, work, NOW, body, axis)
-                work.motion[NEW, body, VELOCITY + axis] = velocity
-                work.motion[NEW, body, axis] = work.motion[NOW, body, axis] + step * velocity
+                work.velocity[NEW, body, axis] = velocity
+                work.place[NEW, body, axis] = work.place[NOW, body, axis] + step * velocity
         move_slips(scene, work, step)
         limit_slips(scene, work)
         return 0.0 if all_finite(work, NEW) else -1.0

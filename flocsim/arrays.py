@@ -1,6 +1,6 @@
 """The tuples of numbers and arrays that kernels and drivers see, and where things lie in them.
 
-Imported as ``at``, so that ``scene.bodies[body, at.MASS]`` says where the name comes from.
+Imported as ``at``, so that ``work.place[at.NOW]`` says where the name comes from.
 """
 
 import math
@@ -10,55 +10,58 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-# Columns of ``Scene.bodies``: what does not change of a body.
-(
-    MASS,  # [kg]
-    BUOYANT_MASS,  # what gravity pulls at [kg]
-    INERTIA,  # about the centroid [kg m²]
-    FREE,  # 1 for a body that moves, 0 for a fixed one
-    EQUIVALENT_RADIUS,  # of the disc of its area [m]
-    BOUNDING_RADIUS,  # of the circle around the centroid that holds it [m]
-    RADIUS,  # the spheroradius [m]
-    ELONGATION,  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area
-    LONG_AXIS,  # the angle of its long axis [rad]
-    IDENTITY,  # the number that its random forces go by
-    RESISTANCE,  # from here on: BodyView.resistance_xx … of a viscosity of 1 Pa s, or zeros
-) = range(11)
+from flocsim.records import Record, clear
+
+
+class BodyConstants(Record):
+    """What does not change of a body in a run; the numbers of its drag as BodyView has them."""
+
+    mass: float  # [kg]
+    buoyant_mass: float  # what gravity pulls at [kg]
+    inertia: float  # about the centroid [kg m²]
+    free: float  # 1 for a body that moves, 0 for a fixed one
+    equivalent_radius: float  # of the disc of its area [m]
+    bounding_radius: float  # of the circle around the centroid that holds it [m]
+    radius: float  # the spheroradius [m]
+    elongation: float  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area
+    long_axis: float  # the angle of its long axis [rad]
+    identity: float  # the number that its random forces go by
+    resistance_xx: float  # over the viscosity: 0 where no drag follows shapes [m]
+    resistance_xy: float  # [m]
+    resistance_yy: float  # [m]
+    resistance_xs: float  # [m²]
+    resistance_ys: float  # [m²]
+    resistance_ss: float  # [m³]
+    strain_xx_x: float  # [m²]
+    strain_xx_y: float  # [m²]
+    strain_xx_s: float  # [m³]
+    strain_xy_x: float  # [m²]
+    strain_xy_y: float  # [m²]
+    strain_xy_s: float  # [m³]
+    shielding_xx: float  # Q of a body in a cluster of a swarm; 1, 0 and 1 of one alone
+    shielding_xy: float
+    shielding_yy: float
+
 
 RESISTANCE_COLUMNS = 12
 """How many numbers a body's resistance has: six of R, six of Γ."""
 
-SHIELDING = RESISTANCE + RESISTANCE_COLUMNS
-"""From here on: BodyView.shielding_xx … in a cluster; those of a body alone are 1, 0 and 1."""
-
 UNSHIELDED = (1.0, 0.0, 1.0)
 
-SCENE_BODY_COLUMNS = SHIELDING + len(UNSHIELDED)
-"""How many columns ``Scene.bodies`` has."""
-
-# Columns of ``Work.motion``; in ``Work.rates`` the velocity stands in the first three.
+# Axes of places and angles, of velocities and spins, of forces and torques.
 (
-    X,  # of the centroid [m]
+    X,  # [m]
     Y,  # [m]
     ANGLE,  # counter-clockwise [rad]
+) = range(3)
+
+# Columns of motions (n, 6) outside of a run, behind those of places.
+(
     VX,  # [m/s]
     VY,  # [m/s]
     SPIN,  # [rad/s]
     MOTION_COLUMNS,
-) = range(7)
-
-VELOCITY = VX
-"""First column of the velocity in ``Work.motion``, for loops over axes."""
-
-# Columns of ``Work.rates``, behind those of the velocity.
-(
-    FX,  # [N]
-    FY,  # [N]
-    TORQUE,  # [N m]
-) = range(3, 6)
-
-FORCE = FX
-"""First column of the force in ``Work.rates``, for loops over axes."""
+) = range(3, 7)
 
 # First columns of a record.
 (
@@ -66,7 +69,7 @@ FORCE = FX
     RECORD_MOTION,  # from here on, of one body after another
 ) = range(2)
 
-# States: rows of ``motion``, ``rates``, ``geometry`` and ``slip`` in Work.
+# States: rows of ``place``, ``velocity``, ``force``, ``geometry`` and ``slip`` in Work.
 (
     NOW,  # as it is
     NEW,  # at the end of the step
@@ -80,7 +83,7 @@ MOST_STAGES = 6
 STATES = FIRST_STAGE + MOST_STAGES
 """How many states there are with all that belongs to them."""
 
-# Rows of ``Work.motion`` alone.
+# States of places and velocities alone.
 (
     START,  # where the step began whose stages are still there
     CHANGE,  # of velocities, by an iteration of Newton's method [m/s, rad/s]
@@ -91,47 +94,48 @@ STATES = FIRST_STAGE + MOST_STAGES
     LOOKED,  # there: the velocities when a method last looked how far it has come
     CYCLE_LAST,  # at the end of the last cycle of switches
     CYCLE_BEFORE,  # at the end of the one before
-    MOTION_ROWS,
+    ALL_STATES,
 ) = range(STATES, STATES + 10)
 
-SLIP_RATES = STATES
-"""Row ``SLIP_RATES + state`` of ``Work.slip`` holds the rates of the displacements in a state."""
 
-# Rows of ``Work.slip`` behind the displacements and their rates.
-(
-    SLIP_OFFSET,  # the error that ξ is carried with, less that of places along the tangent [m]
-    GRAZING_FORCE,  # the tangential force of a pair that grazes, now [N]
-    FRESH,  # 1 where it has only just begun to graze
-    GRAZING_RESISTANCE,  # by how much that force falls with the rate of the gap [N s/m]
-    GAP_OFFSET,  # the gap at which it has been held, which counts as none [m]
-    FLIGHT,  # how far a pair has been apart since it last parted [m]
-    FLIGHTS,  # how often that was next to nothing (events.grazes)
-    OVERLAP,  # by which friction goes while a step's end is looked for [m]
-    PART,  # the part of the step by which it goes then
-    FADES,  # the gap within which that of a pair that opens falls to half [m]
-    BEARING,  # the overlap that is held, and the part with it; 0: none is [m]
-    LEFT,  # of an interior-point method: what is left of the gap [m]
-    HARDNESS,  # the normal stiffness that the rest are over [N/m]
-    LIMIT,  # what friction can hold [m]
-    RUBBING,  # the share of it that there is
-    STUCK,  # what there would be if the pair stuck [m]
-    YIELDS,  # by how much that grows with v_t [s]
-    AHEAD,  # how far the pair slides ahead [m]
-    BEHIND,  # and behind [m]
-    KEPT_SLIP,  # displacements, set aside while the list is made anew [m]
-    KEPT_OFFSET,  # SLIP_OFFSET, set aside [m]
-    KEPT_FORCE,  # GRAZING_FORCE, set aside [N]
-    KEPT_GAP,  # GAP_OFFSET, set aside [m]
-    KEPT_FLIGHTS,  # FLIGHTS, set aside
-    CYCLE_SLIP,  # displacements at the end of the last cycle of switches [m]
-    CYCLE_SLIP_BEFORE,  # of the one before [m]
-    CYCLE_GAP,  # gaps at the end of the last cycle [m]
-    CYCLE_GAP_BEFORE,  # of the one before [m]
-    FLOWN_AT,  # when the pair last touched again behind a flight next to nothing [s]
-    SAMPLED,  # its margin (events.crossings) at the last place looked at in a step [m]
-    SAMPLED_RATE,  # and the rate of that [m/s]
-    SLIP_ROWS,
-) = range(2 * STATES, 2 * STATES + 32)
+class ContactState(Record):
+    """What a pair that touches, grazes or has just parted carries from step to step."""
+
+    slip_offset: float  # error that ξ was carried with, less that of places along t [m]
+    grazing_force: float  # tangential force of a pair that grazes, now [N]
+    fresh: float  # 1 where it has only just begun to graze
+    grazing_resistance: float  # by how much that force falls with the rate of the gap [N s/m]
+    gap_offset: float  # gap at which the pair has been held, which counts as none [m]
+    flight: float  # how far the pair has been apart since it last parted [m]
+    flights: float  # how often that was next to nothing (events.grazes)
+    cycle_slip: float  # ξ at the end of the last cycle of switches (events.cycles) [m]
+    cycle_slip_before: float  # ξ at the end of the cycle before [m]
+    cycle_gap: float  # gap at the end of the last cycle [m]
+    cycle_gap_before: float  # gap at the end of the cycle before [m]
+    flown_at: float  # when the pair last touched again after a flight next to nothing [s]
+    sampled: float  # its margin (events.crossings) at the last place looked at in a step [m]
+    sampled_rate: float  # rate of that margin [m/s]
+
+
+class InteriorPoint(Record):
+    """The unknowns of a contact in backward Euler's interior-point iteration, and its law there.
+
+    All forces are over ``normal_stiffness``, and so are lengths [m].
+    """
+
+    overlap: float  # δ, complementary to the slack [m]
+    slack: float  # s, what is left of the gap: gap = s − δ [m]
+    friction: float  # tangential force as a share of its limit, from −1 to 1
+    slide_ahead: float  # how far the pair slides along the tangent [m]
+    slide_behind: float  # how far it slides against it [m]
+    normal_stiffness: float  # what the other forces are divided by [N/m]
+    friction_limit: float  # largest tangential force that friction bears [m]
+    stick_force: float  # tangential force if the pair stuck [m]
+    stick_slope: float  # derivative of the stick force by the tangential velocity [s]
+    held_overlap: float  # overlap by which friction goes from now on; 0: by δ [m]
+    step_share: float  # share of the step in which the pair touches
+    fading_gap: float  # gap within which that share falls to half as the pair opens [m]
+
 
 TERMS = 44
 """Terms of a step's series at most."""
@@ -151,73 +155,90 @@ TERMS = 44
 MOST_FRAMES = 3
 """Stages for which a body keeps a frame."""
 
-# Columns of a frame: how a body's contacts follow it through an implicit step.
-(
-    TURN_COSINE,
-    TURN_SINE,
-    SHIFT_X,  # [m]
-    SHIFT_Y,  # [m]
-    FRAME_COLUMNS,
-) = range(5)
 
-# Columns of ``Work.bodies``: what changes of a body beside its motion. A cluster are bodies that
-# act on each other; what is of a cluster stands with its first body, its leader.
-(
-    LISTED,  # x [m] …
-    LISTED_Y,  # … y [m] …
-    LISTED_ANGLE,  # … and angle [rad] at the last listing
-    COSINE,  # of its angle
-    SINE,
-    MEMORY,  # how long it remembers a velocity [s]
-    SHIFT_SUM,  # of a cluster: mass times shift along x [kg m] …
-    SHIFT_SUM_Y,  # … and y
-    MASS_SUM,  # of a cluster [kg]
-    RELAXATION,  # how long drag lets a velocity last [s]
-    STEP_PLACE,  # the last step's error of place [m]
-    STEP_SPEED,  # and of velocity [m/s]
-    ERROR_PLACE,  # what all steps' errors have led to [m]
-    ERROR_SPEED,  # [m/s]
-    SWITCH_PLACE,  # what those of switches have led to [m]
-    SWITCH_SPEED,  # [m/s]
-    DOUBT_PLACE,  # what contacts that may have opened have led to [m]
-    DOUBT_SPEED,  # [m/s]
-    SHORTENED,  # of a cluster: the share to which the carried error is shortened
-    LEADER_FORCE,  # of a cluster: the sum of forces along x [N] …
-    LEADER_FORCE_Y,  # … and y
-    LEADER_RATE,  # of a cluster: masses times accelerations along x [N] …
-    LEADER_RATE_Y,  # … and y
-    KICK_AT,  # of body 0: where the present kick begins, in the shortest kicks
-    KICK_SPAN,  # and how long it is
-    KICK_X,  # the noise in it along x [1/√s] …
-    KICK_Y,  # … y …
-    KICK_TURN,  # … and the angle
-    KNOWN_ANGLE,  # an angle whose cosine and sine are remembered [rad]
-    KNOWN_COSINE,
-    KNOWN_SINE,
-    MOST_PLACE,  # of a cluster: by how much a place in it may be wrong [m]
-    STATED,  # the body's stated error [m]
-    WAY,  # how far its points move at most in a step that is a series [m]
-    FRAMES,  # from here on: its frames at an implicit step's stages
-) = range(35)
+class Frame(Record):
+    """How a body's contacts follow it through a stage of an implicit step."""
 
-BODY_COLUMNS = FRAMES + MOST_FRAMES * FRAME_COLUMNS
-"""How many columns ``Work.bodies`` has."""
+    turn_cosine: float  # of the turn of their normals
+    turn_sine: float
+    shift_x: float  # [m]
+    shift_y: float  # [m]
 
-# Columns of ``Work.candidates``: a vertex of one body and an edge of another, that may touch.
-(
-    VERTEX_BODY,
-    VERTEX,  # its core point
-    EDGE_BODY,
-    EDGE_START,  # first core point of the edge
-    EDGE_END,  # its last
-    CLOSED,  # how the pair touches in this step, see OPEN
-    NEAR,  # 1 where it may have a share of a surface force in it
-    SLIDING,  # ±1 where it slides in it, in the direction of ξ, 0 where it sticks
-    PAIR,  # the row of the two bodies in ``Work.pairs``
-    CANDIDATE_COLUMNS,
-) = range(10)
 
-# What CLOSED says.
+class Pose(Record):
+    """How a body lies, and where it lay when pairs were last listed."""
+
+    listed_x: float  # at the last listing [m]
+    listed_y: float  # [m]
+    listed_angle: float  # [rad]
+    cosine: float  # of its angle
+    sine: float
+    known_angle: float  # an angle whose cosine and sine are remembered [rad]
+    known_cosine: float
+    known_sine: float
+    way: float  # how far its points move at most in a step that is a series [m]
+
+
+class BodyErrors(Record):
+    """What the errors of steps, and of the times of switches, have led to, at a body's outline."""
+
+    memory: float  # how long the body remembers a velocity [s]
+    relaxation: float  # how long drag lets a velocity last [s]
+    step_place: float  # the last step's error of place [m]
+    step_speed: float  # and of velocity [m/s]
+    place: float  # what all steps' errors have led to [m]
+    speed: float  # [m/s]
+    switch_place: float  # what those of switches have led to [m]
+    switch_speed: float  # [m/s]
+    doubt_place: float  # what contacts that may have opened have led to [m]
+    doubt_speed: float  # [m/s]
+    stated: float  # the body's stated error [m]
+
+
+class Cluster(Record):
+    """Sums over bodies that act on each other, with the first of them, their leader."""
+
+    mass: float  # [kg]
+    shift_x: float  # mass times shift [kg m]
+    shift_y: float  # [kg m]
+    force_x: float  # [N]
+    force_y: float  # [N]
+    rate_x: float  # masses times accelerations [N]
+    rate_y: float  # [N]
+    shortened: float  # the share to which the carried error is shortened
+    most_place: float  # by how much a place in it may be wrong [m]
+
+
+class Kick(Record):
+    """The noise in the present thermal kick of a body."""
+
+    x: float  # [1/√s]
+    y: float  # [1/√s]
+    turn: float  # [1/√s]
+
+
+class KickTime(Record):
+    """When the present thermal kick is."""
+
+    at: float  # its beginning, in the shortest kicks
+    span: float  # and how long it is
+
+
+class Candidate(Record):
+    """A vertex of one body and an edge of another, which may touch."""
+
+    vertex_body: int
+    vertex: int  # its core point
+    edge_body: int
+    edge_start: int  # first core point of the edge
+    edge_end: int  # its last
+    closed: int  # how the pair touches in this step, see OPEN
+    near: int  # 1 where it may have a share of a surface force in it
+    sliding: int  # ±1 where it slides in it, in the direction of ξ, 0 where it sticks
+    pair: int  # the row of the two bodies in ``Work.pairs``
+
+
+# What Candidate.closed says.
 (
     OPEN,  # the pair is apart
     TOUCHES,  # it touches, with the whole contact law
@@ -348,39 +369,47 @@ strain pulls at them with, and the smooth gap of the last two bodies that were a
 SOFT_GAP = 6
 """Column of that gap [m]."""
 
-# Columns of ``Work.pairs``: two bodies that may come near each other.
-(
-    LATER,  # the body of the larger number
-    EARLIER,
-    ACTING,  # 1 where they act on each other in this step
-    PAIR_COLUMNS,
-) = range(4)
 
-# Columns of ``Work.geometry``: where a vertex is beside an edge, flocsim.geometry.contact.points.
-(
-    NORMAL_X,  # unit normal from the foot on the edge to the vertex
-    NORMAL_Y,
-    GAP,  # [m]
-    VERTEX_ARM_N,  # the moment about the vertex's body of a unit force along n, at the middle …
-    VERTEX_ARM_T,  # … of the overlap, and along t [m]
-    EDGE_ARM_N,  # the same about the edge's body [m]
-    EDGE_ARM_T,
-    TURNING,  # the angle by which n turns for every metre of the vertex along t [1/m]
-    FOOT,  # how far along the edge the foot lies [m]
-    SIDE,  # ±1 where t goes along the edge or against it
-    SHARE,  # of a surface force, that acts through it
-    GEOMETRY_COLUMNS,
-) = range(12)
+class BodyPair(Record):
+    """Two bodies that may come near each other."""
 
-# Columns of ``Work.kept``: pairs whose displacements are set aside.
-(
-    KEPT_LATER,  # the body of the larger number
-    KEPT_EARLIER,
-    KEPT_VERTEX,  # core point of the vertex
-    KEPT_EDGE,  # first core point of the edge
-    KEPT_MODE,  # how the pair touched, see OPEN
-    KEPT_COLUMNS,
-) = range(6)
+    later: int  # the body of the larger number
+    earlier: int
+    acting: int  # 1 where they act on each other in this step
+
+
+class VertexAtEdge(Record):
+    """Where a vertex is beside an edge (flocsim.geometry.contact.points)."""
+
+    normal_x: float  # unit normal from the foot on the edge to the vertex
+    normal_y: float
+    gap: float  # [m]
+    vertex_arm_n: (
+        float  # the moment about the vertex's body of a unit force along n, at the middle …
+    )
+    vertex_arm_t: float  # … of the overlap, and along t [m]
+    edge_arm_n: float  # the same about the edge's body [m]
+    edge_arm_t: float
+    turning: float  # the angle by which n turns for every metre of the vertex along t [1/m]
+    foot: float  # how far along the edge the foot lies [m]
+    side: float  # ±1 where t goes along the edge or against it
+    share: float  # of a surface force, that acts through it
+
+
+class KeptContact(Record):
+    """A pair whose displacement is set aside while the list is made anew."""
+
+    later: int  # the body of the larger number
+    earlier: int
+    vertex: int  # core point of the vertex
+    edge: int  # first core point of the edge
+    mode: int  # how the pair touched, see OPEN
+    slip: float  # its displacement [m]
+    slip_offset: float  # see ContactState
+    grazing_force: float
+    gap_offset: float
+    flights: float
+
 
 # Matrices in ``Work.jacobian``: minus the derivatives of the forces …
 (
@@ -388,20 +417,21 @@ SOFT_GAP = 6
     STIFFNESS,  # … by place
 ) = range(2)
 
-# Places in ``Work.tally``.
-(
-    CANDIDATES,  # pairs of features listed
-    PAIRS,  # pairs of bodies listed
-    EVALUATIONS,  # forces summed so far
-    REBUILDS,  # lists made so far
-    SOLVES,  # systems solved so far
-    KEPT,  # one more than displacements set aside for a list that found no room; 0: none are
-    FULL,  # what has found no room, see NOTHING_FULL
-    SERIES_TERMS,  # terms of the last step's series in ``Work.series``; 0: it was none
-    TALLY_SIZE,
-) = range(9)
 
-# What FULL says.
+class Tally(Record):
+    """What a run's lists and sums have come to."""
+
+    candidates: int  # pairs of features listed
+    pairs: int  # pairs of bodies listed
+    evaluations: int  # forces summed so far
+    rebuilds: int  # lists made so far
+    solves: int  # systems solved so far
+    kept: int  # one more than displacements set aside for a list that found no room; 0: none are
+    full: int  # what has found no room, see NOTHING_FULL
+    series_terms: int  # terms of the last step's series in ``Work.series``; 0: it was none
+
+
+# What Tally.full says.
 (
     NOTHING_FULL,
     CANDIDATES_FULL,
@@ -410,63 +440,68 @@ SOFT_GAP = 6
     NOT_COMPILED,  # what the engine has left out until it is reached
 ) = range(5)
 
-# Places in the ``clock`` of a run.
-(
-    TIME,  # [s]
-    UNTIL,  # the end, or a stop on the way [s]
-    STEP,  # the next step [s]
-    TOLERANCE,  # [m]; inf: steps are fixed
-    ERROR,  # the stated error [m]
-    LARGEST_STEP,  # [s]
-    PREVIOUS_STEP,  # size of the step before [s]; inf: there was none, 0: a trial has failed
-    PREVIOUS_RATIO,  # its error over the tolerance
-    PACE,  # by how much each of Newton's iterations shrinks the last change
-    STAGED_STEP,  # size of the step whose stages are still there [s]; 0: none are
-    STAGED_AT,  # the time at which it began [s]
-    BEARABLE_STEP,  # the largest that is expected to work at all [s]
-    STEP_ERROR,  # error of the step just taken [m]
-    REJECTED_STEP,  # size of the trial that was just rejected [s]; 0: none was
-    REJECTED_RATIO,  # its error over the tolerance
-    SETTLING,  # steps in a row that ended at a switch, until one has been taken that does not
-    SETTLED_STEP,  # size of the last such step [s]
-    FLYING_STEP,  # size of the one that was planned where the last flight ended [s]
-    ESTIMATE_SHARE,  # share of what the method estimates that counts in the stated error
-    HORIZON,  # until when the run goes on, where UNTIL is a stop on the way; 0: it is not [s]
-    SEEN_PACE,  # pace of the last second iteration that was made; 0: it is not known
-    SEEN_STEP,  # size of its step [s]
-    ACROSS,  # 1 where steps go on across switches, 0 where they end there
-    RATES_KNOWN,  # of steps across them: 1 where LAST_RATES are known
-    SWITCHES,  # how many there were since a method last looked how far it has come
-    LOOKED_AT,  # when that was [s]; inf: it is to do so anew
-    CYCLE_AT,  # the end of the last cycle of switches [s]
-    CYCLE_AT_BEFORE,  # of the one before [s]
-    CYCLE_ERROR,  # the stated error at the last [m]
-    LONGEST_SERIES,  # the longest step whose motion may be a series; inf: others do as well [s]
-    SERIES_STEP,  # that of the series in ``Work.series`` [s]
-    SERIES_TURNS,  # that times a bound of its fastest rate
-    CLOCK_SIZE,
-) = range(33)
 
-# Places in the ``counts`` of a run.
-(
-    STEPS,  # taken
-    REJECTED,  # tried in vain
-    MAX_STEPS,  # budget of all that are tried
-    RECORDED,  # rows in the record
-    PAUSE_AT,  # steps after which to pause
-    CODE,  # the observer's last
-    LOCATED,  # events located
-    STILL,  # steps in a row by which no time has gone by
-    LOOK_AT,  # steps after which a method looks how far it has come
-    LOOKED_TRIED,  # how many had been tried when it last did
-    CYCLE_MODES,  # of cycles of switches (events.cycles): in which modes one begins; 0: none has
-    CYCLE_CODE,  # a number for what has switched since
-    CYCLE_CODE_BEFORE,  # and for the cycle before
-    CYCLE_SWITCHES,  # how many switches there were
-    CYCLES_SEEN,  # how many cycles have ended
-    CYCLE_RETURNS,  # how often those modes have come again
-    COUNTS_SIZE,
-) = range(17)
+class Clock(Record):
+    """The times, steps and errors of a run."""
+
+    time: float  # [s]
+    until: float  # end of the run, or a stop on the way [s]
+    horizon: float  # end of the run where ``until`` is a stop on the way; 0: it is not one [s]
+    step: float  # next step [s]
+    tolerance: float  # error that a step may have [m]; inf: steps are fixed
+    error: float  # stated error of the motion so far [m]
+    largest_step: float  # [s]
+    bearable_step: float  # largest step that is expected to work at all [s]
+    step_error: float  # error of the step just taken [m]
+    estimate_share: float  # share of the method's own estimate that counts in the stated error
+    # The last steps: what the next one is chosen by.
+    previous_step: float  # size of the step before [s]; inf: there was none, 0: a trial has failed
+    previous_ratio: float  # its error over the tolerance
+    rejected_step: float  # size of the trial that was just rejected [s]; 0: none was
+    rejected_ratio: float  # its error over the tolerance
+    settling: float  # steps in a row that ended at a switch, until one has been taken that did not
+    settled_step: float  # size of the last such step [s]
+    flying_step: float  # step that was planned when the last flight ended [s]
+    # Newton's method and the stages of Radau IIA.
+    pace: float  # factor by which each iteration shrinks the last change
+    seen_pace: float  # that of the last second iteration; 0: not known
+    seen_step: float  # size of the step in which it was seen [s]
+    staged_step: float  # size of the step whose stages are still there [s]; 0: none are
+    staged_at: float  # time at which that step began [s]
+    # Motion as a series.
+    longest_series: float  # longest step whose motion may be a series; inf: any [s]
+    series_step: float  # size of the step of the series in ``Work.series`` [s]
+    series_turns: float  # that size times a bound of its fastest rate
+    # Backward Euler, whose steps go on across switches.
+    across: float  # 1 where steps go on across switches, 0 where they end there
+    rates_known: float  # 1 where the rates of the last such step (LAST_RATES) are known
+    switches: float  # switches since a method last looked how far it had come
+    looked_at: float  # when that was [s]; inf: it is to look anew
+    # Cycles of switches that are left out (events.cycles).
+    cycle_at: float  # end of the last cycle [s]
+    cycle_at_before: float  # end of the one before [s]
+    cycle_error: float  # stated error at the end of the last [m]
+
+
+class Counts(Record):
+    """What a run has counted, and its budgets."""
+
+    steps: int  # steps taken
+    rejected: int  # steps tried in vain
+    max_steps: int  # budget of both and of located events
+    recorded: int  # rows in the record
+    pause_at: int  # steps after which to pause
+    code: int  # what the observer has said last
+    located: int  # events located
+    still: int  # steps in a row by which no time has passed
+    look_at: int  # steps after which a method looks how far it has come
+    looked_tried: int  # steps that had been tried when it last looked
+    cycle_modes: int  # contact modes in which a cycle of switches begins; 0: none has begun
+    cycle_code: int  # number that stands for what has switched since
+    cycle_code_before: int  # the same of the cycle before
+    cycle_switches: int  # switches since the cycle began
+    cycles_seen: int  # cycles that have ended
+    cycle_returns: int  # how often those modes have come again
 
 
 class BodyView(NamedTuple):
@@ -623,7 +658,7 @@ NO_BOX = (math.inf, math.inf)
 class Scene(NamedTuple):
     """What does not change in a run: n bodies, all their core points, the forces' numbers."""
 
-    bodies: Annotated[np.ndarray, ("n", SCENE_BODY_COLUMNS)]  # see MASS
+    bodies: np.ndarray  # (n,) of BodyConstants
     first: np.ndarray  # (n + 1,): where a body's core points begin
     vertices: np.ndarray  # (points, 2 or more): geometry.contact.compounds.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
@@ -672,37 +707,47 @@ class Elimination(NamedTuple):
 class Work(NamedTuple):
     """What changes in a run, and the scratch space of the drivers; all arrays are reused."""
 
-    motion: Annotated[np.ndarray, ("rows", "n", MOTION_COLUMNS)]  # by states, then see START
-    rates: Annotated[np.ndarray, ("states", "n", MOTION_COLUMNS)]  # velocity, then see FX
+    place: Annotated[np.ndarray, ("rows", "n", 3)]  # in all states [m, m, rad]
+    velocity: Annotated[np.ndarray, ("rows", "n", 3)]  # in all states [m/s, m/s, rad/s]
+    force: Annotated[np.ndarray, ("states", "n", 3)]  # and torque [N, N, N m]
     series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # of a motion, see MOTION [m, m, rad]
     remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ [N, N m]
     weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
     linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # what it follows from, see DAMPING
-    slip: np.ndarray  # (SLIP_ROWS, capacity): ξ in the states [m], SLIP_RATES, then see SLIP_OFFSET
-    bodies: Annotated[np.ndarray, ("n", BODY_COLUMNS)]  # see LISTED
+    slip: np.ndarray  # (states, capacity): tangential displacements ξ [m]
+    slip_rate: np.ndarray  # (states, capacity): their rates [m/s]
+    contacts: np.ndarray  # (capacity,) of ContactState
+    interior: np.ndarray  # (capacity,) of InteriorPoint
+    poses: np.ndarray  # (n,) of Pose
+    frames: np.ndarray  # (n, MOST_FRAMES) of Frame
+    errors: np.ndarray  # (n,) of BodyErrors
+    clusters: np.ndarray  # (n,) of Cluster
+    kicks: np.ndarray  # (n,) of Kick
+    kick: KickTime
     cluster: np.ndarray  # (n,): first of the bodies that one acts on, through others, too
     jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # see DAMPING and rhs.blocks
     loads: np.ndarray  # (2, 3 n), complex: right-hand sides, then solutions
     system: np.ndarray  # (2, 3 n, 3 n), complex: few bodies' systems, factorised
     pivots: np.ndarray  # (2, 3 n): which rows have changed places
     elimination: Elimination  # systems of many bodies
-    candidates: Annotated[np.ndarray, ("capacity", CANDIDATE_COLUMNS)]  # see VERTEX_BODY
-    geometry: Annotated[np.ndarray, ("states", "capacity", GEOMETRY_COLUMNS)]  # see NORMAL_X
-    kept: Annotated[np.ndarray, ("capacity", KEPT_COLUMNS)]  # see KEPT_LATER
+    candidates: np.ndarray  # (capacity,) of Candidate
+    geometry: np.ndarray  # (states, capacity) of VertexAtEdge
+    kept: np.ndarray  # (capacity,) of KeptContact
     near: np.ndarray  # (4, pieces + 1): pieces of two bodies, see NEAR_A
     listed: np.ndarray  # see LISTED_A
     feet: np.ndarray  # scratch of rhs.outline_sum
     nodes: Annotated[np.ndarray, (NODE_ROWS, MOST_NODES)]  # see NODE_X
     rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss's: nodes, weights
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
-    pairs: Annotated[np.ndarray, ("pairs", PAIR_COLUMNS)]  # see LATER
+    pairs: np.ndarray  # (pairs,) of BodyPair
+    coordinates: Annotated[np.ndarray, (12,)]  # of two bodies: events.cycles
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
     along: Annotated[np.ndarray, ("pairs", 4)]  # what acts along outlines now, and by how both are
     # turned: F_x, F_y on the later body [N], the torques on it and on the earlier one [N m]
     discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
     order: np.ndarray  # (n,): the same
     starts: np.ndarray  # (n + 1,): the same
-    tally: np.ndarray  # see CANDIDATES
+    tally: Tally
 
 
 ALL_PAIRS = 12
@@ -721,7 +766,7 @@ PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
 
 def counts_as_pair(bodies: np.ndarray, a: int, b: int) -> bool:
     """Whether two bodies can act on each other: one of them is free."""
-    return bool(bodies[a, FREE] + bodies[b, FREE] > 0.0)
+    return bool(bodies[a].free + bodies[b].free > 0.0)
 
 
 def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
@@ -730,7 +775,7 @@ def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
     for later in range(bodies.shape[0]):
         for earlier in range(later):
             if counts_as_pair(bodies, later, earlier):
-                pairs[count, LATER], pairs[count, EARLIER] = later, earlier
+                pairs[count].later, pairs[count].earlier = later, earlier
                 count += 1
     return count
 
@@ -782,36 +827,46 @@ def work_of(
     elif pairs is None:
         pairs = PAIRS_A_BODY * n
     work = Work(
-        motion=np.zeros((MOTION_ROWS, n, MOTION_COLUMNS)),
-        rates=np.zeros((STATES, n, MOTION_COLUMNS)),
+        place=np.zeros((ALL_STATES, n, 3)),
+        velocity=np.zeros((ALL_STATES, n, 3)),
+        force=np.zeros((STATES, n, 3)),
         series=np.zeros((2, TERMS, dense, 3)),
         remainder=np.zeros((2, 4, dense, 3)),
         weights=np.zeros((2, dense, 3)),
         linear=np.zeros((2, dense, dense, 3, 3)),
-        slip=np.zeros((SLIP_ROWS, capacity)),
-        bodies=np.zeros((n, BODY_COLUMNS)),
+        slip=np.zeros((STATES, capacity)),
+        slip_rate=np.zeros((STATES, capacity)),
+        contacts=ContactState.rows(capacity),
+        interior=InteriorPoint.rows(capacity),
+        poses=Pose.rows(n),
+        frames=Frame.rows(n, MOST_FRAMES),
+        errors=BodyErrors.rows(n),
+        clusters=Cluster.rows(n),
+        kicks=Kick.rows(n),
+        kick=KickTime.one(),
         cluster=np.zeros(n, dtype=np.int64),
         jacobian=np.zeros((2, 2 * n + 2 * pairs, 3, 3)),
         loads=np.zeros((2, 3 * n), dtype=complex),
         system=np.zeros((2, 3 * dense, 3 * dense), dtype=complex),
         pivots=np.zeros((2, 3 * dense), dtype=np.int64),
         elimination=elimination_of(n, pairs, BLOCKS_A_BODY * n if blocks is None else blocks),
-        candidates=np.zeros((capacity, CANDIDATE_COLUMNS), dtype=np.int64),
-        geometry=np.zeros((STATES, capacity, GEOMETRY_COLUMNS)),
-        kept=np.zeros((capacity, KEPT_COLUMNS), dtype=np.int64),
+        candidates=Candidate.rows(capacity),
+        geometry=VertexAtEdge.rows(STATES, capacity),
+        kept=KeptContact.rows(capacity),
         near=np.zeros((4, len(scene.pieces) + 1), dtype=np.int64),
         listed=np.zeros(LISTED_SIZE),
         feet=np.zeros(MOST_FEET),
         nodes=np.zeros((NODE_ROWS, MOST_NODES)),
         rules=gauss_rules(),
         squares=np.zeros((SQUARES + 1, 7)),
-        pairs=np.zeros((pairs, PAIR_COLUMNS), dtype=np.int64),
+        pairs=BodyPair.rows(pairs),
+        coordinates=np.zeros(12),
         budget=np.zeros(pairs),
         along=np.zeros((pairs, 4)),
         discs=np.zeros((n, 8)),
         order=np.zeros(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
-        tally=np.zeros(TALLY_SIZE, dtype=np.int64),
+        tally=Tally.one(),
     )
     begin(work, scene, position, velocity, all_pairs)
     return work
@@ -824,9 +879,9 @@ def begin(
     work.listed.fill(-1.0)
     work.budget.fill(-1.0)
     work.order[:] = range(len(work.order))
-    work.motion[NOW, :, :VELOCITY], work.motion[NOW, :, VELOCITY:] = position, velocity
+    work.place[NOW], work.velocity[NOW] = position, velocity
     if len(scene.bodies) <= ALL_PAIRS and all_pairs:
-        work.tally[PAIRS] = all_counting(scene.bodies, work.pairs)
+        work.tally.pairs = all_counting(scene.bodies, work.pairs)
 
 
 def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
@@ -834,8 +889,18 @@ def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndar
     than to make new ones."""
     for name in Work._fields:
         if name not in ("elimination", "rules"):
-            getattr(work, name).fill(0)
+            clear(getattr(work, name))
     begin(work, scene, position, velocity)
+
+
+def motion_of(work: Work, state: int) -> np.ndarray:
+    """Return places and velocities in a state (n, 6: x, y, angle, vx, vy, spin), a copy."""
+    return np.hstack([work.place[state], work.velocity[state]])
+
+
+def put_motion(work: Work, state: int, motion: np.ndarray) -> None:
+    """Write a motion (n, 6) into a state."""
+    work.place[state], work.velocity[state] = motion[:, :3], motion[:, 3:]
 
 
 def copy_of(work: Work) -> Work:
@@ -862,13 +927,13 @@ def wider(arrays: Any, size: int, **axes: int) -> Any:
 
 
 def with_room(work: Work) -> Work:
-    """The same work with twice the room for what has found none: see FULL."""
-    full, elimination = work.tally[FULL], work.elimination
-    work.tally[FULL] = NOTHING_FULL
+    """The same work with twice the room for what has found none (Tally.full)."""
+    full, elimination = work.tally.full, work.elimination
+    work.tally.full = NOTHING_FULL
     if full == PAIRS_FULL:
         pairs = 2 * len(work.pairs)
         work = wider(work, pairs, pairs=0, budget=0, along=0)
-        work = wider(work, 2 * len(work.bodies) + 2 * pairs, jacobian=1)
+        work = wider(work, 2 * len(work.poses) + 2 * pairs, jacobian=1)
         return work._replace(elimination=wider(elimination, pairs, pairs=0))
     if full == BLOCKS_FULL:
         room = 2 * len(elimination.column)
@@ -879,4 +944,5 @@ def with_room(work: Work) -> Work:
 
 def with_capacity(work: Work, capacity: int) -> Work:
     """The same work arrays with room for more contact candidates."""
-    return wider(work, capacity, slip=1, candidates=0, geometry=1, kept=0)
+    by_row = dict.fromkeys(("candidates", "contacts", "interior", "kept"), 0)
+    return wider(work, capacity, slip=1, slip_rate=1, geometry=1, **by_row)

@@ -9,7 +9,14 @@ import numpy as np
 
 import flocsim.arrays as at
 from flocsim import water
-from flocsim.arrays import NO_LAYER, NO_OUTLINES, RESISTANCE_COLUMNS, UNSHIELDED, Scene
+from flocsim.arrays import (
+    NO_LAYER,
+    NO_OUTLINES,
+    RESISTANCE_COLUMNS,
+    UNSHIELDED,
+    BodyConstants,
+    Scene,
+)
 from flocsim.constants import (
     ROOM_TEMPERATURE,
     WATER_DENSITY,
@@ -279,7 +286,7 @@ def scene_of(
     that has no laws. ``resistances``: of every body, where a drag follows their shapes
     (flocsim.forces.drag); ``others``: further fields of the Scene."""
     shapes = [body.shape for body in bodies]
-    columns: tuple[list[float], ...] = (
+    columns: tuple[Iterable[float], ...] = (
         [body.mass for body in bodies],
         [body.buoyant_mass(fluid) for body in bodies],
         [body.inertia for body in bodies],
@@ -289,12 +296,15 @@ def scene_of(
         [shape.radius for shape in shapes],
         [shape.elongation for shape in shapes],
         [shape.long_axis for shape in shapes],
-        list(range(len(bodies))),
+        range(len(bodies)),
     )
-    water = np.zeros((len(bodies), RESISTANCE_COLUMNS)) if resistances is None else resistances
-    alone = np.tile(UNSHIELDED, (len(bodies), 1))
+    if resistances is None:
+        resistances = np.zeros((len(bodies), RESISTANCE_COLUMNS))
+    known = BodyConstants.rows(len(bodies))
+    rows = zip(zip(*columns, strict=True), resistances, strict=True)
+    known[:] = [(*own, *resistance, *UNSHIELDED) for own, resistance in rows]
     scene = Scene(
-        bodies=np.hstack([np.array(columns, dtype=float).T, np.array(water), alone]),
+        bodies=known,
         **outlines_of(shapes)._asdict(),
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         **charges_of_bodies(shapes, layer[0])._asdict(),

@@ -112,9 +112,9 @@ def repulsion_of_circles(
 def pushes(scene, work, total, gaps, found):
     """The force on the second of two spheres away from the first, at each gap, into ``found``."""
     for k in range(len(gaps)):
-        work.motion[at.NOW, 1, at.X] = total + gaps[k]
+        work.place[at.NOW, 1, at.X] = total + gaps[k]
         evaluate_as_they_lie(scene, work)
-        found[k] = work.rates[at.NOW, 1, at.FORCE]
+        found[k] = work.force[at.NOW, 1, at.X]
 
 
 class Profile:
@@ -291,7 +291,7 @@ def placed(first: Run, near: float, seed: int, replicate: int) -> Run:
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
     numbers = 2.0 * np.pi * np.random.Generator(np.random.Philox(stream)).random(3)
     run.scene = first.scene._replace(key=key_of(seed, replicate))
-    run.work.motion[at.NOW] = 0.0
-    run.work.motion[at.NOW, :, 2] = numbers[:2]
-    run.work.motion[at.NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
+    run.work.place[at.NOW] = run.work.velocity[at.NOW] = 0.0
+    run.work.place[at.NOW, :, at.ANGLE] = numbers[:2]
+    run.work.place[at.NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
     return run

@@ -92,7 +92,7 @@ over this share."""
 def resolving_step(clock, frequency, later):
     """The step behind a touch at a speed by which bodies would go so far later [m], that resolves
     how contacts of a frequency [1/s] take it up, as far as the tolerance asks for it."""
-    return (SHARE_OF_TOUCH * clock[at.TOLERANCE] / later) ** 0.25 / frequency
+    return (SHARE_OF_TOUCH * clock.tolerance / later) ** 0.25 / frequency
 
 
 @hook

@@ -45,10 +45,10 @@ MAY_BE_INFINITE = ("slip_limit", "contact_event")
 
 
 def with_more(driver: Any, work: Work) -> tuple[Callable[..., int], Work]:
-    """An engine and its arrays with what was lacking (flocsim.arrays: FULL): with what it had left
+    """An engine and its arrays with what was lacking (Tally.full): with what it had left
     out until a run needs it, or with room."""
-    if work.tally[at.FULL] == at.NOT_COMPILED:
-        work.tally[at.FULL] = at.NOTHING_FULL
+    if work.tally.full == at.NOT_COMPILED:
+        work.tally.full = at.NOTHING_FULL
         return driver.whole, work
     return driver, with_room(work)
 
@@ -75,7 +75,7 @@ class Run:
     ) -> None:
         self.driver, self.scene, self.work = driver, scene, work
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(max_steps)
-        self.clock[at.UNTIL] = until
+        self.clock.until = until
         self.observed = np.zeros(1) if observed is None else observed
         n = len(scene.bodies)
         self.record = np.zeros((RECORD_ROWS if record else 0, 1 + 6 * n))
@@ -83,21 +83,21 @@ class Run:
 
     def row_now(self) -> np.ndarray:
         """Time and state now, as one row of a record."""
-        return np.concatenate([[self.clock[at.TIME]], self.work.motion[at.NOW].ravel()])[None]
+        return np.concatenate([[self.clock.time], at.motion_of(self.work, at.NOW).ravel()])[None]
 
     def advance(self, steps: int | None = None) -> Status:
         """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
 
         A pause comes between two steps, so that it changes nothing.
         """
-        self.counts[at.PAUSE_AT] = self.counts[at.STEPS] + (steps or STEPS_AT_A_TIME)
+        self.counts.pause_at = self.counts.steps + (steps or STEPS_AT_A_TIME)
         while True:
             code = self.driver(
                 self.scene, self.work, self.observed, self.clock, self.counts, self.record
             )
-            if self.counts[at.RECORDED] > 0:
-                self.saved.append(self.record[: self.counts[at.RECORDED]].copy())
-                self.counts[at.RECORDED] = 0
+            if self.counts.recorded > 0:
+                self.saved.append(self.record[: self.counts.recorded].copy())
+                self.counts.recorded = 0
             if code == Status.NO_ROOM:
                 self.driver, self.work = with_more(self.driver, self.work)
             elif code != Status.RECORD_FULL:
@@ -147,31 +147,31 @@ class Run:
     @property
     def time(self) -> float:
         """How far it has come [s]."""
-        return float(self.clock[at.TIME])
+        return float(self.clock.time)
 
     @property
     def steps(self) -> int:
-        return int(self.counts[at.STEPS])
+        return int(self.counts.steps)
 
     @property
     def rejected(self) -> int:
         """Steps tried in vain."""
-        return int(self.counts[at.REJECTED])
+        return int(self.counts.rejected)
 
     @property
     def evaluations(self) -> int:
         """How often the forces were summed."""
-        return int(self.work.tally[at.EVALUATIONS])
+        return int(self.work.tally.evaluations)
 
     @property
     def error(self) -> float:
         """The sum of the steps' estimated errors [m]."""
-        return float(self.clock[at.ERROR])
+        return float(self.clock.error)
 
     @property
     def code(self) -> int:
         """The observer's last code."""
-        return int(self.counts[at.CODE])
+        return int(self.counts.code)
 
 
 def locate(scene: Any, work: Work) -> bool:
@@ -194,8 +194,8 @@ def views_of(
         "oriented": [oriented_now(scene, work, time, a, b) for a, b in pairs],
     }
     if located(scene, work):
-        rows = range(work.tally[at.CANDIDATES])
-        touching = [row for row in rows if work.geometry[at.NOW, row, at.GAP] < 0.0]
+        rows = range(work.tally.candidates)
+        touching = [row for row in rows if work.geometry[at.NOW, row].gap < 0.0]
         flag_near(scene, work, at.NOW, 0.0)
         first, views["surface"] = 0, []
         while first < len(rows):
@@ -259,7 +259,7 @@ def force_to_blame(system: Any, run: Run) -> str:
     """The force of a System that gives NaN, or more than LARGEST, where a Run has ended, in words;
     or ""."""
     scene: Any = system.scene(jit=False)
-    start = run.work.motion[at.NOW].copy()
+    start = at.motion_of(run.work, at.NOW)
     if not np.isfinite(start).all():
         return ""
     work = copy_of(run.work)
@@ -268,9 +268,9 @@ def force_to_blame(system: Any, run: Run) -> str:
     classes = [type(force) for force in used.values()]
     located = compose(locate, system.fillings(), jit=False)
     for ahead in AHEAD:
-        work.motion[at.NOW] = start
-        work.motion[at.NOW, :, : at.VELOCITY] += ahead * start[:, at.VELOCITY :]
-        views = views_of(system, scene, work, run.clock[at.TIME] + ahead, located)
+        at.put_motion(work, at.NOW, start)
+        work.place[at.NOW] += ahead * work.velocity[at.NOW]
+        views = views_of(system, scene, work, run.clock.time + ahead, located)
         for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)
             if words:

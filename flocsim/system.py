@@ -292,9 +292,7 @@ class System:
                           KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
-            growth = self.amplification(
-                run.time, run.work.motion[at.NOW, :, :3], max_steps, jit=jit
-            )
+            growth = self.amplification(run.time, run.work.place[at.NOW], max_steps, jit=jit)
         legs = ((run.steps, end),)
         origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
@@ -315,29 +313,29 @@ class System:
                 f"{type(start).__name__}: run the first one until then, and hand that over"
             )
         origin = start.known()
-        if run.clock[at.UNTIL] <= start.t[-1]:
+        if run.clock.until <= start.t[-1]:
             raise UsageError(
                 f"until must be a time above {start.t[-1]:g} s, at which start has ended, found "
-                f"{run.clock[at.UNTIL]:g}"
+                f"{run.clock.until:g}"
             )
         scene = origin.ended.scene
         if not all(
             np.array_equal(own, other)
             for own, other in (
                 (run.scene.first, scene.first), (run.scene.vertices, scene.vertices),
-                (run.scene.bodies[:, at.RADIUS], scene.bodies[:, at.RADIUS]),
+                (run.scene.bodies["radius"], scene.bodies["radius"]),
             )
         ):  # fmt: skip
             raise UsageError("start must be a run of the same shapes in the same order")
         run.work = copy_of(origin.ended.work)
         run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
         if (run.scene.kicks, run.scene.key) != (scene.kicks, scene.key):
-            run.work.bodies[0, at.KICK_SPAN] = 0.0  # no kick has begun
-        run.work.tally[at.REBUILDS] = 0
-        run.work.tally[at.EVALUATIONS] = 0
-        run.clock[at.TIME] = start.t[-1]
-        if np.isfinite(start.error) and np.isfinite(run.clock[at.TOLERANCE]):
-            run.clock[at.ERROR] = start.error
+            run.work.kick.span = 0.0  # no kick has begun
+        run.work.tally.rebuilds = 0
+        run.work.tally.evaluations = 0
+        run.clock.time = start.t[-1]
+        if np.isfinite(start.error) and np.isfinite(run.clock.tolerance):
+            run.clock.error = start.error
         run.saved = [run.row_now()]
         return run
 
@@ -355,7 +353,7 @@ class System:
         def companion(bodies: list[Body]) -> np.ndarray | None:
             run = attrs.evolve(self, bodies=bodies).begin(until, max_steps=max_steps, jit=jit)
             ended = run.to_end() == Status.FINISHED
-            return run.work.motion[at.NOW, :, :3] if ended else None
+            return run.work.place[at.NOW] if ended else None
 
         return amplification_of(self.bodies, end, companion, nudge)
 

@@ -18,11 +18,12 @@ from flocsim.integrators.rhs.views import inertia
 
 def read_state(work, vector):
     """Write a state vector into NOW."""
-    bodies = work.motion.shape[1]
+    bodies = work.place.shape[1]
     for body in range(bodies):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NOW, body, axis] = vector[6 * body + axis]
-    for row in range(work.tally[at.CANDIDATES]):
+        for axis in range(3):
+            work.place[at.NOW, body, axis] = vector[6 * body + axis]
+            work.velocity[at.NOW, body, axis] = vector[6 * body + 3 + axis]
+    for row in range(work.tally.candidates):
         work.slip[at.NOW, row] = vector[6 * bodies + row]
 
 
@@ -31,15 +32,15 @@ def rate_state(scene, work, time, vector, rates):
     read_state(work, vector)
     locate_and_rate(scene, work, at.NOW)
     sum_forces(scene, work, time, at.NOW)
-    bodies = work.motion.shape[1]
+    bodies = work.place.shape[1]
     for body in range(bodies):
         for axis in range(3):
-            gain = scene.bodies[body, at.FREE] / inertia(scene, body, axis)
+            gain = scene.bodies[body].free / inertia(scene, body, axis)
             rates[6 * body + axis] = vector[6 * body + 3 + axis]
-            rates[6 * body + 3 + axis] = gain * work.rates[at.NOW, body, at.FORCE + axis]
-    for row in range(work.tally[at.CANDIDATES]):
-        closed = work.candidates[row, at.CLOSED] == 1
-        rates[6 * bodies + row] = work.slip[at.SLIP_RATES + at.NOW, row] if closed else 0.0
+            rates[6 * body + 3 + axis] = gain * work.force[at.NOW, body, axis]
+    for row in range(work.tally.candidates):
+        closed = work.candidates[row].closed == 1
+        rates[6 * bodies + row] = work.slip_rate[at.NOW, row] if closed else 0.0
 
 
 def locate_now(scene, work):
@@ -78,9 +79,9 @@ def inspect(scene, work, observed, time, vector, watch):
     The code is the observer's if it is to ``watch``, else 0.
     """
     read_state(work, vector)
-    least = locate_now(scene, work) if work.tally[at.CANDIDATES] > 0 else math.inf
+    least = locate_now(scene, work) if work.tally.candidates > 0 else math.inf
     opened = False
-    for row in range(work.tally[at.CANDIDATES]):
-        opened = opened or (work.candidates[row, at.CLOSED] == 0 and work.slip[at.NOW, row] != 0.0)
+    for row in range(work.tally.candidates):
+        opened = opened or (work.candidates[row].closed == 0 and work.slip[at.NOW, row] != 0.0)
     code = observe(scene, work, observed, time) if watch else 0
     return spent(scene, work, at.NOW), opened, least, too_deep(scene, work), code

@@ -71,13 +71,13 @@ class SciPyRun:
         """(state vector, longest step) with the pairs listed anew."""
         while (longest := self.pieces[1](self.scene, self.work)) < 0.0:
             self.work = with_capacity(self.work, 2 * len(self.work.candidates))
-        slips = self.work.slip[at.NOW, : self.work.tally[at.CANDIDATES]]
-        return np.concatenate([self.work.motion[at.NOW].ravel(), slips]), longest
+        slips = self.work.slip[at.NOW, : self.work.tally.candidates]
+        return np.concatenate([at.motion_of(self.work, at.NOW).ravel(), slips]), longest
 
     def start_solver(self, method, time, until, tolerance, step):
         """A solver from the present state."""
         vector, longest = self.make_list()
-        slips = np.full(len(vector) - self.work.motion[at.NOW].size, tolerance)
+        slips = np.full(len(vector) - 6 * len(self.work.poses), tolerance)
         absolute = np.concatenate([state_tolerances(self.system, tolerance), slips])
         relative = max(tolerance / 1e-5, SMALLEST_RELATIVE)
         largest = min(longest, until - time)
@@ -139,5 +139,5 @@ class SciPyRun:
             if time.process_time() - began > budget:
                 status = status or "TIME_BUDGET"
         cpu = time.process_time() - began
-        motion = self.work.motion[at.NOW].copy()
+        motion = at.motion_of(self.work, at.NOW)
         return Measured(motion, status or "FINISHED", cpu, steps, 0, self.evaluations), code

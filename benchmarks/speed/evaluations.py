@@ -28,17 +28,15 @@ NEAR_GAP, FAR_GAP = 0.3e-6, 100e-6
 
 
 def push(scene, work, step):
-    """One symplectic Euler step with the forces in place NOW of ``work.rates``."""
+    """One symplectic Euler step with the forces in place NOW of ``work.force``."""
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
-            gain = step * scene.bodies[body, at.FREE] / inertia(scene, body, axis)
-            work.motion[at.NOW, body, at.VELOCITY + axis] += (
-                gain * work.rates[at.NOW, body, at.FORCE + axis]
-            )
-            work.motion[at.NOW, body, axis] += step * work.motion[at.NOW, body, at.VELOCITY + axis]
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == 1:
-            work.slip[at.NOW, row] += step * work.slip[at.SLIP_RATES + at.NOW, row]
+            gain = step * scene.bodies[body].free / inertia(scene, body, axis)
+            work.velocity[at.NOW, body, axis] += gain * work.force[at.NOW, body, axis]
+            work.place[at.NOW, body, axis] += step * work.velocity[at.NOW, body, axis]
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == 1:
+            work.slip[at.NOW, row] += step * work.slip_rate[at.NOW, row]
 
 
 def evaluate_and_push(scene, work, step, count, turn):
@@ -53,8 +51,8 @@ def evaluate_and_push(scene, work, step, count, turn):
         locate_and_rate(scene, work, at.NOW)
         sum_forces(scene, work, 0.0, at.NOW)
         hand_over(scene, work)
-        for row in range(work.tally[at.CANDIDATES]):
-            if work.candidates[row, at.CLOSED] == 1:
+        for row in range(work.tally.candidates):
+            if work.candidates[row].closed == 1:
                 touching += 1
                 break
         push(scene, work, -step if k // turn % 2 == 1 else step)
@@ -100,12 +98,12 @@ def cost(scene, turn, count):
     arrays = system.scene()
     work = work_of(arrays, *system.motion(), capacity=8192)
     loop(arrays, work, STEP, 1, turn)
-    rebuilds = work.tally[at.REBUILDS]
+    rebuilds = work.tally.rebuilds
     began = time.process_time()
     touching = loop(arrays, work, STEP, count, turn)
     took = time.process_time() - began
-    lists = max(work.tally[at.REBUILDS] - rebuilds, 1)
-    return Cost(1e6 * took / count, count / lists, int(work.tally[at.CANDIDATES]), touching / count)
+    lists = max(work.tally.rebuilds - rebuilds, 1)
+    return Cost(1e6 * took / count, count / lists, int(work.tally.candidates), touching / count)
 
 
 def rolling_cost(preset, vertices, count):

@@ -47,7 +47,7 @@ def run_once(system, driver, until, budget):
             break
     cpu = time.process_time() - began
     name = "TIME_BUDGET" if status == Status.PAUSED else status.name
-    motion = run.work.motion[at.NOW].copy()
+    motion = at.motion_of(run.work, at.NOW)
     return Measured(motion, name, cpu, run.steps, run.rejected, run.evaluations)
 
 

@@ -79,25 +79,25 @@ def bond_between(scene, work, time, i, j):
     nx, ny, distance = centre_line(scene, work, at.NOW, j, i)
     gap = least_listed_gap(work)
     surface = gap
-    if scene.surface_reach > 0.0 and work.tally[at.CANDIDATES] > 0:
+    if scene.surface_reach > 0.0 and work.tally.candidates > 0:
         flag_near(scene, work, at.NOW, 0.0)
-        surface = surface_view(scene, work, time, at.NOW, 0, work.tally[at.CANDIDATES]).gap
+        surface = surface_view(scene, work, time, at.NOW, 0, work.tally.candidates).gap
     return Bond(i, j, nx, ny, distance, gap, surface)
 
 
 def is_closed(work, row):
     """Whether a listed pair of features touches now."""
-    return work.geometry[at.NOW, row, at.GAP] < 0.0
+    return work.geometry[at.NOW, row].gap < 0.0
 
 
 def size_of(scene, i, j):
     """The smaller bounding radius [m]: by so much outlines move as the bodies turn by one."""
-    return min(scene.bodies[i, at.BOUNDING_RADIUS], scene.bodies[j, at.BOUNDING_RADIUS])
+    return min(scene.bodies[i].bounding_radius, scene.bodies[j].bounding_radius)
 
 
 def radii_of(scene, bond):
     """r_i + r_j, equivalent radii [m]."""
-    return scene.bodies[bond.i, at.EQUIVALENT_RADIUS] + scene.bodies[bond.j, at.EQUIVALENT_RADIUS]
+    return scene.bodies[bond.i].equivalent_radius + scene.bodies[bond.j].equivalent_radius
 
 
 def are_spheres(scene, bond):
@@ -108,21 +108,24 @@ def are_spheres(scene, bond):
 
 def speeds_of(scene, work, bond):
     """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
-    v, i, j = work.motion, bond.i, bond.j
-    ux, uy = v[at.NOW, j, at.VX] - v[at.NOW, i, at.VX], v[at.NOW, j, at.VY] - v[at.NOW, i, at.VY]
+    i, j = bond.i, bond.j
+    ux, uy = (
+        work.velocity[at.NOW, j, at.X] - work.velocity[at.NOW, i, at.X],
+        work.velocity[at.NOW, j, at.Y] - work.velocity[at.NOW, i, at.Y],
+    )
     rx, ry = bond.nx * bond.distance, bond.ny * bond.distance
-    spin = v[at.NOW, i, at.SPIN]
+    spin = work.velocity[at.NOW, i, at.ANGLE]
     shear = math.hypot(ux + spin * ry, uy - spin * rx)
-    turning = abs(v[at.NOW, j, at.SPIN] - spin) * size_of(scene, i, j)
+    turning = abs(work.velocity[at.NOW, j, at.ANGLE] - spin) * size_of(scene, i, j)
     return abs(ux * bond.nx + uy * bond.ny), shear + turning
 
 
 def doublet_pose(scene, work, state, i, j):
     """Place [m] and angle of body j in the frame of i, which turns with it, in a state."""
     x, y = separation(scene, work, state, j, i)
-    turn = work.motion[state, i, at.ANGLE]
+    turn = work.place[state, i, at.ANGLE]
     c, s = math.cos(turn), math.sin(turn)
-    return c * x + s * y, c * y - s * x, work.motion[state, j, at.ANGLE] - turn
+    return c * x + s * y, c * y - s * x, work.place[state, j, at.ANGLE] - turn
 
 
 def way_between(scene, i, j, pose, before):
@@ -140,14 +143,27 @@ def resting_contact(view, slip):
 def energy_of(scene, work, bond):
     """What the bodies have to climb out with [J]: the energy of their motion against each other, of
     their spins, and twice that of their contacts' springs."""
-    v, i, j = work.motion, bond.i, bond.j
-    ux, uy = v[at.NOW, j, at.VX] - v[at.NOW, i, at.VX], v[at.NOW, j, at.VY] - v[at.NOW, i, at.VY]
+    i, j = bond.i, bond.j
+    ux, uy = (
+        work.velocity[at.NOW, j, at.X] - work.velocity[at.NOW, i, at.X],
+        work.velocity[at.NOW, j, at.Y] - work.velocity[at.NOW, i, at.Y],
+    )
     total = 0.5 * effective_mass(scene, i, j) * (ux * ux + uy * uy)
-    total += 0.5 * scene.bodies[i, at.INERTIA] * v[at.NOW, i, at.SPIN] * v[at.NOW, i, at.SPIN]
-    total += 0.5 * scene.bodies[j, at.INERTIA] * v[at.NOW, j, at.SPIN] * v[at.NOW, j, at.SPIN]
+    total += (
+        0.5
+        * scene.bodies[i].inertia
+        * work.velocity[at.NOW, i, at.ANGLE]
+        * work.velocity[at.NOW, i, at.ANGLE]
+    )
+    total += (
+        0.5
+        * scene.bodies[j].inertia
+        * work.velocity[at.NOW, j, at.ANGLE]
+        * work.velocity[at.NOW, j, at.ANGLE]
+    )
     if not has(scene, CONTACT_FORCE):
         return total
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if is_closed(work, row):
             view = contact_view(scene, work, at.NOW, row)
             normal, tangential = contact_force(scene, resting_contact(view, view.slip))
@@ -255,7 +271,7 @@ def leverage(work, bond, least):
     lies on one side of it."""
     left, right = math.inf, math.inf
     nx, ny, distance = bond.nx, bond.ny, bond.distance
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if not is_closed(work, row):
             continue
         x, y = contact_point(work, row, bond.i)
@@ -273,7 +289,7 @@ def is_held(scene, work, time, bond, load):
     along, shear = speeds_of(scene, work, bond)
     if not along < CALM * load.drift:
         return False
-    mass, spin = effective_mass(scene, bond.i, bond.j), work.motion[at.NOW, bond.i, at.SPIN]
+    mass, spin = effective_mass(scene, bond.i, bond.j), work.velocity[at.NOW, bond.i, at.ANGLE]
     needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)

@@ -66,9 +66,9 @@ REST_TURNS = 3.0
 def swings(scene, work, i, j, load):
     """Whether a doublet that turns to hang still swings: it passes the worst direction of its load,
     but may yet be thrown open. One that any load may meet turns with the flow, or its cluster."""
-    outer = scene.bodies[i, at.BOUNDING_RADIUS] + scene.bodies[j, at.BOUNDING_RADIUS]
+    outer = scene.bodies[i].bounding_radius + scene.bodies[j].bounding_radius
     turns = load.x != 0.0 or load.y != 0.0
-    return turns and abs(work.motion[at.NOW, i, at.SPIN]) * outer > CALM * load.drift
+    return turns and abs(work.velocity[at.NOW, i, at.ANGLE]) * outer > CALM * load.drift
 
 
 def has_shown(scene, bond, load, rested):
@@ -82,7 +82,7 @@ def has_shown(scene, bond, load, rested):
     if near and rested >= FAR_LONGER:
         return True
     hangs = bond.nx * load.x + bond.ny * load.y >= HANGING or (load.x == 0.0 and load.y == 0.0)
-    hangs = hangs or scene.bodies[bond.i, at.FREE] == 0.0 or scene.bodies[bond.j, at.FREE] == 0.0
+    hangs = hangs or scene.bodies[bond.i].free == 0.0 or scene.bodies[bond.j].free == 0.0
     return bond.gap < 0.0 and hangs and rested >= 1.0
 
 
@@ -90,7 +90,7 @@ def outlasts_kicks(scene, work, time, bond, load):
     """Whether kicks let the bond rest."""
     barrier = BARRIER * load.kicks
     if not are_spheres(scene, bond):
-        radii = scene.bodies[bond.i, at.RADIUS], scene.bodies[bond.j, at.RADIUS]
+        radii = scene.bodies[bond.i].radius, scene.bodies[bond.j].radius
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
     return load.force > 0.0 and not lets_out(scene, work, time, bond, load.force, barrier)
 
@@ -126,7 +126,7 @@ def grip_of(scene, work):
     least = 0.0
     if not has(scene, CONTACT_FORCE):
         return least
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if is_closed(work, row):
             view = contact_view(scene, work, at.NOW, row)
             slip, limit = view.overlap, math.inf
@@ -145,8 +145,9 @@ def grip_of(scene, work):
 
 def normal_on(work, bond, row):
     """The unit vector along which a contact pushes body j."""
-    x, y = work.geometry[at.NOW, row, at.NORMAL_X], work.geometry[at.NOW, row, at.NORMAL_Y]
-    return (x, y) if work.candidates[row, at.VERTEX_BODY] == bond.j else (-x, -y)
+    geometry = work.geometry[at.NOW, row]
+    x, y = geometry.normal_x, geometry.normal_y
+    return (x, y) if work.candidates[row].vertex_body == bond.j else (-x, -y)
 
 
 def push_of(work, bond, size, grip, edge):
@@ -172,7 +173,7 @@ def is_allowed(work, bond, size, grip, motion):
     """Whether no force of any contact does negative work along a motion (of j's centroid; ``size``
     times its turn)."""
     vx, vy, turn = motion
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if not is_closed(work, row):
             continue
         nx, ny = normal_on(work, bond, row)
@@ -194,9 +195,9 @@ def load_works(scene, bond, load, size, motion):
     at_j, at_i = load.x * vx + load.y * vy, load.x * tx + load.y * ty
     if load.x == 0.0 and load.y == 0.0:
         return vx * vx + vy * vy + tx * tx + ty * ty > ROUNDING * ROUNDING
-    if scene.bodies[bond.i, at.FREE] == 0.0:
+    if scene.bodies[bond.i].free == 0.0:
         return at_j > ROUNDING
-    if scene.bodies[bond.j, at.FREE] == 0.0:
+    if scene.bodies[bond.j].free == 0.0:
         return at_i > ROUNDING
     pulling = bond.nx * vx + bond.ny * vy
     askew = load.x * bond.nx + load.y * bond.ny
@@ -212,7 +213,7 @@ def is_hooked(scene, work, bond, load):
     grip, size = grip_of(scene, work), size_of(scene, bond.i, bond.j)
     if grip == 0.0 or are_spheres(scene, bond):
         return False
-    count = EDGES * work.tally[at.CANDIDATES]
+    count = EDGES * work.tally.candidates
     for first in range(count):
         if not is_closed(work, first // EDGES):
             continue

@@ -4,7 +4,7 @@ numba passes an array as seven to eleven numbers, and a tuple of arrays as those
 run's state would be some four hundred numbers in every call. Here a call hands over the address of
 a table of words. There an array is the address of its data, then its sizes; a tuple is what is in
 it, one behind the other; a number is one word. Inside compiled code ``work`` is a pointer into the
-table, ``work.motion`` another, and ``work.motion[state, body, axis]`` a load through that. No word
+table, ``work.place`` another, and ``work.place[state, body, axis]`` a load through that. No word
 changes while compiled code runs, which LLVM is told, so that it reads each once.
 
 Arrays lie in C order; indices are whole numbers from 0 on, neither checked nor counted from the
@@ -62,11 +62,15 @@ def flatten(value, words, kinds):
     if isinstance(value, np.ndarray):
         words.append(address_of(value))
         words.extend(value.shape)
+        kind = value.dtype if value.dtype.names else value.dtype.char
         if value.flags.c_contiguous:
-            kinds.append((value.dtype.char, value.ndim))
+            kinds.append((kind, value.ndim))
         else:
             words.extend(value.strides)
-            kinds.append((value.dtype.char, value.ndim, "A"))
+            kinds.append((kind, value.ndim, "A"))
+    elif isinstance(value, np.record):
+        words.append(value.__array_interface__["data"][0])
+        kinds.append(value.dtype)
     elif isinstance(value, tuple):
         if (kept := KEPT.get(id(value))) is not None:
             words += kept[1]
@@ -123,9 +127,10 @@ def kinds_of_types():
     """(Table, Elements): the numba types of a tuple with names and of an array in a table, with
     all that numba has to know of them."""
     from llvmlite import ir
+    from numba import from_dtype
     from numba.core import types
     from numba.core.datamodel import models, register_default
-    from numba.core.imputils import lower_builtin, lower_getattr_generic
+    from numba.core.imputils import lower_builtin, lower_getattr_generic, lower_setattr_generic
     from numba.core.typing.templates import (
         AbstractTemplate,
         AttributeTemplate,
@@ -159,6 +164,41 @@ def kinds_of_types():
             self.words = 1 + ndim
             self.array = types.Array(dtype, ndim, "C")
             super().__init__(f"elements_{dtype}_{'_'.join(map(str, sizes))}")
+
+    class Row(types.Type):
+        """A record: a row of named numbers."""
+
+        def __init__(self, dtype):
+            self.numbers = {
+                name: (from_dtype(kind), offset) for name, (kind, offset) in dtype.fields.items()
+            }
+            self.size = dtype.itemsize
+            self.words = 1
+            told = blake2b(repr(dtype).encode(), digest_size=6)
+            super().__init__(f"row_{told.hexdigest()}")
+
+    @register_default(Row)
+    class RowModel(models.DataModel):
+        """A row by its address; in an array, the words themselves."""
+
+        def get_value_type(self):
+            return word.as_pointer()
+
+        get_argument_type = get_return_type = get_value_type
+
+        def get_data_type(self):
+            return ir.ArrayType(word, self._fe_type.size // 8)
+
+        def as_data(self, builder, value):
+            return builder.load(builder.bitcast(value, self.get_data_type().as_pointer()))
+
+        def as_argument(self, builder, value):
+            return value
+
+        from_argument = as_return = from_return = as_argument
+
+        def load_from_data_pointer(self, builder, ptr, align=None):
+            return builder.bitcast(ptr, self.get_value_type())
 
     @register_default(Table)
     @register_default(Elements)
@@ -195,6 +235,8 @@ def kinds_of_types():
         if kind == types.none:
             return context.get_dummy_value()
         found = read_word(builder, table, place)
+        if isinstance(kind, Row):
+            return builder.inttoptr(found, word.as_pointer())
         if kind == types.float64:
             return builder.bitcast(found, ir.DoubleType())
         return context.cast(builder, found, types.int64, kind)
@@ -279,6 +321,38 @@ def kinds_of_types():
         lengths = types.UniTuple(types.intp, kind.ndim)
         return context.make_tuple(builder, lengths, sizes(builder, kind, value))
 
+    @infer_getattr
+    class RowFields(AttributeTemplate):
+        key = Row
+
+        def generic_resolve(self, row, name):
+            return row.numbers[name][0] if name in row.numbers else None
+
+    def field_at(context, builder, kind, value, name):
+        """The address of a number of a row, and its type."""
+        typed, offset = kind.numbers[name]
+        place = builder.gep(value, [word(offset // 8)], inbounds=True)
+        return builder.bitcast(place, context.get_data_type(typed).as_pointer()), typed
+
+    def named(builder, kind, name, access):
+        """Tell LLVM that this number is none of another name."""
+        module = builder.module
+        root = module.add_metadata(["flocsim"])
+        tag = module.add_metadata([f"{kind.name}.{name}", root, word(0)])
+        return marked(builder, access, "tbaa", tag, tag, word(0))
+
+    @lower_getattr_generic(Row)
+    def get_number(context, builder, kind, value, name):
+        place, _ = field_at(context, builder, kind, value, name)
+        return named(builder, kind, name, builder.load(place))
+
+    @lower_setattr_generic(Row)
+    def set_number(context, builder, sig, args, name):
+        value, given = args
+        place, _ = field_at(context, builder, sig.args[0], value, name)
+        named(builder, sig.args[0], name, builder.store(given, place))
+        return context.get_dummy_value()
+
     @infer_global(len)
     class Length(AbstractTemplate):
         def generic(self, args, kws):
@@ -332,6 +406,13 @@ def kinds_of_types():
             pointer = element(context, builder, kind, value, index, place)
             if kind.dtype in plain:
                 aliases(builder, kind.dtype, builder.store(number, pointer))
+            elif isinstance(kind.dtype, Row):
+                pointer = builder.bitcast(pointer, word.as_pointer())
+                for name in kind.dtype.numbers:
+                    source, _ = field_at(context, builder, kind.dtype, number, name)
+                    target, _ = field_at(context, builder, kind.dtype, pointer, name)
+                    copied = named(builder, kind.dtype, name, builder.load(source))
+                    named(builder, kind.dtype, name, builder.store(copied, target))
             else:
                 context.pack_value(builder, kind.dtype, number, pointer)
             return context.get_dummy_value()
@@ -339,7 +420,7 @@ def kinds_of_types():
         call = context.get_function(operator.setitem, inner)
         return call(builder, (whole(context, builder, kind, value, kind.array), place, number))
 
-    return Table, Elements, value_at, data
+    return Table, Elements, value_at, data, Row
 
 
 def is_array(kind: Any) -> bool:
@@ -352,7 +433,7 @@ def is_array(kind: Any) -> bool:
 
 def address_of_data(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """The address of an array's data, in LLVM's terms; what is no array stays what it is."""
-    _, elements, _, data = kinds_of_types()
+    _, elements, _, data, _ = kinds_of_types()
     if isinstance(kind, elements):
         return data(context, builder, kind, value)
     return context.make_array(kind)(context, builder, value).data if is_array(kind) else value
@@ -378,9 +459,9 @@ def type_of(value: Any, *, arrays: bool, sizes: tuple[int, ...] = ()) -> Any:
     """
     from numba import from_dtype, types
 
-    table, elements, _, _ = kinds_of_types()
+    table, elements, _, _, row = kinds_of_types()
     if isinstance(value, np.ndarray):
-        dtype = from_dtype(value.dtype)
+        dtype = row(value.dtype) if value.dtype.names else from_dtype(value.dtype)
         if arrays:
             return types.Array(dtype, value.ndim, "C" if value.flags.c_contiguous else "A")
         if not value.flags.c_contiguous:
@@ -397,6 +478,8 @@ def type_of(value: Any, *, arrays: bool, sizes: tuple[int, ...] = ()) -> Any:
         return table(type(value).__name__, tuple(zip(value._fields, kinds, strict=True)))
     if isinstance(value, tuple):
         return types.Tuple.from_types([type_of(each, arrays=arrays) for each in value])
+    if isinstance(value, np.record):
+        return row(value.dtype)
     if value is None or callable(value):
         return types.none
     if isinstance(value, bool | np.bool_):
@@ -423,7 +506,7 @@ def argument_at(kind: Any, place: int) -> Any:
     from llvmlite import ir
     from numba.extending import intrinsic
 
-    _, _, value_at, _ = kinds_of_types()
+    _, _, value_at, _, _ = kinds_of_types()
 
     def generate(context, builder, typed, values):
         table = builder.inttoptr(values[0], ir.IntType(64).as_pointer())

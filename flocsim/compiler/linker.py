@@ -82,7 +82,7 @@ def plain(value: Any) -> Any:
 def reached(function: Any) -> dict[str, Any]:
     """The globals that a function reads: {name: value}."""
     known = function.__globals__
-    names = sorted(names_in(function.__code__))
+    names = sorted({chain[0] for chain in chains(function.__code__)})
     return {name: plain(known[name]) for name in names if name in known}
 
 

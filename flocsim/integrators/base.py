@@ -55,14 +55,14 @@ class Integrator(ABC):
     A subclass gives ``attempt``, a plain function that numba can compile, on arrays of which it
     uses elements, ``shape``, ``len``, rows and slices:
 
-    ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.motion[NOW]``
-    (n, 6: x, y, angle, vx, vy, spin), the time ``clock[TIME]`` and the step [s] to be tried. It
-    must write the motion a step later to ``work.motion[NEW]``, and the tangential displacements
-    there to ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns the step's
-    error over what is allowed: above 1 the step is tried again, shorter; below 0 it has failed and
-    is tried again much shorter. A method of controlled error writes that error to
-    ``clock[STEP_ERROR]`` [m] and, for each body, how long a velocity is remembered to
-    ``work.bodies[:, MEMORY]`` [s], which says how finely switches must be located:
+    ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.place[NOW]``
+    (n, 3: x, y, angle) and ``work.velocity[NOW]``, the time ``clock.time`` and the step [s] to be
+    tried. It must write the motion a step later to the same arrays at NEW, and the tangential
+    displacements there to ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns
+    the step's error over what is allowed: above 1 the step is tried again, shorter; below 0 it has
+    failed and is tried again much shorter. A method of controlled error writes that error to
+    ``clock.step_error`` [m] and, for each body, how long a velocity is remembered to
+    ``work.errors[body].memory`` [s], which says how finely switches must be located:
     ``parts.error_ratio`` and ``parts.weigh_velocities`` do both. A method of fixed steps returns 0
     or, where the motion is no longer finite, −1, and subclasses ``parts.FixedStep``.
 
@@ -106,23 +106,23 @@ class Integrator(ABC):
             hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
         }  # fmt: skip
 
-    def fresh_clock(self) -> np.ndarray:
+    def fresh_clock(self) -> at.Clock:
         """The float state of a run that starts at time zero."""
-        clock = np.zeros(at.CLOCK_SIZE)
-        clock[at.UNTIL] = math.inf
-        clock[at.STEP] = self.first_step
-        clock[at.TOLERANCE] = self.tolerance
-        clock[at.LARGEST_STEP] = self.largest_step
-        clock[at.ESTIMATE_SHARE] = self.estimate_share
-        clock[at.PREVIOUS_STEP] = math.inf
-        clock[at.BEARABLE_STEP] = math.inf
-        clock[at.SETTLED_STEP] = math.inf
-        clock[at.ACROSS] = float(self.across)
+        clock = at.Clock.one()
+        clock.until = math.inf
+        clock.step = self.first_step
+        clock.tolerance = self.tolerance
+        clock.largest_step = self.largest_step
+        clock.estimate_share = self.estimate_share
+        clock.previous_step = math.inf
+        clock.bearable_step = math.inf
+        clock.settled_step = math.inf
+        clock.across = float(self.across)
         return clock
 
-    def fresh_counts(self, max_steps: int) -> np.ndarray:
+    def fresh_counts(self, max_steps: int) -> at.Counts:
         """The integer state of a run with a step budget."""
-        counts = np.zeros(at.COUNTS_SIZE, dtype=np.int64)
-        counts[at.MAX_STEPS] = max_steps
-        counts[at.PAUSE_AT] = np.iinfo(np.int64).max
+        counts = at.Counts.one()
+        counts.max_steps = max_steps
+        counts.pause_at = np.iinfo(np.int64).max
         return counts

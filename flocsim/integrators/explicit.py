@@ -41,32 +41,33 @@ def state_of(stage):
     return at.NOW if stage == 0 else at.FIRST_STAGE + stage - 1
 
 
-def rate_of(scene, work, state, body, axis):
-    """Rate of a place (axis 0–2) or of a velocity (axis 3–5) in a state."""
-    rate = work.rates[state, body, axis]
-    if axis < at.VELOCITY:
-        return rate
-    return rate * scene.bodies[body, at.FREE] / inertia(scene, body, axis - at.VELOCITY)
+def acceleration_of(scene, work, state, body, axis):
+    """Rate of a velocity in a state."""
+    rate = work.force[state, body, axis]
+    return rate * scene.bodies[body].free / inertia(scene, body, axis)
 
 
 def combine(scene, work, weights, stages, base, end):
     """State ``end`` = ``base`` times state NOW + the weighted rates of the first stages."""
     for body in range(scene.bodies.shape[0]):
-        for axis in range(at.MOTION_COLUMNS):
-            total = 0.0
+        for axis in range(3):
+            way = faster = 0.0
             for stage in range(stages):
                 if weights[stage] != 0.0:
-                    total += weights[stage] * rate_of(scene, work, state_of(stage), body, axis)
-            work.motion[end, body, axis] = base * work.motion[at.NOW, body, axis] + total
+                    state = state_of(stage)
+                    way += weights[stage] * work.velocity[state, body, axis]
+                    faster += weights[stage] * acceleration_of(scene, work, state, body, axis)
+            work.place[end, body, axis] = base * work.place[at.NOW, body, axis] + way
+            work.velocity[end, body, axis] = base * work.velocity[at.NOW, body, axis] + faster
 
 
 def combine_slips(scene, work, weights, stages, step, end):
     """Tangential displacements of the closed pairs in state ``end``."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == 1:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == 1:
             total = 0.0
             for stage in range(stages):
-                total += weights[stage] * work.slip[at.SLIP_RATES + state_of(stage), row]
+                total += weights[stage] * work.slip_rate[state_of(stage), row]
             work.slip[end, row] = slip_in(
                 scene, work, end, row, work.slip[at.NOW, row] + step * total
             )
@@ -107,7 +108,7 @@ class DormandPrince54(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where the motion is no longer finite."""
-        time = clock[at.TIME]
+        time = clock.time
         evaluate_stages(scene, work, time, step)
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
         combine(scene, work, times(ESTIMATE, step), 7, 0.0, at.DEVIATION)
@@ -125,31 +126,30 @@ HALFWAY = at.FIRST_STAGE
 
 def kick_and_drift(scene, work, step):
     """Half a kick into HALFWAY, whose velocity leads to the place of NEW; NEW has a whole kick."""
-    motion = work.motion
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            speed = motion[at.NOW, body, at.VELOCITY + axis]
+            speed = work.velocity[at.NOW, body, axis]
             kick = gain(scene, work, at.NOW, body, axis, step)
-            motion[HALFWAY, body, at.VELOCITY + axis] = speed + 0.5 * kick
-            motion[at.NEW, body, axis] = motion[at.NOW, body, axis] + step * (speed + 0.5 * kick)
+            work.velocity[HALFWAY, body, axis] = speed + 0.5 * kick
+            work.place[at.NEW, body, axis] = work.place[at.NOW, body, axis] + step * (
+                speed + 0.5 * kick
+            )
             # Drag at the half step's velocity would be half a step late: take a whole kick's.
-            motion[at.NEW, body, at.VELOCITY + axis] = speed + kick
+            work.velocity[at.NEW, body, axis] = speed + kick
 
 
 def finish_kick(scene, work, step):
     """The velocity of NEW: that of HALFWAY and half a kick at the force of NEW."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             kick = gain(scene, work, at.NEW, body, axis, 0.5 * step)
-            work.motion[at.NEW, body, at.VELOCITY + axis] = (
-                work.motion[HALFWAY, body, at.VELOCITY + axis] + kick
-            )
+            work.velocity[at.NEW, body, axis] = work.velocity[HALFWAY, body, axis] + kick
 
 
 def gain(scene, work, state, body, axis, step):
     """Change of a velocity in a step at the force of a state."""
-    force = work.rates[state, body, at.FORCE + axis]
-    return step * scene.bodies[body, at.FREE] * force / inertia(scene, body, axis)
+    force = work.force[state, body, axis]
+    return step * scene.bodies[body].free * force / inertia(scene, body, axis)
 
 
 @attrs.frozen
@@ -162,10 +162,10 @@ class VelocityVerlet(FixedStep):
     @staticmethod
     def attempt(scene, work, clock, step):
         """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
-        evaluate(scene, work, clock[at.TIME], at.NOW)
+        evaluate(scene, work, clock.time, at.NOW)
         kick_and_drift(scene, work, step)
         move_slips(scene, work, step)
-        sum_forces(scene, work, clock[at.TIME] + step, at.NEW)
+        sum_forces(scene, work, clock.time + step, at.NEW)
         finish_kick(scene, work, step)
         limit_slips(scene, work)
         return 0.0 if all_finite(work, at.NEW) else -1.0

@@ -68,7 +68,7 @@ def is_tried_again(scene, clock):
     """Whether the step before began here as well, and is taken anew so that it ends at a switch:
     what was found out about its start is known still. Not so with surface forces, as which pairs
     have a share in them hangs on the size of the step."""
-    staged = clock[at.STAGED_STEP] > 0.0 and clock[at.STAGED_AT] == clock[at.TIME]
+    staged = clock.staged_step > 0.0 and clock.staged_at == clock.time
     return staged and scene.listed_reach <= 0.0
 
 
@@ -80,17 +80,17 @@ gets, speed/ω0, times (h ω0)⁵ over this share: what turns meanwhile is not i
 def step_behind_touch(work, clock, frequency, speed, later):
     """The first step behind a touch."""
     if is_dense(work):
-        share = SHARE_OF_TOUCH * clock[at.TOLERANCE] * frequency / speed
+        share = SHARE_OF_TOUCH * clock.tolerance * frequency / speed
         return share**0.2 / frequency
     return resolving_step(clock, frequency, later)
 
 
 def carry_over_step(scene, work, clock, step):
     """Carry the error over an accepted step; the largest one of a body's outline [m]."""
-    if work.tally[at.SERIES_TERMS] == 0:
+    if work.tally.series_terms == 0:
         return carry_error(scene, work, clock, step)
     bound_carried(scene, work)
-    whole = clock[at.SERIES_STEP]
+    whole = clock.series_step
     carry_known(work, clock, whole, step / whole)
     if nothing_swings(clock):
         grow_sums(scene, work, step)
@@ -100,7 +100,7 @@ def carry_over_step(scene, work, clock, step):
 
 def within(work, step, share, body):
     """Write a body's motion at a share of the step into TRIAL."""
-    terms = work.tally[at.SERIES_TERMS]
+    terms = work.tally.series_terms
     if terms > 0:
         write_at(work, at.START, terms, step, share, at.TRIAL, body, body + 1)
     else:
@@ -109,9 +109,9 @@ def within(work, step, share, body):
 
 def end_early(scene, work, step, ratio, share):
     """Make the motion at a share of the step the new state, where it is known well enough."""
-    terms = work.tally[at.SERIES_TERMS]
+    terms = work.tally.series_terms
     if terms > 0:
-        write_at(work, at.START, terms, step, share, at.NEW, 0, work.motion.shape[1])
+        write_at(work, at.START, terms, step, share, at.NEW, 0, work.place.shape[1])
         return True
     return end_on_the_cubic(scene, work, step, ratio, share)
 
@@ -130,7 +130,7 @@ def resolve_switch(scene, work, step, share):
     """The step to be tried behind one that was seen to pass a switch at a share of it: where that
     was Radau IIA, which leaves vibrations out, a series that shows them."""
     fastest = fastest_vibration(scene, work)
-    if work.tally[at.SERIES_TERMS] > 0 or not may_be_series(scene, work) or fastest == 0.0:
+    if work.tally.series_terms > 0 or not may_be_series(scene, work) or fastest == 0.0:
         return share * step
     return max(share * step, min(0.5 * step, RADIANS / fastest))
 
@@ -140,8 +140,8 @@ def solve_as_series(scene, work, clock, step, known):
     whether the last one was."""
     if not may_be_series(scene, work):
         return -1.0
-    work.tally[at.SERIES_TERMS] = solve_series(scene, work, clock, step, known)
-    if work.tally[at.SERIES_TERMS] == 0:
+    work.tally.series_terms = solve_series(scene, work, clock, step, known)
+    if work.tally.series_terms == 0:
         return -1.0
     judge_series(scene, work, clock, step)
     return error_ratio(scene, work, clock, step)
@@ -151,8 +151,8 @@ def forget_series(work, clock, known):
     """No series is there any more; how long ago the stages of Radau IIA, if they are there, or the
     state before, began."""
     if known:
-        staged = clock[at.STAGED_STEP] > 0.0
-        clock[at.STAGED_STEP] = clock[at.STAGED_AT] - clock[at.TIME] if staged else 0.0
+        staged = clock.staged_step > 0.0
+        clock.staged_step = clock.staged_at - clock.time if staged else 0.0
 
 
 @attrs.frozen
@@ -179,11 +179,11 @@ class Implicit(Integrator):
     @staticmethod
     def attempt(scene, work, clock, step):
         """One step: error over tolerance, or −1 where Newton's method fails."""
-        known = work.tally[at.SERIES_TERMS] > 0
-        work.tally[at.SERIES_TERMS], clock[at.LONGEST_SERIES] = 0, math.inf
-        if clock[at.ACROSS] == 1.0:
+        known = work.tally.series_terms > 0
+        work.tally.series_terms, clock.longest_series = 0, math.inf
+        if clock.across == 1.0:
             return step_across(scene, work, clock, step)
-        time = clock[at.TIME]
+        time = clock.time
         remaining = max(end_of_run(clock) - time, step)
         grazes = any_grazes(work)
         if grazes:
@@ -194,7 +194,7 @@ class Implicit(Integrator):
             assemble_jacobian(scene, work, time, remaining)
         if not grazes:
             ratio = solve_as_series(scene, work, clock, step, known)
-            if work.tally[at.SERIES_TERMS] > 0:
+            if work.tally.series_terms > 0:
                 return ratio
         forget_series(work, clock, known)
         if grazes:
@@ -217,14 +217,14 @@ class Implicit(Integrator):
     @staticmethod
     def next_step(clock, step, ratio):
         """The step for which the estimate and Newton's pace stay in bounds."""
-        if clock[at.ACROSS] == 1.0:
+        if clock.across == 1.0:
             return next_across(clock, step, ratio)
         factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
-        if clock[at.PACE] > 0.0:
-            factor = min(factor, (COMFORTABLE_PACE / clock[at.PACE]) ** 0.5)
+        if clock.pace > 0.0:
+            factor = min(factor, (COMFORTABLE_PACE / clock.pace) ** 0.5)
         factor = max(factor, SMALLEST_FACTOR)
         if ratio <= 1.0:
-            return max(min(step * factor, clock[at.LONGEST_SERIES]), min(step, step * factor))
+            return max(min(step * factor, clock.longest_series), min(step, step * factor))
         return step * factor
 
     @property

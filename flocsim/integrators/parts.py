@@ -9,8 +9,7 @@ from collections.abc import Callable
 
 import attrs
 
-import flocsim.arrays as at
-from flocsim.arrays import NEW, NOW, TIME, UNTIL, VELOCITY
+from flocsim.arrays import NEW, NOW
 from flocsim.fields import quantity
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
@@ -27,9 +26,6 @@ from flocsim.integrators.rhs.views import inertia, tangential_rate
 __all__ = [
     "NEW",
     "NOW",
-    "TIME",
-    "UNTIL",
-    "VELOCITY",
     "FixedStep",
     "acceleration",
     "adaptive_factor",
@@ -64,8 +60,8 @@ def evaluate_as_they_lie(scene, work):
 def acceleration(scene, work, state, body, axis):
     """Rate of change of a body's velocity (axis 0, 1) or spin (2) in an evaluated state; 0 where
     the body is fixed."""
-    force = work.rates[state, body, at.FORCE + axis]
-    return scene.bodies[body, at.FREE] * force / inertia(scene, body, axis)
+    force = work.force[state, body, axis]
+    return scene.bodies[body].free * force / inertia(scene, body, axis)
 
 
 def move_slips(scene, work, step):
@@ -73,19 +69,21 @@ def move_slips(scene, work, step):
     at both ends of a fixed step whose start has been evaluated."""
     locate_and_rate(scene, work, NEW)
     slip = work.slip
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         slip[NEW, row] = 0.0
-        if work.candidates[row, at.CLOSED] == 1:
+        if work.candidates[row].closed == 1:
             rate = tangential_rate(work, NEW, row)
-            if work.geometry[NOW, row, at.GAP] < 0.0:
+            if work.geometry[NOW, row].gap < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))
             slip[NEW, row] = slip[NOW, row] + step * rate
 
 
 def all_finite(work, state):
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            if not math.isfinite(work.motion[state, body, axis]):
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            if not math.isfinite(work.place[state, body, axis]):
+                return False
+            if not math.isfinite(work.velocity[state, body, axis]):
                 return False
     return True
 
@@ -105,7 +103,7 @@ class FixedStep(Integrator):
 
     @staticmethod
     def next_step(clock, step, ratio):
-        return clock[at.LARGEST_STEP]
+        return clock.largest_step
 
     @property
     def first_step(self) -> float:  # type: ignore[override]

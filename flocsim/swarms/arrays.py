@@ -9,7 +9,13 @@ from flocsim.arrays import Scene
 from flocsim.geometry.contact.body_pairs import DISC_COLUMNS
 
 ERROR_COLUMNS = 6
-"""Columns of ``errors``: from ERROR_PLACE to DOUBT_SPEED of a run."""
+"""Columns of ``errors``: ``place`` to ``doubt_speed`` of BodyErrors."""
+
+# Which of an island's clocks, and of its counts.
+(
+    RUNNING,  # of the island that runs
+    FRESH,  # as each of them begins
+) = range(2)
 
 # Places in ``times``.
 (
@@ -30,7 +36,7 @@ ERROR_COLUMNS = 6
 ) = range(6)
 
 SLIP_COLUMNS = 5
-"""Columns of ``slips``, of the same contacts: from KEPT_SLIP to KEPT_FLIGHTS of a run."""
+"""Columns of ``slips``, of the same contacts: ``slip`` to ``flights`` of KeptContact."""
 
 # Columns of ``costs``, of every island.
 (
@@ -108,8 +114,8 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         motion=motion,
         carried=np.zeros((n, at.MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
-        steps=np.full(n, clock[at.STEP]),
-        methods=np.full(n, clock[at.ACROSS]),
+        steps=np.full(n, clock.step),
+        methods=np.full(n, clock.across),
         wander=np.zeros(n),
         first_link=np.zeros(n + 1, dtype=np.int64),
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
@@ -117,8 +123,8 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         new_motion=motion.copy(),
         new_carried=np.zeros((n, at.MOTION_COLUMNS)),
         new_errors=np.zeros((n, ERROR_COLUMNS)),
-        new_steps=np.full(n, clock[at.STEP]),
-        new_methods=np.full(n, clock[at.ACROSS]),
+        new_steps=np.full(n, clock.step),
+        new_methods=np.full(n, clock.across),
         stated=np.zeros(n),
         strayed=np.zeros(n),
         ways=np.zeros((n, STRETCHES, BOX_COLUMNS)),

@@ -33,7 +33,7 @@ from flocsim.integrators.radau.contact_frames import unite
 
 def set_disc(swarm, body, x, y, way_x, way_y, wide):
     """The disc of a body that begins at a place, goes a way, and reaches so far [m]."""
-    disc, free = swarm.discs[body], swarm.bodies[body, at.FREE]
+    disc, free = swarm.discs[body], swarm.bodies[body].free
     if free == 0.0:
         # Found by its outline: its circle may be as wide as the box.
         x = y = way_x = way_y = wide = 0.0
@@ -44,11 +44,11 @@ def set_disc(swarm, body, x, y, way_x, way_y, wide):
 
 def disc_reach(swarm, body, reach, stray):
     """How far a disc reaches in which a body may stray by so much [m]."""
-    return swarm.bodies[body, at.BOUNDING_RADIUS] + stray + 0.5 * reach
+    return swarm.bodies[body].bounding_radius + stray + 0.5 * reach
 
 
 def both_free(swarm, a, b):
-    return swarm.bodies[a, at.FREE] * swarm.bodies[b, at.FREE] == 1.0
+    return swarm.bodies[a].free * swarm.bodies[b].free == 1.0
 
 
 def set_discs(swarm, span, reach):
@@ -93,8 +93,8 @@ def reaches_wall(swarm, body, wall, span, reach, width, height):
     x = nearest_way(m[body, at.X] - m[wall, at.X], width)
     y = nearest_way(m[body, at.Y] - m[wall, at.Y], height)
     way = span * math.hypot(m[body, at.VX] - m[wall, at.VX], m[body, at.VY] - m[wall, at.VY])
-    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall, at.BOUNDING_RADIUS]
-    near = swarm.bodies[body, at.BOUNDING_RADIUS] + swarm.bodies[wall, at.RADIUS] + reach
+    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall].bounding_radius
+    near = swarm.bodies[body].bounding_radius + swarm.bodies[wall].radius + reach
     near += way + swarm.wander[body] + widest_swell(swarm, wall)
     return core_distance2(swarm, wall, x, y) < near * near
 
@@ -109,7 +109,7 @@ def name_islands(labels):
 def note_walls(swarm, span, reach, width, height, labels, walls, touches):
     """Note which of the fixed bodies ``walls`` each body can reach; these are of no island."""
     for body in range(labels.shape[0]):
-        free = swarm.bodies[body, at.FREE] == 1.0
+        free = swarm.bodies[body].free == 1.0
         for each in range(walls.shape[0]):
             touches[body, each] = free and reaches_wall(
                 swarm, body, walls[each], span, reach, width, height
@@ -125,7 +125,7 @@ def share_to_touch(swarm, a, b, span, width, height):
     x = nearest_way(m[a, at.X] - m[b, at.X], width)
     y = nearest_way(m[a, at.Y] - m[b, at.Y], height)
     way_x, way_y = span * (m[a, at.VX] - m[b, at.VX]), span * (m[a, at.VY] - m[b, at.VY])
-    near = bodies[a, at.BOUNDING_RADIUS] + bodies[b, at.BOUNDING_RADIUS]
+    near = bodies[a].bounding_radius + bodies[b].bounding_radius
     apart, closing = max(x * x + y * y - near * near, 0.0), -(x * way_x + y * way_y)
     left = closing * closing - apart * (way_x * way_x + way_y * way_y)
     if closing <= 0.0 or left <= 0.0:
@@ -138,7 +138,7 @@ def widen_landing(swarm, span, width, height, pairs, total, reach):
     there are any."""
     m, found = swarm.motion, False
     for pair in range(total):
-        a, b = pairs[pair, 0], pairs[pair, 1]
+        a, b = pairs[pair].later, pairs[pair].earlier
         share = share_to_touch(swarm, a, b, span, width, height) if both_free(swarm, a, b) else 1.0
         if share < 1.0:
             b_goes = math.hypot(m[b, at.VX], m[b, at.VY])
@@ -168,8 +168,8 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     for body in range(n):
         labels[body] = body
     for pair in range(total):
-        if both_free(swarm, pairs[pair, 0], pairs[pair, 1]):
-            unite(labels, pairs[pair, 0], pairs[pair, 1])
+        if both_free(swarm, pairs[pair].later, pairs[pair].earlier):
+            unite(labels, pairs[pair].later, pairs[pair].earlier)
     name_islands(labels)
     note_walls(swarm, span, reach, width, height, labels, walls, touches)
     return total
@@ -197,7 +197,7 @@ def gap_along(low, high, other_low, other_high, period):
 
 def have_met(swarm, a, b, reach, width, height):
     """Whether two bodies have been in each other's reach in any stretch of the window."""
-    near = swarm.bodies[a, at.BOUNDING_RADIUS] + swarm.bodies[b, at.BOUNDING_RADIUS] + reach
+    near = swarm.bodies[a].bounding_radius + swarm.bodies[b].bounding_radius + reach
     for stretch in range(sw.STRETCHES):
         one, other = swarm.ways[a, stretch], swarm.ways[b, stretch]
         x = gap_along(one[sw.LEFT], one[sw.RIGHT], other[sw.LEFT], other[sw.RIGHT], width)
@@ -215,7 +215,7 @@ def join_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
     if total > pairs.shape[0]:
         return total
     for pair in range(total):
-        a, b = pairs[pair, 0], pairs[pair, 1]
+        a, b = pairs[pair].later, pairs[pair].earlier
         others = both_free(swarm, a, b) and labels[a] != labels[b]
         if others and have_met(swarm, a, b, reach, width, height):
             unite(labels, a, b)

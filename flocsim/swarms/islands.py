@@ -42,9 +42,9 @@ def watch_paths(scene, work, observed, time):
     stop."""
     before, since = observed[0, sw.SEEN_AT], time - observed[0, sw.SINCE]
     first, last = stretch_at(observed, before), stretch_at(observed, time)
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
-            x, y = work.motion[at.NOW, body, at.X], work.motion[at.NOW, body, at.Y]
+    for body in range(work.poses.shape[0]):
+        if scene.bodies[body].free == 1.0:
+            x, y = work.place[at.NOW, body, at.X], work.place[at.NOW, body, at.Y]
             for stretch in range(first, last):
                 border = (
                     observed[0, sw.SINCE] + observed[0, sw.LENGTH] * (stretch + 1) / sw.STRETCHES
@@ -68,8 +68,7 @@ def put_scene(swarm, scene, members, first):
     point = 0
     for body in range(scene.bodies.shape[0]):
         member = members[first + body]
-        for column in range(scene.bodies.shape[1]):
-            scene.bodies[body, column] = swarm.bodies[member, column]
+        scene.bodies[body] = swarm.bodies[member]
         scene.first[body] = point
         begin, end = swarm.first[member], swarm.first[member + 1]
         for each in range(begin, end):
@@ -82,27 +81,56 @@ def put_scene(swarm, scene, members, first):
     scene.first[scene.bodies.shape[0]] = point
 
 
+def clear_body(work, body):
+    """Set what a run knows of a body besides its motion to zero."""
+    pose, errors, cluster, kick = (
+        work.poses[body],
+        work.errors[body],
+        work.clusters[body],
+        work.kicks[body],
+    )
+    pose.listed_x = pose.listed_y = pose.listed_angle = pose.cosine = pose.sine = 0.0
+    pose.known_angle = pose.known_cosine = pose.known_sine = pose.way = 0.0
+    errors.memory = errors.relaxation = errors.step_place = errors.step_speed = errors.stated = 0.0
+    errors.place = errors.speed = errors.switch_place = errors.switch_speed = 0.0
+    errors.doubt_place = errors.doubt_speed = 0.0
+    cluster.mass = cluster.shift_x = cluster.shift_y = cluster.shortened = cluster.most_place = 0.0
+    cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
+    kick.x = kick.y = kick.turn = 0.0
+    for stage in range(at.MOST_FRAMES):
+        frame = work.frames[body, stage]
+        frame.turn_cosine = frame.turn_sine = frame.shift_x = frame.shift_y = 0.0
+
+
 def put_state(swarm, work, members, first):
     """The state of its bodies into its work; nothing else of that is left from before."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         member = members[first + body]
-        for row in range(at.MOTION_ROWS):
-            for axis in range(at.MOTION_COLUMNS):
-                work.motion[row, body, axis] = 0.0
+        for row in range(at.ALL_STATES):
+            for axis in range(3):
+                work.place[row, body, axis] = 0.0
+                work.velocity[row, body, axis] = 0.0
         for row in range(at.STATES):
-            for axis in range(at.MOTION_COLUMNS):
-                work.rates[row, body, axis] = 0.0
-        for column in range(work.bodies.shape[1]):
-            work.bodies[body, column] = 0.0
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NOW, body, axis] = swarm.motion[member, axis]
-            work.motion[at.CARRIED, body, axis] = swarm.carried[member, axis]
-        for kind in range(sw.ERROR_COLUMNS):
-            work.bodies[body, at.ERROR_PLACE + kind] = swarm.errors[member, kind]
+            for axis in range(3):
+                work.force[row, body, axis] = 0.0
+        clear_body(work, body)
+        for axis in range(3):
+            work.place[at.NOW, body, axis] = swarm.motion[member, axis]
+            work.place[at.CARRIED, body, axis] = swarm.carried[member, axis]
+            work.velocity[at.NOW, body, axis] = swarm.motion[member, at.VX + axis]
+            work.velocity[at.CARRIED, body, axis] = swarm.carried[member, at.VX + axis]
+        known = work.errors[body]
+        known.place = swarm.errors[member, 0]
+        known.speed = swarm.errors[member, 1]
+        known.switch_place = swarm.errors[member, 2]
+        known.switch_speed = swarm.errors[member, 3]
+        known.doubt_place = swarm.errors[member, 4]
+        known.doubt_speed = swarm.errors[member, 5]
         work.order[body] = body
         work.cluster[body] = body
-    for place in range(at.TALLY_SIZE):
-        work.tally[place] = 0
+    work.kick.at = work.kick.span = 0.0
+    work.tally.candidates = work.tally.pairs = work.tally.kept = work.tally.full = 0
+    work.tally.evaluations = work.tally.rebuilds = work.tally.solves = work.tally.series_terms = 0
     for place in range(work.elimination.found.shape[0]):
         work.elimination.found[place] = 0
 
@@ -122,7 +150,7 @@ def local_of(members, first, size, body):
 def put_slips(swarm, scene, work, members, first):
     """The displacements of its contacts among those that the first list takes up; False without
     room."""
-    count, size = 0, work.bodies.shape[0]
+    count, size = 0, work.poses.shape[0]
     for body in range(size):
         member = members[first + body]
         for link in range(swarm.first_link[member], swarm.first_link[member + 1]):
@@ -131,26 +159,28 @@ def put_slips(swarm, scene, work, members, first):
                 continue
             if count == work.kept.shape[0]:
                 return False
-            work.kept[count, at.KEPT_LATER], work.kept[count, at.KEPT_EARLIER] = body, other
-            work.kept[count, at.KEPT_VERTEX] = local_point(
+            work.kept[count].later, work.kept[count].earlier = body, other
+            work.kept[count].vertex = local_point(
                 swarm, scene, members, first, swarm.links[link, sw.AT_VERTEX], body, other
             )
-            work.kept[count, at.KEPT_EDGE] = local_point(
+            work.kept[count].edge = local_point(
                 swarm, scene, members, first, swarm.links[link, sw.AT_EDGE], body, other
             )
-            work.kept[count, at.KEPT_MODE] = swarm.links[link, sw.MODE]
-            for kind in range(sw.SLIP_COLUMNS):
-                work.slip[at.KEPT_SLIP + kind, count] = swarm.slips[link, kind]
+            work.kept[count].mode = swarm.links[link, sw.MODE]
+            kept = work.kept[count]
+            kept.slip, kept.slip_offset = swarm.slips[link, 0], swarm.slips[link, 1]
+            kept.grazing_force, kept.gap_offset = swarm.slips[link, 2], swarm.slips[link, 3]
+            kept.flights = swarm.slips[link, 4]
             count += 1
-    work.tally[at.KEPT] = count + 1
+    work.tally.kept = count + 1
     return True
 
 
 def touch_plainly(work):
     """Let no contact graze or be held: where steps go on across switches there is none of that."""
-    for kept in range(work.tally[at.KEPT] - 1):
-        work.kept[kept, at.KEPT_MODE] = at.OPEN
-        work.slip[at.KEPT_GAP, kept] = 0.0
+    for kept in range(work.tally.kept - 1):
+        work.kept[kept].mode = at.OPEN
+        work.kept[kept].gap_offset = 0.0
 
 
 def local_point(swarm, scene, members, first, point, body, other):
@@ -168,23 +198,21 @@ def global_point(swarm, scene, members, first, point, body, other):
     return swarm.first[members[first + body]] + point - scene.first[body]
 
 
-def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, first):
+def put_times(swarm, work, observed, clocks, counts, members, first):
     """Clock, counts, and the paths that its bodies are expected to go.
 
     Steps go on across switches where those of any of its bodies did, from their shortest step.
     """
-    for place in range(at.CLOCK_SIZE):
-        clock[place] = start_clock[place]
-    for place in range(at.COUNTS_SIZE):
-        counts[place] = start_counts[place]
-    clock[at.TIME], clock[at.UNTIL] = swarm.times[sw.BEGIN], swarm.times[sw.END]
-    clock[at.HORIZON] = swarm.times[sw.HORIZON_AT]
+    clocks[sw.RUNNING], counts[sw.RUNNING] = clocks[sw.FRESH], counts[sw.FRESH]
+    clock = clocks[sw.RUNNING]
+    clock.time, clock.until = swarm.times[sw.BEGIN], swarm.times[sw.END]
+    clock.horizon = swarm.times[sw.HORIZON_AT]
     observed[0, sw.SINCE] = observed[0, sw.SEEN_AT] = swarm.times[sw.BEGIN]
     observed[0, sw.LENGTH] = swarm.times[sw.END] - swarm.times[sw.BEGIN]
     step, across = math.inf, 0.0
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         member = members[first + body]
-        if swarm.bodies[member, at.FREE] == 1.0:
+        if swarm.bodies[member].free == 1.0:
             other = swarm.methods[member]
             if other > across:
                 step, across = math.inf, other
@@ -200,60 +228,74 @@ def put_times(swarm, work, observed, clock, counts, start_clock, start_counts, m
             observed[body, box + sw.LEFT] = observed[body, box + sw.LOW] = math.inf
             observed[body, box + sw.RIGHT] = observed[body, box + sw.HIGH] = -math.inf
         widen(observed, body, 0, x, y)
-    clock[at.ACROSS] = across
-    clock[at.STEP] = step if step < math.inf else start_clock[at.STEP]
+    clock.across = across
+    clock.step = step if step < math.inf else clocks[sw.FRESH].step
 
 
 def take_slips(swarm, scene, work, found, members, first):
     """Write down the displacements of its contacts; False without room."""
     count, begin = keep_slips(work), found.filled[0]
-    work.tally[at.KEPT] = 0
+    work.tally.kept = 0
     if begin + count > found.links.shape[0]:
         return False
     for kept in range(count):
-        later, earlier = work.kept[kept, at.KEPT_LATER], work.kept[kept, at.KEPT_EARLIER]
+        later, earlier = work.kept[kept].later, work.kept[kept].earlier
         row = begin + kept
         found.links[row, sw.LATER_BODY] = members[first + later]
         found.links[row, sw.EARLIER_BODY] = members[first + earlier]
         found.links[row, sw.AT_VERTEX] = global_point(
-            swarm, scene, members, first, work.kept[kept, at.KEPT_VERTEX], later, earlier
+            swarm, scene, members, first, work.kept[kept].vertex, later, earlier
         )
         found.links[row, sw.AT_EDGE] = global_point(
-            swarm, scene, members, first, work.kept[kept, at.KEPT_EDGE], later, earlier
+            swarm, scene, members, first, work.kept[kept].edge, later, earlier
         )
-        found.links[row, sw.MODE] = work.kept[kept, at.KEPT_MODE]
-        for kind in range(sw.SLIP_COLUMNS):
-            found.slips[row, kind] = work.slip[at.KEPT_SLIP + kind, kept]
+        found.links[row, sw.MODE] = work.kept[kept].mode
+        found.slips[row, 0] = work.kept[kept].slip
+        found.slips[row, 1] = work.kept[kept].slip_offset
+        found.slips[row, 2] = work.kept[kept].grazing_force
+        found.slips[row, 3] = work.kept[kept].gap_offset
+        found.slips[row, 4] = work.kept[kept].flights
     found.filled[0] = begin + count
     return True
 
 
 def take_state(swarm, work, observed, clock, members, first):
     """Write the state of its bodies at the window's end, and how they got there."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         member = members[first + body]
         swarm.strayed[member] = observed[body, sw.FURTHEST]
         for stretch in range(sw.STRETCHES):
             for column in range(sw.BOX_COLUMNS):
                 swarm.ways[member, stretch, column] = observed[body, box_at(stretch) + column]
-        if swarm.bodies[member, at.FREE] == 0.0:
+        if swarm.bodies[member].free == 0.0:
             continue
-        for axis in range(at.MOTION_COLUMNS):
-            swarm.new_motion[member, axis] = work.motion[at.NOW, body, axis]
-            swarm.new_carried[member, axis] = work.motion[at.CARRIED, body, axis]
-        for kind in range(sw.ERROR_COLUMNS):
-            swarm.new_errors[member, kind] = work.bodies[body, at.ERROR_PLACE + kind]
-        swarm.new_steps[member] = clock[at.STEP]
-        swarm.stated[member] = work.bodies[body, at.STATED]
-        swarm.new_methods[member] = clock[at.ACROSS]
+        for axis in range(3):
+            swarm.new_motion[member, axis] = work.place[at.NOW, body, axis]
+            swarm.new_carried[member, axis] = work.place[at.CARRIED, body, axis]
+            swarm.new_motion[member, at.VX + axis] = work.velocity[at.NOW, body, axis]
+            swarm.new_carried[member, at.VX + axis] = work.velocity[at.CARRIED, body, axis]
+        known = work.errors[body]
+        swarm.new_errors[member, 0] = known.place
+        swarm.new_errors[member, 1] = known.speed
+        swarm.new_errors[member, 2] = known.switch_place
+        swarm.new_errors[member, 3] = known.switch_speed
+        swarm.new_errors[member, 4] = known.doubt_place
+        swarm.new_errors[member, 5] = known.doubt_speed
+        swarm.new_steps[member] = clock.step
+        swarm.stated[member] = work.errors[body].stated
+        swarm.new_methods[member] = clock.across
 
 
 def run_islands(
-    swarm, scene, work, observed, clock, counts, record, start_clock, start_counts, members, starts,
-    codes, costs, found, first, last,
+    swarm, scene, work, observed, clocks, counts, record, members, starts, codes, costs, found,
+    first, last,
 ):  # fmt: skip
     """Run the islands from ``first`` to before ``last``, all of as many bodies as ``scene`` has:
-    their Status into ``codes``. How far that went: to one that found no room, or to the last."""
+    their Status into ``codes``. How far that went: to one that found no room, or to the last.
+
+    ``clocks`` and ``counts``: of the island that runs, RUNNING, and as each of them begins, FRESH.
+    """
+    clock, count = clocks[sw.RUNNING], counts[sw.RUNNING]
     for island in range(first, last):
         begin = starts[island]
         put_scene(swarm, scene, members, begin)
@@ -261,21 +303,21 @@ def run_islands(
         for pair in range(work.budget.shape[0]):
             work.budget[pair] = -1.0
         if watches_all(work):
-            work.tally[at.PAIRS] = all_counting(scene.bodies, work.pairs)
+            work.tally.pairs = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
-            work.tally[at.FULL] = at.CANDIDATES_FULL
+            work.tally.full = at.CANDIDATES_FULL
             return island
-        put_times(swarm, work, observed, clock, counts, start_clock, start_counts, members, begin)
-        if clock[at.ACROSS] == 1.0:
+        put_times(swarm, work, observed, clocks, counts, members, begin)
+        if clock.across == 1.0:
             touch_plainly(work)
-        code = advance(scene, work, observed, clock, counts, record)
+        code = advance(scene, work, observed, clock, count, record)
         if code == NO_ROOM:
             return island
         if code == FINISHED and not take_slips(swarm, scene, work, found, members, begin):
             return island
         codes[island] = code
-        costs[island, sw.STEPS_TAKEN] = counts[at.STEPS]
-        costs[island, sw.STEPS_REJECTED] = counts[at.REJECTED]
-        costs[island, sw.FORCES_SUMMED] = work.tally[at.EVALUATIONS]
+        costs[island, sw.STEPS_TAKEN] = count.steps
+        costs[island, sw.STEPS_REJECTED] = count.rejected
+        costs[island, sw.FORCES_SUMMED] = work.tally.evaluations
         take_state(swarm, work, observed, clock, members, begin)
     return last

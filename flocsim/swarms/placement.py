@@ -195,7 +195,7 @@ class Leaving:
         """Which bodies are outside, with all of their circles, and will not come back themselves:
         through the top only what rises."""
         x, y = swarm.motion[:, at.X], swarm.motion[:, at.Y]
-        reach = swarm.bodies[:, at.BOUNDING_RADIUS]
+        reach = swarm.bodies["bounding_radius"]
         found = np.zeros(len(x), bool)
         if not self.repeats[0]:
             found |= (x < -reach) | (x > self.area[0] + reach)
@@ -219,7 +219,7 @@ class Leaving:
     def removed(self, swarm: Swarm, gone: np.ndarray) -> Swarm:
         """The swarm without some bodies (n,) bool, which lie outside from now on."""
         swarm.motion[gone] = 0.0
-        apart = PARKED * max(float(swarm.bodies[:, at.BOUNDING_RADIUS].max()), *self.area)
+        apart = PARKED * max(float(swarm.bodies["bounding_radius"].max()), *self.area)
         axis = at.X if not self.repeats[0] else at.Y
         swarm.motion[gone, axis] = -apart * (2.0 + np.arange(len(gone)))[gone]
         for array in (swarm.stated, swarm.strayed, swarm.carried, swarm.errors):
@@ -233,14 +233,14 @@ class Leaving:
         rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(
             tuple(self.key), spawn_key=(int(members[0]), count)
         )))  # fmt: skip
-        place, reach = swarm.motion[members, :2], swarm.bodies[members, at.BOUNDING_RADIUS]
+        place, reach = swarm.motion[members, :2], swarm.bodies[members]["bounding_radius"]
         low = (place - reach[:, None]).min(axis=0)
         high = (place + reach[:, None]).max(axis=0)
         wide, tall = high - low
         rises = not self.repeats[1] and low[1] > self.area[1]
         others = present.copy()
         others[members] = False
-        there, radii = swarm.motion[others, :2], swarm.bodies[others, at.BOUNDING_RADIUS]
+        there, radii = swarm.motion[others, :2], swarm.bodies[others]["bounding_radius"]
         out, clear = 0.0, CLEAR * max(wide, tall)
         while True:
             for _ in range(FEW_TRIALS):

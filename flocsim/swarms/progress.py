@@ -144,8 +144,8 @@ class Progress:
         self.leaving, self.shielding = leaving, shielding
         self.gone = np.zeros(len(swarm.bodies), bool)
         self.returns = np.zeros(len(swarm.bodies), dtype=np.int64)
-        self.free = swarm.bodies[:, at.FREE] == 1.0
-        self.least_wander = LEAST_WANDER * swarm.bodies[:, at.BOUNDING_RADIUS]
+        self.free = swarm.bodies["free"] == 1.0
+        self.least_wander = LEAST_WANDER * swarm.bodies["bounding_radius"]
         swarm.wander[:] = self.least_wander
         swarm.times[sw.HORIZON_AT] = until
         self.time, self.effort = 0.0, Effort()
@@ -157,7 +157,7 @@ class Progress:
     @property
     def mean_radius(self) -> float:
         """The mean bounding radius of the bodies that move [m]."""
-        return float(np.mean(self.swarm.bodies[self.free, at.BOUNDING_RADIUS]))
+        return float(np.mean(self.swarm.bodies[self.free]["bounding_radius"]))
 
     def time_to_go(self, way: float) -> float:
         """The time in which no body goes further than that against the mean of all [s]."""
@@ -299,7 +299,7 @@ class Progress:
         self.gone |= gone
         self.free &= ~gone
         swarm = self.swarm
-        swarm.bodies[gone, at.FREE] = swarm.bodies[gone, at.MASS] = 0.0
+        swarm.bodies[gone].free = swarm.bodies[gone].mass = 0.0
 
     def let_leave(self) -> None:
         """Deal with what has left the box, as ``leaving`` says."""

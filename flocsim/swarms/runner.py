@@ -52,7 +52,7 @@ class IslandArrays:
     scene: Scene
     work: Work
     observed: np.ndarray
-    clock: np.ndarray
+    clocks: np.ndarray
     counts: np.ndarray
 
 
@@ -70,8 +70,10 @@ class ThreadArrays:
     @property
     def tried(self) -> int:
         """Steps tried in the island that runs."""
-        running = self.running
-        return 0 if running is None else int(running.counts[at.STEPS] + running.counts[at.REJECTED])
+        if self.running is None:
+            return 0
+        counts = self.running.counts[sw.RUNNING]
+        return int(counts.steps + counts.rejected)
 
     def halt(self, halted: bool = True) -> None:
         """Let the islands that run stop at their next steps; or those to come run on."""
@@ -84,7 +86,7 @@ class ThreadArrays:
         if size not in self.by_size:
             points = size * self.most_points
             scene = self.template._replace(
-                bodies=np.ones((size, self.template.bodies.shape[1])),
+                bodies=np.resize(self.template.bodies, size),
                 first=np.zeros(size + 1, dtype=np.int64),
                 vertices=np.zeros((points, self.template.vertices.shape[1])),
                 tree=np.zeros((2 * points, 3)),
@@ -96,7 +98,7 @@ class ThreadArrays:
             work = work_of(scene, zeros, zeros, room, pairs=pairs, blocks=blocks)
             self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
-                integrator.fresh_clock(), integrator.fresh_counts(0),
+                at.Clock.rows(2), at.Counts.rows(2),
             )  # fmt: skip
         return self.by_size[size]
 
@@ -189,7 +191,7 @@ class Runner:
     integrator: Integrator
     threads: list[ThreadArrays]
     max_steps: int
-    pairs: np.ndarray = attrs.field(factory=lambda: np.zeros((256, 2), dtype=np.int64))
+    pairs: np.ndarray = attrs.field(factory=lambda: at.BodyPair.rows(256))
     pool: ThreadPoolExecutor | None = None
 
     def reached(
@@ -198,15 +200,15 @@ class Runner:
     ) -> Reached:  # fmt: skip
         """Who can reach whom in a window of so many seconds; with what was known ``before`` it was
         run: who has."""
-        n, gone = len(swarm.bodies), swarm.bodies[:, at.MASS] == 0.0
-        walls = np.flatnonzero((swarm.bodies[:, at.FREE] == 0.0) & ~gone)
+        n, gone = len(swarm.bodies), swarm.bodies["mass"] == 0.0
+        walls = np.flatnonzero((swarm.bodies["free"] == 0.0) & ~gone)
         labels = np.zeros(n, dtype=np.int64) if before is None else before.labels
         touches = np.zeros((n, len(walls)), dtype=np.bool_)
         find = self.finder if before is None else self.joiner
         while (
             found := find(swarm, span, reach, *box, self.pairs, labels, walls, touches)
         ) > len(self.pairs):  # fmt: skip
-            self.pairs = np.zeros((2 * found, 2), dtype=np.int64)
+            self.pairs = at.BodyPair.rows(2 * found)
         labels[gone] = -1
         return Reached(labels, walls, touches)
 
@@ -216,19 +218,19 @@ class Runner:
         """Run islands of one size."""
         size = int(islands.sizes[first])
         own.running = place = own.of_size(size, self.integrator)
-        start_clock = self.integrator.fresh_clock()
-        start_counts = self.integrator.fresh_counts(budget_of(self.max_steps, size))
+        place.clocks[sw.FRESH] = self.integrator.fresh_clock()
+        place.counts[sw.FRESH] = self.integrator.fresh_counts(budget_of(self.max_steps, size))
         record = np.zeros((0, 1))
         own.make_room(LINKS * size * (last - first))
         while not own.halted:
             first = self.driver(
-                swarm, place.scene, place.work, place.observed, place.clock, place.counts, record,
-                start_clock, start_counts, islands.members, islands.starts, islands.codes,
+                swarm, place.scene, place.work, place.observed, place.clocks, place.counts, record,
+                islands.members, islands.starts, islands.codes,
                 islands.costs, own.found, first, last,
             )  # fmt: skip
             if first == last:
                 return
-            if place.work.tally[at.FULL] == at.NOTHING_FULL:
+            if place.work.tally.full == at.NOTHING_FULL:
                 own.make_room(len(own.found.links))
             else:
                 self.driver, work = with_more(self.driver, place.work)

@@ -87,22 +87,23 @@ class Instant:
     def forces(self, scene: Scene) -> np.ndarray:
         """(n, 3) force and torque on every body [N, N, N m] of a scene with these or other laws."""
         sum_forces(scene, self.work, self.time, at.NOW)
-        return self.work.rates[at.NOW, :, at.FORCE : at.FORCE + 3].copy()
+        return self.work.force[at.NOW].copy()
 
     def contacts(self) -> list[Contact]:
         """All contact points."""
         work, found = self.work, []
-        for row in np.flatnonzero(work.candidates[: work.tally[at.CANDIDATES], at.CLOSED] == 1):
-            a, b = (int(work.candidates[row, place]) for place in (at.VERTEX_BODY, at.EDGE_BODY))
-            geometry, motion = work.geometry[at.NOW, row], work.motion[at.NOW, a]
+        for row in np.flatnonzero(work.candidates[: work.tally.candidates]["closed"] == 1):
+            candidate = work.candidates[row]
+            a, b = int(candidate.vertex_body), int(candidate.edge_body)
+            geometry, (x, y, _) = work.geometry[at.NOW, row], work.place[at.NOW, a]
             dx, dy = contact_point(work, row, a)
             force = (0.0, 0.0)
             if has(self.scene, CONTACT_FORCE):
                 force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
             found.append(Contact(
-                (a, b), (float(motion[0] + dx), float(motion[1] + dy)),
-                (float(geometry[at.NORMAL_X]), float(geometry[at.NORMAL_Y])),
-                float(-geometry[at.GAP]), float(work.slip[at.NOW, row]),
+                (a, b), (float(x + dx), float(y + dy)),
+                (float(geometry.normal_x), float(geometry.normal_y)),
+                float(-geometry.gap), float(work.slip[at.NOW, row]),
                 (float(force[0]), float(force[1])),
             ))  # fmt: skip
         return found
@@ -113,8 +114,8 @@ class Replay:
 
     def __init__(self, origin: Origin) -> None:
         self.origin, self.run, self.leg = origin, origin.begin(), 0
-        self.run.counts[at.MAX_STEPS] = np.iinfo(np.int64).max
-        self.run.clock[at.UNTIL] = origin.legs[0][1]
+        self.run.counts.max_steps = np.iinfo(np.int64).max
+        self.run.clock.until = origin.legs[0][1]
         self.scene = self.scene_of(origin.forces)
 
     def scene_of(self, forces: Sequence[Force]) -> Scene:
@@ -140,7 +141,7 @@ class Replay:
             last = legs[self.leg][0]
             if self.run.steps >= last and self.leg + 1 < len(legs):
                 self.leg += 1
-                self.run.clock[at.UNTIL] = legs[self.leg][1]
+                self.run.clock.until = legs[self.leg][1]
                 continue
             self.run.advance(min(step, last) - self.run.steps)
 
@@ -153,7 +154,7 @@ class Replay:
             step = int(np.searchsorted(steps, time, side="right")) - 1
             if steps[step] == time:
                 self.to_step(step)
-                yield self.instant(time, self.run.work.motion[at.NOW], self.slips())
+                yield self.instant(time, at.motion_of(self.run.work, at.NOW), self.slips())
                 continue
             yield self.instant(time, *self.within(float(time), step, steps))
 
@@ -167,7 +168,7 @@ class Replay:
         ahead = copy.copy(self)
         ahead.run = self.run.copy()
         ahead.to_step(step + 1)
-        start, before, after = self.run.work.motion[at.NOW], self.slips(), ahead.slips()
+        start, before, after = at.motion_of(self.run.work, at.NOW), self.slips(), ahead.slips()
         share = (time - begin) / (end - begin)
         slips = {
             key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
@@ -178,21 +179,21 @@ class Replay:
     def slips(self) -> Slips:
         """The tangential displacements of all listed pairs now."""
         work = self.run.work
-        rows = range(work.tally[at.CANDIDATES])
+        rows = range(work.tally.candidates)
         return {key_of(work, row): float(work.slip[at.NOW, row]) for row in rows}
 
     def instant(self, time: float, motion: np.ndarray, slips: Slips) -> Instant:
         """The Instant of a motion (n, 6) near where the run is now."""
         work = copy_of(self.run.work)
-        work.motion[at.NOW] = motion
+        at.put_motion(work, at.NOW, motion)
         touching = has(self.scene, CONTACT_FORCE) or self.scene.listed_reach > 0.0
         if touching or not watches_all(work):
-            while not work.tally[at.CANDIDATES] and not list_candidates(self.scene, work):
+            while not work.tally.candidates and not list_candidates(self.scene, work):
                 work = with_room(work)
         if touching:
             locate_contacts(self.scene, work, at.NOW)
             set_closed(work)
-            for row in range(work.tally[at.CANDIDATES]):
+            for row in range(work.tally.candidates):
                 work.slip[at.NOW, row] = slips.get(key_of(work, row), 0.0)
             if self.scene.listed_reach > 0.0:
                 flag_near(self.scene, work, at.NOW, 0.0)
@@ -200,8 +201,8 @@ class Replay:
 
 
 def key_of(work, row):
-    columns = [at.VERTEX_BODY, at.VERTEX, at.EDGE_BODY, at.EDGE_START]
-    return tuple(work.candidates[row, columns].tolist())
+    pair = work.candidates[row]
+    return pair.vertex_body, pair.vertex, pair.edge_body, pair.edge_start
 
 
 def step_motion(
@@ -213,18 +214,20 @@ def step_motion(
     of others, and where the stages are no longer those of the step, Hermite's through both ends.
     """
     work, clock = run.work, run.clock
-    terms = int(work.tally[at.SERIES_TERMS])
-    if terms > 0 and np.array_equal(work.motion[at.START], start):
-        whole = float(clock[at.SERIES_STEP])
+    terms = int(work.tally.series_terms)
+    if terms > 0 and np.array_equal(at.motion_of(work, at.START), start):
+        whole = float(clock.series_step)
         write_at(work, at.START, terms, whole, (time - begin) / whole, at.TRIAL, 0, len(start))
-        return work.motion[at.TRIAL].copy()
-    stages = work.motion[[at.START, at.FIRST_STAGE, SECOND_STAGE, THIRD_STAGE]]
-    whole = float(clock[at.STAGED_STEP])
-    if whole == 0.0 and np.array_equal(stages[3], work.motion[at.NOW]):
+        return at.motion_of(work, at.TRIAL)
+    stages = np.array(
+        [at.motion_of(work, each) for each in (at.START, at.FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]
+    )
+    whole = float(clock.staged_step)
+    if whole == 0.0 and np.array_equal(stages[3], at.motion_of(work, at.NOW)):
         whole = end - begin
-    own = origin.has_stages and clock[at.STAGED_AT] == begin and whole > 0.0
+    own = origin.has_stages and clock.staged_at == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
-        return hermite(begin, end, start, work.motion[at.NOW], time)
+        return hermite(begin, end, start, at.motion_of(work, at.NOW), time)
     return cubic(stage_weights((time - begin) / whole), *stages)
 
 
@@ -291,7 +294,7 @@ def energies_of(origin: Origin, times: np.ndarray, velocity: np.ndarray) -> Ener
     free = np.array([0.0 if body.fixed else 1.0 for body in origin.bodies])[:, None]
 
     def powers(instant: Instant) -> np.ndarray:
-        rates = instant.work.motion[at.NOW, :, 3:] * free
+        rates = instant.work.velocity[at.NOW] * free
         return np.array([np.sum(instant.forces(scene) * rates) for scene in smooth.values()])
 
     inside = times[:-1, None] + np.diff(times)[:, None] * LOBATTO

@@ -100,7 +100,7 @@ class Trajectory:
     ) -> "Trajectory":  # fmt: skip
         """What a Run has come to."""
         times, position, velocity = run.motion()
-        adaptive = np.isfinite(run.clock[at.TOLERANCE])
+        adaptive = np.isfinite(run.clock.tolerance)
         return cls(
             times, position, velocity, status, run.steps, run.rejected, run.evaluations,
             run.error if adaptive else float("nan"), wall_time, amplification, row, origin,
@@ -228,8 +228,8 @@ class Trajectory:
             reason = self.status.reason if self.row is None else "its study has decided it"
             raise UsageError(f"this run cannot continue: {reason}")
         began, run = time.perf_counter(), origin.ended.revived(origin.begin).copy()
-        run.clock[at.UNTIL] = end
-        run.counts[at.MAX_STEPS] += max_steps
+        run.clock.until = end
+        run.counts.max_steps += max_steps
         status = watched(run, watch)
         made = attrs.evolve(origin, ended=run, legs=(*origin.legs, (run.steps, end)))
         return Trajectory.of(run, status, self.wall_time + time.perf_counter() - began, origin=made)
@@ -324,7 +324,7 @@ def watched(run: Run, watch: Watch | None) -> Status:
     if watch is None:
         return run.to_end()
     while (status := run.advance(1)) == Status.PAUSED:
-        motion = run.work.motion[at.NOW].copy()
-        if watch(State(float(run.clock[at.TIME]), motion[:, :3], motion[:, 3:])):
+        place, velocity = run.work.place[at.NOW].copy(), run.work.velocity[at.NOW].copy()
+        if watch(State(float(run.clock.time), place, velocity)):
             return Status.STOPPED
     return status

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds import rest
 from flocsim.bonds.certificate import is_closed, size_of
@@ -43,7 +42,7 @@ def hooked(two, drift=(0.0, -1e-3)):
 def test_an_ell_over_another_hooks_under_a_load_downwards(fixed, friction):
     """Of a free doublet the line of centres becomes the plumb: then it takes friction, too."""
     two = drawn(ELL, OVER, (0.0, REACH), friction, fixed=(fixed, False))
-    assert any(is_closed(two.work, row) for row in range(two.work.tally[at.CANDIDATES]))
+    assert any(is_closed(two.work, row) for row in range(two.work.tally.candidates))
     assert hooked(two) == (fixed or friction != 0.0)
     assert not hooked(two, (0.0, 1e-3))
 
@@ -110,7 +109,7 @@ def entangled(rng, friction):
         apart = rng.uniform(4e-6, 15e-6)
         places = [(0.0, 0.0, turns[0]), (apart * math.cos(way), apart * math.sin(way), turns[1])]
         two = TwoBodies(shapes, places, [Contact(friction=friction)])
-        gaps = [two.work.geometry[0, row, 2] for row in range(two.work.tally[at.CANDIDATES])]
+        gaps = [two.work.geometry[0, row, 2] for row in range(two.work.tally.candidates)]
         if gaps and -2e-6 < min(gaps) < 0.0:
             return shapes, np.array(places), two
 
@@ -120,7 +119,7 @@ def by_linear_program(two, drift, grip):
     bond, work = two.bond, two.work
     size = size_of(two.scene, 0, 1)
     pushes = []
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if not is_closed(work, row):
             continue
         n = np.array(rest.normal_on(work, bond, row))

@@ -3,7 +3,6 @@
 import attrs
 import pytest
 
-import flocsim.arrays as at
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.study import Study
@@ -56,7 +55,7 @@ def test_pairs_in_a_flow_are_drawn_with_it(tmp_path, meeting):
     study = Study(config)
     draws = [study.draw(0, 4, 0.5, each) for each in range(2)]
     for draw in draws:
-        assert draw.encounter.scene.bodies[:, at.RESISTANCE].min() > 0.0
+        assert draw.encounter.scene.bodies["resistance_xx"].min() > 0.0
 
 
 def test_an_engine_for_drag_of_shapes_is_not_taken_for_pairs_without(tmp_path):

@@ -61,10 +61,10 @@ def bodies_of(plain, **material):
 
 def keys_of(scene, work):
     """(vertex's body, vertex, edge's body, edge) of every listed pair."""
-    first = scene.first
+    first, names = scene.first, ["vertex_body", "vertex", "edge_body", "edge_start"]
     return [
-        (int(a), int(point - first[a]), int(b), int(start - first[b]))
-        for a, point, b, start in work.candidates[: work.tally[at.CANDIDATES], :4]
+        (a, int(point - first[a]), b, int(start - first[b]))
+        for a, point, b, start in work.candidates[: work.tally.candidates][names].tolist()
     ]
 
 
@@ -85,7 +85,7 @@ class FastScene:
             # A second listing has to hand the displacements back to the same pairs.
             self.put_slips(slips)
             assert self.evaluate(self.scene, self.work)
-        return self.work.rates[at.NOW, :, 3:].copy()
+        return self.work.force[at.NOW].copy()
 
     def put_slips(self, slips):
         """Write displacements {pair: ξ} into the list; every pair must be in it."""
@@ -101,7 +101,7 @@ class FastScene:
 
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
-        rows = self.work.geometry[at.NOW, : self.work.tally[at.CANDIDATES]]
+        rows = self.work.geometry[at.NOW, : self.work.tally.candidates]
         return {
             key: row
             for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)
@@ -111,7 +111,7 @@ class FastScene:
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""
         nx, ny, across, along = row[0], row[1], row[3], row[4]
-        x, y = self.work.motion[at.NOW, key[0], :2]
+        x, y = self.work.place[at.NOW, key[0], :2]
         return np.array([x + along * nx + across * ny, y + along * ny - across * nx])
 
 

@@ -92,11 +92,11 @@ class LoneStudy(StudyKind):
         """Run a floc: how fast it sinks, and how far it drifts away."""
         until, most = self.scene.duration, self.config.integrator.max_steps
         run = self.system(condition.vertices, replicate).begin(until, max_steps=most)
-        before = run.work.motion[at.NOW, 1, :2].copy()
+        before = run.work.place[at.NOW, 1, :2].copy()
         status = run.to_end(halted)
         if status == Status.PAUSED:
             return None, None
-        x, y = run.work.motion[at.NOW, 1, :2] - before
+        x, y = run.work.place[at.NOW, 1, :2] - before
         failed = status != Status.FINISHED
         row = {"speed": -y / until, "drift": x, "steps": run.steps, "failed": failed}
         return row, self.note(condition, replicate, status.name) if failed else None

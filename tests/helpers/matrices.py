@@ -2,7 +2,6 @@
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 
 
@@ -12,8 +11,8 @@ def whole_matrix(work, which):
     matrix = np.zeros((n, 3, n, 3))
     for body in range(n):
         matrix[body, :, body] = blocks[body]
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         matrix[a, :, b] = blocks[lower_block(work, pair)]
         matrix[b, :, a] = blocks[upper_block(work, pair)]
     return matrix.reshape(3 * n, 3 * n)

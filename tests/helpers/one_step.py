@@ -23,7 +23,7 @@ def from_before(scene, work, clock, step):
 def from_anywhere(scene, work, clock, step):
     """One step of whose contacts nothing is known."""
     begin_step(work, clock)
-    evaluate_others(scene, work, clock[at.TIME], step)
+    evaluate_others(scene, work, clock.time, step)
     flag_close(scene, work)
     gather_clusters(scene, work)
     usual, way = usual_sizes(scene, work, step)
@@ -49,7 +49,7 @@ class Stage:
         self.scene = system.scene(jit=False)
         self.work = work_of(self.scene, *system.motion())
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
-        self.clock[at.UNTIL] = 1.0
+        self.clock.until = 1.0
         assert self.linked(keep_lists)(self.scene, self.work, self.counts, 0.0)
 
     def linked(self, function):
@@ -70,12 +70,12 @@ class Stage:
 
     @property
     def time(self):
-        return self.clock[at.TIME]
+        return self.clock.time
 
     @property
     def position(self):
-        return self.work.motion[at.NOW, :, : at.VX].copy()
+        return self.work.place[at.NOW].copy()
 
     @property
     def velocity(self):
-        return self.work.motion[at.NOW, :, at.VX :].copy()
+        return self.work.velocity[at.NOW].copy()

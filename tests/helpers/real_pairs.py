@@ -119,7 +119,7 @@ class Resistance:
         self.entry = system.compose(entry=resistance_here, observer=None, jit=jit)
 
     def __call__(self, places):
-        self.work.motion[at.NOW, :, :3] = places
+        self.work.place[at.NOW] = places
         assert self.entry(self.scene, self.work)
         blocks = self.work.jacobian[at.DAMPING]
         return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])

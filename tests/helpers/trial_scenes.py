@@ -141,10 +141,10 @@ def watched(
     run = system.begin(until, max_steps=max_steps, observer=WATCH, observed=observed, jit=jit)
     run.work = work_of(run.scene, *system.motion(), capacity)
     if largest_step is not None:
-        run.clock[at.LARGEST_STEP] = min(run.clock[at.LARGEST_STEP], largest_step)
+        run.clock.largest_step = min(run.clock.largest_step, largest_step)
     status = run.to_end()
     return Watched(
-        motion=run.work.motion[at.NOW].copy(), status=status, time=run.time, steps=run.steps,
+        motion=at.motion_of(run.work, at.NOW), status=status, time=run.time, steps=run.steps,
         rejected=run.rejected, error=run.error,
         contacts=int(observed[CONTACTS]), deepest=float(observed[DEEPEST]),
         touch_time=float(observed[TOUCH_TIME]), touch_gap=float(observed[TOUCH_GAP]),

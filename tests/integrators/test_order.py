@@ -33,7 +33,7 @@ def even_steps(scene, work, clock, counts, step, count):
             return False
         locate_contacts(scene, work, at.NEW)
         take_new_state(work)
-        clock[at.TIME] += step
+        clock.time += step
     return True
 
 
@@ -63,10 +63,10 @@ def end_of(name, integrator, count):
     driver = system.compose(entry=even_steps, jit=False)
     scene = system.scene(jit=False)
     work, clock = work_of(scene, *system.motion()), integrator.fresh_clock()
-    clock[at.TOLERANCE] = min(clock[at.TOLERANCE], EXACT)
-    clock[at.UNTIL], clock[at.LARGEST_STEP] = until, until / count
+    clock.tolerance = min(clock.tolerance, EXACT)
+    clock.until, clock.largest_step = until, until / count
     assert driver(scene, work, clock, integrator.fresh_counts(count), until / count, count)
-    return work.motion[at.NOW] * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
+    return at.motion_of(work, at.NOW) * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
 def order_of(scene, integrator, counts, exact):

@@ -6,7 +6,6 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, Swarm, System
 from flocsim.errors import ConfigError, UsageError
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
@@ -39,7 +38,7 @@ def shielding_of(swarm):
     position, _ = swarm.system.motion()
     known = swarm.system.scene(jit=False).bodies.copy()
     Shielding(swarm.bodies, swarm.forces, swarm.gauge()).apply(known, position)
-    return known[:, at.SHIELDING : at.SHIELDING + 3]
+    return np.column_stack([known[f"shielding_{name}"] for name in ("xx", "xy", "yy")])
 
 
 def velocity(bodies, forces=FORCES, **options):

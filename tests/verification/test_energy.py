@@ -23,11 +23,11 @@ def energies(run):
     """(kinetic, normal, tangential) energy [J] of a Run now, its greatest overlap [m], and how many
     contacts it has."""
     work, bodies = run.work, run.scene.bodies
-    now, listed = work.motion[at.NOW], int(work.tally[at.CANDIDATES])
-    speeds = bodies[:, at.MASS] * (now[:, at.VX] ** 2 + now[:, at.VY] ** 2)
-    kinetic = 0.5 * np.sum(speeds + bodies[:, at.INERTIA] * now[:, at.SPIN] ** 2)
-    closed = work.candidates[:listed, at.CLOSED] > 0
-    overlap = -work.geometry[at.NOW, :listed, at.GAP][closed]
+    velocity, listed = work.velocity[at.NOW], int(work.tally.candidates)
+    speeds = bodies["mass"] * (velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
+    kinetic = 0.5 * np.sum(speeds + bodies["inertia"] * velocity[:, 2] ** 2)
+    closed = work.candidates[:listed]["closed"] > 0
+    overlap = -work.geometry[at.NOW, :listed]["gap"][closed]
     slip = work.slip[at.NOW, :listed][closed]
     parts = kinetic, 0.5 * K_N * np.sum(overlap**2), 0.5 * K_T * np.sum(slip**2)
     return parts, overlap.max(initial=0.0), int(closed.sum())

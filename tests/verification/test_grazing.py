@@ -43,13 +43,14 @@ def rod_on_a_bar(lean, gravity, speed, tolerance=1e-9, law=None):
 
 def energy(run, gravity):
     """Of the rod's motion, weight and springs [J]."""
-    work, (mass, inertia) = run.work, run.scene.bodies[1, [at.MASS, at.INERTIA]]
-    _, y, _, vx, vy, spin = work.motion[at.NOW, 1]
+    work, body = run.work, run.scene.bodies[1]
+    mass, inertia = body.mass, body.inertia
+    y, (vx, vy, spin) = work.place[at.NOW, 1, at.Y], work.velocity[at.NOW, 1]
     total = 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * spin**2 + mass * gravity * y
     law = Contact()
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
-            overlap, slip = work.geometry[at.NOW, row, at.GAP], work.slip[at.NOW, row]
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES:
+            overlap, slip = work.geometry[at.NOW, row].gap, work.slip[at.NOW, row]
             total += 0.5 * law.k_n * overlap**2 + 0.5 * law.k_t * slip**2
     return total
 
@@ -59,8 +60,8 @@ def carried(system, gravity=0.0, until=UNTIL):
     run = system.begin(until, max_steps=100_000)
     grazing, energies = 0, []
     while (status := run.advance(1)) == Status.PAUSED:
-        rows = run.work.candidates[: run.work.tally[at.CANDIDATES]]
-        grazing += bool(np.any(rows[:, at.CLOSED] == at.GRAZES))
+        rows = run.work.candidates[: run.work.tally.candidates]
+        grazing += bool(np.any(rows["closed"] == at.GRAZES))
         energies.append(energy(run, gravity))
     assert status == Status.FINISHED
     return run, grazing, np.array(energies)
@@ -73,7 +74,7 @@ def test_the_limit_is_what_the_cycles_come_to_in_a_fraction_of_their_steps(scene
     exact, never, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
     assert grazing > 0 and never == 0
     assert 2.4 * run.steps < exact.steps
-    ends = [each.work.motion[at.NOW, :, :3] for each in (run, exact)]
+    ends = [each.work.place[at.NOW] for each in (run, exact)]
     assert end_distance(system.bodies, *ends) < run.error
 
 
@@ -87,7 +88,7 @@ def test_what_a_dozen_grazes_are_wrong_by_does_not_cancel_in_what_is_stated():
         run, grazes, _ = carried(system)
         if grazes > 0:
             exact, _, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
-            ends = [each.work.motion[at.NOW, :, :3] for each in (run, exact)]
+            ends = [each.work.place[at.NOW] for each in (run, exact)]
             beyond += end_distance(system.bodies, *ends) > run.error
             grazing += 1
     assert grazing > 30 and beyond <= 0.01 * grazing
@@ -107,4 +108,4 @@ def test_without_a_tangential_force_nothing_grazes():
     for law in (Contact(friction=0.0), Contact(k_t=0.0)):
         run, grazing, _ = carried(rod_on_a_bar(0.6, 1.0, -1e-3, law=law))
         assert grazing == 0 and run.steps < 100
-        assert run.work.motion[at.NOW, 1, 3] == pytest.approx(-1e-3, rel=1e-12)
+        assert run.work.velocity[at.NOW, 1, at.X] == pytest.approx(-1e-3, rel=1e-12)

@@ -204,8 +204,8 @@ class Draw:
         row = BLANK | {
             "angle_i": self.angles[0],
             "angle_j": self.angles[1],
-            "r_i": bodies[outcomes.BODY_I, at.EQUIVALENT_RADIUS],
-            "r_j": bodies[outcomes.BODY_J, at.EQUIVALENT_RADIUS],
+            "r_i": bodies[outcomes.BODY_I].equivalent_radius,
+            "r_j": bodies[outcomes.BODY_J].equivalent_radius,
             "D_0": observed[outcomes.ZONE],
             "outcome": outcome,
             "d_c_last": observed[outcomes.D_LAST],
@@ -236,7 +236,7 @@ class Draw:
     def system(self) -> System:
         """Return the plain System where the replicate starts."""
         system, bodies = self.encounter.system, []
-        starts = self.encounter.start(self.angles, self.share).motion[at.NOW].tolist()
+        starts = at.motion_of(self.encounter.start(self.angles, self.share), at.NOW).tolist()
         for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
             place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
             bodies.append(attrs.evolve(body, **place))

@@ -131,19 +131,19 @@ CLEARANCE = 0.25
 """The outlines must stay further apart on the way than this share of the escape gap."""
 
 
-def apart(work, column):
+def apart(of, axis):
     """Return by how much j has more of a column than i."""
-    return work.motion[at.NOW, BODY_J, column] - work.motion[at.NOW, BODY_I, column]
+    return of[at.NOW, BODY_J, axis] - of[at.NOW, BODY_I, axis]
 
 
 def outer_of(scene):
     """Return R_i + R_j [m]."""
-    return scene.bodies[BODY_I, at.BOUNDING_RADIUS] + scene.bodies[BODY_J, at.BOUNDING_RADIUS]
+    return scene.bodies[BODY_I].bounding_radius + scene.bodies[BODY_J].bounding_radius
 
 
 def rate_of_parting(work, nx, ny):
     """Return the speed at which j moves away from i along the unit vector between them [m/s]."""
-    return nx * apart(work, at.VX) + ny * apart(work, at.VY)
+    return nx * apart(work.velocity, at.X) + ny * apart(work.velocity, at.Y)
 
 
 def speed_by_centre_forces(scene, work, observed, time):
@@ -173,15 +173,18 @@ def is_away(scene, work, observed, distance, gap):
 
 def left_over(scene, work, observed):
     """Return how far j may still be carried off the drift, or the flow, by its velocity [m]."""
-    ux, uy = apart(work, at.VX) - observed[DRIFT_X], apart(work, at.VY) - observed[DRIFT_Y]
+    ux, uy = (
+        apart(work.velocity, at.X) - observed[DRIFT_X],
+        apart(work.velocity, at.Y) - observed[DRIFT_Y],
+    )
     if observed[IN_FLOW] != 0.0:
-        x, y = apart(work, at.X), apart(work, at.Y)
-        ux = apart(work, at.VX) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
-        uy = apart(work, at.VY) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
+        x, y = apart(work.place, at.X), apart(work.place, at.Y)
+        ux = apart(work.velocity, at.X) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
+        uy = apart(work.velocity, at.Y) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
     # Drag uses a velocity u up over u times the relaxation time m µ.
     relaxation = max(
-        scene.bodies[BODY_I, at.MASS] * observed[MOBILITY_I],
-        scene.bodies[BODY_J, at.MASS] * observed[MOBILITY_J],
+        scene.bodies[BODY_I].mass * observed[MOBILITY_I],
+        scene.bodies[BODY_J].mass * observed[MOBILITY_J],
     )
     return relaxation * math.hypot(ux, uy)
 
@@ -189,8 +192,8 @@ def left_over(scene, work, observed):
 def turn_left(scene, work, time, body, passing):
     """Return how far an outline may still be moved by its turning [m] within the time of passing
     [s]."""
-    outer = scene.bodies[body, at.BOUNDING_RADIUS]
-    spin, damping = work.motion[at.NOW, body, at.SPIN], 0.0
+    outer = scene.bodies[body].bounding_radius
+    spin, damping = work.velocity[at.NOW, body, at.ANGLE], 0.0
     if not has(scene, VELOCITY_DERIVATIVES) or spin == 0.0:
         return outer * abs(spin) * passing
     view = body_view(scene, work, time, at.NOW, body)
@@ -201,7 +204,7 @@ def turn_left(scene, work, time, body, passing):
     # ω → ω_∞ = ω + T/ζ, by exp(−ζ t/I): by |ω − ω_∞| I/ζ in all, and at ω_∞ for as long as it
     # takes.
     last = spin + torque / damping
-    turned = abs(spin - last) * scene.bodies[body, at.INERTIA] / damping + abs(last) * passing
+    turned = abs(spin - last) * scene.bodies[body].inertia / damping + abs(last) * passing
     return outer * turned
 
 
@@ -209,7 +212,7 @@ def can_meet_again(scene, work, observed, time):
     """Return True if the outlines may come together along the drift that is left."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
-    x, y = apart(work, at.X), apart(work, at.Y)
+    x, y = apart(work.place, at.X), apart(work.place, at.Y)
     along, aside = x * ux + y * uy, abs(x * uy - y * ux)
     outer = outer_of(scene)
     clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
@@ -220,11 +223,11 @@ def can_meet_again(scene, work, observed, time):
     passing = (outer + clear + max(-along, 0.0)) / drift
     clear += turn_left(scene, work, time, BODY_I, passing)
     clear += turn_left(scene, work, time, BODY_J, passing)
-    contact = scene.bodies[BODY_I, at.RADIUS] + scene.bodies[BODY_J, at.RADIUS]
+    contact = scene.bodies[BODY_I].radius + scene.bodies[BODY_J].radius
     turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
     c, s = (
-        math.cos(work.motion[at.NOW, BODY_I, at.ANGLE]),
-        math.sin(work.motion[at.NOW, BODY_I, at.ANGLE]),
+        math.cos(work.place[at.NOW, BODY_I, at.ANGLE]),
+        math.sin(work.place[at.NOW, BODY_I, at.ANGLE]),
     )
     # In the frame of i: sphere tracing of j's outline along the drift.
     ux, uy = c * ux + s * uy, c * uy - s * ux
@@ -320,7 +323,7 @@ def return_bound(scene, work, observed, time):
 
     exp(−v a/D) over the farther half a of the path, at the least drift v there.
     """
-    outer, x, y = outer_of(scene), apart(work, at.X), apart(work, at.Y)
+    outer, x, y = outer_of(scene), apart(work.place, at.X), apart(work.place, at.Y)
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
     if observed[IN_FLOW] != 0.0:

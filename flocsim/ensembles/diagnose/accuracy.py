@@ -60,7 +60,7 @@ def ending(row: Mapping[str, Any]) -> str:
 
 def position_of(run: Run) -> np.ndarray:
     """Return where the bodies are (n, 3) [m, m, rad]."""
-    return run.work.motion[at.NOW, :, :3]
+    return run.work.place[at.NOW]
 
 
 @attrs.define(eq=False)

@@ -12,7 +12,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES, Draw
 from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.config.loader import load_config
@@ -96,7 +95,7 @@ def replicate_of(replicate: int, place: Place, study: Study) -> Trajectory:
         row = draw.row(run, status)
         origin = Origin(
             system.bodies, system.forces, system.fluid, method or system.integrator, fresh, run,
-            ((run.steps, float(run.clock[at.UNTIL])),),
+            ((run.steps, float(run.clock.until)),),
         )  # fmt: skip
         lasted = time.perf_counter() - began
         return row, Trajectory.of(run, status, lasted, row=row_in_words(row), origin=origin)

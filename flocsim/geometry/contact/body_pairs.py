@@ -30,40 +30,53 @@ end."""
 
 def watches_all(work):
     """Whether all pairs that count are watched."""
-    return work.bodies.shape[0] <= at.ALL_PAIRS
+    return work.poses.shape[0] <= at.ALL_PAIRS
 
 
 def wander_of(scene):
     """How far a body may go until the pairs are listed anew [m]."""
     total, free = 0.0, 0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
-            total += scene.bodies[body, at.BOUNDING_RADIUS]
+        if scene.bodies[body].free == 1.0:
+            total += scene.bodies[body].bounding_radius
             free += 1
     return WANDER * total / max(free, 1)
 
 
-def drift_of(scene, work, state, axis):
-    """The mean way of all bodies since the listing, or their mean velocity, along an axis; none
-    where one is fixed."""
-    total = 0.0
+def drift_of(scene, work, state):
+    """The mean way (x, y) of all bodies since the listing; none where one is fixed."""
+    x = y = 0.0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 0.0:
-            return 0.0
-        total += work.motion[state, body, axis]
-        if axis < at.VELOCITY:
-            total -= work.bodies[body, at.LISTED + axis]
-    return total / scene.bodies.shape[0]
+        pose = work.poses[body]
+        if scene.bodies[body].free == 0.0:
+            return 0.0, 0.0
+        x += work.place[state, body, at.X]
+        x -= pose.listed_x
+        y += work.place[state, body, at.Y]
+        y -= pose.listed_y
+    return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
+
+
+def mean_velocity(scene, work):
+    """The mean velocity (x, y) of all bodies; none where one is fixed."""
+    x = y = 0.0
+    for body in range(scene.bodies.shape[0]):
+        if scene.bodies[body].free == 0.0:
+            return 0.0, 0.0
+        x += work.velocity[at.NOW, body, at.X]
+        y += work.velocity[at.NOW, body, at.Y]
+    return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
 
 
 @hook
 def wandered(scene, work, state):
     """The largest share of its way that a body has gone since the listing, against the mean."""
     most, furthest = wander_of(scene), 0.0
-    drift_x, drift_y = drift_of(scene, work, state, 0), drift_of(scene, work, state, 1)
+    drift_x, drift_y = drift_of(scene, work, state)
     for body in range(scene.bodies.shape[0]):
-        x = work.motion[state, body, 0] - work.bodies[body, at.LISTED] - drift_x
-        y = work.motion[state, body, 1] - work.bodies[body, at.LISTED + 1] - drift_y
+        pose = work.poses[body]
+        x = work.place[state, body, at.X] - pose.listed_x - drift_x
+        y = work.place[state, body, at.Y] - pose.listed_y - drift_y
         furthest = max(furthest, length_of(x, y))
     return furthest / most
 
@@ -72,11 +85,10 @@ def wandered(scene, work, state):
 def time_to_wander(scene, work, share):
     """The time [s] in which no body goes further than a share of its way, at constant speed."""
     most, fastest = wander_of(scene), 0.0
-    drift_x = drift_of(scene, work, at.NOW, at.VELOCITY)
-    drift_y = drift_of(scene, work, at.NOW, at.VELOCITY + 1)
+    drift_x, drift_y = mean_velocity(scene, work)
     for body in range(scene.bodies.shape[0]):
-        x = work.motion[at.NOW, body, at.VELOCITY] - drift_x
-        y = work.motion[at.NOW, body, at.VELOCITY + 1] - drift_y
+        x = work.velocity[at.NOW, body, at.X] - drift_x
+        y = work.velocity[at.NOW, body, at.Y] - drift_y
         fastest = max(fastest, length_of(x, y))
     return share * most / fastest if fastest > 0.0 else math.inf
 
@@ -85,19 +97,19 @@ def time_to_wander(scene, work, share):
 def list_near(scene, work, cut):
     """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
     discs, (width, height) = work.discs, scene.box
-    for body in range(work.bodies.shape[0]):
-        discs[body, PLACE_X] = work.motion[at.NOW, body, 0]
-        discs[body, PLACE_Y] = work.motion[at.NOW, body, 1]
+    for body in range(work.poses.shape[0]):
+        discs[body, PLACE_X] = work.place[at.NOW, body, at.X]
+        discs[body, PLACE_Y] = work.place[at.NOW, body, at.Y]
         discs[body, WAY_X] = discs[body, WAY_Y] = 0.0
-        discs[body, REACH] = scene.bodies[body, at.BOUNDING_RADIUS] + 0.5 * cut
-        discs[body, MOVES] = scene.bodies[body, at.FREE]
+        discs[body, REACH] = scene.bodies[body].bounding_radius + 0.5 * cut
+        discs[body, MOVES] = scene.bodies[body].free
     total = near_pairs(discs, work.order, width, height, work.starts, work.pairs)
     if total > work.pairs.shape[0]:
-        work.tally[at.FULL], work.tally[at.PAIRS] = at.PAIRS_FULL, 0
+        work.tally.full, work.tally.pairs = at.PAIRS_FULL, 0
         return False
     for pair in range(total):
-        work.pairs[pair, at.ACTING] = 0
-    work.tally[at.PAIRS] = total
+        work.pairs[pair].acting = 0
+    work.tally.pairs = total
     return True
 
 
@@ -172,18 +184,18 @@ def sweep(discs, order, width, height, starts, pairs, fill):
             if come_near(discs, a, b, width, height):
                 later = max(a, b)
                 if fill:
-                    pairs[starts[later], 0], pairs[starts[later], 1] = later, min(a, b)
+                    pairs[starts[later]].later, pairs[starts[later]].earlier = later, min(a, b)
                 starts[later] += 1
 
 
 def sort_rows(pairs, first, end):
     """Sort one disc's pairs by the other one."""
     for row in range(first + 1, end):
-        other, free = pairs[row, 1], row
-        while free > first and pairs[free - 1, 1] > other:
-            pairs[free, 1] = pairs[free - 1, 1]
+        other, free = pairs[row].earlier, row
+        while free > first and pairs[free - 1].earlier > other:
+            pairs[free].earlier = pairs[free - 1].earlier
             free -= 1
-        pairs[free, 1] = other
+        pairs[free].earlier = other
 
 
 def near_pairs(discs, order, width, height, starts, pairs):

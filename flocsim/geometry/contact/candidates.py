@@ -41,7 +41,7 @@ have spent before lists are made anew for the sake of a longer step."""
 def edge_length(scene, body):
     """The mean length of a body's edges [m], as if its outline were a circle's."""
     points = scene.first[body + 1] - scene.first[body]
-    return 2.0 * math.pi * scene.bodies[body, at.EQUIVALENT_RADIUS] / points
+    return 2.0 * math.pi * scene.bodies[body].equivalent_radius / points
 
 
 def widened(skin, way):
@@ -51,16 +51,16 @@ def widened(skin, way):
 
 def skin_of(scene, work, a, b, ahead):
     """Cut-off gap of the list of a pair of bodies for steps of ``ahead`` [s] [m]."""
-    size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
+    size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
     edge = min(edge_length(scene, a), edge_length(scene, b))
-    contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
+    contact = scene.bodies[a].radius + scene.bodies[b].radius
     skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
     return widened(skin, relative_speed(scene, work, a, b) * ahead)
 
 
 def list_for_surface_force(scene, work, pair, skin, reach):
     """List what can become the closest pair before the budget is spent; the budget [m]."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
     least = gap_between(scene, work, a, b)
     if least > reach + skin:
         return least - reach
@@ -75,11 +75,11 @@ def widest_cut(scene, work, ahead):
     ``ahead`` [s] [m]."""
     largest, contact, edge, fastest = 0.0, 0.0, 0.0, 0.0
     for body in range(scene.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
-            largest = max(largest, scene.bodies[body, at.BOUNDING_RADIUS])
+        if scene.bodies[body].free == 1.0:
+            largest = max(largest, scene.bodies[body].bounding_radius)
             edge = max(edge, edge_length(scene, body))
             fastest = max(fastest, outline_speed(scene, work, body))
-        contact = max(contact, scene.bodies[body, at.RADIUS])
+        contact = max(contact, scene.bodies[body].radius)
     skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
     reach = max(0.0, scene.listed_reach, scene.centre_reach)
     return reach + widened(skin, 2.0 * fastest * ahead)
@@ -88,30 +88,26 @@ def widest_cut(scene, work, ahead):
 def list_pair(scene, work, pair, ahead):
     """List the candidates of two bodies for steps of ``ahead`` [s]; how far they may move before it
     must be made again."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
     ox, oy = separation(scene, work, at.NOW, a, b)
     reach = scene.listed_reach
     skin = skin_of(scene, work, a, b, ahead)
-    apart = (
-        length_of(ox, oy)
-        - scene.bodies[a, at.BOUNDING_RADIUS]
-        - scene.bodies[b, at.BOUNDING_RADIUS]
-    )
+    apart = length_of(ox, oy) - scene.bodies[a].bounding_radius - scene.bodies[b].bounding_radius
     if apart > max(0.0, reach) + skin:
         return apart - max(0.0, reach)
     if reach > 0.0:
         return list_for_surface_force(scene, work, pair, skin, reach)
-    before = work.tally[at.CANDIDATES]
+    before = work.tally.candidates
     if not list_polygons(scene, work, pair, skin):
         return -math.inf
-    if work.tally[at.CANDIDATES] == before:
+    if work.tally.candidates == before:
         return max(skin, gap_between(scene, work, a, b))
     return skin
 
 
 def core_radius(scene, body):
     """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
-    return scene.bodies[body, at.BOUNDING_RADIUS] - scene.bodies[body, at.RADIUS]
+    return scene.bodies[body].bounding_radius - scene.bodies[body].radius
 
 
 def shifted_by(dx, dy, ox, oy, turn):
@@ -130,12 +126,12 @@ def moved(scene, work, state, a, b, enough):
     """
     dx, dy = separation(scene, work, state, a, b)
     # Of the same image of a as now.
-    ox = work.bodies[a, at.LISTED + at.X] - work.bodies[b, at.LISTED + at.X]
-    oy = work.bodies[a, at.LISTED + at.Y] - work.bodies[b, at.LISTED + at.Y]
-    ox += dx - (work.motion[state, a, at.X] - work.motion[state, b, at.X])
-    oy += dy - (work.motion[state, a, at.Y] - work.motion[state, b, at.Y])
-    turn_a = work.motion[state, a, at.ANGLE] - work.bodies[a, at.LISTED + at.ANGLE]
-    turn_b = work.motion[state, b, at.ANGLE] - work.bodies[b, at.LISTED + at.ANGLE]
+    ox = work.poses[a].listed_x - work.poses[b].listed_x
+    oy = work.poses[a].listed_y - work.poses[b].listed_y
+    ox += dx - (work.place[state, a, at.X] - work.place[state, b, at.X])
+    oy += dy - (work.place[state, a, at.Y] - work.place[state, b, at.Y])
+    turn_a = work.place[state, a, at.ANGLE] - work.poses[a].listed_angle
+    turn_b = work.place[state, b, at.ANGLE] - work.poses[b].listed_angle
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
     plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
     if plain < enough:
@@ -150,24 +146,26 @@ def spent(scene, work, state):
     """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
     worst = 0.0
     if not watches_all(work):
-        if work.tally[at.REBUILDS] == 0:
+        if work.tally.rebuilds == 0:
             return math.inf
         worst = wandered(scene, work, state)
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         budget = work.budget[pair]
         if budget <= 0.0:
             return math.inf
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
     return worst
 
 
 def relative_speed(scene, work, a, b):
     """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
-    v = work.motion
     x, y = separation(scene, work, at.NOW, a, b)
-    vx, vy = v[at.NOW, a, at.VX] - v[at.NOW, b, at.VX], v[at.NOW, a, at.VY] - v[at.NOW, b, at.VY]
-    spin_a, spin_b = v[at.NOW, a, at.SPIN], v[at.NOW, b, at.SPIN]
+    vx, vy = (
+        work.velocity[at.NOW, a, at.X] - work.velocity[at.NOW, b, at.X],
+        work.velocity[at.NOW, a, at.Y] - work.velocity[at.NOW, b, at.Y],
+    )
+    spin_a, spin_b = work.velocity[at.NOW, a, at.ANGLE], work.velocity[at.NOW, b, at.ANGLE]
     turning = abs(spin_a - spin_b)
     seen_from_b = length_of(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
     seen_from_a = length_of(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
@@ -176,18 +174,15 @@ def relative_speed(scene, work, a, b):
 
 def outline_speed(scene, work, body):
     """A bound of how fast the core of a body moves now [m/s]."""
-    v = work.motion
-    turning = abs(v[at.NOW, body, at.SPIN]) * core_radius(scene, body)
-    return length_of(v[at.NOW, body, at.VX], v[at.NOW, body, at.VY]) + turning
+    turning = abs(work.velocity[at.NOW, body, at.ANGLE]) * core_radius(scene, body)
+    return length_of(work.velocity[at.NOW, body, at.X], work.velocity[at.NOW, body, at.Y]) + turning
 
 
 def time_within(scene, work, share):
     """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
     longest = math.inf if watches_all(work) else time_to_wander(scene, work, share)
-    for pair in range(work.tally[at.PAIRS]):
-        speed = relative_speed(
-            scene, work, work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-        )
+    for pair in range(work.tally.pairs):
+        speed = relative_speed(scene, work, work.pairs[pair].later, work.pairs[pair].earlier)
         if speed > 0.0:
             longest = min(longest, share * work.budget[pair] / speed)
     return longest
@@ -214,9 +209,10 @@ def too_wide(scene, work, ahead):
     """Whether the lists of few bodies are far wider than steps of ``ahead`` [s] need."""
     before = -1
     if watches_all(work):
-        for row in range(work.tally[at.CANDIDATES]):
-            pair = work.candidates[row, at.PAIR]
-            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        for row in range(work.tally.candidates):
+            candidate = work.candidates[row]
+            pair = candidate.pair
+            a, b = candidate.vertex_body, candidate.edge_body
             if pair != before and work.budget[pair] > TOO_WIDE * skin_of(scene, work, a, b, ahead):
                 return True
             before = pair
@@ -231,15 +227,17 @@ def list_candidates(scene, work):
 def list_ahead(scene, work, ahead):
     """The same, for steps of ``ahead`` [s]."""
     kept = keep_slips(work)
-    work.tally[at.CANDIDATES] = 0
-    work.tally[at.REBUILDS] += 1
+    work.tally.candidates = 0
+    work.tally.rebuilds += 1
     for body in range(scene.bodies.shape[0]):
-        for axis in range(3):
-            work.bodies[body, at.LISTED + axis] = work.motion[at.NOW, body, axis]
+        pose = work.poses[body]
+        pose.listed_x = work.place[at.NOW, body, at.X]
+        pose.listed_y = work.place[at.NOW, body, at.Y]
+        pose.listed_angle = work.place[at.NOW, body, at.ANGLE]
     if not list_pairs(scene, work, widest_cut(scene, work, ahead)):
         return False
     room = True
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         budget = list_pair(scene, work, pair, ahead)
         work.budget[pair] = budget
         room = room and budget > 0.0
@@ -254,63 +252,67 @@ def keep_slips(work):
 
     Those that an earlier attempt has set aside, whose list found no room, are still the ones.
     """
-    if work.tally[at.KEPT] > 0:
-        return work.tally[at.KEPT] - 1
+    if work.tally.kept > 0:
+        return work.tally.kept - 1
     count = 0
-    for row in range(work.tally[at.CANDIDATES]):
-        mode = work.candidates[row, at.CLOSED]
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        contact = work.contacts[row]
+        mode = candidate.closed
         # Whether there is anything to be known of a pair besides where its bodies are.
-        known = work.slip[at.NOW, row] != 0.0 or work.slip[at.GAP_OFFSET, row] != 0.0
-        if known or work.slip[at.FLIGHTS, row] != 0.0 or mode == at.GRAZES:
-            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-            work.kept[count, at.KEPT_LATER] = max(a, b)
-            work.kept[count, at.KEPT_EARLIER] = min(a, b)
-            work.kept[count, at.KEPT_VERTEX] = work.candidates[row, at.VERTEX]
-            work.kept[count, at.KEPT_EDGE] = work.candidates[row, at.EDGE_START]
-            work.kept[count, at.KEPT_MODE] = mode
-            work.slip[at.KEPT_SLIP, count] = work.slip[at.NOW, row]
-            work.slip[at.KEPT_FORCE, count] = work.slip[at.GRAZING_FORCE, row]
-            work.slip[at.KEPT_GAP, count] = work.slip[at.GAP_OFFSET, row]
-            work.slip[at.KEPT_OFFSET, count] = work.slip[at.SLIP_OFFSET, row]
-            work.slip[at.KEPT_FLIGHTS, count] = work.slip[at.FLIGHTS, row]
+        known = work.slip[at.NOW, row] != 0.0 or contact.gap_offset != 0.0
+        if known or contact.flights != 0.0 or mode == at.GRAZES:
+            a, b = candidate.vertex_body, candidate.edge_body
+            work.kept[count].later = max(a, b)
+            work.kept[count].earlier = min(a, b)
+            work.kept[count].vertex = candidate.vertex
+            work.kept[count].edge = candidate.edge_start
+            work.kept[count].mode = mode
+            work.kept[count].slip = work.slip[at.NOW, row]
+            work.kept[count].grazing_force = contact.grazing_force
+            work.kept[count].gap_offset = contact.gap_offset
+            work.kept[count].slip_offset = contact.slip_offset
+            work.kept[count].flights = contact.flights
             count += 1
-    work.tally[at.KEPT] = count + 1
+    work.tally.kept = count + 1
     return count
 
 
 def comes_before(work, kept, later, earlier):
     """Whether the bodies of a kept displacement come before two others in the list."""
-    if work.kept[kept, at.KEPT_LATER] != later:
-        return work.kept[kept, at.KEPT_LATER] < later
-    return work.kept[kept, at.KEPT_EARLIER] < earlier
+    if work.kept[kept].later != later:
+        return work.kept[kept].later < later
+    return work.kept[kept].earlier < earlier
 
 
 def restore_slips(work, count):
     """Give the kept displacements back to the same pairs of the new list; both are in the order of
     their bodies."""
     first = 0
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.NOW, row] = work.slip[at.SLIP_OFFSET, row] = 0.0
-        work.slip[at.GAP_OFFSET, row] = 0.0
-        work.slip[at.FLIGHT, row] = work.slip[at.FLIGHTS, row] = 0.0
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        contact = work.contacts[row]
+        work.slip[at.NOW, row] = contact.slip_offset = 0.0
+        contact.gap_offset = 0.0
+        contact.flight = contact.flights = 0.0
+        a, b = candidate.vertex_body, candidate.edge_body
         later, earlier = max(a, b), min(a, b)
         while first < count and comes_before(work, first, later, earlier):
             first += 1
         for k in range(first, count):
-            if work.kept[k, at.KEPT_LATER] != later or work.kept[k, at.KEPT_EARLIER] != earlier:
+            if work.kept[k].later != later or work.kept[k].earlier != earlier:
                 break
-            same = work.kept[k, at.KEPT_VERTEX] == work.candidates[row, at.VERTEX]
-            if same and work.kept[k, at.KEPT_EDGE] == work.candidates[row, at.EDGE_START]:
-                work.slip[at.NOW, row] = work.slip[at.KEPT_SLIP, k]
-                work.slip[at.SLIP_OFFSET, row] = work.slip[at.KEPT_OFFSET, k]
-                work.slip[at.GAP_OFFSET, row] = work.slip[at.KEPT_GAP, k]
-                work.slip[at.FLIGHTS, row] = work.slip[at.KEPT_FLIGHTS, k]
-                if work.kept[k, at.KEPT_MODE] == at.GRAZES:
-                    work.candidates[row, at.CLOSED] = at.GRAZES
-                    work.slip[at.GRAZING_FORCE, row] = work.slip[at.KEPT_FORCE, k]
-                    work.slip[at.FRESH, row] = 0.0
-    work.tally[at.KEPT] = 0
+            same = work.kept[k].vertex == candidate.vertex
+            if same and work.kept[k].edge == candidate.edge_start:
+                work.slip[at.NOW, row] = work.kept[k].slip
+                contact.slip_offset = work.kept[k].slip_offset
+                contact.gap_offset = work.kept[k].gap_offset
+                contact.flights = work.kept[k].flights
+                if work.kept[k].mode == at.GRAZES:
+                    candidate.closed = at.GRAZES
+                    contact.grazing_force = work.kept[k].grazing_force
+                    contact.fresh = 0.0
+    work.tally.kept = 0
 
 
 @hook
@@ -324,11 +326,11 @@ def same_corner(scene, body, point, other):
 def rolls_on_to(scene, work, row, other):
     """Whether a pair of features of the same two bodies neighbours another, either way round."""
     pairs = work.candidates
-    point, start, end = pairs[row, at.VERTEX], pairs[row, at.EDGE_START], pairs[row, at.EDGE_END]
-    on = pairs[other, at.VERTEX]
-    first, last = pairs[other, at.EDGE_START], pairs[other, at.EDGE_END]
-    if pairs[row, at.VERTEX_BODY] == pairs[other, at.VERTEX_BODY]:
-        near = same_corner(scene, pairs[row, at.VERTEX_BODY], point, on)
+    point, start, end = pairs[row].vertex, pairs[row].edge_start, pairs[row].edge_end
+    on = pairs[other].vertex
+    first, last = pairs[other].edge_start, pairs[other].edge_end
+    if pairs[row].vertex_body == pairs[other].vertex_body:
+        near = same_corner(scene, pairs[row].vertex_body, point, on)
         return near and (start in (first, last) or end in (first, last))
     return on in (start, end) and point in (first, last)
 
@@ -340,18 +342,19 @@ def heir_of(scene, work, row):
     or within r_i + r_j of the spheroradii. Where two corners meet, four pairs have one point: that
     which is displaced least takes over, as rounding would else decide.
     """
+    candidate = work.candidates[row]
     found, least, displaced = -1, math.inf, math.inf
-    low = min(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
-    high = max(work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY])
-    near = scene.bodies[low, at.RADIUS] + scene.bodies[high, at.RADIUS]
+    low = min(candidate.vertex_body, candidate.edge_body)
+    high = max(candidate.vertex_body, candidate.edge_body)
+    near = scene.bodies[low].radius + scene.bodies[high].radius
     x, y = contact_point(work, row, low)
-    pair, first = work.candidates[row, at.PAIR], row
-    while first > 0 and work.candidates[first - 1, at.PAIR] == pair:
+    pair, first = candidate.pair, row
+    while first > 0 and work.candidates[first - 1].pair == pair:
         first -= 1  # the rows of two bodies follow one another
-    for other in range(first, work.tally[at.CANDIDATES]):
-        if work.candidates[other, at.PAIR] != pair:
+    for other in range(first, work.tally.candidates):
+        if work.candidates[other].pair != pair:
             break
-        if work.geometry[at.NOW, other, at.GAP] < 0.0:
+        if work.geometry[at.NOW, other].gap < 0.0:
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
             own = abs(work.slip[at.NOW, other])
@@ -370,9 +373,9 @@ def hand_over(scene, work):
     Σ ½ k_t ξ² of the two bodies never grows, since what it grew by would drive them without end.
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
-    for row in range(work.tally[at.CANDIDATES]):
-        opened = work.geometry[at.NOW, row, at.GAP] >= 0.0
-        grazes = work.candidates[row, at.CLOSED] == at.GRAZES
+    for row in range(work.tally.candidates):
+        opened = work.geometry[at.NOW, row].gap >= 0.0
+        grazes = work.candidates[row].closed == at.GRAZES
         if work.slip[at.NOW, row] != 0.0 and opened and not grazes:
             heir = heir_of(scene, work, row)
             if heir >= 0:
@@ -381,22 +384,21 @@ def hand_over(scene, work):
                 agreement = tangent_agreement(work, row, heir)
                 total = own + given * agreement
                 work.slip[at.NOW, heir] = min(max(total, -most), most)
-                wrong = slip_error(work, row, at.X) + work.slip[at.SLIP_OFFSET, row]
-                work.slip[at.SLIP_OFFSET, heir] += wrong * agreement
+                wrong = slip_error(work, row, work.place) + work.contacts[row].slip_offset
+                work.contacts[heir].slip_offset += wrong * agreement
             work.slip[at.NOW, row] = 0.0
 
 
-def slip_error(work, row, first):
+def slip_error(work, row, of):
     """How wrong a pair's two contact points lie along the tangent, as carried on with the motion
-    [m], for ``first`` X; how wrong they move there [m/s], for VELOCITY."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    e, g = work.motion, work.geometry
-    along = g[at.NOW, row, at.NORMAL_X] * (
-        e[at.CARRIED, a, first + 1] - e[at.CARRIED, b, first + 1]
-    )
-    along -= g[at.NOW, row, at.NORMAL_Y] * (e[at.CARRIED, a, first] - e[at.CARRIED, b, first])
-    along += g[at.NOW, row, at.VERTEX_ARM_T] * e[at.CARRIED, a, first + 2]
-    return along - g[at.NOW, row, at.EDGE_ARM_T] * e[at.CARRIED, b, first + 2]
+    [m], ``of`` places; how wrong they move there [m/s], of velocities."""
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g = work.geometry
+    along = g[at.NOW, row].normal_x * (of[at.CARRIED, a, at.Y] - of[at.CARRIED, b, at.Y])
+    along -= g[at.NOW, row].normal_y * (of[at.CARRIED, a, at.X] - of[at.CARRIED, b, at.X])
+    along += g[at.NOW, row].vertex_arm_t * of[at.CARRIED, a, at.ANGLE]
+    return along - g[at.NOW, row].edge_arm_t * of[at.CARRIED, b, at.ANGLE]
 
 
 def tangent_agreement(work, row, other):
@@ -406,9 +408,9 @@ def tangent_agreement(work, row, other):
     """
     geometry = work.geometry[at.NOW]
     cosine = (
-        geometry[row, at.NORMAL_X] * geometry[other, at.NORMAL_X]
-        + geometry[row, at.NORMAL_Y] * geometry[other, at.NORMAL_Y]
+        geometry[row].normal_x * geometry[other].normal_x
+        + geometry[row].normal_y * geometry[other].normal_y
     )
-    if work.candidates[row, at.VERTEX_BODY] == work.candidates[other, at.VERTEX_BODY]:
+    if work.candidates[row].vertex_body == work.candidates[other].vertex_body:
         return cosine
     return -cosine

@@ -136,7 +136,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     room = True
     for point in range(start_a, end_a):
         for start in range(start_b, end_b):
-            if begins_pair(vertices, point, start, a == work.pairs[pair, at.LATER]):
+            if begins_pair(vertices, point, start, a == work.pairs[pair].later):
                 limit = reach + vertices[point, SWELL] + vertices[start, SWELL]
                 if feature_distance2(vertices, pose, point, start) < limit * limit:
                     end = start + int(vertices[start, ONWARD])
@@ -157,11 +157,12 @@ def swollen_run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
 
 def swollen_radii(scene, work, row):
     """points.row_radii, of the parts that the vertex and the edge belong to [m]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    point, start = work.candidates[row, at.VERTEX], work.candidates[row, at.EDGE_START]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    point, start = candidate.vertex, candidate.edge_start
     return (
-        scene.bodies[a, at.RADIUS] + scene.vertices[point, SWELL],
-        scene.bodies[b, at.RADIUS] + scene.vertices[start, SWELL],
+        scene.bodies[a].radius + scene.vertices[point, SWELL],
+        scene.bodies[b].radius + scene.vertices[start, SWELL],
     )
 
 

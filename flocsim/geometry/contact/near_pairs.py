@@ -245,23 +245,23 @@ def core_distance(outlines, a, b, pose):
 def pose_of(scene, work, a, b):
     """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
     x, y = separation(scene, work, at.NOW, a, b)
-    turn = work.motion[at.NOW, a, at.ANGLE] - work.motion[at.NOW, b, at.ANGLE]
-    c, s = math.cos(work.motion[at.NOW, b, at.ANGLE]), math.sin(work.motion[at.NOW, b, at.ANGLE])
+    turn = work.place[at.NOW, a, at.ANGLE] - work.place[at.NOW, b, at.ANGLE]
+    c, s = math.cos(work.place[at.NOW, b, at.ANGLE]), math.sin(work.place[at.NOW, b, at.ANGLE])
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
 def add_pair(work, pair, a, point, b, start, end):
     """Append a pair of features to the list; False where no room is left."""
-    row = work.tally[at.CANDIDATES]
+    row = work.tally.candidates
     if row == work.candidates.shape[0]:
-        work.tally[at.FULL] = at.CANDIDATES_FULL
+        work.tally.full = at.CANDIDATES_FULL
         return False
     new = work.candidates
-    new[row, at.VERTEX_BODY], new[row, at.VERTEX] = a, point
-    new[row, at.EDGE_BODY], new[row, at.EDGE_START], new[row, at.EDGE_END] = b, start, end
-    new[row, at.CLOSED], new[row, at.NEAR] = 0, 0
-    new[row, at.SLIDING], new[row, at.PAIR] = 0, pair
-    work.tally[at.CANDIDATES] = row + 1
+    new[row].vertex_body, new[row].vertex = a, point
+    new[row].edge_body, new[row].edge_start, new[row].edge_end = b, start, end
+    new[row].closed, new[row].near = 0, 0
+    new[row].sliding, new[row].pair = 0, pair
+    work.tally.candidates = row + 1
     return True
 
 
@@ -286,13 +286,13 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 @hook
 def list_polygons(scene, work, pair, cutoff):
     """List the pairs of features of two bodies, both ways round; False for a full list."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
     side_a, side_b = side_of(scene, a), side_of(scene, b)
     _, points_a, _, _ = side_a
     _, points_b, _, _ = side_b
     if points_a == 1 and points_b == 1:
         return list_spheres(scene, work, pair, cutoff)
-    reach = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS] + cutoff
+    reach = scene.bodies[a].radius + scene.bodies[b].radius + cutoff
     pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
     plan = plan_of(scene.tree, side_a, side_b)
@@ -313,7 +313,7 @@ def list_polygons(scene, work, pair, cutoff):
 
 def list_spheres(scene, work, pair, cutoff):
     """List the one pair of two spheres where its gap is below the cut-off; False if full."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
     point = scene.first[b]
@@ -323,13 +323,13 @@ def list_spheres(scene, work, pair, cutoff):
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
     ox, oy = separation(scene, work, at.NOW, a, b)
-    return length_of(ox, oy) - scene.bodies[a, at.RADIUS] - scene.bodies[b, at.RADIUS]
+    return length_of(ox, oy) - scene.bodies[a].radius - scene.bodies[b].radius
 
 
 @hook
 def gap_between(scene, work, a, b):
     """The distance between two outlines now [m], negative where they overlap."""
-    contact = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
+    contact = scene.bodies[a].radius + scene.bodies[b].radius
     return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact
 
 

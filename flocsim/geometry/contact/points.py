@@ -4,10 +4,10 @@ in kernels; and of placed shapes, where they touch, and whether they overlap too
 A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
 vertex–edge method); two spheres are one pair of points.
 
-A row of ``geometry`` has the columns NORMAL_X … TURNING of flocsim.arrays. The normal n points from
-the foot on the edge to the vertex, t = (−n_y, n_x). It turns by TURNING for every metre by which
-the vertex is shifted along t: 0 where the foot lies inside the edge, which alone turns it then,
-1/distance where it is an end.
+``geometry[state, row]`` is a VertexAtEdge of flocsim.arrays. The normal n points from the foot on
+the edge to the vertex, t = (−n_y, n_x). It turns by ``turning`` for every metre by which the vertex
+is shifted along t: 0 where the foot lies inside the edge, which alone turns it then, 1/distance
+where it is an end.
 
 A run needs cosine and sine of angles some ten times a step, of angles that hardly differ, and a
 library's functions for them take more time there than anything else. So they are asked for at
@@ -57,8 +57,9 @@ def length_of(x, y):
 @hook
 def separation(scene, work, state, a, b):
     """(x, y) of body a as seen from body b, in a state [m]."""
-    m = work.motion
-    return m[state, a, at.X] - m[state, b, at.X], m[state, a, at.Y] - m[state, b, at.Y]
+    return work.place[state, a, at.X] - work.place[state, b, at.X], work.place[
+        state, a, at.Y
+    ] - work.place[state, b, at.Y]
 
 
 def nearest_way(length, period):
@@ -70,9 +71,9 @@ def nearest_way(length, period):
 
 def nearest_image(scene, work, state, a, b):
     """The same where space repeats itself: of a's image that is nearest to b."""
-    m, (width, height) = work.motion, scene.box
-    x = nearest_way(m[state, a, at.X] - m[state, b, at.X], width)
-    return x, nearest_way(m[state, a, at.Y] - m[state, b, at.Y], height)
+    width, height = scene.box
+    x = nearest_way(work.place[state, a, at.X] - work.place[state, b, at.X], width)
+    return x, nearest_way(work.place[state, a, at.Y] - work.place[state, b, at.Y], height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
@@ -84,72 +85,76 @@ def cosine_and_sine(work, body, angle):
     if not abs(angle) < LARGEST:
         return math.cos(angle), math.sin(angle)
     nearest = math.floor(PER_RADIAN * angle + 0.5) / PER_RADIAN
-    bodies = work.bodies
+    pose = work.poses[body]
     # No cosine of a multiple of 1/64 is 0.
-    if nearest != bodies[body, at.KNOWN_ANGLE] or bodies[body, at.KNOWN_COSINE] == 0.0:
-        bodies[body, at.KNOWN_ANGLE] = nearest
-        bodies[body, at.KNOWN_COSINE] = math.cos(nearest)
-        bodies[body, at.KNOWN_SINE] = math.sin(nearest)
+    if nearest != pose.known_angle or pose.known_cosine == 0.0:
+        pose.known_angle = nearest
+        pose.known_cosine = math.cos(nearest)
+        pose.known_sine = math.sin(nearest)
     rest = angle - nearest
     square = rest * rest
     c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0))
     s = rest * (1.0 - square * (1.0 / 6.0 - square / 120.0))
-    cosine, sine = bodies[body, at.KNOWN_COSINE], bodies[body, at.KNOWN_SINE]
+    cosine, sine = pose.known_cosine, pose.known_sine
     return cosine * c - sine * s, sine * c + cosine * s
 
 
 @hook
 def turn_body(work, state, body):
-    """Cosine and sine of a body's angle in a state, into ``work.bodies``."""
-    cosine, sine = cosine_and_sine(work, body, work.motion[state, body, at.ANGLE])
-    work.bodies[body, at.COSINE], work.bodies[body, at.SINE] = cosine, sine
+    """Cosine and sine of a body's angle in a state, into ``work.poses``."""
+    pose = work.poses[body]
+    cosine, sine = cosine_and_sine(work, body, work.place[state, body, at.ANGLE])
+    pose.cosine, pose.sine = cosine, sine
 
 
 def turn_bodies(work, state):
     """The same of all bodies."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         turn_body(work, state, body)
 
 
 def turned(scene, work, body, point):
     """A core point relative to its body's centroid, in the frame of the scene."""
+    pose = work.poses[body]
     x = scene.vertices[point, at.X]
     y = scene.vertices[point, at.Y]
-    c = work.bodies[body, at.COSINE]
-    s = work.bodies[body, at.SINE]
+    c = pose.cosine
+    s = pose.sine
     return c * x - s * y, s * x + c * y
 
 
 def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side):
     """Write one geometry row from the normal and the two arms of the contact point."""
     geometry = work.geometry
-    geometry[state, row, at.NORMAL_X] = nx
-    geometry[state, row, at.NORMAL_Y] = ny
-    geometry[state, row, at.GAP] = gap - work.slip[at.GAP_OFFSET, row]
-    geometry[state, row, at.VERTEX_ARM_N] = ax * ny - ay * nx
-    geometry[state, row, at.VERTEX_ARM_T] = ax * nx + ay * ny
-    geometry[state, row, at.EDGE_ARM_N] = bx * ny - by * nx
-    geometry[state, row, at.EDGE_ARM_T] = bx * nx + by * ny
-    geometry[state, row, at.TURNING] = turning
-    geometry[state, row, at.FOOT] = foot
-    geometry[state, row, at.SIDE] = side
+    geometry[state, row].normal_x = nx
+    geometry[state, row].normal_y = ny
+    geometry[state, row].gap = gap - work.contacts[row].gap_offset
+    geometry[state, row].vertex_arm_n = ax * ny - ay * nx
+    geometry[state, row].vertex_arm_t = ax * nx + ay * ny
+    geometry[state, row].edge_arm_n = bx * ny - by * nx
+    geometry[state, row].edge_arm_t = bx * nx + by * ny
+    geometry[state, row].turning = turning
+    geometry[state, row].foot = foot
+    geometry[state, row].side = side
 
 
 @hook
 def row_radii(scene, work, row):
     """(of the vertex, of the edge) of a pair: the radii of the disks that sweep them [m]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    return scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    return scene.bodies[a].radius, scene.bodies[b].radius
 
 
 @hook
 def locate_polygons(scene, work, state, row):
     """Geometry of one vertex–edge pair; a vertex right on the edge gets an arbitrary normal."""
-    a, point = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.VERTEX]
+    candidate = work.candidates[row]
+    a, point = candidate.vertex_body, candidate.vertex
     b, start, end = (
-        work.candidates[row, at.EDGE_BODY],
-        work.candidates[row, at.EDGE_START],
-        work.candidates[row, at.EDGE_END],
+        candidate.edge_body,
+        candidate.edge_start,
+        candidate.edge_end,
     )
     px, py = turned(scene, work, a, point)
     sx, sy = turned(scene, work, b, start)
@@ -177,15 +182,16 @@ def locate_polygons(scene, work, state, row):
 
 def locate_spheres(scene, work, state, row):
     """Geometry of two spheres: nothing to turn."""
-    a = work.candidates[row, at.VERTEX_BODY]
-    b = work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a = candidate.vertex_body
+    b = candidate.edge_body
     ox, oy = separation(scene, work, state, a, b)
     distance = length_of(ox, oy)
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = ox / distance, oy / distance
-    middle = 0.5 * (distance + scene.bodies[b, at.RADIUS] - scene.bodies[a, at.RADIUS])
-    gap = distance - scene.bodies[a, at.RADIUS] - scene.bodies[b, at.RADIUS]
+    middle = 0.5 * (distance + scene.bodies[b].radius - scene.bodies[a].radius)
+    gap = distance - scene.bodies[a].radius - scene.bodies[b].radius
     bx, by = middle * nx, middle * ny
     turning = 1.0 / max(distance, TINY)
     store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
@@ -196,9 +202,9 @@ def locate_contacts(scene, work, state):
     """Geometry of all listed pairs in a state; the smallest gap (inf without pairs)."""
     turn_bodies(work, state)
     least = math.inf
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         locate_polygons(scene, work, state, row)
-        least = min(least, work.geometry[state, row, at.GAP])
+        least = min(least, work.geometry[state, row].gap)
     return least
 
 
@@ -206,27 +212,28 @@ def locate_contacts(scene, work, state):
 def locate_acting(scene, work, state):
     """Geometry, in a state, of the listed pairs through which forces act in this step."""
     turn_bodies(work, state)
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed + candidate.near > 0:
             locate_polygons(scene, work, state, row)
 
 
 def least_listed_gap(work):
     """The smallest gap among the listed pairs now (inf where none is listed)."""
     least = math.inf
-    for row in range(work.tally[at.CANDIDATES]):
-        least = min(least, work.geometry[at.NOW, row, at.GAP])
+    for row in range(work.tally.candidates):
+        least = min(least, work.geometry[at.NOW, row].gap)
     return least
 
 
 def contact_point(work, row, body):
     """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
     geometry = work.geometry[at.NOW]
-    nx, ny = geometry[row, at.NORMAL_X], geometry[row, at.NORMAL_Y]
-    if work.candidates[row, at.VERTEX_BODY] == body:
-        across, along = geometry[row, at.VERTEX_ARM_N], geometry[row, at.VERTEX_ARM_T]
+    nx, ny = geometry[row].normal_x, geometry[row].normal_y
+    if work.candidates[row].vertex_body == body:
+        across, along = geometry[row].vertex_arm_n, geometry[row].vertex_arm_t
     else:
-        across, along = geometry[row, at.EDGE_ARM_N], geometry[row, at.EDGE_ARM_T]
+        across, along = geometry[row].edge_arm_n, geometry[row].edge_arm_t
     return along * nx + across * ny, along * ny - across * nx
 
 

@@ -102,7 +102,7 @@ def edge_is_open(vertices, k, gap):
 
 def is_open(vertices, gap):
     """Whether the polygon is simple, and no two of its edges face each other outside by < gap."""
-    for k in range(len(vertices)):  # noqa: SIM110
+    for k in range(len(vertices)):
         if not edge_is_open(vertices, k, gap):
             return False
     return True

@@ -38,39 +38,42 @@ tolerance, or of its overlap at the start where that is more."""
 
 def takes_part(work, row):
     """Whether a pair is closed at the start of the step, TRIAL, or at its end, NOW."""
-    return work.geometry[at.NOW, row, at.GAP] < 0.0 or work.geometry[at.TRIAL, row, at.GAP] < 0.0
+    return work.geometry[at.NOW, row].gap < 0.0 or work.geometry[at.TRIAL, row].gap < 0.0
 
 
 def closed_share(work, row):
     """The part of the step for which a pair is closed, as its gap goes along a line."""
-    before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
+    before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
     if before < 0.0:
         return (
-            1.0 if after <= 0.0 else work.slip[at.FADES, row] / (work.slip[at.FADES, row] + after)
+            1.0
+            if after <= 0.0
+            else work.interior[row].fading_gap / (work.interior[row].fading_gap + after)
         )
     return after / (after - before) if after < 0.0 else 0.0
 
 
 def share_slope(work, row):
     """By how much that grows with the gap at the end [1/m]."""
-    before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
+    before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
     if before < 0.0 < after:
-        return -work.slip[at.FADES, row] / (work.slip[at.FADES, row] + after) ** 2
+        return -work.interior[row].fading_gap / (work.interior[row].fading_gap + after) ** 2
     return -before / (after - before) ** 2 if after < 0.0 <= before else 0.0
 
 
 def end_overlap(work, row):
     """Δ₁⁺ of a pair, by its gap at the end [m]."""
-    return max(-work.geometry[at.NOW, row, at.GAP], 0.0)
+    return max(-work.geometry[at.NOW, row].gap, 0.0)
 
 
 def view_with(scene, work, row, step, after, slip, rate):
     """The ContactView of a pair over the step, of an overlap ``after`` at its end [m]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    pressing = (after - max(-work.geometry[at.TRIAL, row, at.GAP], 0.0)) / step
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    pressing = (after - max(-work.geometry[at.TRIAL, row].gap, 0.0)) / step
     return ContactView(
         after, pressing, slip, rate, effective_mass(scene, a, b),
-        scene.bodies[a, at.RADIUS], scene.bodies[b, at.RADIUS], smaller_radius(scene, a, b),
+        scene.bodies[a].radius, scene.bodies[b].radius, smaller_radius(scene, a, b),
     )  # fmt: skip
 
 
@@ -87,21 +90,21 @@ def sticking_slopes(scene, view, limit, step):
 def bearing_of(work, row):
     """The overlap that the friction of a pair goes by [m]: its own, unless another one is held, and
     PART with it."""
-    held = work.slip[at.BEARING, row]
-    return held if held > 0.0 else work.slip[at.OVERLAP, row]
+    held = work.interior[row].held_overlap
+    return held if held > 0.0 else work.interior[row].overlap
 
 
 def friction_view(scene, work, row, step):
     """The ContactView of a pair over the step of the overlap that its friction goes by; ξ₁ goes to
     NEW, whether it slides to SLIDING."""
     bearing, rate = bearing_of(work, row), tangential_rate(work, at.NOW, row)
-    slip, side = work.slip[at.NOW, row] + work.slip[at.PART, row] * step * rate, 0
+    slip, side = work.slip[at.NOW, row] + work.interior[row].step_share * step * rate, 0
     if has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view_with(scene, work, row, step, bearing, 0.0, 0.0))
         if abs(slip) > limit:
             side = 1 if slip > 0.0 else -1
             slip = side * limit
-    work.slip[at.NEW, row], work.candidates[row, at.SLIDING] = slip, side
+    work.slip[at.NEW, row], work.candidates[row].sliding = slip, side
     return view_with(scene, work, row, step, bearing, slip, rate)
 
 
@@ -118,35 +121,42 @@ def normal_stiffness(scene, work, row, step, after):
 
 def friction_force(scene, work, row, step):
     """s T of a pair [N]; it is flagged where it slides."""
-    return work.slip[at.PART, row] * contact_force(scene, friction_view(scene, work, row, step))[1]
+    return (
+        work.interior[row].step_share
+        * contact_force(scene, friction_view(scene, work, row, step))[1]
+    )
 
 
 @apart
 def add_mean_forces(scene, work, step):
     """Add the forces of all contacts in the step to those in NOW; friction goes by the overlaps at
     its end."""
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.OVERLAP, row] = end_overlap(work, row)
-        if work.slip[at.BEARING, row] == 0.0:
-            work.slip[at.PART, row] = closed_share(work, row)
+    for row in range(work.tally.candidates):
+        work.interior[row].overlap = end_overlap(work, row)
+        if work.interior[row].held_overlap == 0.0:
+            work.interior[row].step_share = closed_share(work, row)
         if takes_part(work, row):
-            normal = normal_force(scene, work, row, step, work.slip[at.OVERLAP, row])
+            normal = normal_force(scene, work, row, step, work.interior[row].overlap)
             push_pair(work, at.NOW, row, normal, friction_force(scene, work, row, step))
         else:
-            work.slip[at.NEW, row], work.candidates[row, at.SLIDING] = 0.0, 0
+            work.slip[at.NEW, row], work.candidates[row].sliding = 0.0, 0
 
 
 @apart
 def add_held_friction(scene, work, step):
     """Add to the loads what friction that goes by what is held lacks of that at the end."""
-    for row in range(work.tally[at.CANDIDATES]):
-        held, part = work.slip[at.BEARING, row], work.slip[at.PART, row]
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        held, part = work.interior[row].held_overlap, work.interior[row].step_share
         if held > 0.0 and takes_part(work, row):
-            work.slip[at.BEARING, row], work.slip[at.PART, row] = 0.0, closed_share(work, row)
+            work.interior[row].held_overlap, work.interior[row].step_share = (
+                0.0,
+                closed_share(work, row),
+            )
             missing = friction_force(scene, work, row, step)
-            work.slip[at.BEARING, row], work.slip[at.PART, row] = held, part
+            work.interior[row].held_overlap, work.interior[row].step_share = held, part
             missing -= friction_force(scene, work, row, step)
-            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            a, b = candidate.vertex_body, candidate.edge_body
             of_a, of_b = tangent_rows(work, row)
             for axis in range(3):
                 work.loads[REAL, 3 * a + axis] += missing * of_a[axis]
@@ -156,8 +166,9 @@ def add_held_friction(scene, work, step):
 def add_slopes(scene, work, row, normal, tangential, coupled):
     """Add to the system what the force of a contact falls by for a metre of the gap, and with the
     rate along the tangent [N/m, N s/m]; and by how much friction falls for a metre of the gap."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    pair = work.candidates[row, at.PAIR]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    pair = candidate.pair
     along, across = normal_rows(work, row), tangent_rows(work, row)
     add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal)
     if coupled != 0.0:
@@ -170,7 +181,7 @@ def friction_slopes(scene, work, row, step):
     overlap [N/m] and its part of the step [N]."""
     view = friction_view(scene, work, row, step)
     found = contact_derivatives(scene, view)
-    part, side = work.slip[at.PART, row], work.candidates[row, at.SLIDING]
+    part, side = work.interior[row].step_share, work.candidates[row].sliding
     by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
     if side != 0:
         by_limit = side * limit_slope(scene, work, at.NOW, row) * found[7]
@@ -187,7 +198,7 @@ def friction_slopes(scene, work, row, step):
 @apart
 def add_all_derivatives(scene, work, step):
     """Add the derivatives of all contacts in the step by the places and velocities at its end."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if takes_part(work, row):
             after, stiffness = end_overlap(work, row), 0.0
             slope, by_overlap, by_part = friction_slopes(scene, work, row, step)
@@ -195,7 +206,7 @@ def add_all_derivatives(scene, work, step):
             if after > 0.0:
                 stiffness = normal_stiffness(scene, work, row, step, after)
                 coupled += by_overlap
-            if work.slip[at.BEARING, row] > 0.0:
+            if work.interior[row].held_overlap > 0.0:
                 coupled = 0.0
             add_slopes(scene, work, row, stiffness, slope, coupled)
             force = normal_force(scene, work, row, step, after)
@@ -209,8 +220,9 @@ of those that close in a step need no other one."""
 
 def flag_close(scene, work):
     """Flag, as closed, all pairs that are or may well be so in this step; none is taken back."""
-    for row in range(work.tally[at.CANDIDATES]):
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-        near = CLOSE * (scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS])
-        if work.geometry[at.NOW, row, at.GAP] < near or work.geometry[at.TRIAL, row, at.GAP] < 0.0:
-            work.candidates[row, at.CLOSED] = 1
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        a, b = candidate.vertex_body, candidate.edge_body
+        near = CLOSE * (scene.bodies[a].radius + scene.bodies[b].radius)
+        if work.geometry[at.NOW, row].gap < near or work.geometry[at.TRIAL, row].gap < 0.0:
+            candidate.closed = 1

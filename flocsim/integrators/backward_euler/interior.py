@@ -5,7 +5,7 @@ that its force has and the gap s = g + δ that is left of it are not below 0, an
 Newton's method (newton.py) finds which, a few pairs an iteration; here all pairs are followed at
 once along δ s = τ, τ falling to nothing (primal-dual, Wright 1997; as for contacts in Christensen
 et al. 1998). The systems are those of Newton's method, the stiffness of a pair being its part
-δ/(δ + s) that is at work. OVERLAP holds δ, LEFT s.
+δ/(δ + s) that is at work. InteriorPoint holds δ as ``overlap``, s as ``slack``.
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
@@ -16,11 +16,11 @@ e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
     df = w (e − f − τ/(L − f) + τ/(L + f) + de) + w (p/(L − f) − q/(L + f)) dL,
     1/w = 1 + p/(L − f) + q/(L + f)
 
-RUBBING holds f/L. L follows δ within an iteration as well as from one to the next: p and q that are
-not told of it are soon far from where they belong, and half of all searches end nowhere. With L a
-system has no symmetry, and there may be no way to a solution (a pair wedged between others that
-slide), or none at all: iterations then go less and less far. There what friction goes by is held,
-BEARING and PART: all of this is convex then, and a step has one end.
+Its ``friction`` is f/L. L follows δ within an iteration as well as from one to the next: p and q
+that do not follow it are soon far from where they belong, and half of all searches end nowhere.
+With L a system has no symmetry, and there may be no way to a solution (a pair wedged between others
+that slide), or none at all: iterations then go less and less far. There what friction goes by is
+held, ``held_overlap`` and ``step_share``: all of this is convex then, and a step has one end.
 
 How far an iteration goes is bounded by the pair that would first leave where it belongs. Among
 hundreds one always does: begun near the last step's end, with most of them right, nothing moves
@@ -67,43 +67,45 @@ SMALL = 0.01
 
 
 def in_play(work, row):
-    return work.candidates[row, at.CLOSED] == 1
+    return work.candidates[row].closed == 1
 
 
 def rate_along(work, row, kind, entries):
     """What velocities, or their change, come to along a direction of both bodies of a pair."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     total = 0.0
     for axis in range(3):
-        total += entries[0][axis] * work.motion[kind, a, at.VELOCITY + axis]
-        total += entries[1][axis] * work.motion[kind, b, at.VELOCITY + axis]
+        total += entries[0][axis] * work.velocity[kind, a, axis]
+        total += entries[1][axis] * work.velocity[kind, b, axis]
     return total
 
 
 def part_of_step(work, row, limited):
     """The part of the step for which a pair is closed, by how much that grows with δ, and by how
     much it falls with s [1/m]: at their ends contact_mean's."""
+    contact = work.interior[row]
     over, left, before = (
-        work.slip[at.OVERLAP, row],
-        work.slip[at.LEFT, row],
-        work.geometry[at.TRIAL, row, at.GAP],
+        contact.overlap,
+        contact.slack,
+        work.geometry[at.TRIAL, row].gap,
     )
     if before >= 0.0:
         return over / (over + before), before / (over + before) ** 2, 0.0
     if limited:
         return 1.0, 0.0, 0.0
-    held = over + work.slip[at.FADES, row]
+    held = over + contact.fading_gap
     return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
 
 
 def press(scene, work, row, step, turns):
     """(N of a pair of the overlap δ [N], how it grows with that [N/m]).
 
-    Of its friction is written down, over a normal stiffness, HARDNESS [N/m]: by how much it grows
-    with v_t, YIELDS [s], what it would be if the pair stuck, STUCK, and at most, LIMIT [m]; 0 where
+    Writes the law of its friction into ``work.interior``, see InteriorPoint; the limit is 0 where
     nothing limits it, or there is none. Along gaps that do not ``turns`` it is limited by springs
     alone, which is smooth: together with dashpots they are clipped."""
-    slip, overlap, rate = work.slip, work.slip[at.OVERLAP, row], tangential_rate(work, at.NOW, row)
+    contact = work.interior[row]
+    overlap, rate = contact.overlap, tangential_rate(work, at.NOW, row)
     view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
     found, limit = contact_derivatives(scene, view), 0.0
     stiffness = hardness = found[2] + found[4] / step
@@ -123,85 +125,89 @@ def press(scene, work, row, step, turns):
                 most = view_with(scene, work, row, step, bearing, held, abs(rate))
                 limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * limit)
             limit /= hardness
-    if slip[at.BEARING, row] == 0.0:
-        slip[at.PART, row], _, _ = part_of_step(work, row, limit > 0.0)
-    part = slip[at.PART, row]
-    slip[at.HARDNESS, row], slip[at.LIMIT, row] = hardness, limit
-    slip[at.YIELDS, row] = (spring * part * step + drag) / hardness
-    slip[at.STUCK, row] = spring / hardness * slip[at.NOW, row] + slip[at.YIELDS, row] * rate
+    if contact.held_overlap == 0.0:
+        contact.step_share, _, _ = part_of_step(work, row, limit > 0.0)
+    part = contact.step_share
+    contact.normal_stiffness, contact.friction_limit = hardness, limit
+    contact.stick_slope = (spring * part * step + drag) / hardness
+    contact.stick_force = spring / hardness * work.slip[at.NOW, row] + contact.stick_slope * rate
     return found[0], stiffness
 
 
 def mean_product(work):
     """The mean of δ s, p (L − f) and q (L + f) over the pairs in play [m²]."""
-    total, count, slip = 0.0, 0, work.slip
-    for row in range(work.tally[at.CANDIDATES]):
+    total, count = 0.0, 0
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            total += slip[at.OVERLAP, row] * slip[at.LEFT, row]
+            contact = work.interior[row]
+            total += contact.overlap * contact.slack
             count += 1
-            if slip[at.LIMIT, row] > 0.0:
-                ahead, behind = slip[at.AHEAD, row], slip[at.BEHIND, row]
-                both = ahead + behind + slip[at.RUBBING, row] * (behind - ahead)
-                total += slip[at.LIMIT, row] * both
+            if contact.friction_limit > 0.0:
+                ahead, behind = contact.slide_ahead, contact.slide_behind
+                both = ahead + behind + contact.friction * (behind - ahead)
+                total += contact.friction_limit * both
                 count += 2
     return total / max(count, 1)
 
 
 def pull(work, row, target):
     """By how much a pair's δ is to change where its gap stays [m]."""
-    overlap, left = work.slip[at.OVERLAP, row], work.slip[at.LEFT, row]
-    off = left - work.geometry[at.NOW, row, at.GAP] - overlap
+    contact = work.interior[row]
+    overlap, left = contact.overlap, contact.slack
+    off = left - work.geometry[at.NOW, row].gap - overlap
     return (target - overlap * left + overlap * off) / (overlap + left)
 
 
 def drag(work, row, target):
     """(w, by how much a pair's friction f is to change where v_t and L stay [m], by how much it
     grows with L)."""
-    limit = work.slip[at.LIMIT, row]
-    force = work.slip[at.RUBBING, row] * limit
+    contact = work.interior[row]
+    limit = contact.friction_limit
+    force = contact.friction * limit
     above, below = limit - force, limit + force
-    ahead, behind = work.slip[at.AHEAD, row] / above, work.slip[at.BEHIND, row] / below
+    ahead, behind = contact.slide_ahead / above, contact.slide_behind / below
     weight = 1.0 / (1.0 + ahead + behind)
-    change = weight * (work.slip[at.STUCK, row] - force - target / above + target / below)
+    change = weight * (contact.stick_force - force - target / above + target / below)
     return weight, change, weight * (ahead - behind)
 
 
 def limit_by_overlap(work, row):
     """By how much the limit of a pair's friction grows with δ; not at all where it is held."""
-    if work.slip[at.BEARING, row] > 0.0:
+    contact = work.interior[row]
+    if contact.held_overlap > 0.0:
         return 0.0
-    return work.slip[at.LIMIT, row] / work.slip[at.OVERLAP, row]
+    return contact.friction_limit / contact.overlap
 
 
 def limited_friction(work, row, target):
     """(s T, how it falls with v_t, how it grows with the gap) of a pair with a limit."""
-    slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
+    contact = work.interior[row]
+    both = contact.overlap + contact.slack
     weight, change, by_limit = drag(work, row, target)
-    whole = slip[at.PART, row] * slip[at.HARDNESS, row]
+    whole = contact.step_share * contact.normal_stiffness
     by_limit *= limit_by_overlap(work, row)
-    force = slip[at.RUBBING, row] * slip[at.LIMIT, row] + change
+    force = contact.friction * contact.friction_limit + change
     force += by_limit * pull(work, row, target)
-    falls = by_limit * slip[at.OVERLAP, row] / both
-    return -whole * force, whole * weight * slip[at.YIELDS, row], -whole * falls
+    falls = by_limit * contact.overlap / both
+    return -whole * force, whole * weight * contact.stick_slope, -whole * falls
 
 
 def other_friction(scene, work, row, step, target):
     """The same of one without."""
-    slip, both = work.slip, work.slip[at.OVERLAP, row] + work.slip[at.LEFT, row]
+    contact = work.interior[row]
+    both = contact.overlap + contact.slack
     force = friction_force(scene, work, row, step)
     slope, _, by_part = friction_slopes(scene, work, row, step)
-    if slip[at.BEARING, row] > 0.0:
+    if contact.held_overlap > 0.0:
         return force, slope, 0.0
     _, grows, falls = part_of_step(work, row, False)
     closing = pull(work, row, target)
-    leaving = closing - (
-        slip[at.LEFT, row] - work.geometry[at.NOW, row, at.GAP] - slip[at.OVERLAP, row]
-    )
+    leaving = closing - (contact.slack - work.geometry[at.NOW, row].gap - contact.overlap)
     force += by_part * (grows * closing - falls * leaving)
     return (
         force,
         slope,
-        by_part * (grows * slip[at.OVERLAP, row] + falls * slip[at.LEFT, row]) / both,
+        by_part * (grows * contact.overlap + falls * contact.slack) / both,
     )
 
 
@@ -210,15 +216,16 @@ def write_forces(scene, work, step, target, turns):
     """Forces and derivatives of the pairs in play, δ and f changed as far as their gaps and v_t are
     not; if they turn, with what that does, which is too large before they fit, and can make systems
     indefinite."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            overlap, left = work.slip[at.OVERLAP, row], work.slip[at.LEFT, row]
+            contact = work.interior[row]
+            overlap, left = contact.overlap, contact.slack
             normal, stiffness = press(scene, work, row, step, turns)
             normal += stiffness * pull(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
-            if work.slip[at.LIMIT, row] > 0.0:
+            if contact.friction_limit > 0.0:
                 tangential, slope, coupled = limited_friction(work, row, target)
-            elif work.slip[at.YIELDS, row] > 0.0:
+            elif contact.stick_slope > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
             push_pair(work, at.NOW, row, normal, tangential)
             works = overlap / (overlap + left)
@@ -236,18 +243,19 @@ def room(share, size, change):
 def change_friction(work, row, target, grown, share, go):
     """The share of the changes of p, q and f that keeps them where they belong, not above the one
     that is given; if they are to ``go``, they go that far. L is ``grown`` by so much [m]."""
-    known, limit = work.slip, work.slip[at.LIMIT, row]
+    contact = work.interior[row]
+    limit = contact.friction_limit
     weight, change, by_limit = drag(work, row, target)
     rate = rate_along(work, row, at.CHANGE, tangent_rows(work, row))
-    stuck = known[at.YIELDS, row] * rate
+    stuck = contact.stick_slope * rate
     change += weight * stuck + by_limit * grown
     ahead, behind, force = (
-        known[at.AHEAD, row],
-        known[at.BEHIND, row],
-        known[at.RUBBING, row] * limit,
+        contact.slide_ahead,
+        contact.slide_behind,
+        contact.friction * limit,
     )
     above, below = limit - force, limit + force
-    slides = known[at.STUCK, row] + stuck - force - change
+    slides = contact.stick_force + stuck - force - change
     # The nearer side of the limit is not divided by: next to nothing is left there.
     if above > below:
         more = (target - ahead * (grown - change)) / above - ahead
@@ -256,11 +264,11 @@ def change_friction(work, row, target, grown, share, go):
         less = (target - behind * (grown + change)) / below - behind
         more = behind + less + slides - ahead
     if go:
-        known[at.STUCK, row] += share * stuck
-        known[at.LIMIT, row] = limit + share * grown
-        known[at.RUBBING, row] = (force + share * change) / known[at.LIMIT, row]
-        known[at.AHEAD, row] += share * more
-        known[at.BEHIND, row] += share * less
+        contact.stick_force += share * stuck
+        contact.friction_limit = limit + share * grown
+        contact.friction = (force + share * change) / contact.friction_limit
+        contact.slide_ahead += share * more
+        contact.slide_behind += share * less
         return share
     share = room(room(share, ahead, more), behind, less)
     return room(room(share, above, grown - change), below, grown + change)
@@ -268,17 +276,17 @@ def change_friction(work, row, target, grown, share, go):
 
 def change_pair(work, row, step, target, share, go):
     """The same of δ and s, and of friction."""
-    known = work.slip
-    overlap, left = known[at.OVERLAP, row], known[at.LEFT, row]
+    contact = work.interior[row]
+    overlap, left = contact.overlap, contact.slack
     opening = step * rate_along(work, row, at.CHANGE, normal_rows(work, row))
     closing = pull(work, row, target) - overlap / (overlap + left) * opening
-    leaving = opening + closing - (left - work.geometry[at.NOW, row, at.GAP] - overlap)
-    if known[at.LIMIT, row] > 0.0:
+    leaving = opening + closing - (left - work.geometry[at.NOW, row].gap - overlap)
+    if contact.friction_limit > 0.0:
         grown = closing * limit_by_overlap(work, row)
         share = change_friction(work, row, target, grown, share, go)
     if go:
-        known[at.OVERLAP, row] += share * closing
-        known[at.LEFT, row] += share * leaving
+        contact.overlap += share * closing
+        contact.slack += share * leaving
         return share
     return room(room(share, overlap, closing), left, leaving)
 
@@ -288,7 +296,7 @@ def change_pairs(work, step, target, own):
     """Change all pairs in play as the velocities in CHANGE do, each as far as all of them may, or
     as its ``own`` parts may: (the least share, the pair that has allowed no more, −1 for none)."""
     share, first = 1.0, -1
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
             goes = change_pair(work, row, step, target, 1.0, False)
             if own:
@@ -296,7 +304,7 @@ def change_pairs(work, step, target, own):
             if goes < share:
                 share, first = goes, row
     if not own:
-        for row in range(work.tally[at.CANDIDATES]):
+        for row in range(work.tally.candidates):
             if in_play(work, row):
                 change_pair(work, row, step, target, share, True)
     return share, first
@@ -306,32 +314,34 @@ def change_pairs(work, step, target, own):
 def let_open(work):
     """Let the s of pairs follow their gaps where these have opened by more: next to δ = 0 it would
     but double in an iteration."""
-    known = work.slip
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            wide = work.geometry[at.NOW, row, at.GAP] + known[at.OVERLAP, row]
-            known[at.LEFT, row] = max(known[at.LEFT, row], wide)
+            contact = work.interior[row]
+            wide = work.geometry[at.NOW, row].gap + contact.overlap
+            contact.slack = max(contact.slack, wide)
 
 
 def begin_friction(work, row, share, target):
     """Let the friction of a pair begin at a share of its limit, with products τ."""
-    known, limit = work.slip, work.slip[at.LIMIT, row]
-    known[at.RUBBING, row] = share
-    known[at.AHEAD, row] = target / (limit * (1.0 - share))
-    known[at.BEHIND, row] = target / (limit * (1.0 + share))
+    contact = work.interior[row]
+    limit = contact.friction_limit
+    contact.friction = share
+    contact.slide_ahead = target / (limit * (1.0 - share))
+    contact.slide_behind = target / (limit * (1.0 + share))
 
 
 @apart
 def hold_friction(work, first):
     """Hold what friction goes by from now on, and let the pair begin again that is in the way of
     the others; False where there is none left to be held."""
-    known, newly = work.slip, False
-    for row in range(work.tally[at.CANDIDATES]):
-        rubs = known[at.YIELDS, row] > 0.0 and known[at.BEARING, row] == 0.0
+    newly = False
+    for row in range(work.tally.candidates):
+        contact = work.interior[row]
+        rubs = contact.stick_slope > 0.0 and contact.held_overlap == 0.0
         if in_play(work, row) and rubs:
-            known[at.BEARING, row], newly = known[at.OVERLAP, row], True
-    if newly and known[at.LIMIT, first] > 0.0:
-        share = min(max(known[at.RUBBING, first], -WITHIN), WITHIN)
+            contact.held_overlap, newly = contact.overlap, True
+    if newly and work.interior[first].friction_limit > 0.0:
+        share = min(max(work.interior[first].friction, -WITHIN), WITHIN)
         begin_friction(work, first, share, mean_product(work))
     return newly
 
@@ -339,27 +349,28 @@ def hold_friction(work, first):
 def in_doubt(work, row, least):
     """Whether a pair has neither δ nor s below a small share of both, or of a size [m]; or, closed,
     neither how far it slides nor what is left until it does below that or a small share of L."""
-    known, limit = work.slip, work.slip[at.LIMIT, row]
-    both = known[at.OVERLAP, row] + known[at.LEFT, row]
-    if min(known[at.OVERLAP, row], known[at.LEFT, row]) > SMALL * max(both, least):
+    contact = work.interior[row]
+    limit = contact.friction_limit
+    both = contact.overlap + contact.slack
+    if min(contact.overlap, contact.slack) > SMALL * max(both, least):
         return True
-    if known[at.OVERLAP, row] < known[at.LEFT, row]:
+    if contact.overlap < contact.slack:
         return False
-    force, least = known[at.RUBBING, row] * limit, min(least, SMALL * max(limit, least))
-    sides = max(min(known[at.AHEAD, row], limit - force), min(known[at.BEHIND, row], limit + force))
+    force, least = contact.friction * limit, min(least, SMALL * max(limit, least))
+    sides = max(min(contact.slide_ahead, limit - force), min(contact.slide_behind, limit + force))
     return limit > 0.0 and sides > least
 
 
 def is_off(work, row, least):
     """Whether the gap of a pair is not s − δ, or how far it slides not e − f, by far more than
     their parts, or than a size [m]."""
-    known = work.slip
-    both = known[at.OVERLAP, row] + known[at.LEFT, row]
-    off = known[at.LEFT, row] - work.geometry[at.NOW, row, at.GAP] - known[at.OVERLAP, row]
+    contact = work.interior[row]
+    both = contact.overlap + contact.slack
+    off = contact.slack - work.geometry[at.NOW, row].gap - contact.overlap
     if abs(off) > SMALL * max(both, SMALL * least):
         return True
-    limit, ahead, behind = known[at.LIMIT, row], known[at.AHEAD, row], known[at.BEHIND, row]
-    off = known[at.STUCK, row] - known[at.RUBBING, row] * limit - ahead + behind
+    limit, ahead, behind = contact.friction_limit, contact.slide_ahead, contact.slide_behind
+    off = contact.stick_force - contact.friction * limit - ahead + behind
     return limit > 0.0 and abs(off) > SMALL * max(limit + ahead + behind, least)
 
 
@@ -367,7 +378,7 @@ def is_off(work, row, least):
 def settled(work, least, fitting):
     """Whether of all pairs it is known if they close and slide, by a size [m]; and, for
     ``fitting``, if that fits their gaps and rates."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         open_question = in_doubt(work, row, least) or (fitting and is_off(work, row, least))
         if open_question and in_play(work, row):
             return False

@@ -92,11 +92,11 @@ time."""
 def largest_change(scene, work):
     """How much the velocity of an outline has changed since the last look [m/s]."""
     largest = 0.0
-    for body in range(work.motion.shape[1]):
-        if scene.bodies[body, at.FREE] == 1.0:
+    for body in range(work.place.shape[1]):
+        if scene.bodies[body].free == 1.0:
             for axis in range(3):
-                now = work.motion[at.NOW, body, at.VELOCITY + axis]
-                change = abs(now - work.motion[at.LOOKED, body, at.VELOCITY + axis])
+                now = work.velocity[at.NOW, body, axis]
+                change = abs(now - work.velocity[at.LOOKED, body, axis])
                 largest = max(largest, lever(scene, body, axis) * change)
     return largest
 
@@ -104,46 +104,46 @@ def largest_change(scene, work):
 def pays(scene, work, clock, trials, passed):
     """Whether backward Euler would have passed that time in far fewer steps than were tried: its
     error of a step is half of that times the change of velocity."""
-    steps = 1.0 + passed * largest_change(scene, work) / clock[at.TOLERANCE]
-    ahead = AHEAD if work.bodies.shape[0] >= FEWEST else FAR_AHEAD
+    steps = 1.0 + passed * largest_change(scene, work) / clock.tolerance
+    ahead = AHEAD if work.poses.shape[0] >= FEWEST else FAR_AHEAD
     return ahead * steps <= trials
 
 
 def crowd(work):
     """How many times the bodies are MANY, or 1."""
-    return max(1.0, work.bodies.shape[0] / MANY)
+    return max(1.0, work.poses.shape[0] / MANY)
 
 
 def hand_over(scene, work, clock, counts):
     """Hand over to backward Euler, or take back, where that is due."""
-    if not has(scene, CONTACT_FORCE) and clock[at.ACROSS] == 0.0:
+    if not has(scene, CONTACT_FORCE) and clock.across == 0.0:
         return
-    tried = counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED]
-    trials = tried - counts[at.LOOKED_TRIED]
-    if clock[at.ACROSS] == 1.0:
+    tried = counts.steps + counts.rejected + counts.located
+    trials = tried - counts.looked_tried
+    if clock.across == 1.0:
         enough = trials >= ENOUGH_TRIALS * crowd(work)
-        quiet = enough and clock[at.SWITCHES] < FEW_SWITCHES * trials
+        quiet = enough and clock.switches < FEW_SWITCHES * trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
         elif not enough:
             return
-    elif clock[at.LOOKED_AT] < math.inf:
-        if counts[at.STEPS] < counts[at.LOOK_AT]:
+    elif clock.looked_at < math.inf:
+        if counts.steps < counts.look_at:
             return
-        passed = clock[at.TIME] - clock[at.LOOKED_AT]
+        passed = clock.time - clock.looked_at
         if pays(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             go_across(clock, passed)
     probe = max(LEAST_PROBE, int(PROBE / crowd(work)))
-    counts[at.LOOK_AT], counts[at.LOOKED_TRIED] = counts[at.STEPS] + probe, tried
-    clock[at.LOOKED_AT], clock[at.SWITCHES] = clock[at.TIME], 0.0
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
-            work.motion[at.LOOKED, body, axis] = work.motion[at.NOW, body, axis]
+    counts.look_at, counts.looked_tried = counts.steps + probe, tried
+    clock.looked_at, clock.switches = clock.time, 0.0
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.velocity[at.LOOKED, body, axis] = work.velocity[at.NOW, body, axis]
 
 
 def across_not_compiled(scene, work, clock, step):
     """Tell that steps across switches have not been compiled yet."""
-    work.tally[at.FULL] = at.NOT_COMPILED
+    work.tally.full = at.NOT_COMPILED
     return -1.0
 
 

@@ -44,42 +44,40 @@ MOST_ITERATIONS = 8
 def begin_step(work, clock):
     """Keep the start of the step."""
     keep_start(work)
-    for row in range(work.tally[at.CANDIDATES]):
-        for column in range(at.GEOMETRY_COLUMNS):
-            work.geometry[at.TRIAL, row, column] = work.geometry[at.NOW, row, column]
-        work.candidates[row, at.CLOSED], work.slip[at.BEARING, row] = at.OPEN, 0.0
-        least = FADING * clock[at.TOLERANCE]
-        work.slip[at.FADES, row] = max(-work.geometry[at.NOW, row, at.GAP], least)
+    for row in range(work.tally.candidates):
+        work.geometry[at.TRIAL, row] = work.geometry[at.NOW, row]
+        work.candidates[row].closed, work.interior[row].held_overlap = at.OPEN, 0.0
+        least = FADING * clock.tolerance
+        work.interior[row].fading_gap = max(-work.geometry[at.NOW, row].gap, least)
 
 
 def put_back(work):
     """Go back to the motion at the start of the step."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NOW, body, axis] = work.motion[at.START, body, axis]
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.NOW, body, axis] = work.place[at.START, body, axis]
+            work.velocity[at.NOW, body, axis] = work.velocity[at.START, body, axis]
 
 
 def end_step(work):
     """Make the iterate the new state, its contacts flagged that take part in the step, and its
     start the current one again."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NEW, body, axis] = work.motion[at.NOW, body, axis]
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.NEW, body, axis] = work.place[at.NOW, body, axis]
+            work.velocity[at.NEW, body, axis] = work.velocity[at.NOW, body, axis]
     put_back(work)
-    for row in range(work.tally[at.CANDIDATES]):
-        work.candidates[row, at.CLOSED] = at.TOUCHES if takes_part(work, row) else at.OPEN
-        for column in range(at.GEOMETRY_COLUMNS):
-            work.geometry[at.NOW, row, column] = work.geometry[at.TRIAL, row, column]
+    for row in range(work.tally.candidates):
+        work.candidates[row].closed = at.TOUCHES if takes_part(work, row) else at.OPEN
+        work.geometry[at.NOW, row] = work.geometry[at.TRIAL, row]
 
 
 def place_ends(work, step):
     """Places at the end from the velocities there."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            start = work.motion[at.START, body, axis]
-            work.motion[at.NOW, body, axis] = (
-                start + step * work.motion[at.NOW, body, at.VELOCITY + axis]
-            )
+            start = work.place[at.START, body, axis]
+            work.place[at.NOW, body, axis] = start + step * work.velocity[at.NOW, body, axis]
 
 
 @apart
@@ -113,55 +111,57 @@ def evaluate_end(scene, work, time, step):
 
 def is_too_deep(scene, work):
     """Whether a pair overlaps by more than half of what the contact law takes."""
-    for row in range(work.tally[at.CANDIDATES]):
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-        size = scene.bodies[a, at.RADIUS] + scene.bodies[b, at.RADIUS]
-        if -work.geometry[at.NOW, row, at.GAP] > 0.5 * DEEPEST_OVERLAP * size:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        a, b = candidate.vertex_body, candidate.edge_body
+        size = scene.bodies[a].radius + scene.bodies[b].radius
+        if -work.geometry[at.NOW, row].gap > 0.5 * DEEPEST_OVERLAP * size:
             return True
     return False
 
 
 def momentum_change(scene, work, body, axis, step):
     """Mass times acceleration in the step."""
-    before = work.motion[at.START, body, at.VELOCITY + axis]
-    return (
-        inertia(scene, body, axis) * (work.motion[at.NOW, body, at.VELOCITY + axis] - before) / step
-    )
+    before = work.velocity[at.START, body, axis]
+    return inertia(scene, body, axis) * (work.velocity[at.NOW, body, axis] - before) / step
 
 
 def unbalanced(scene, work, body, axis, step):
     """Force less mass times acceleration."""
-    force = work.rates[at.NOW, body, at.FORCE + axis]
+    force = work.force[at.NOW, body, axis]
     return force - momentum_change(scene, work, body, axis, step)
 
 
 def write_load(scene, work, step):
     """What the forces do not balance, of a cluster as a whole in the rows of its first body: forces
     and rates apart, so that what is mutual cancels."""
-    bodies, n = work.bodies, work.bodies.shape[0]
+    n = work.poses.shape[0]
     for body in range(n):
-        for axis in range(2):
-            bodies[body, at.LEADER_FORCE + axis] = bodies[body, at.LEADER_RATE + axis] = 0.0
+        cluster = work.clusters[body]
+        cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     for body in range(n):
-        leader = work.cluster[body]
-        for axis in range(2):
-            bodies[leader, at.LEADER_FORCE + axis] += work.rates[at.NOW, body, at.FORCE + axis]
-            rate = momentum_change(scene, work, body, axis, step)
-            bodies[leader, at.LEADER_RATE + axis] += rate
+        cluster = work.clusters[work.cluster[body]]
+        cluster.force_x += work.force[at.NOW, body, at.X]
+        cluster.force_y += work.force[at.NOW, body, at.Y]
+        cluster.rate_x += momentum_change(scene, work, body, 0, step)
+        cluster.rate_y += momentum_change(scene, work, body, 1, step)
     for body in range(n):
-        free = scene.bodies[body, at.FREE]
-        for axis in range(3):
-            load = unbalanced(scene, work, body, axis, step)
-            if axis < 2 and work.cluster[body] == body:
-                load = bodies[body, at.LEADER_FORCE + axis] - bodies[body, at.LEADER_RATE + axis]
-            work.loads[REAL, 3 * body + axis] = free * load
+        free = scene.bodies[body].free
+        x = unbalanced(scene, work, body, 0, step)
+        y = unbalanced(scene, work, body, 1, step)
+        if work.cluster[body] == body:
+            cluster = work.clusters[body]
+            x, y = cluster.force_x - cluster.rate_x, cluster.force_y - cluster.rate_y
+        work.loads[REAL, 3 * body] = free * x
+        work.loads[REAL, 3 * body + 1] = free * y
+        work.loads[REAL, 3 * body + 2] = free * unbalanced(scene, work, body, 2, step)
 
 
 @apart
 def assemble_rest(scene, work, clock, step):
     """Derivatives of all forces at the end of the step but those of contacts."""
-    remaining = max(end_of_run(clock) - clock[at.TIME], step)
-    assemble_others(scene, work, clock[at.TIME] + step, remaining)
+    remaining = max(end_of_run(clock) - clock.time, step)
+    assemble_others(scene, work, clock.time + step, remaining)
 
 
 def refresh(scene, work, clock, step):
@@ -179,13 +179,13 @@ def solve_change(scene, work, step):
     """Newton's change of velocities into CHANGE; the largest that it makes in place [m]."""
     write_load(scene, work, step)
     solve_real(work)
-    work.tally[at.SOLVES] += 1
+    work.tally.solves += 1
     largest = 0.0
-    for body in range(work.bodies.shape[0]):
-        memory = step + work.bodies[body, at.MEMORY]
+    for body in range(work.poses.shape[0]):
+        memory = step + work.errors[body].memory
         for axis in range(3):
-            change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body, at.FREE]
-            work.motion[at.CHANGE, body, at.VELOCITY + axis] = change
+            change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body].free
+            work.velocity[at.CHANGE, body, axis] = change
             if not abs(change) < math.inf:
                 return math.inf
             largest = max(largest, lever(scene, body, axis) * memory * abs(change))
@@ -194,14 +194,14 @@ def solve_change(scene, work, step):
 
 def go_along(work, way):
     """Add a share of the change to the velocities."""
-    for body in range(work.bodies.shape[0]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
-            work.motion[at.NOW, body, axis] += way * work.motion[at.CHANGE, body, axis]
+    for body in range(work.poses.shape[0]):
+        for axis in range(3):
+            work.velocity[at.NOW, body, axis] += way * work.velocity[at.CHANGE, body, axis]
 
 
 def goal_of(scene, work, clock, step):
     """What a change may be at most where it is the last one [m]."""
-    return max(NEWTON_SHARE * clock[at.TOLERANCE], rounding_size(scene, work, at.NOW, step))
+    return max(NEWTON_SHARE * clock.tolerance, rounding_size(scene, work, at.NOW, step))
 
 
 @apart
@@ -209,7 +209,7 @@ def solve_end(scene, work, clock, step):
     """Find the end of the step, of which begin_step has kept the start, from velocities that are
     near it; False where it is not found."""
     for _ in range(MOST_ITERATIONS):
-        if not evaluate_end(scene, work, clock[at.TIME], step):
+        if not evaluate_end(scene, work, clock.time, step):
             return False
         if not refresh(scene, work, clock, step):
             return False
@@ -218,5 +218,5 @@ def solve_end(scene, work, clock, step):
             return False
         go_along(work, 1.0)
         if change <= goal_of(scene, work, clock, step):
-            return evaluate_end(scene, work, clock[at.TIME], step)
+            return evaluate_end(scene, work, clock.time, step)
     return False

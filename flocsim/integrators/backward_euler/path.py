@@ -91,9 +91,9 @@ NOWHERE, NEAR, THERE = range(3)
 def usual_force(scene, work):
     """How large forces are that stop, or hold, a body [N], in the mean."""
     total, count = 0.0, 0
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
-            fx, fy = work.rates[at.NOW, body, at.FORCE], work.rates[at.NOW, body, at.FORCE + 1]
+    for body in range(work.poses.shape[0]):
+        if scene.bodies[body].free == 1.0:
+            fx, fy = work.force[at.NOW, body, at.X], work.force[at.NOW, body, at.Y]
             total += math.hypot(fx, fy)
             count += 1
     return total / max(count, 1)
@@ -102,13 +102,14 @@ def usual_force(scene, work):
 def usual_sizes(scene, work, step):
     """(a usual δ, a usual s [m]); 0 where no pair is in play."""
     count, stopped, way, deepest, stiffness = 0, 0.0, 0.0, 0.0, 0.0
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            candidate = work.candidates[row]
+            a, b = candidate.vertex_body, candidate.edge_body
             speed = abs(rate_along(work, row, at.START, normal_rows(work, row)))
             stopped += effective_mass(scene, a, b) * speed / step
             way += step * speed
-            deepest = max(deepest, -work.geometry[at.NOW, row, at.GAP])
+            deepest = max(deepest, -work.geometry[at.NOW, row].gap)
             stiffness += normal_stiffness(scene, work, row, step, 1e-12)
             count += 1
     if count == 0 or not stiffness > 0.0:
@@ -119,49 +120,53 @@ def usual_sizes(scene, work, step):
 
 def begin_anywhere(scene, work, step, usual, way):
     """δ, s and friction of all pairs in play to begin with, of which nothing is known, or held."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            known, gap = work.slip, work.geometry[at.NOW, row, at.GAP]
-            known[at.OVERLAP, row] = max(-work.geometry[at.TRIAL, row, at.GAP], AWAY * usual)
-            known[at.LEFT, row] = max(gap + known[at.OVERLAP, row], AWAY * way, -gap)
-            known[at.BEARING, row] = 0.0
+            contact = work.interior[row]
+            gap = work.geometry[at.NOW, row].gap
+            contact.overlap = max(-work.geometry[at.TRIAL, row].gap, AWAY * usual)
+            contact.slack = max(gap + contact.overlap, AWAY * way, -gap)
+            contact.held_overlap = 0.0
             press(scene, work, row, step, False)
-            known[at.RUBBING, row] = 0.0
-            slides = AWAY * usual * AWAY * way / max(known[at.LIMIT, row], SMALL_LIMIT * usual)
-            known[at.AHEAD, row] = max(known[at.STUCK, row], slides)
-            known[at.BEHIND, row] = max(-known[at.STUCK, row], slides)
+            contact.friction = 0.0
+            slides = AWAY * usual * AWAY * way / max(contact.friction_limit, SMALL_LIMIT * usual)
+            contact.slide_ahead = max(contact.stick_force, slides)
+            contact.slide_behind = max(-contact.stick_force, slides)
 
 
 def begin_as_before(scene, work, step, usual):
     """The same where pairs are closed and slide as at the start of the step."""
     target = (AS_BEFORE * usual) ** 2
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if in_play(work, row):
-            known, before = work.slip, work.geometry[at.TRIAL, row, at.GAP]
+            geometry = work.geometry[at.NOW, row]
+            contact = work.interior[row]
+            before = work.geometry[at.TRIAL, row].gap
             if before < 0.0:
-                known[at.OVERLAP, row], known[at.LEFT, row] = -before, -target / before
-            elif work.geometry[at.NOW, row, at.GAP] < 0.0:
-                known[at.OVERLAP, row], known[at.LEFT, row] = usual, target / usual
+                contact.overlap, contact.slack = -before, -target / before
+            elif geometry.gap < 0.0:
+                contact.overlap, contact.slack = usual, target / usual
             else:
-                known[at.LEFT, row] = max(work.geometry[at.NOW, row, at.GAP], FOUND * usual)
-                known[at.OVERLAP, row] = target / known[at.LEFT, row]
+                contact.slack = max(geometry.gap, FOUND * usual)
+                contact.overlap = target / contact.slack
             press(scene, work, row, step, True)
-            limit, side = known[at.LIMIT, row], work.candidates[row, at.SLIDING]
+            limit, side = contact.friction_limit, work.candidates[row].sliding
             if limit > 0.0:
-                share = float(side) if side != 0 else known[at.STUCK, row] / limit
+                share = float(side) if side != 0 else contact.stick_force / limit
                 share = min(max(share, FOUND - 1.0), 1.0 - FOUND)
-                slides = side * (known[at.STUCK, row] - share * limit)
+                slides = side * (contact.stick_force - share * limit)
                 begin_friction(work, row, share, target)
-                moves = at.AHEAD if side > 0 else at.BEHIND
-                if side != 0:
-                    known[moves, row] = max(known[moves, row], slides)
+                if side > 0:
+                    contact.slide_ahead = max(contact.slide_ahead, slides)
+                elif side < 0:
+                    contact.slide_behind = max(contact.slide_behind, slides)
 
 
 def advance_gaps(work, share, step):
     """Gaps after a share of the change of velocities, in the directions that they had."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         opening = rate_along(work, row, at.CHANGE, normal_rows(work, row))
-        work.geometry[at.NOW, row, at.GAP] += share * step * opening
+        work.geometry[at.NOW, row].gap += share * step * opening
 
 
 @apart
@@ -179,13 +184,13 @@ def iterate(scene, work, clock, step, target, turns, own):
     share, first = change_pairs(work, step, target, own)
     go_along(work, 1.0 if own else share)
     if turns:
-        evaluate_in_play(scene, work, clock[at.TIME], step)
+        evaluate_in_play(scene, work, clock.time, step)
         if own:
             let_open(work)
     else:
         advance_gaps(work, share, step)
         place_ends(work, step)
-        sum_other_forces(scene, work, clock[at.TIME] + step, at.NOW)
+        sum_other_forces(scene, work, clock.time + step, at.NOW)
     return share, first, change
 
 
@@ -195,8 +200,8 @@ def may_go_apart(scene, work):
     there the bodies' ends would be others than those that pairs know of, and steps are rejected."""
     if has(scene, SLIP_LIMIT):
         return True
-    for row in range(work.tally[at.CANDIDATES]):
-        if in_play(work, row) and work.slip[at.YIELDS, row] > 0.0:
+    for row in range(work.tally.candidates):
+        if in_play(work, row) and work.interior[row].stick_slope > 0.0:
             return False
     return True
 
@@ -242,7 +247,7 @@ def arrive(scene, work, clock, step, usual, most, own):
 def come_from_afar(scene, work, clock, step, usual, way, careful):
     """Go to the end of the step from where nothing is known of it; where that leads to."""
     put_back(work)
-    evaluate_others(scene, work, clock[at.TIME], step)
+    evaluate_others(scene, work, clock.time, step)
     begin_anywhere(scene, work, step, usual, way)
     share, halted, standing = 0.0, 0, CAREFUL if careful else STANDING
     for _ in range(MOST_ITERATIONS):
@@ -254,7 +259,7 @@ def come_from_afar(scene, work, clock, step, usual, way, careful):
         if not goes_on:
             return NOWHERE
         if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
-            evaluate_others(scene, work, clock[at.TIME], step)
+            evaluate_others(scene, work, clock.time, step)
             own = not careful and may_go_apart(scene, work)
             return arrive(scene, work, clock, step, usual, MOST_TURNING, own)
     return NOWHERE
@@ -262,8 +267,8 @@ def come_from_afar(scene, work, clock, step, usual, way, careful):
 
 def leaves_out(work):
     """Whether a pair has closed that was not in play."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.geometry[at.NOW, row, at.GAP] < 0.0 and not in_play(work, row):
+    for row in range(work.tally.candidates):
+        if work.geometry[at.NOW, row].gap < 0.0 and not in_play(work, row):
             return True
     return False
 
@@ -272,7 +277,7 @@ def ends(scene, work, clock, step, led):
     """Whether the end of the step is there, or Newton's method finds it from where a search has
     led."""
     if led == THERE:
-        if not evaluate_end(scene, work, clock[at.TIME], step):
+        if not evaluate_end(scene, work, clock.time, step):
             return False
         if not leaves_out(work):
             return True
@@ -294,7 +299,7 @@ def search_afar(scene, work, clock, step, usual, way):
 def find_end(scene, work, clock, step):
     """Find the end of the step, of which begin_step has kept the start; False where it is not
     found."""
-    evaluate_others(scene, work, clock[at.TIME], step)
+    evaluate_others(scene, work, clock.time, step)
     flag_close(scene, work)
     gather_clusters(scene, work)
     usual, way = usual_sizes(scene, work, step)

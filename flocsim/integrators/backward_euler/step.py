@@ -49,7 +49,7 @@ def next_across(clock, step, ratio):
         return step * max(LEAST_SHARE, SAFETY / ratio)
     longer = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
     # A step cut short by the end of the window says nothing against a longer one.
-    return max(clock[at.STEP], longer) if step < clock[at.STEP] and ratio <= 0.5 else longer
+    return max(clock.step, longer) if step < clock.step and ratio <= 0.5 else longer
 
 
 def solve_step(scene, work, clock, step):
@@ -61,10 +61,15 @@ def solve_step(scene, work, clock, step):
 
 def speed_along(work, row, state):
     """How fast the bodies of a pair came at each other in a state [m/s]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, motion = work.geometry, work.motion
-    speed = g[at.NOW, row, at.NORMAL_X] * (motion[state, b, at.VX] - motion[state, a, at.VX])
-    return speed + g[at.NOW, row, at.NORMAL_Y] * (motion[state, b, at.VY] - motion[state, a, at.VY])
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g = work.geometry
+    speed = g[at.NOW, row].normal_x * (
+        work.velocity[state, b, at.X] - work.velocity[state, a, at.X]
+    )
+    return speed + g[at.NOW, row].normal_y * (
+        work.velocity[state, b, at.Y] - work.velocity[state, a, at.Y]
+    )
 
 
 @apart
@@ -72,15 +77,15 @@ def fastest_bounce(scene, work, clock, lasting):
     """ω0 [1/s] of the stiffest contact of the step from which bodies would fly apart again, by
     more than is allowed; of those alone that have closed in it unless ``lasting``."""
     fastest = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        closed = work.geometry[at.TRIAL, row, at.GAP] >= 0.0 > work.geometry[at.NOW, row, at.GAP]
+    for row in range(work.tally.candidates):
+        closed = work.geometry[at.TRIAL, row].gap >= 0.0 > work.geometry[at.NOW, row].gap
         if closed or (lasting and takes_part(work, row)):
             speed = speed_along(work, row, at.START)
             if lasting:
                 speed = max(abs(speed), abs(speed_along(work, row, at.NOW)))
-            if speed * memory_of(work, row) > clock[at.TOLERANCE]:
+            if speed * memory_of(work, row) > clock.tolerance:
                 view = contact_view(scene, work, at.NOW, row)
-                stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
+                stiffness = pressed_stiffness(scene, view, clock.tolerance)
                 if stiffness > 0.0:
                     frequency = math.sqrt(stiffness / view.effective_mass)
                     if bounces(scene, view, speed, frequency):
@@ -103,42 +108,42 @@ def euler_step(scene, work, clock, step, lasting):
 def note_rates(scene, work, clock, step):
     """Write down what a step that has been accepted says of the next one."""
     # A short one, in which a pair has landed, says nothing of how rates go on.
-    clock[at.RATES_KNOWN] = 1.0 if step > SHORT * clock[at.STEP] else 0.0
-    if clock[at.RATES_KNOWN] == 1.0:
+    clock.rates_known = 1.0 if step > SHORT * clock.step else 0.0
+    if clock.rates_known == 1.0:
         write_rates(work, step)
-    for row in range(work.tally[at.CANDIDATES]):
-        before, after = work.geometry[at.TRIAL, row, at.GAP], work.geometry[at.NOW, row, at.GAP]
-        clock[at.SWITCHES] += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
+    for row in range(work.tally.candidates):
+        before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
+        clock.switches += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
 
 
 def go_across(clock, step):
     """From now on, steps go on across switches; the size of the first one."""
-    clock[at.ACROSS], clock[at.STEP] = 1.0, step
-    clock[at.RATES_KNOWN] = clock[at.STAGED_STEP] = 0.0
-    clock[at.BEARABLE_STEP] = math.inf
+    clock.across, clock.step = 1.0, step
+    clock.rates_known = clock.staged_step = 0.0
+    clock.bearable_step = math.inf
 
 
 @apart
 def end_at_switches(scene, work, clock):
     """From now on, steps end at switches, as pairs are flagged by gaps and displacements now."""
-    clock[at.ACROSS], clock[at.STEP], clock[at.LOOKED_AT] = (
+    clock.across, clock.step, clock.looked_at = (
         0.0,
-        FIRST_SHARE * clock[at.STEP],
+        FIRST_SHARE * clock.step,
         math.inf,
     )
-    clock[at.PREVIOUS_STEP] = clock[at.BEARABLE_STEP] = clock[at.SETTLED_STEP] = math.inf
-    clock[at.SETTLING] = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        work.candidates[row, at.SLIDING] = 0
+    clock.previous_step = clock.bearable_step = clock.settled_step = math.inf
+    clock.settling = 0.0
+    for row in range(work.tally.candidates):
+        work.candidates[row].sliding = 0
     set_modes(scene, work)
 
 
 def write_rates(work, step):
     """Write the accelerations of the step, which has begun in START, into LAST_RATES."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
-            change = work.motion[at.NOW, body, axis] - work.motion[at.START, body, axis]
-            work.motion[at.LAST_RATES, body, axis] = change / step
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            change = work.velocity[at.NOW, body, axis] - work.velocity[at.START, body, axis]
+            work.velocity[at.LAST_RATES, body, axis] = change / step
 
 
 @apart
@@ -151,30 +156,27 @@ def solve_loads(scene, work, weight):
 @apart
 def estimate_step(scene, work, clock, step):
     """The error of the step, whose end stands in NOW, into DEVIATION."""
-    motion, loads = work.motion, work.loads
-    if clock[at.RATES_KNOWN] == 0.0:
+    loads = work.loads
+    if clock.rates_known == 0.0:
         write_rates(work, step)
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            place = at.VELOCITY + axis
-            less = motion[at.START, body, place] - motion[at.NOW, body, place]
-            slower = motion[at.LAST_RATES, body, place] + less / step
+            less = work.velocity[at.START, body, axis] - work.velocity[at.NOW, body, axis]
+            slower = work.velocity[at.LAST_RATES, body, axis] + less / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
-            motion[at.CHANGE, body, axis] = less
+            work.place[at.CHANGE, body, axis] = less
     if has(scene, CONTACT_FORCE):
         add_held_friction(scene, work, step)
     solve_loads(scene, work, 0.5 * step)
-    for body in range(motion.shape[1]):
-        free = scene.bodies[body, at.FREE]
+    for body in range(work.place.shape[1]):
+        free = scene.bodies[body].free
         for axis in range(3):
             speed = loads[REAL, 3 * body + axis].real
-            error = free * step * (0.5 * motion[at.CHANGE, body, axis] + speed)
-            motion[at.DEVIATION, body, axis] = motion[at.CHANGE, body, axis] = error
+            error = free * step * (0.5 * work.place[at.CHANGE, body, axis] + speed)
+            work.place[at.DEVIATION, body, axis] = work.place[at.CHANGE, body, axis] = error
             loads[REAL, 3 * body + axis] = inertia(scene, body, axis) / step * speed
     solve_loads(scene, work, 1.0)
-    for body in range(motion.shape[1]):
-        free = scene.bodies[body, at.FREE]
+    for body in range(work.place.shape[1]):
+        free = scene.bodies[body].free
         for axis in range(3):
-            motion[at.DEVIATION, body, at.VELOCITY + axis] = (
-                free * loads[REAL, 3 * body + axis].real
-            )
+            work.velocity[at.DEVIATION, body, axis] = free * loads[REAL, 3 * body + axis].real

@@ -34,47 +34,46 @@ MOST_TRIALS = 60
 def interpolate(work, step, share, body):
     """Write a body's motion at a share of the step into TRIAL: the cubic through both of its
     ends."""
-    motion = work.motion
     rest = 1.0 - share
     for axis in range(3):
-        change = motion[at.NEW, body, axis] - motion[at.NOW, body, axis]
-        start = step * motion[at.NOW, body, at.VELOCITY + axis] - change
-        end = change - step * motion[at.NEW, body, at.VELOCITY + axis]
+        change = work.place[at.NEW, body, axis] - work.place[at.NOW, body, axis]
+        start = step * work.velocity[at.NOW, body, axis] - change
+        end = change - step * work.velocity[at.NEW, body, axis]
         bend = rest * start + share * end
-        motion[at.TRIAL, body, axis] = (
-            motion[at.NOW, body, axis] + share * change + share * rest * bend
+        work.place[at.TRIAL, body, axis] = (
+            work.place[at.NOW, body, axis] + share * change + share * rest * bend
         )
         slope = change + (rest - share) * bend + share * rest * (end - start)
-        motion[at.TRIAL, body, at.VELOCITY + axis] = slope / step
+        work.velocity[at.TRIAL, body, axis] = slope / step
 
 
 def margin(work, state, row):
     """What must not become negative while the flags hold [m]: the gap of a pair that is open now,
     the overlap of a closed one; nothing of one that grazes."""
-    gap = work.geometry[state, row, at.GAP]
-    if work.candidates[row, at.CLOSED] == at.GRAZES:
+    gap = work.geometry[state, row].gap
+    if work.candidates[row].closed == at.GRAZES:
         return math.inf
-    return -gap if work.geometry[at.NOW, row, at.GAP] < 0.0 else gap
+    return -gap if work.geometry[at.NOW, row].gap < 0.0 else gap
 
 
 def margin_rate(work, state, row):
     """Rate of change of the margin [m/s]."""
     rate = normal_rate(work, state, row)
-    if work.candidates[row, at.CLOSED] == at.GRAZES:
+    if work.candidates[row].closed == at.GRAZES:
         return 0.0
-    return -rate if work.geometry[at.NOW, row, at.GAP] < 0.0 else rate
+    return -rate if work.geometry[at.NOW, row].gap < 0.0 else rate
 
 
 def is_too_deep(scene, work, state, row):
     """Whether a listed pair overlaps past the limit of the contact law."""
     radius_a, radius_b = row_radii(scene, work, row)
-    return -work.geometry[state, row, at.GAP] > DEEPEST_OVERLAP * (radius_a + radius_b)
+    return -work.geometry[state, row].gap > DEEPEST_OVERLAP * (radius_a + radius_b)
 
 
 def look_at(scene, work, step, share, row):
     """Locate a pair at a share of the step; the margin."""
-    for column in (at.VERTEX_BODY, at.EDGE_BODY):
-        body = work.candidates[row, column]
+    candidate = work.candidates[row]
+    for body in (candidate.vertex_body, candidate.edge_body):
         interpolate(work, step, share, body)
         turn_body(work, at.TRIAL, body)
     locate_polygons(scene, work, at.TRIAL, row)
@@ -94,12 +93,12 @@ def may_dip(work, step, row, level):
 
 def speed_against(scene, work, state, row):
     """A bound of how fast any points of a pair's two bodies move against each other [m/s]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    v = work.motion
-    speed = abs(v[state, a, at.VX] - v[state, b, at.VX])
-    speed += abs(v[state, a, at.VY] - v[state, b, at.VY])
-    speed += abs(v[state, a, at.SPIN]) * scene.bodies[a, at.BOUNDING_RADIUS]
-    return speed + abs(v[state, b, at.SPIN]) * scene.bodies[b, at.BOUNDING_RADIUS]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    speed = abs(work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
+    speed += abs(work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
+    speed += abs(work.velocity[state, a, at.ANGLE]) * scene.bodies[a].bounding_radius
+    return speed + abs(work.velocity[state, b, at.ANGLE]) * scene.bodies[b].bounding_radius
 
 
 def lowest_share(scene, work, step, row, level):
@@ -163,7 +162,7 @@ def collides(work, step, row, depth):
 
 def unnoticed(scene, work, step, row, resolution, depth):
     """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
-    before, after = work.geometry[at.NOW, row, at.GAP], work.geometry[at.NEW, row, at.GAP]
+    before, after = work.geometry[at.NOW, row].gap, work.geometry[at.NEW, row].gap
     if before < 0.0 <= after:
         return release_resolution(scene, work, at.NEW, row, resolution)
     if before >= 0.0 > after and collides(work, step, row, depth):
@@ -180,7 +179,7 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
         if lowest > high:
             return earliest
         high = lowest
-        if work.tally[at.SERIES_TERMS] > 0 and work.geometry[at.NOW, row, at.GAP] < 0.0:
+        if work.tally.series_terms > 0 and work.geometry[at.NOW, row].gap < 0.0:
             # It has opened, and what pulls it shut again is a law that ends there.
             limit = resolution
     at_high = look_at(scene, work, step, high, row)
@@ -191,7 +190,7 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
 
 def may_switch(scene, work, step, resolution, depth):
     """Whether a pair may switch in a step before its end, as seen from both ends of it."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         limit = unnoticed(scene, work, step, row, resolution, depth)
         if margin(work, at.NEW, row) < -limit or may_dip(work, step, row, 0.0):
             return True
@@ -204,11 +203,11 @@ def passes_within(scene, work, step, depth):
     reach, g = scene.surface_reach, work.geometry
     if reach <= 0.0:
         return False
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if (
-            min(g[at.NOW, row, at.GAP], g[at.NEW, row, at.GAP]) > reach
+            min(g[at.NOW, row].gap, g[at.NEW, row].gap) > reach
             and lowest_share(scene, work, step, row, reach) < 1.0
-            and g[at.TRIAL, row, at.GAP] < reach - depth
+            and g[at.TRIAL, row].gap < reach - depth
         ):
             return True
     return False
@@ -216,8 +215,8 @@ def passes_within(scene, work, step, depth):
 
 def touches(work):
     """Whether any listed pair does."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] != at.OPEN:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed != at.OPEN:
             return True
     return False
 
@@ -226,9 +225,9 @@ def changes_sides(work):
     """Whether a vertex has come from one side of an edge to the other in a step across switches,
     which is told of a touch by its end alone."""
     g = work.geometry
-    for row in range(work.tally[at.CANDIDATES]):
-        along = g[at.NOW, row, at.NORMAL_X] * g[at.NEW, row, at.NORMAL_X]
-        along += g[at.NOW, row, at.NORMAL_Y] * g[at.NEW, row, at.NORMAL_Y]
+    for row in range(work.tally.candidates):
+        along = g[at.NOW, row].normal_x * g[at.NEW, row].normal_x
+        along += g[at.NOW, row].normal_y * g[at.NEW, row].normal_y
         if along < 0.0:
             return True
     return False
@@ -241,8 +240,8 @@ def first_switch(scene, work, step, resolution, depth):
     one that counts is located to ``resolution`` [m].
     """
     earliest, before, way, back = NEVER, -1, 0.0, 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        pair = work.candidates[row, at.PAIR]
+    for row in range(work.tally.candidates):
+        pair = work.candidates[row].pair
         if pair != before:
             before = pair
             way = 0.5 * step * speed_against(scene, work, at.NOW, row)
@@ -264,9 +263,9 @@ def deepest_of(work, state, row, end):
     """The row of the least gap in a state, of those that touch; −1 without."""
     deepest = -1
     for each in range(row, end):
-        gap = work.geometry[state, each, at.GAP]
-        if work.candidates[each, at.CLOSED] == at.TOUCHES and (
-            deepest < 0 or gap < work.geometry[state, deepest, at.GAP]
+        gap = work.geometry[state, each].gap
+        if work.candidates[each].closed == at.TOUCHES and (
+            deepest < 0 or gap < work.geometry[state, deepest].gap
         ):
             deepest = each
     return deepest
@@ -282,23 +281,23 @@ def overtaken(work, row, end, closed):
     if old < 0 or old == new:
         return -1
     g = work.geometry
-    deep, deeper = -g[at.NOW, old, at.GAP], -g[at.NEW, new, at.GAP]
+    deep, deeper = -g[at.NOW, old].gap, -g[at.NEW, new].gap
     if not (deep > 0.0 and deeper > 0.0):
         return -1
-    way = min(g[at.NOW, new, at.GAP], 0.0) + deep + min(g[at.NEW, old, at.GAP], 0.0) + deeper
+    way = min(g[at.NOW, new].gap, 0.0) + deep + min(g[at.NEW, old].gap, 0.0) + deeper
     return old if way > LARGE * (deep + deeper) else -1
 
 
 def overtakes(scene, work, clock, step):
     """Whether a contact has overtaken another one of the same bodies from NOW to NEW, and the step
     is too long to tell. Only pairs that are closed count where steps end at switches."""
-    row, closed = 0, clock[at.ACROSS] == 0.0
-    while row < work.tally[at.CANDIDATES]:
+    row, closed = 0, clock.across == 0.0
+    while row < work.tally.candidates:
         end = run_end(work, row)
         old = overtaken(work, row, end, closed)
         if old >= 0:
             view = contact_view(scene, work, at.NOW, old)
-            stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
+            stiffness = pressed_stiffness(scene, view, clock.tolerance)
             if step * step * stiffness > RESOLVED * RESOLVED * view.effective_mass:
                 return True
         row = end

@@ -62,60 +62,75 @@ TINY = 1e-300
 
 def share_of_second(scene):
     """Where the point that stands for the pair lies between its bodies: their centre of mass."""
-    if scene.bodies[0, at.FREE] == 0.0:
+    if scene.bodies[0].free == 0.0:
         return 0.0
-    if scene.bodies[1, at.FREE] == 0.0:
+    if scene.bodies[1].free == 0.0:
         return 1.0
-    return scene.bodies[1, at.MASS] / (scene.bodies[0, at.MASS] + scene.bodies[1, at.MASS])
+    return scene.bodies[1].mass / (scene.bodies[0].mass + scene.bodies[1].mass)
 
 
 def coordinate(scene, work, state, which):
     """A coordinate of the pair: place (x, y) and angle of the second body as seen from the first,
     velocities (x, y, spin) of both along its axes, then its angle, and the place of the pair."""
-    m = work.motion
-    turn = m[state, 0, at.ANGLE]
+    turn = work.place[state, 0, at.ANGLE]
     c, s = math.cos(turn), math.sin(turn)
-    dx, dy = m[state, 1, at.X] - m[state, 0, at.X], m[state, 1, at.Y] - m[state, 0, at.Y]
+    dx, dy = (
+        work.place[state, 1, at.X] - work.place[state, 0, at.X],
+        work.place[state, 1, at.Y] - work.place[state, 0, at.Y],
+    )
     if which == 0:
         return c * dx + s * dy
     if which == 1:
         return c * dy - s * dx
     if which == 2:
-        return m[state, 1, at.ANGLE] - turn
+        return work.place[state, 1, at.ANGLE] - turn
     if which < WHOLE:
         body, axis = (which - 3) // 3, (which - 3) % 3
         if axis == 0:
-            return c * m[state, body, at.VX] + s * m[state, body, at.VY]
+            return c * work.velocity[state, body, at.X] + s * work.velocity[state, body, at.Y]
         if axis == 1:
-            return c * m[state, body, at.VY] - s * m[state, body, at.VX]
-        return m[state, body, at.SPIN]
+            return c * work.velocity[state, body, at.Y] - s * work.velocity[state, body, at.X]
+        return work.velocity[state, body, at.ANGLE]
     if which == WHOLE:
         return turn
     share = share_of_second(scene)
     if which == WHOLE + 1:
-        return m[state, 0, at.X] + share * dx
-    return m[state, 0, at.Y] + share * dy
+        return work.place[state, 0, at.X] + share * dx
+    return work.place[state, 0, at.Y] + share * dy
 
 
 def place_by(scene, work):
-    """Make the coordinates that lie in TRIAL the motion of NOW."""
-    m, q = work.motion, work.motion[at.TRIAL]
-    turn, share = q[1, 3], share_of_second(scene)
+    """Make ``work.coordinates`` the motion of NOW."""
+    q = work.coordinates
+    turn, share = q[9], share_of_second(scene)
     c, s = math.cos(turn), math.sin(turn)
-    dx, dy = c * q[0, 0] - s * q[0, 1], s * q[0, 0] + c * q[0, 1]
-    m[at.NOW, 0, at.X], m[at.NOW, 0, at.Y] = q[1, 4] - share * dx, q[1, 5] - share * dy
-    m[at.NOW, 1, at.X], m[at.NOW, 1, at.Y] = m[at.NOW, 0, at.X] + dx, m[at.NOW, 0, at.Y] + dy
-    m[at.NOW, 0, at.ANGLE], m[at.NOW, 1, at.ANGLE] = turn, turn + q[0, 2]
-    m[at.NOW, 0, at.VX], m[at.NOW, 0, at.VY] = c * q[0, 3] - s * q[0, 4], s * q[0, 3] + c * q[0, 4]
-    m[at.NOW, 0, at.SPIN], m[at.NOW, 1, at.SPIN] = q[0, 5], q[1, 2]
-    m[at.NOW, 1, at.VX], m[at.NOW, 1, at.VY] = c * q[1, 0] - s * q[1, 1], s * q[1, 0] + c * q[1, 1]
+    dx, dy = c * q[0] - s * q[1], s * q[0] + c * q[1]
+    work.place[at.NOW, 0, at.X], work.place[at.NOW, 0, at.Y] = (
+        q[10] - share * dx,
+        q[11] - share * dy,
+    )
+    work.place[at.NOW, 1, at.X], work.place[at.NOW, 1, at.Y] = (
+        work.place[at.NOW, 0, at.X] + dx,
+        work.place[at.NOW, 0, at.Y] + dy,
+    )
+    work.place[at.NOW, 0, at.ANGLE], work.place[at.NOW, 1, at.ANGLE] = turn, turn + q[2]
+    work.velocity[at.NOW, 0, at.X], work.velocity[at.NOW, 0, at.Y] = (
+        c * q[3] - s * q[4],
+        s * q[3] + c * q[4],
+    )
+    work.velocity[at.NOW, 0, at.ANGLE], work.velocity[at.NOW, 1, at.ANGLE] = q[5], q[8]
+    work.velocity[at.NOW, 1, at.X], work.velocity[at.NOW, 1, at.Y] = (
+        c * q[6] - s * q[7],
+        s * q[6] + c * q[7],
+    )
 
 
 def modes_of(work):
     """A number for how all listed pairs touch."""
     code = 1
-    for row in range(work.tally[at.CANDIDATES]):
-        mode = 3 * work.candidates[row, at.CLOSED] + work.candidates[row, at.SLIDING] + 1
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        mode = 3 * candidate.closed + candidate.sliding + 1
         code = (code * BASE + mode + 1) % MODULUS
     return code
 
@@ -123,7 +138,7 @@ def modes_of(work):
 def any_hums(work):
     """Whether a pair hums: where none does, the cycles are bounces, which somebody may want to
     see."""
-    for row in range(work.tally[at.CANDIDATES]):  # noqa: SIM110
+    for row in range(work.tally.candidates):
         if hums(work, row):
             return True
     return False
@@ -131,26 +146,29 @@ def any_hums(work):
 
 def begin_at(counts, modes):
     """Let cycles be counted from these modes on."""
-    counts[at.CYCLE_MODES], counts[at.CYCLES_SEEN], counts[at.CYCLE_SWITCHES] = modes, 0, 0
-    counts[at.CYCLE_CODE] = counts[at.CYCLE_CODE_BEFORE] = 0
+    counts.cycle_modes, counts.cycles_seen, counts.cycle_switches = modes, 0, 0
+    counts.cycle_code = counts.cycle_code_before = 0
 
 
 def end_cycle(work, clock, counts):
     """Keep the state at the end of a cycle beside that of the end before."""
     for body in range(2):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.CYCLE_BEFORE, body, axis] = work.motion[at.CYCLE_LAST, body, axis]
-            work.motion[at.CYCLE_LAST, body, axis] = work.motion[at.NOW, body, axis]
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.CYCLE_SLIP_BEFORE, row] = work.slip[at.CYCLE_SLIP, row]
-        work.slip[at.CYCLE_SLIP, row] = work.slip[at.NOW, row]
-        work.slip[at.CYCLE_GAP_BEFORE, row] = work.slip[at.CYCLE_GAP, row]
-        work.slip[at.CYCLE_GAP, row] = work.geometry[at.NOW, row, at.GAP]
-    clock[at.CYCLE_AT_BEFORE], clock[at.CYCLE_AT] = clock[at.CYCLE_AT], clock[at.TIME]
-    clock[at.CYCLE_ERROR] = clock[at.ERROR]
-    counts[at.CYCLE_CODE_BEFORE], counts[at.CYCLE_CODE] = counts[at.CYCLE_CODE], 0
-    counts[at.CYCLE_SWITCHES] = counts[at.CYCLE_RETURNS] = 0
-    counts[at.CYCLES_SEEN] += 1
+        for axis in range(3):
+            work.place[at.CYCLE_BEFORE, body, axis] = work.place[at.CYCLE_LAST, body, axis]
+            work.place[at.CYCLE_LAST, body, axis] = work.place[at.NOW, body, axis]
+            work.velocity[at.CYCLE_BEFORE, body, axis] = work.velocity[at.CYCLE_LAST, body, axis]
+            work.velocity[at.CYCLE_LAST, body, axis] = work.velocity[at.NOW, body, axis]
+    for row in range(work.tally.candidates):
+        contact = work.contacts[row]
+        contact.cycle_slip_before = contact.cycle_slip
+        contact.cycle_slip = work.slip[at.NOW, row]
+        contact.cycle_gap_before = contact.cycle_gap
+        contact.cycle_gap = work.geometry[at.NOW, row].gap
+    clock.cycle_at_before, clock.cycle_at = clock.cycle_at, clock.time
+    clock.cycle_error = clock.error
+    counts.cycle_code_before, counts.cycle_code = counts.cycle_code, 0
+    counts.cycle_switches = counts.cycle_returns = 0
+    counts.cycles_seen += 1
 
 
 def known(change, least):
@@ -193,9 +211,9 @@ def allowed(most, now, last, before, size, least):
 def sizes_of(work):
     """The largest (gap, tangential displacement) of the pairs that take part [m]."""
     gaps = slips = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if takes_part(work, row):
-            gaps = max(gaps, abs(work.geometry[at.NOW, row, at.GAP]))
+            gaps = max(gaps, abs(work.geometry[at.NOW, row].gap))
             slips = max(slips, abs(work.slip[at.NOW, row]))
     return gaps, slips
 
@@ -204,20 +222,21 @@ def cycles_of_form(work):
     """How many cycles leave gaps and displacements about as they are."""
     least, most = above_rounding(work, at.NOW, 0.0), MOST_AT_ONCE
     gaps, slips = sizes_of(work)
-    for row in range(work.tally[at.CANDIDATES]):
-        now, last = work.geometry[at.NOW, row, at.GAP], work.slip[at.CYCLE_GAP, row]
+    for row in range(work.tally.candidates):
+        contact = work.contacts[row]
+        now, last = work.geometry[at.NOW, row].gap, contact.cycle_gap
         size = gaps if takes_part(work, row) else now
-        most = allowed(most, now, last, work.slip[at.CYCLE_GAP_BEFORE, row], size, least)
+        most = allowed(most, now, last, contact.cycle_gap_before, size, least)
         if takes_part(work, row):
-            now, last = work.slip[at.NOW, row], work.slip[at.CYCLE_SLIP, row]
-            most = allowed(most, now, last, work.slip[at.CYCLE_SLIP_BEFORE, row], slips, least)
+            now, last = work.slip[at.NOW, row], contact.cycle_slip
+            most = allowed(most, now, last, contact.cycle_slip_before, slips, least)
     return most
 
 
 def lasted(clock):
     """How long the last cycle took, and the one before [s]."""
-    at_last, at_before = clock[at.CYCLE_AT], clock[at.CYCLE_AT_BEFORE]
-    return clock[at.TIME] - at_last, at_last - at_before
+    at_last, at_before = clock.cycle_at, clock.cycle_at_before
+    return clock.time - at_last, at_last - at_before
 
 
 def period_of(clock):
@@ -242,7 +261,7 @@ def rates_of(scene, work, clock, which):
 def way_of(scene, work, clock, first):
     """(Largest change over a cycle in three coordinates from ``first`` on, of which the angle
     counts in the place of an outline, by how much it differs from the one before) [m]."""
-    size = scene.bodies[0, at.BOUNDING_RADIUS] + scene.bodies[1, at.BOUNDING_RADIUS]
+    size = scene.bodies[0].bounding_radius + scene.bodies[1].bounding_radius
     way = bend = 0.0
     period, _ = period_of(clock)
     for which in range(first, first + 3):
@@ -279,9 +298,9 @@ def cycles_of_motion(scene, work, clock, until):
     for power in (3.0, 3.0, 2.0):
         # It goes with the square of their number at least, and with its third power at most.
         error = error_of(scene, work, clock, most)
-        if error > clock[at.TOLERANCE]:
-            most *= (clock[at.TOLERANCE] / error) ** (1.0 / power)
-    return min(most, 0.5 * (until - clock[at.TIME]) / period)
+        if error > clock.tolerance:
+            most *= (clock.tolerance / error) ** (1.0 / power)
+    return min(most, 0.5 * (until - clock.time) / period)
 
 
 def leave_out(scene, work, clock, many):
@@ -292,67 +311,70 @@ def leave_out(scene, work, clock, many):
     for which in range(COORDINATES):
         rate, more = rates_of(scene, work, clock, which)
         now = coordinate(scene, work, at.NOW, which) + rate * time
-        work.motion[at.TRIAL, which // at.MOTION_COLUMNS, which % at.MOTION_COLUMNS] = (
-            now + bent * more if which >= WHOLE else now
-        )
+        work.coordinates[which] = now + bent * more if which >= WHOLE else now
     place_by(scene, work)
     gaps, slips = sizes_of(work)
     least = above_rounding(work, at.NOW, 0.0)
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if takes_part(work, row):
-            slip, gap = work.slip[at.NOW, row], work.geometry[at.NOW, row, at.GAP]
-            last, before = work.slip[at.CYCLE_SLIP, row], work.slip[at.CYCLE_SLIP_BEFORE, row]
+            contact = work.contacts[row]
+            slip, gap = work.slip[at.NOW, row], work.geometry[at.NOW, row].gap
+            last, before = contact.cycle_slip, contact.cycle_slip_before
             work.slip[at.NOW, row] += many * trend(slip, last, before, slips, least)
-            last, before = work.slip[at.CYCLE_GAP, row], work.slip[at.CYCLE_GAP_BEFORE, row]
-            work.slip[at.CYCLE_GAP, row] = gap + many * trend(gap, last, before, gaps, least)
-    clock[at.TIME] += time
+            last, before = contact.cycle_gap, contact.cycle_gap_before
+            contact.cycle_gap = gap + many * trend(gap, last, before, gaps, least)
+    clock.time += time
     locate_contacts(scene, work, at.NOW)
 
 
 def restore_gaps(work):
     """Count the gaps of pairs that take part as what a cycle makes of them: what a turn bends them
     by is far below them."""
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if takes_part(work, row):
-            work.slip[at.GAP_OFFSET, row] += (
-                work.geometry[at.NOW, row, at.GAP] - work.slip[at.CYCLE_GAP, row]
-            )
-            work.geometry[at.NOW, row, at.GAP] = work.slip[at.CYCLE_GAP, row]
+            geometry = work.geometry[at.NOW, row]
+            contact = work.contacts[row]
+            contact.gap_offset += geometry.gap - contact.cycle_gap
+            geometry.gap = contact.cycle_gap
 
 
 def carry_on_errors(work, clock, many, more):
     """Let what is stated of errors grow on as it has in the last cycle, and by ``more`` [m]."""
-    grown = many * max(clock[at.ERROR] - clock[at.CYCLE_ERROR], 0.0) + more
+    grown = many * max(clock.error - clock.cycle_error, 0.0) + more
     if grown > 0.0:
-        factor = 1.0 + grown / max(clock[at.ERROR], TINY)
+        factor = 1.0 + grown / max(clock.error, TINY)
         for body in range(2):
-            for column in (at.ERROR_PLACE, at.SWITCH_PLACE, at.DOUBT_PLACE, at.STATED):
-                work.bodies[body, column] *= factor
-            for axis in range(at.MOTION_COLUMNS):
-                work.motion[at.CARRIED, body, axis] *= factor
-        clock[at.ERROR] *= factor
+            errors = work.errors[body]
+            errors.place *= factor
+            errors.switch_place *= factor
+            errors.doubt_place *= factor
+            errors.stated *= factor
+            for axis in range(3):
+                work.place[at.CARRIED, body, axis] *= factor
+                work.velocity[at.CARRIED, body, axis] *= factor
+        clock.error *= factor
 
 
 def leave_out_cycles(scene, work, clock, counts, until):
     """Look at a switch of two bodies that has just been, and leave out the cycles that it ends, if
     they have been alike."""
-    if work.bodies.shape[0] != 2 or not any_hums(work):
-        counts[at.CYCLE_MODES] = 0
+    if work.poses.shape[0] != 2 or not any_hums(work):
+        counts.cycle_modes = 0
         return
     modes = modes_of(work)
-    counts[at.CYCLE_CODE] = (counts[at.CYCLE_CODE] * BASE + modes) % MODULUS
-    counts[at.CYCLE_SWITCHES] += 1
-    if counts[at.CYCLE_SWITCHES] > MOST_SWITCHES or counts[at.CYCLE_MODES] == 0:
+    counts.cycle_code = (counts.cycle_code * BASE + modes) % MODULUS
+    counts.cycle_switches += 1
+    if counts.cycle_switches > MOST_SWITCHES or counts.cycle_modes == 0:
         begin_at(counts, modes)
-    if modes != counts[at.CYCLE_MODES]:
+    if modes != counts.cycle_modes:
         return
-    counts[at.CYCLE_RETURNS] += 1
-    if counts[at.CYCLES_SEEN] > 0 and counts[at.CYCLE_RETURNS] < RETURNS:
+    counts.cycle_returns += 1
+    if counts.cycles_seen > 0 and counts.cycle_returns < RETURNS:
         return
     many = 0.0
-    if counts[at.CYCLES_SEEN] >= 2:
-        if counts[at.CYCLE_CODE] != counts[at.CYCLE_CODE_BEFORE]:
-            counts[at.CYCLE_MODES] = 0
+    if counts.cycles_seen >= 2:
+        if counts.cycle_code != counts.cycle_code_before:
+            counts.cycle_modes = 0
             return
         many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
     if many >= FEWEST:

@@ -41,24 +41,22 @@ its sign may be rounding, and steps would end there for ever, and no time would 
 def deepest_overlap(work):
     """The largest overlap of a listed pair now [m], at least 0."""
     deepest = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        deepest = max(deepest, -work.geometry[at.NOW, row, at.GAP])
+    for row in range(work.tally.candidates):
+        deepest = max(deepest, -work.geometry[at.NOW, row].gap)
     return deepest
 
 
 def resolutions_of(work, clock):
     """How far a pair may go behind its switch unnoticed, and how far it may be there without being
     told from one before it [m]."""
-    resolution = (
-        RESOLUTION * step_tolerance(work, clock) if clock[at.TOLERANCE] < math.inf else 1e-13
-    )
+    resolution = RESOLUTION * step_tolerance(work, clock) if clock.tolerance < math.inf else 1e-13
     deepest = deepest_overlap(work)
     if deepest > 0.0:
         resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
     resolution = max(resolution, ROUNDING * furthest_place(work, at.NEW))
     if deepest > 0.0:
         return resolution, resolution
-    return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock[at.TOLERANCE]))
+    return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock.tolerance))
 
 
 def event_share(scene, work, row, which):
@@ -78,8 +76,8 @@ def event_share(scene, work, row, which):
 
 def law_event_share(scene, work, share):
     """The share of the step at which the first contact passes a kink, or the given one before."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == 1:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == 1:
             for which in range(scene.events):
                 share = min(share, event_share(scene, work, row, which))
     return share
@@ -88,8 +86,8 @@ def law_event_share(scene, work, share):
 def friction_share(scene, work, share, step, resolution):
     """The share of the step at which the first contact begins or ends to slide, or the given one
     before; what is beyond that by less than the resolution [m] at the end of the step is left."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == 1:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == 1:
             distance, share_there = beyond(scene, work, row, step)
             if distance > resolution:
                 share = min(share, share_there)
@@ -111,7 +109,7 @@ def switch_share(scene, work, observed, clock, step):
 
     Expects the geometry of all pairs in NEW.
     """
-    ends = clock[at.TOLERANCE] < math.inf and clock[at.ACROSS] == 0.0
+    ends = clock.tolerance < math.inf and clock.across == 0.0
     if ends or awaits_touch(observed):
         resolution, depth = resolutions_of(work, clock)
         share = first_switch(scene, work, step, resolution, depth)
@@ -128,12 +126,13 @@ def set_closed(work, state=at.NOW):
     """Flag every listed pair by its gap in a state, but for those that graze; whether
     any has changed."""
     changed = False
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.GRAZES:
             continue
-        closed = at.TOUCHES if work.geometry[state, row, at.GAP] < 0.0 else at.OPEN
-        changed = changed or work.candidates[row, at.CLOSED] != closed
-        work.candidates[row, at.CLOSED] = closed
+        closed = at.TOUCHES if work.geometry[state, row].gap < 0.0 else at.OPEN
+        changed = changed or candidate.closed != closed
+        candidate.closed = closed
     return changed
 
 

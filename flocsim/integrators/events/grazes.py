@@ -77,13 +77,13 @@ def pull_of(scene, work, row):
 
 def begins(scene, work, clock, row):
     """Whether a pair that has just parted grazes from now on."""
-    if work.candidates[row, at.SLIDING] != 0 or rattles(work, row):
+    if work.candidates[row].sliding != 0 or rattles(work, row):
         return False
     view = contact_view(scene, work, at.NOW, row)
     _, force = contact_force(scene, view)
     speed, pull = normal_rate(work, at.NOW, row), abs(force) * pull_of(scene, work, row)
     share = SHARE_OF_FLIGHT if hums(work, row) else SHARE_OF_FIRST
-    if speed * speed > 2.0 * pull * share * clock[at.TOLERANCE]:
+    if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
     pull, _ = contact_force(scene, pressed_view(view, 0.0, 0.0))
     if abs(pull) > LEAST_PULL * abs(force):
@@ -93,9 +93,9 @@ def begins(scene, work, clock, row):
         return True
     if not hums(work, row):
         kick = abs(force) / math.sqrt(spring * view.effective_mass)
-        if kick * memory_of(work, row) > FIRST_KICK * clock[at.TOLERANCE]:
+        if kick * memory_of(work, row) > FIRST_KICK * clock.tolerance:
             return False
-    return abs(force) <= SHARE_OF_SLIP * clock[at.TOLERANCE] * spring
+    return abs(force) <= SHARE_OF_SLIP * clock.tolerance * spring
 
 
 def spring_of(scene, view):
@@ -105,7 +105,7 @@ def spring_of(scene, view):
 
 def near(work, row, other):
     """Whether two rows have one contact point."""
-    body = work.candidates[row, at.VERTEX_BODY]
+    body = work.candidates[row].vertex_body
     x, y = contact_point(work, row, body)
     other_x, other_y = contact_point(work, other, body)
     return math.hypot(other_x - x, other_y - y) < SAME_PLACE
@@ -114,56 +114,57 @@ def near(work, row, other):
 def shares_point(work, row, other):
     """Whether two rows of the same two bodies have one contact point and gap: two corners that
     touch are up to four rows, of both bodies' edges."""
-    if work.candidates[row, at.PAIR] != work.candidates[other, at.PAIR]:
+    if work.candidates[row].pair != work.candidates[other].pair:
         return False
-    if abs(
-        work.geometry[at.NOW, row, at.GAP] - work.geometry[at.NOW, other, at.GAP]
-    ) > above_rounding(work, at.NOW, 0.0):
+    if abs(work.geometry[at.NOW, row].gap - work.geometry[at.NOW, other].gap) > above_rounding(
+        work, at.NOW, 0.0
+    ):
         return False
     return near(work, row, other)
 
 
 def enter(scene, work, row):
     """Let a pair graze."""
+    contact = work.contacts[row]
     _, force = contact_force(scene, contact_view(scene, work, at.NOW, row))
-    work.candidates[row, at.CLOSED] = at.GRAZES
-    work.slip[at.GRAZING_FORCE, row] = force
-    work.slip[at.FRESH, row] = 1.0
+    work.candidates[row].closed = at.GRAZES
+    contact.grazing_force = force
+    contact.fresh = 1.0
 
 
 def share_forces(work):
     """Rows of one contact point bear the same force."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.GRAZES:
             total, count = 0.0, 0
-            for other in range(work.tally[at.CANDIDATES]):
-                if work.candidates[other, at.CLOSED] == at.GRAZES and shares_point(
-                    work, row, other
-                ):
-                    total, count = total + work.slip[at.GRAZING_FORCE, other], count + 1
-            work.slip[at.GRAZING_RESISTANCE, row] = total / max(count, 1)
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
-            work.slip[at.GRAZING_FORCE, row] = work.slip[at.GRAZING_RESISTANCE, row]
+            for other in range(work.tally.candidates):
+                if work.candidates[other].closed == at.GRAZES and shares_point(work, row, other):
+                    total, count = total + work.contacts[other].grazing_force, count + 1
+            work.contacts[row].grazing_resistance = total / max(count, 1)
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.GRAZES:
+            contact = work.contacts[row]
+            contact.grazing_force = contact.grazing_resistance
 
 
 def hold_gap(work, row, gap):
     """Count the gap that a pair has now as another one."""
-    work.slip[at.GAP_OFFSET, row] += work.geometry[at.NOW, row, at.GAP] - gap
-    work.geometry[at.NOW, row, at.GAP] = gap
+    geometry = work.geometry[at.NOW, row]
+    work.contacts[row].gap_offset += geometry.gap - gap
+    geometry.gap = gap
 
 
 def sliding_speed(work, row):
     """How fast the bodies of a pair that grazes slide against its force [m/s]."""
     speed = tangential_rate(work, at.NOW, row)
-    return -speed if work.slip[at.GRAZING_FORCE, row] > 0.0 else speed
+    return -speed if work.contacts[row].grazing_force > 0.0 else speed
 
 
 def sticks(scene, work, row):
     """Whether a pair that grazes has ceased to slide; its spring takes the force over then, as far
     as it held that before. Without a spring the law's whole force is what it needs then."""
     view = contact_view(scene, work, at.NOW, row)
-    force, spring = work.slip[at.GRAZING_FORCE, row], spring_of(scene, view)
+    force, spring = work.contacts[row].grazing_force, spring_of(scene, view)
     if spring == 0.0:
         _, whole = contact_force(scene, view)
         return whole * force <= force * force
@@ -179,19 +180,20 @@ def sticks(scene, work, row):
 
 def leave(work, row, mode, gap):
     """Let a pair cease to graze."""
-    work.candidates[row, at.CLOSED] = mode
+    work.candidates[row].closed = mode
     hold_gap(work, row, gap)
 
 
 def go_on(scene, work, row):
     """Whether a pair goes on grazing behind a step."""
-    if work.slip[at.FRESH, row] != 0.0:
+    contact = work.contacts[row]
+    if contact.fresh != 0.0:
         # Its first step takes what is left of the gap's rate away, of which no load tells.
-        work.slip[at.FRESH, row] = 0.0
+        contact.fresh = 0.0
         return True
-    before, rate = work.slip[at.GRAZING_FORCE, row], normal_rate(work, at.NOW, row)
-    after = before - work.slip[at.GRAZING_RESISTANCE, row] * rate
-    work.slip[at.GRAZING_FORCE, row] = after
+    before, rate = contact.grazing_force, normal_rate(work, at.NOW, row)
+    after = before - contact.grazing_resistance * rate
+    contact.grazing_force = after
     if after * before <= 0.0:
         leave(work, row, at.OPEN, 0.0)
         return False
@@ -203,15 +205,17 @@ def go_on(scene, work, row):
 
 def forget_gap(work, row):
     """The gap of a pair that has gone far from where it grazed counts as it is."""
-    offset = work.slip[at.GAP_OFFSET, row]
-    if offset != 0.0 and work.geometry[at.NOW, row, at.GAP] > FAR * abs(offset):
-        work.geometry[at.NOW, row, at.GAP] += offset
-        work.slip[at.GAP_OFFSET, row] = 0.0
+    geometry = work.geometry[at.NOW, row]
+    contact = work.contacts[row]
+    offset = contact.gap_offset
+    if offset != 0.0 and geometry.gap > FAR * abs(offset):
+        geometry.gap += offset
+        contact.gap_offset = 0.0
 
 
 def hums(work, row):
     """Whether a pair has parted and touched again and again, by far less than the tolerance."""
-    return work.slip[at.FLIGHTS, row] >= MANY
+    return work.contacts[row].flights >= MANY
 
 
 def rattles(work, row):
@@ -219,9 +223,9 @@ def rattles(work, row):
     they throw each other open in turn."""
     if not hums(work, row):
         return False
-    for other in range(work.tally[at.CANDIDATES]):
-        same = work.candidates[other, at.PAIR] == work.candidates[row, at.PAIR]
-        later = work.slip[at.FLOWN_AT, other] > work.slip[at.FLOWN_AT, row]
+    for other in range(work.tally.candidates):
+        same = work.candidates[other].pair == work.candidates[row].pair
+        later = work.contacts[other].flown_at > work.contacts[row].flown_at
         if same and later and hums(work, other) and not near(work, row, other):
             return True
     return False
@@ -229,7 +233,7 @@ def rattles(work, row):
 
 def takes_part(work, row):
     """Whether a pair touches, or has done so a moment ago."""
-    return work.candidates[row, at.CLOSED] != at.OPEN or work.slip[at.FLIGHTS, row] > 0.0
+    return work.candidates[row].closed != at.OPEN or work.contacts[row].flights > 0.0
 
 
 def count_flight(work, clock, step, row):
@@ -238,31 +242,33 @@ def count_flight(work, clock, step, row):
     Where a single step has led from parting to touching again, no end of a step has seen it apart:
     it has flown a quarter of the way that its rate would have led, as on a parabola.
     """
-    flight = work.slip[at.FLIGHT, row]
+    contact = work.contacts[row]
+    flight = contact.flight
     if flight == 0.0:
         flight = 0.25 * step * abs(normal_rate(work, at.NOW, row))
-    if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
-        work.slip[at.FLIGHTS, row] = 0.0
+    if flight > SHARE_OF_FLIGHT * clock.tolerance:
+        contact.flights = 0.0
     elif flight > 0.0:
-        work.slip[at.FLIGHTS, row] += 1.0
-        work.slip[at.FLOWN_AT, row] = clock[at.TIME]
-    work.slip[at.FLIGHT, row] = 0.0
+        contact.flights += 1.0
+        contact.flown_at = clock.time
+    contact.flight = 0.0
 
 
 def note_flight(work, clock, row):
     """Keep how far a pair that is apart has been since it parted; far enough, it hums no more."""
-    flight = max(work.slip[at.FLIGHT, row], work.geometry[at.NOW, row, at.GAP])
-    work.slip[at.FLIGHT, row] = flight
-    if flight > SHARE_OF_FLIGHT * clock[at.TOLERANCE]:
-        work.slip[at.FLIGHTS, row] = 0.0
+    contact = work.contacts[row]
+    flight = max(contact.flight, work.geometry[at.NOW, row].gap)
+    contact.flight = flight
+    if flight > SHARE_OF_FLIGHT * clock.tolerance:
+        contact.flights = 0.0
 
 
 def part(scene, work, clock, row):
     """What becomes of a closed pair that has parted; whether it begins to graze."""
     if not begins(scene, work, clock, row):
         return False
-    for other in range(work.tally[at.CANDIDATES]):
-        if work.candidates[other, at.CLOSED] == at.TOUCHES and shares_point(work, row, other):
+    for other in range(work.tally.candidates):
+        if work.candidates[other].closed == at.TOUCHES and shares_point(work, row, other):
             enter(scene, work, other)
     return True
 
@@ -271,25 +277,22 @@ def part(scene, work, clock, row):
 def settle(scene, work, clock, step):
     """Let pairs begin and cease to graze at the end of a step; whether any has."""
     changed, entered = False, False
-    for row in range(work.tally[at.CANDIDATES]):
-        mode = work.candidates[row, at.CLOSED]
+    for row in range(work.tally.candidates):
+        mode = work.candidates[row].closed
         if mode == at.GRAZES:
             changed = not go_on(scene, work, row) or changed
         elif mode == at.OPEN:
             forget_gap(work, row)
             note_flight(work, clock, row)
-            if work.geometry[at.NOW, row, at.GAP] < 0.0:
+            if work.geometry[at.NOW, row].gap < 0.0:
                 count_flight(work, clock, step, row)
-    for row in range(work.tally[at.CANDIDATES]):
-        if (
-            work.candidates[row, at.CLOSED] == at.TOUCHES
-            and work.geometry[at.NOW, row, at.GAP] >= 0.0
-        ):
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES and work.geometry[at.NOW, row].gap >= 0.0:
             entered = part(scene, work, clock, row) or entered
     if entered:
         share_forces(work)
-        for row in range(work.tally[at.CANDIDATES]):
-            if work.candidates[row, at.CLOSED] == at.GRAZES:
+        for row in range(work.tally.candidates):
+            if work.candidates[row].closed == at.GRAZES:
                 hold_gap(work, row, 0.0)
     return changed or entered
 
@@ -297,9 +300,10 @@ def settle(scene, work, clock, step):
 def force_needed(work, row):
     """T of a pair that grazes at the end of a step; in its first one without what takes the rate
     away with which the pair has parted."""
+    contact = work.contacts[row]
     after = grazing_force(work, at.NEW, row)
-    if work.slip[at.FRESH, row] != 0.0:
-        resistance = work.slip[at.GRAZING_RESISTANCE, row]
+    if contact.fresh != 0.0:
+        resistance = contact.grazing_resistance
         after += resistance / STIFFER * normal_rate(work, at.NOW, row)
     return after
 
@@ -310,19 +314,20 @@ def share_left(work, clock, step, row):
 
     T and the speed of sliding go along lines.
     """
-    resistance = abs(work.slip[at.GRAZING_RESISTANCE, row])
+    contact = work.contacts[row]
+    resistance = abs(contact.grazing_resistance)
     if resistance == 0.0:
         return NEVER
-    before, after = work.slip[at.GRAZING_FORCE, row], force_needed(work, row)
+    before, after = contact.grazing_force, force_needed(work, row)
     # What a newton does to the gap in a step, and later.
     lever = STIFFER / resistance * (step + memory_of(work, row))
-    if abs(after) * lever < LATE * clock[at.TOLERANCE]:
+    if abs(after) * lever < LATE * clock.tolerance:
         return NEVER
     share = before / (before - after) if before * after < 0.0 else NEVER
     side = 1.0 if before > 0.0 else -1.0
     slow = -side * tangential_rate(work, at.NOW, row)
     slower = -side * tangential_rate(work, at.NEW, row)
-    if work.slip[at.FRESH, row] != 0.0 and -slower * step > LATE * clock[at.TOLERANCE]:
+    if contact.fresh != 0.0 and -slower * step > LATE * clock.tolerance:
         # It may have stuck before, and parted by rounding.
         slow = max(slow, 0.0)
     if slow >= 0.0 > slower:
@@ -333,13 +338,14 @@ def share_left(work, clock, step, row):
 def leave_early(scene, work, clock, step):
     """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
     changed = False
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if (
-            work.candidates[row, at.CLOSED] == at.GRAZES
+            work.candidates[row].closed == at.GRAZES
             and share_left(work, clock, step, row) < AT_ONCE
         ):
-            fresh = work.slip[at.FRESH, row] != 0.0
-            if fresh or work.slip[at.GRAZING_FORCE, row] * force_needed(work, row) < 0.0:
+            contact = work.contacts[row]
+            fresh = contact.fresh != 0.0
+            if fresh or contact.grazing_force * force_needed(work, row) < 0.0:
                 leave(work, row, at.OPEN, 0.0)
             else:
                 leave(work, row, at.TOUCHES, TOUCHING_GAP)
@@ -349,7 +355,7 @@ def leave_early(scene, work, clock, step):
 
 def grazing_share(work, clock, step, share):
     """The share of the step at which the first pair ceases to graze, or the given one before."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.GRAZES:
             share = min(share, BEHIND * share_left(work, clock, step, row))
     return share

@@ -41,9 +41,9 @@ def bounces(scene, view, speed, frequency):
 def furthest_place(work, state):
     """The largest coordinate of a body [m]."""
     furthest = 0.0
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(2):
-            furthest = max(furthest, abs(work.motion[state, body, axis]))
+            furthest = max(furthest, abs(work.place[state, body, axis]))
     return furthest
 
 

@@ -71,11 +71,11 @@ TINY = 1e-300
 
 def guess_remainder(work, clock, step, known):
     """R as that of the last step goes on, if ``known``; else none."""
-    staged, remainder = clock[at.STAGED_STEP], work.remainder
+    staged, remainder = clock.staged_step, work.remainder
     scale = begin = 0.0
     if known and staged > 0.0:
-        scale, begin = step / staged, (clock[at.TIME] - clock[at.STAGED_AT]) / staged
-    for body in range(work.motion.shape[1]):
+        scale, begin = step / staged, (clock.time - clock.staged_at) / staged
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             third = remainder[at.MOTION, 3, body, axis]
             second = remainder[at.MOTION, 2, body, axis] + 3.0 * begin * third
@@ -87,27 +87,26 @@ def guess_remainder(work, clock, step, known):
 def subtract_linear(work, stage, block, body, other):
     """Subtract what a block makes of another body's motion to a point from the force on a body
     there, in CHANGE."""
-    motion, jacobian = work.motion, work.jacobian
+    jacobian = work.jacobian
     for i in range(3):
-        total = motion[at.CHANGE, body, at.VELOCITY + i]
+        total = work.velocity[at.CHANGE, body, i]
         for j in range(3):
-            moved = motion[stage, other, j] - motion[at.NOW, other, j]
-            faster = motion[stage, other, at.VELOCITY + j] - motion[at.NOW, other, at.VELOCITY + j]
+            moved = work.place[stage, other, j] - work.place[at.NOW, other, j]
+            faster = work.velocity[stage, other, j] - work.velocity[at.NOW, other, j]
             total += jacobian[at.STIFFNESS, block, i, j] * moved
             total += jacobian[at.DAMPING, block, i, j] * faster
-        motion[at.CHANGE, body, at.VELOCITY + i] = total
+        work.velocity[at.CHANGE, body, i] = total
 
 
 def write_remainder(work, stage):
     """R at a point, in the columns of velocities of CHANGE."""
-    motion, rates = work.motion, work.rates
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            force = rates[stage, body, at.FORCE + axis] - rates[at.NOW, body, at.FORCE + axis]
-            motion[at.CHANGE, body, at.VELOCITY + axis] = force
+            force = work.force[stage, body, axis] - work.force[at.NOW, body, axis]
+            work.velocity[at.CHANGE, body, axis] = force
         subtract_linear(work, stage, body, body, body)
-    for pair in range(work.tally[at.PAIRS]):
-        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
         subtract_linear(work, stage, lower_block(work, pair), later, earlier)
         subtract_linear(work, stage, upper_block(work, pair), earlier, later)
 
@@ -115,19 +114,18 @@ def write_remainder(work, stage):
 def effect_of(scene, work, step, stage, goal):
     """What the changes of R at the points, in their rates, change at one of them in places, now and
     later, and in overlaps, over what may be wrong of those, in terms of the goal [m]."""
-    largest, rates = 0.0, work.rates
+    largest = 0.0
     one, two, three = MATRIX[stage]
-    for body in range(work.motion.shape[1]):
-        memory = step + work.bodies[body, at.MEMORY]
+    for body in range(work.place.shape[1]):
+        memory = step + work.errors[body].memory
         for axis in range(3):
-            column = at.FORCE + axis
-            mean = one * rates[at.FIRST_STAGE, body, column]
-            mean += two * rates[at.FIRST_STAGE + 1, body, column]
-            mean += three * rates[at.FIRST_STAGE + 2, body, column]
-            speed = scene.bodies[body, at.FREE] * step / inertia(scene, body, axis) * mean
+            mean = one * work.force[at.FIRST_STAGE, body, axis]
+            mean += two * work.force[at.FIRST_STAGE + 1, body, axis]
+            mean += three * work.force[at.FIRST_STAGE + 2, body, axis]
+            speed = scene.bodies[body].free * step / inertia(scene, body, axis) * mean
             if not abs(speed) < math.inf:
                 return math.inf
-            work.motion[at.CHANGE, body, at.VELOCITY + axis] = speed
+            work.velocity[at.CHANGE, body, axis] = speed
             largest = max(largest, lever(scene, body, axis) * memory * abs(speed))
     return max(largest, change_of_forces(scene, work, step, stage, goal))
 
@@ -173,27 +171,26 @@ def iterate(scene, work, time, terms, step, goal):
     largest = 0.0
     for stage in range(3):
         write_remainder(work, at.FIRST_STAGE + stage)
-        for body in range(work.motion.shape[1]):
+        for body in range(work.place.shape[1]):
             for axis in range(3):
-                change = work.motion[at.CHANGE, body, at.VELOCITY + axis]
+                change = work.velocity[at.CHANGE, body, axis]
                 change -= remainder_at(work, NODES[stage], body, axis)
                 # The force at the point is not needed any more.
-                work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis] = change
+                work.force[at.FIRST_STAGE + stage, body, axis] = change
     for stage in range(3):
         largest = max(largest, effect_of(scene, work, step, stage, goal))
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            column = at.FORCE + axis
             amend_remainder(
-                work, body, axis, work.rates[at.FIRST_STAGE, body, column],
-                work.rates[at.FIRST_STAGE + 1, body, column],
-                work.rates[at.FIRST_STAGE + 2, body, column],
+                work, body, axis, work.force[at.FIRST_STAGE, body, axis],
+                work.force[at.FIRST_STAGE + 1, body, axis],
+                work.force[at.FIRST_STAGE + 2, body, axis],
             )  # fmt: skip
     return largest
 
 
 def write_all_at(work, terms, step, share, state):
-    write_at(work, at.NOW, terms, step, share, state, 0, work.motion.shape[1])
+    write_at(work, at.NOW, terms, step, share, state, 0, work.place.shape[1])
 
 
 def finish(scene, work, terms, step):
@@ -211,7 +208,7 @@ def solve_series(scene, work, clock, step, known):
     """Find the motion of a step as a series; how many terms it has, 0 where the step is too long
     for one, or R does not settle. ``known``: whether that of the last step is there."""
     allowed = step_tolerance(work, clock)
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = max(inertia(scene, body, axis), TINY)
             spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
@@ -222,11 +219,11 @@ def solve_series(scene, work, clock, step, known):
     expected, before = expected_pace(clock, step), math.inf
     terms = expand(scene, work, clock, step, allowed)
     if terms > 0:
-        clock[at.STAGED_STEP] = 0.0
+        clock.staged_step = 0.0
     for _ in range(MOST_ITERATIONS):
         if terms == 0:
             return 0
-        change = iterate(scene, work, clock[at.TIME], terms, step, ITERATION_SHARE * allowed)
+        change = iterate(scene, work, clock.time, terms, step, ITERATION_SHARE * allowed)
         goal = max(ITERATION_SHARE * allowed, rounding_size(scene, work, at.FIRST_STAGE + 2, step))
         pace = expected if before == math.inf else change / before
         if not (change < math.inf and pace < 1.0):
@@ -234,34 +231,35 @@ def solve_series(scene, work, clock, step, known):
         terms = amend(work, terms, step, allowed)
         if terms > 0 and change * pace <= goal * (1.0 - pace):
             finish(scene, work, terms, step)
-            clock[at.STAGED_STEP], clock[at.STAGED_AT] = step, clock[at.TIME]
-            clock[at.SERIES_STEP] = step
-            clock[at.PACE] = 0.0 if before == math.inf else pace
+            clock.staged_step, clock.staged_at = step, clock.time
+            clock.series_step = step
+            clock.pace = 0.0 if before == math.inf else pace
             if before < math.inf:
-                clock[at.SEEN_PACE], clock[at.SEEN_STEP] = pace, step
+                clock.seen_pace, clock.seen_step = pace, step
             return terms
         before = change
-    clock[at.SEEN_PACE] = 0.0
+    clock.seen_pace = 0.0
     return 0
 
 
 def error_of_radau(scene, work, terms, step):
     """What a step of Radau IIA would be wrong by in this motion [m], by its estimate
     (radau/estimate.py) but for what contacts take up of that."""
-    motion, series = work.motion, work.series
-    for body in range(motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            motion[at.DEVIATION, body, axis] = 0.0
+    series = work.series
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.DEVIATION, body, axis] = 0.0
+            work.velocity[at.DEVIATION, body, axis] = 0.0
     before, damped = 0.0, step / EIGENVALUES[REAL].real
     one, two = RADAU[0] ** 3, RADAU[1] ** 3
     for k in range(4, terms):
         one, two = one * RADAU[0], two * RADAU[1]
         here = (ESTIMATE[0] * one + ESTIMATE[1] * two + ESTIMATE[2]) / step
-        for body in range(motion.shape[1]):
+        for body in range(work.place.shape[1]):
             for axis in range(3):
                 term = damped * series[at.MOTION, k, body, axis]
-                motion[at.DEVIATION, body, axis] += here * term
-                motion[at.DEVIATION, body, at.VELOCITY + axis] += before * k / step * term
+                work.place[at.DEVIATION, body, axis] += here * term
+                work.velocity[at.DEVIATION, body, axis] += before * k / step * term
         before = here
     return error_size(scene, work)
 
@@ -269,7 +267,7 @@ def error_of_radau(scene, work, terms, step):
 def estimate(work, step):
     """What leaving out the second point would change, in DEVIATION."""
     remainder = work.remainder
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             cubic = remainder[at.MOTION, 3, body, axis]
             remainder[at.CHANGED, 0, body, axis] = 0.0
@@ -282,44 +280,43 @@ def estimate(work, step):
 
 def add_last_term(work, step):
     """Add the last term of the motion to its error: all that is left out comes to less."""
-    last = work.tally[at.SERIES_TERMS] - 1
-    for body in range(work.motion.shape[1]):
+    last = work.tally.series_terms - 1
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             term = work.series[at.MOTION, last, body, axis]
-            work.motion[at.DEVIATION, body, axis] += term
-            work.motion[at.DEVIATION, body, at.VELOCITY + axis] += last / step * term
+            work.place[at.DEVIATION, body, axis] += term
+            work.velocity[at.DEVIATION, body, axis] += last / step * term
 
 
 @apart
 def judge_series(scene, work, clock, step):
     """Estimate the error of a step, in DEVIATION."""
-    longer = clock[at.LONGEST_SERIES] / step
+    longer = clock.longest_series / step
     if longer < math.inf:
-        error = error_of_radau(scene, work, work.tally[at.SERIES_TERMS], step)
+        error = error_of_radau(scene, work, work.tally.series_terms, step)
         if error * longer**4 <= LEAVES * step_tolerance(work, clock):
-            clock[at.LONGEST_SERIES] *= LEAP
+            clock.longest_series *= LEAP
     estimate(work, step)
     add_last_term(work, step)
 
 
 def nothing_swings(clock):
     """Whether the step is so short that nothing swings in it."""
-    return clock[at.SERIES_TURNS] <= A_SWING
+    return clock.series_turns <= A_SWING
 
 
 def errors_over_ways(work, share):
     """How large the carried error is, at the start of a step and as CHANGE has it at its end, over
     the way from there to here, both along what R is in the end: 0 where the step does not go that
     way."""
-    motion = work.motion
     before = after = along = every = 0.0
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             force = remainder_at(work, 1.0, body, axis)
-            way = force * (motion[at.NOW, body, axis] - motion[at.START, body, axis])
+            way = force * (work.place[at.NOW, body, axis] - work.place[at.START, body, axis])
             along, every = along + way, every + abs(way)
-            before += force * motion[at.CARRIED, body, axis]
-            after += force * motion[at.CHANGE, body, axis]
+            before += force * work.place[at.CARRIED, body, axis]
+            after += force * work.place[at.CHANGE, body, axis]
     if abs(along) <= LEAST_ALONG * every:
         return 0.0, 0.0
     return before * share / along, after * share / along
@@ -328,16 +325,16 @@ def errors_over_ways(work, share):
 def begin_carrying(work, step, before, after):
     """Write the first terms of the carried error, and what pushes it on besides: FORCING, and as
     much as R changes with the way."""
-    motion, series, remainder = work.motion, work.series, work.remainder
+    series, remainder = work.series, work.remainder
     more = after - before
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            series[at.CHANGED, 0, body, axis] = motion[at.CARRIED, body, axis]
-            series[at.CHANGED, 1, body, axis] = step * motion[at.CARRIED, body, at.VELOCITY + axis]
+            series[at.CHANGED, 0, body, axis] = work.place[at.CARRIED, body, axis]
+            series[at.CHANGED, 1, body, axis] = step * work.velocity[at.CARRIED, body, axis]
             one = remainder[at.MOTION, 1, body, axis]
             two = 2.0 * remainder[at.MOTION, 2, body, axis]
             three = 3.0 * remainder[at.MOTION, 3, body, axis]
-            forcing = motion[at.FORCING, body, at.VELOCITY + axis]
+            forcing = work.velocity[at.FORCING, body, axis]
             remainder[at.CHANGED, 0, body, axis] = forcing + before * one
             remainder[at.CHANGED, 1, body, axis] = before * two + more * one
             remainder[at.CHANGED, 2, body, axis] = before * three + more * two

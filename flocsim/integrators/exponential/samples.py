@@ -47,43 +47,45 @@ def parts_of(scene, turns):
 
 
 def write_ways(scene, work, terms):
-    """Write how far a body's points move at most in the step [m], into WAY."""
-    for body in range(work.motion.shape[1]):
+    """Write how far a body's points move at most in the step [m], into its Pose."""
+    for body in range(work.place.shape[1]):
         way = 0.0
         for axis in range(3):
             size = lever(scene, body, axis)
             for k in range(1, terms):
                 way += size * abs(work.series[at.MOTION, k, body, axis])
-        work.bodies[body, at.WAY] = way
+        work.poses[body].way = way
 
 
 def may_meet(work, row):
     """Whether a pair may come to where it switches in the step, or rub otherwise."""
-    if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    candidate = work.candidates[row]
+    if candidate.closed == at.TOUCHES:
         return True
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    return margin(work, at.NOW, row) <= work.bodies[a, at.WAY] + work.bodies[b, at.WAY]
+    a, b = candidate.vertex_body, candidate.edge_body
+    return margin(work, at.NOW, row) <= work.poses[a].way + work.poses[b].way
 
 
 def look(scene, work, terms, step, share):
     """Put the bodies where they are at a share of the step, in TRIAL."""
-    write_at(work, at.NOW, terms, step, share, at.TRIAL, 0, work.motion.shape[1])
-    for body in range(work.motion.shape[1]):
+    write_at(work, at.NOW, terms, step, share, at.TRIAL, 0, work.place.shape[1])
+    for body in range(work.place.shape[1]):
         turn_body(work, at.TRIAL, body)
 
 
 def has_switched(work, row, depth):
     """Whether a pair has in TRIAL: one that was apart where it is so deep there [m]."""
-    least = -depth if work.candidates[row, at.CLOSED] == at.OPEN else 0.0
+    least = -depth if work.candidates[row].closed == at.OPEN else 0.0
     return margin(work, at.TRIAL, row) < least
 
 
 def lowest(scene, work, terms, step, low, high, row, depth):
     """Where between two shares of the step a row, the margin of which falls at the first and rises
     at the second, has switched; 2 where it has not."""
-    rate_low, rate_high = work.slip[at.SAMPLED_RATE, row], margin_rate(work, at.TRIAL, row)
+    contact = work.contacts[row]
+    rate_low, rate_high = contact.sampled_rate, margin_rate(work, at.TRIAL, row)
     span = step * (high - low)
-    if min(work.slip[at.SAMPLED, row] + 0.5 * span * rate_low,
+    if min(contact.sampled + 0.5 * span * rate_low,
            margin(work, at.TRIAL, row) - 0.5 * span * rate_high) >= 0.0:  # fmt: skip
         return 2.0
     for _ in range(TRIES):
@@ -105,7 +107,7 @@ def rubs_otherwise(scene, work, row, resolution):
     its law in TRIAL."""
     if has(scene, SLIP_LIMIT):
         work.slip[at.TRIAL, row] = work.slip[at.NOW, row] + rolled(scene, work, at.TRIAL, row)
-        side = work.candidates[row, at.SLIDING]
+        side = work.candidates[row].sliding
         if side == 0:
             beyond = abs(work.slip[at.TRIAL, row]) - limit_in(scene, work, at.TRIAL, row)
             if beyond > resolution:
@@ -123,31 +125,33 @@ def rubs_otherwise(scene, work, row, resolution):
 def first_seen(scene, work, parts, step, resolution, depth):
     """The first share of a step at which something is seen to have switched; 1 where nothing is
     before its end."""
-    terms = work.tally[at.SERIES_TERMS]
+    terms = work.tally.series_terms
     write_ways(scene, work, terms)
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.SAMPLED, row] = margin(work, at.NOW, row)
-        work.slip[at.SAMPLED_RATE, row] = margin_rate(work, at.NOW, row)
+    for row in range(work.tally.candidates):
+        contact = work.contacts[row]
+        contact.sampled = margin(work, at.NOW, row)
+        contact.sampled_rate = margin_rate(work, at.NOW, row)
     for part in range(1, parts + 1):
         low, high = (part - 1.0) / parts, part / parts
         look(scene, work, terms, step, high)
-        for row in range(work.tally[at.CANDIDATES]):
+        for row in range(work.tally.candidates):
+            contact = work.contacts[row]
             if not may_meet(work, row):
                 continue
             locate_polygons(scene, work, at.TRIAL, row)
             value, rate = margin(work, at.TRIAL, row), margin_rate(work, at.TRIAL, row)
             if has_switched(work, row, depth):
                 return high
-            if work.candidates[row, at.CLOSED] == at.TOUCHES and rubs_otherwise(
+            if work.candidates[row].closed == at.TOUCHES and rubs_otherwise(
                 scene, work, row, resolution
             ):
                 return high
-            if work.slip[at.SAMPLED_RATE, row] < 0.0 < rate:
+            if contact.sampled_rate < 0.0 < rate:
                 share = lowest(scene, work, terms, step, low, high, row, depth)
                 if share <= 1.0:
                     return share
                 look(scene, work, terms, step, high)
-            work.slip[at.SAMPLED, row], work.slip[at.SAMPLED_RATE, row] = value, rate
+            contact.sampled, contact.sampled_rate = value, rate
     return 1.0
 
 
@@ -155,8 +159,8 @@ def first_too_deep(scene, work):
     """The first point of the collocation at which a pair that touches is too deep for its law; 1
     where none is before the end."""
     for stage in range(2):
-        for row in range(work.tally[at.CANDIDATES]):
-            touches = work.candidates[row, at.CLOSED] == at.TOUCHES
+        for row in range(work.tally.candidates):
+            touches = work.candidates[row].closed == at.TOUCHES
             if touches and is_too_deep(scene, work, at.FIRST_STAGE + stage, row):
                 return NODES[stage]
     return 1.0
@@ -168,39 +172,40 @@ def parts_of_way(scene, work):
     parts, before = 1, -1
     if touches(work):
         return parts
-    for row in range(work.tally[at.CANDIDATES]):
-        pair = work.candidates[row, at.PAIR]
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        pair = candidate.pair
         if pair != before:
             before = pair
-            a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+            a, b = candidate.vertex_body, candidate.edge_body
             way = abs(way_of(work, a, at.X) - way_of(work, b, at.X))
             way += abs(way_of(work, a, at.Y) - way_of(work, b, at.Y))
-            way += abs(way_of(work, a, at.ANGLE)) * scene.bodies[a, at.BOUNDING_RADIUS]
-            way += abs(way_of(work, b, at.ANGLE)) * scene.bodies[b, at.BOUNDING_RADIUS]
-            size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
+            way += abs(way_of(work, a, at.ANGLE)) * scene.bodies[a].bounding_radius
+            way += abs(way_of(work, b, at.ANGLE)) * scene.bodies[b].bounding_radius
+            size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
             parts = max(parts, int(way / (A_WAY * size)) + 1)
     return parts
 
 
 def way_of(work, body, axis):
     """By how much a body's place changes in the step [m or rad]."""
-    return work.motion[at.NEW, body, axis] - work.motion[at.NOW, body, axis]
+    return work.place[at.NEW, body, axis] - work.place[at.NOW, body, axis]
 
 
 def has_parted(work, step, row):
     """Whether a pair is apart, and goes further than it is in a step."""
     way = step * normal_rate(work, at.NOW, row)
-    return work.candidates[row, at.CLOSED] == at.OPEN and way > work.geometry[at.NOW, row, at.GAP]
+    return work.candidates[row].closed == at.OPEN and way > work.geometry[at.NOW, row].gap
 
 
 def share_to_return(scene, work, step):
     """The share of a step at which the first pair that has parted would be back if it was slowed
     down evenly; inf where none would."""
     earliest, looked = math.inf, False
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         if has_parted(work, step, row):
             if not looked:
-                look(scene, work, work.tally[at.SERIES_TERMS], step, SOON)
+                look(scene, work, work.tally.series_terms, step, SOON)
                 looked = True
             locate_polygons(scene, work, at.TRIAL, row)
             rate = normal_rate(work, at.NOW, row)
@@ -215,8 +220,8 @@ def first_return(scene, work, step, depth):
     is. In a long step it may pass through the other body, and be apart at its end."""
     share = BEHIND * share_to_return(scene, work, step)
     while share < 1.0:
-        look(scene, work, work.tally[at.SERIES_TERMS], step, share)
-        for row in range(work.tally[at.CANDIDATES]):
+        look(scene, work, work.tally.series_terms, step, share)
+        for row in range(work.tally.candidates):
             if has_parted(work, step, row):
                 locate_polygons(scene, work, at.TRIAL, row)
                 if has_switched(work, row, depth):
@@ -228,14 +233,14 @@ def first_return(scene, work, step, depth):
 def cut(scene, work, clock, step, resolution, depth):
     """End a step that is a series where something is first seen to have switched; the share of it
     that is left."""
-    terms = work.tally[at.SERIES_TERMS]
+    terms = work.tally.series_terms
     share = min(first_too_deep(scene, work), first_return(scene, work, step, depth))
-    parts = max(parts_of(scene, clock[at.SERIES_TURNS]), parts_of_way(scene, work))
+    parts = max(parts_of(scene, clock.series_turns), parts_of_way(scene, work))
     if share == 1.0 and parts > 1:
         share = first_seen(scene, work, parts, step, resolution, depth)
     if share < 1.0:
         shorten(work, terms, share)
-        clock[at.STAGED_STEP] *= share
-        clock[at.SERIES_STEP] = clock[at.STAGED_STEP]
-        write_at(work, at.NOW, terms, share * step, 1.0, at.NEW, 0, work.motion.shape[1])
+        clock.staged_step *= share
+        clock.series_step = clock.staged_step
+        write_at(work, at.NOW, terms, share * step, 1.0, at.NEW, 0, work.place.shape[1])
     return share

@@ -46,14 +46,14 @@ def scale_block(work, block, body, other, step):
 
 def scale_derivatives(scene, work, step):
     """The same of all, and how far a force moves a body in the square of the step."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            share = scene.bodies[body, at.FREE] * step * step / inertia(scene, body, axis)
+            share = scene.bodies[body].free * step * step / inertia(scene, body, axis)
             work.weights[at.MOVED, body, axis] = share
             work.weights[at.LEVER, body, axis] = lever(scene, body, axis)
         scale_block(work, body, body, body, step)
-    for pair in range(work.tally[at.PAIRS]):
-        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
         scale_block(work, lower_block(work, pair), later, earlier, step)
         scale_block(work, upper_block(work, pair), earlier, later, step)
 
@@ -62,13 +62,13 @@ def write_term(work, which, k):
     """Write term k + 2 of a series; how far it displaces a body [m]."""
     series, linear, weights, largest = work.series, work.linear, work.weights, 0.0
     after, factor = k + 1.0, 1.0 / ((k + 1.0) * (k + 2.0))
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         first = second = third = 0.0
         if k < 4:
             first = work.remainder[which, k, body, 0] * weights[at.MOVED, body, 0]
             second = work.remainder[which, k, body, 1] * weights[at.MOVED, body, 1]
             third = work.remainder[which, k, body, 2] * weights[at.MOVED, body, 2]
-        for other in range(work.motion.shape[1]):
+        for other in range(work.place.shape[1]):
             for j in range(3):
                 place = series[which, k, other, j]
                 speed = after * series[which, k + 1, other, j]
@@ -90,8 +90,8 @@ def write_term(work, which, k):
 def longest_memory(work):
     """How long a body remembers a velocity at most [s]."""
     longest = 0.0
-    for body in range(work.motion.shape[1]):
-        longest = max(longest, work.bodies[body, at.MEMORY])
+    for body in range(work.place.shape[1]):
+        longest = max(longest, work.errors[body].memory)
     return longest
 
 
@@ -99,12 +99,12 @@ def begin(scene, work, step):
     """Write the first terms: no displacement, the velocity, the acceleration."""
     scale_derivatives(scene, work, step)
     series = work.series
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             series[at.MOTION, 0, body, axis] = 0.0
-            speed = work.motion[at.NOW, body, at.VELOCITY + axis]
+            speed = work.velocity[at.NOW, body, axis]
             series[at.MOTION, 1, body, axis] = step * speed
-            force = 0.5 * work.rates[at.NOW, body, at.FORCE + axis]
+            force = 0.5 * work.force[at.NOW, body, axis]
             series[at.MOTION, 2, body, axis] = work.weights[at.MOVED, body, axis] * force
 
 
@@ -125,10 +125,10 @@ def turns_of(work):
     """A bound of how far the fastest vibration turns in a step, h ω: by the rows of K, in metres of
     outlines."""
     largest, weights = 0.0, work.weights
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             total = 0.0
-            for other in range(work.motion.shape[1]):
+            for other in range(work.place.shape[1]):
                 for j in range(3):
                     size = abs(work.linear[at.STIFFNESS, body, other, axis, j])
                     total += size / weights[at.LEVER, other, j]
@@ -148,17 +148,17 @@ def expand(scene, work, clock, step, goal):
         small = small + 1 if size <= goal else 0
         if small >= 2 and k + 3 >= LEAST_TERMS:
             longer = reach(k + 2, max(size, one), max(two, three), goal)
-            clock[at.LONGEST_SERIES], clock[at.SERIES_TURNS] = step * longer, turns_of(work)
+            clock.longest_series, clock.series_turns = step * longer, turns_of(work)
             return k + 3
         if not size < math.inf:
             break
-    clock[at.LONGEST_SERIES] = math.inf
+    clock.longest_series = math.inf
     return 0
 
 
 def begin_change(work):
     """Write the first terms of a change of the motion that begins with none."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             for k in range(3):
                 work.series[at.CHANGED, k, body, axis] = 0.0
@@ -173,7 +173,7 @@ def amend(work, terms, step, goal):
     for k in range(1, at.TERMS - 2):
         size = write_term(work, at.CHANGED, k) * (1.0 + later * (k + 2.0))
         small = small + 1 if size <= goal else 0
-        for body in range(work.motion.shape[1]):
+        for body in range(work.place.shape[1]):
             for axis in range(3):
                 before = series[at.MOTION, k + 2, body, axis] if k + 2 < terms else 0.0
                 change = series[at.CHANGED, k + 2, body, axis]
@@ -188,22 +188,22 @@ def amend(work, terms, step, goal):
 def write_change(work, first, step, share, kind):
     """Write a change of places and velocities at a share of the step into a row of the motion, from
     the term ``first`` on, those before being written."""
-    series, motion = work.series, work.motion
-    for body in range(motion.shape[1]):
+    series = work.series
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            motion[kind, body, axis] = series[at.CHANGED, 0, body, axis]
-            motion[kind, body, axis] += share * series[at.CHANGED, 1, body, axis]
-            motion[kind, body, at.VELOCITY + axis] = series[at.CHANGED, 1, body, axis] / step
+            work.place[kind, body, axis] = series[at.CHANGED, 0, body, axis]
+            work.place[kind, body, axis] += share * series[at.CHANGED, 1, body, axis]
+            work.velocity[kind, body, axis] = series[at.CHANGED, 1, body, axis] / step
     largest, small, power = 0.0, 0, share**first
     for k in range(first, at.TERMS - 2):
         # In velocities, which outlast places.
         size = (k + 2.0) * write_term(work, at.CHANGED, k)
         rate, power = (k + 2.0) * power * share / step, power * share
-        for body in range(motion.shape[1]):
+        for body in range(work.place.shape[1]):
             for axis in range(3):
                 term = series[at.CHANGED, k + 2, body, axis]
-                motion[kind, body, axis] += power * share * term
-                motion[kind, body, at.VELOCITY + axis] += rate * term
+                work.place[kind, body, axis] += power * share * term
+                work.velocity[kind, body, axis] += rate * term
         largest = max(largest, size)
         small = small + 1 if size <= ROUGHLY * largest else 0
         if (small >= 2 and k + 3 >= LEAST_TERMS) or not size < math.inf:
@@ -215,17 +215,17 @@ def shorten(work, terms, share):
     power = 1.0
     for k in range(1, terms):
         power *= share
-        for body in range(work.motion.shape[1]):
+        for body in range(work.place.shape[1]):
             for axis in range(3):
                 work.series[at.MOTION, k, body, axis] *= power
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             power = 1.0
             for k in range(1, 4):
                 power *= share
                 work.remainder[at.MOTION, k, body, axis] *= power
             work.weights[at.MOVED, body, axis] *= share * share
-            for other in range(work.motion.shape[1]):
+            for other in range(work.place.shape[1]):
                 for j in range(3):
                     work.linear[at.STIFFNESS, body, other, axis, j] *= share * share
                     work.linear[at.DAMPING, body, other, axis, j] *= share
@@ -234,10 +234,10 @@ def shorten(work, terms, share):
 def write_at(work, start, terms, step, share, state, first, end):
     """Write the motion of the bodies from the first one to before the end at a share of the step
     from a state into another one."""
-    motion, series = work.motion, work.series
+    series = work.series
     for body in range(first, end):
         for axis in range(3):
-            motion[state, body, axis] = motion[state, body, at.VELOCITY + axis] = 0.0
+            work.place[state, body, axis] = work.velocity[state, body, axis] = 0.0
     power = share
     for k in range(2, terms):
         rate = k * power / step
@@ -245,12 +245,11 @@ def write_at(work, start, terms, step, share, state, first, end):
         for body in range(first, end):
             for axis in range(3):
                 term = series[at.MOTION, k, body, axis]
-                motion[state, body, axis] += power * term
-                motion[state, body, at.VELOCITY + axis] += rate * term
+                work.place[state, body, axis] += power * term
+                work.velocity[state, body, axis] += rate * term
     for body in range(first, end):
         for axis in range(3):
             # In changes, so that what does not move stays just where it is.
-            motion[state, body, axis] += share * series[at.MOTION, 1, body, axis]
-            motion[state, body, axis] += motion[start, body, axis]
-            column = at.VELOCITY + axis
-            motion[state, body, column] += motion[start, body, column]
+            work.place[state, body, axis] += share * series[at.MOTION, 1, body, axis]
+            work.place[state, body, axis] += work.place[start, body, axis]
+            work.velocity[state, body, axis] += work.velocity[start, body, axis]

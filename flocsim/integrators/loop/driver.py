@@ -68,20 +68,20 @@ MOST_STILL = 100
 def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
     deep = False
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         deep = deep or is_too_deep(scene, work, at.NOW, row)
     return deep
 
 
 def take_new_state(work):
     """Make the new state the current one."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NOW, body, axis] = work.motion[at.NEW, body, axis]
-    for row in range(work.tally[at.CANDIDATES]):
-        for column in range(at.GEOMETRY_COLUMNS):
-            work.geometry[at.NOW, row, column] = work.geometry[at.NEW, row, column]
-        if work.candidates[row, at.CLOSED] == 1:
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.NOW, body, axis] = work.place[at.NEW, body, axis]
+            work.velocity[at.NOW, body, axis] = work.velocity[at.NEW, body, axis]
+    for row in range(work.tally.candidates):
+        work.geometry[at.NOW, row] = work.geometry[at.NEW, row]
+        if work.candidates[row].closed == 1:
             work.slip[at.NOW, row] = work.slip[at.NEW, row]
 
 
@@ -89,10 +89,10 @@ def take_new_state(work):
 def accept(scene, work, clock, counts, step, lists):
     """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
     take_new_state(work)
-    clock[at.TIME] += step
+    clock.time += step
     meet_kick(scene, work, clock)
-    counts[at.STEPS] += 1
-    controlled, across = clock[at.TOLERANCE] < math.inf, clock[at.ACROSS] == 1.0
+    counts.steps += 1
+    controlled, across = clock.tolerance < math.inf, clock.across == 1.0
     if controlled:
         carry_errors(scene, work, clock, step)
     if across:
@@ -117,36 +117,36 @@ def plan_flight(work, clock, planned, flew):
     contacts have switched behind a series: what comes and goes in one is seen, however long it
     is."""
     if flew:
-        clock[at.FLYING_STEP] = planned
+        clock.flying_step = planned
     if not touches(work):
-        clock[at.STEP] = max(clock[at.STEP], clock[at.FLYING_STEP])
+        clock.step = max(clock.step, clock.flying_step)
 
 
 def stands_still(clock, counts, step):
     """Count the accepted steps in a row that are as good as none; whether they are too many."""
-    counts[at.STILL] = 0 if moves(clock, step) else counts[at.STILL] + 1
-    return counts[at.STILL] > MOST_STILL
+    counts.still = 0 if moves(clock, step) else counts.still + 1
+    return counts.still > MOST_STILL
 
 
 def record_row(work, clock, counts, record):
     """Write the current state to the record (rows of time, then six numbers for each body)."""
-    row = counts[at.RECORDED]
-    record[row, at.RECORD_TIME] = clock[at.TIME]
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            record[row, at.RECORD_MOTION + at.MOTION_COLUMNS * body + axis] = work.motion[
-                at.NOW, body, axis
-            ]
-    counts[at.RECORDED] = row + 1
+    row = counts.recorded
+    record[row, at.RECORD_TIME] = clock.time
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            column = at.RECORD_MOTION + 6 * body + axis
+            record[row, column] = work.place[at.NOW, body, axis]
+            record[row, column + 3] = work.velocity[at.NOW, body, axis]
+    counts.recorded = row + 1
 
 
 def pause_reason(counts, record):
     """The Status that ends the loop before the next step; 0 to go on."""
-    if counts[at.STEPS] + counts[at.REJECTED] + counts[at.LOCATED] >= counts[at.MAX_STEPS]:
+    if counts.steps + counts.rejected + counts.located >= counts.max_steps:
         return STEP_BUDGET
-    if counts[at.STEPS] >= counts[at.PAUSE_AT]:
+    if counts.steps >= counts.pause_at:
         return PAUSED
-    if record.shape[0] > 0 and counts[at.RECORDED] == record.shape[0]:
+    if record.shape[0] > 0 and counts.recorded == record.shape[0]:
         return RECORD_FULL
     return 0
 
@@ -160,7 +160,7 @@ def keep_lists(scene, work, counts, ahead):
             return False
         locate_contacts(scene, work, at.NOW)
         set_modes(scene, work)
-        counts[at.CYCLE_MODES] = 0
+        counts.cycle_modes = 0
     return True
 
 
@@ -170,19 +170,19 @@ def went_too_far(scene, work, clock, step):
     if spent(scene, work, at.NEW) > 1.0:
         return True
     locate_contacts(scene, work, at.NEW)
-    if clock[at.ACROSS] == 1.0 and changes_sides(work):
+    if clock.across == 1.0 and changes_sides(work):
         return True
-    if scene.listed_reach <= 0.0 or clock[at.TOLERANCE] == math.inf:
+    if scene.listed_reach <= 0.0 or clock.tolerance == math.inf:
         return False
-    if overlooked(scene, work) or passes_within(scene, work, step, clock[at.TOLERANCE]):
+    if overlooked(scene, work) or passes_within(scene, work, step, clock.tolerance):
         return True
     return overtakes(scene, work, clock, step)
 
 
 def roll_slips(scene, work, step):
     """Tangential displacements of the closed pairs in NEW, which is located, after a step."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES:
             besides = 0.5 * step * rolled_besides(scene, work, at.NEW, row)
             stuck = work.slip[at.NOW, row] + rolled(scene, work, at.NEW, row) + besides
             work.slip[at.NEW, row] = slip_in(scene, work, at.NEW, row, stuck)
@@ -208,8 +208,8 @@ def look(scene, work, observed, clock, counts, record, lists):
         record_row(work, clock, counts, record)
     if lists and too_deep(scene, work):
         return TOO_DEEP
-    counts[at.CODE] = observe(scene, work, observed, clock[at.TIME])
-    return STOPPED if counts[at.CODE] != 0 else 0
+    counts.code = observe(scene, work, observed, clock.time)
+    return STOPPED if counts.code != 0 else 0
 
 
 def advance(scene, work, observed, clock, counts, record):
@@ -220,11 +220,11 @@ def advance(scene, work, observed, clock, counts, record):
     lists = has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0
     lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
     limit, trials = math.inf, 0
-    while clock[at.TIME] < clock[at.UNTIL]:
+    while clock.time < clock.until:
         status = pause_reason(counts, record)
         if status != 0:
             return status
-        if lists and trials == 0 and not keep_lists(scene, work, counts, clock[at.STEP]):
+        if lists and trials == 0 and not keep_lists(scene, work, counts, clock.step):
             return NO_ROOM
         choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
@@ -232,9 +232,9 @@ def advance(scene, work, observed, clock, counts, record):
         if scene.listed_reach > 0.0:
             flag_near(scene, work, at.NOW, step)
         ratio = attempt(scene, work, clock, step)
-        if work.tally[at.FULL] != at.NOTHING_FULL:
+        if work.tally.full != at.NOTHING_FULL:
             return NO_ROOM
-        if ratio < 0.0 and clock[at.TOLERANCE] == math.inf:
+        if ratio < 0.0 and clock.tolerance == math.inf:
             return NOT_FINITE
         too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
         if ratio < 0.0 or ratio > 1.0 or too_far:
@@ -243,11 +243,11 @@ def advance(scene, work, observed, clock, counts, record):
                 return STALLED
             continue
         if lists and trials < MOST_TRIALS and leave_at_once(scene, work, clock, step):
-            counts[at.LOCATED] += 1
+            counts.located += 1
             trials += 1
-            clock[at.STAGED_STEP] = 0.0
+            clock.staged_step = 0.0
             continue
-        if lists and trials < MOST_TRIALS and work.tally[at.SERIES_TERMS] > 0:
+        if lists and trials < MOST_TRIALS and work.tally.series_terms > 0:
             resolution, depth = resolutions_of(work, clock)
             kept = cut(scene, work, clock, step, resolution, depth)
             if kept < 1.0:
@@ -260,24 +260,24 @@ def advance(scene, work, observed, clock, counts, record):
             trials += 1
             if not ends_early(scene, work, clock, step, ratio, share):
                 limit = step_to_switch(scene, work, step, share)
-                counts[at.LOCATED] += 1
+                counts.located += 1
                 continue
             step *= share
-        flew = work.tally[at.SERIES_TERMS] > 0 and not touches(work)
-        planned = clock[at.STEP]
+        flew = work.tally.series_terms > 0 and not touches(work)
+        planned = clock.step
         switched = accept(scene, work, clock, counts, step, lists)
         if switched == OTHER_CONTACTS:
-            until = min(clock[at.UNTIL], kick_end(scene, work))
+            until = min(clock.until, kick_end(scene, work))
             leave_out_cycles(scene, work, clock, counts, until)
         plan(clock, step, ratio, trials > 0, switched)
-        if switched == OTHER_CONTACTS and work.tally[at.SERIES_TERMS] > 0:
+        if switched == OTHER_CONTACTS and work.tally.series_terms > 0:
             plan_flight(work, clock, planned, flew)
         if trials > 0 and switched == SAME:
             # Behind a kink of a law its derivatives may still be those before.
-            clock[at.SEEN_PACE] = 0.0
+            clock.seen_pace = 0.0
         if switched != SAME:
-            clock[at.STEP] = max(clock[at.STEP], shortest_needed(scene, work))
-            clock[at.STEP] = min(clock[at.STEP], step_behind_touch(scene, work, clock))
+            clock.step = max(clock.step, shortest_needed(scene, work))
+            clock.step = min(clock.step, step_behind_touch(scene, work, clock))
         limit, trials = math.inf, 0
         status = look(scene, work, observed, clock, counts, record, lists)
         if status != 0:

@@ -50,36 +50,36 @@ def kick_end(scene, work):
     """When the present kick ends [s]; inf where there are none."""
     if not has_kicks(scene):
         return math.inf
-    return (work.bodies[0, at.KICK_AT] + work.bodies[0, at.KICK_SPAN]) * finest_kick(scene)
+    return (work.kick.at + work.kick.span) * finest_kick(scene)
 
 
 def meet_kick(scene, work, clock):
     """Let a step that has ended with the kick, but for rounding, end just there."""
     if has_kicks(scene):
         end = kick_end(scene, work)
-        near = SAME_TIME * work.bodies[0, at.KICK_SPAN] * finest_kick(scene)
-        if abs(clock[at.TIME] - end) <= max(near, ROUNDED * clock[at.TIME]):
-            clock[at.TIME] = end
+        near = SAME_TIME * work.kick.span * finest_kick(scene)
+        if abs(clock.time - end) <= max(near, ROUNDED * clock.time):
+            clock.time = end
 
 
 def listed_gap(work, pair):
     """The least gap of the listed features of two bodies [m]; half of what is left until they must
     be listed anew where none is."""
     least = math.inf
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.PAIR] == pair:
-            least = min(least, work.geometry[at.NOW, row, at.GAP])
+    for row in range(work.tally.candidates):
+        if work.candidates[row].pair == pair:
+            least = min(least, work.geometry[at.NOW, row].gap)
     return least if least < math.inf else max(0.5 * work.budget[pair], 0.0)
 
 
 def nearest(scene, work):
     """How near any two bodies that are watched are, at least [m]."""
     least = math.inf
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         x, y = separation(scene, work, at.NOW, a, b)
         gap = length_of(x, y)
-        gap -= scene.bodies[a, at.BOUNDING_RADIUS] + scene.bodies[b, at.BOUNDING_RADIUS]
+        gap -= scene.bodies[a].bounding_radius + scene.bodies[b].bounding_radius
         if gap <= 0.0:
             gap = listed_gap(work, pair)
         least = min(least, gap)
@@ -122,25 +122,24 @@ def renew_kicks(scene, work, clock):
     """Begin the next kick where the present one has ended."""
     if not has_kicks(scene):
         return
-    finest, bodies = finest_kick(scene), work.bodies
-    begun = bodies[0, at.KICK_AT] * finest <= clock[at.TIME]
-    if bodies[0, at.KICK_SPAN] > 0.0 and begun and clock[at.TIME] < kick_end(scene, work):
+    finest = finest_kick(scene)
+    begun = work.kick.at * finest <= clock.time
+    if work.kick.span > 0.0 and begun and clock.time < kick_end(scene, work):
         return
-    place = int(clock[at.TIME] / finest)
-    while (place + 1) * finest <= clock[at.TIME]:
+    place = int(clock.time / finest)
+    while (place + 1) * finest <= clock.time:
         place += 1
-    while place * finest > clock[at.TIME]:
+    while place * finest > clock.time:
         place -= 1
     span = span_from(scene, work, place)
-    bodies[0, at.KICK_AT], bodies[0, at.KICK_SPAN] = float(place), float(span)
+    work.kick.at, work.kick.span = float(place), float(span)
     kick, halvings = scene.kicks[KICK], int(scene.kicks[HALVINGS])
-    for body in range(bodies.shape[0]):
-        who = int(scene.bodies[body, at.IDENTITY])
+    for body in range(work.kicks.shape[0]):
+        who = int(scene.bodies[body].identity)
         noise = mean_noise(kick, halvings, place, span, who, scene.key)
-        for axis in range(3):
-            bodies[body, at.KICK_X + axis] = noise[axis]
+        work.kicks[body].x, work.kicks[body].y, work.kicks[body].turn = noise
     # What was extrapolated from the last kick would only mislead.
-    clock[at.STAGED_STEP] = 0.0
+    clock.staged_step = 0.0
 
 
 LOW = 0xFFFFFFFF

@@ -27,9 +27,9 @@ def seen_order(clock, step, ratio, order):
     Behind a switch stiff forces settle, and the error falls far more slowly than the order says
     (Gustafsson 1994).
     """
-    if clock[at.REJECTED_STEP] <= step:
+    if clock.rejected_step <= step:
         return order
-    decay = math.log(clock[at.REJECTED_RATIO] / ratio) / math.log(clock[at.REJECTED_STEP] / step)
+    decay = math.log(clock.rejected_ratio / ratio) / math.log(clock.rejected_step / step)
     return min(max(decay, LOWEST_ORDER), order)
 
 
@@ -45,11 +45,11 @@ def adaptive_factor(clock, step, ratio, order):
     if ratio > 1.0:
         order = seen_order(clock, step, ratio, order)
     factor = SAFETY * ratio ** (-1.0 / order)
-    before = clock[at.PREVIOUS_STEP]
-    if ratio <= 1.0 and (before == 0.0 or clock[at.REJECTED_STEP] > 0.0):
+    before = clock.previous_step
+    if ratio <= 1.0 and (before == 0.0 or clock.rejected_step > 0.0):
         factor = min(factor, 1.0)
     if ratio <= 1.0 and 0.0 < before < math.inf:
-        trend = max(clock[at.PREVIOUS_RATIO], 1e-2) / (ratio * ratio)
+        trend = max(clock.previous_ratio, 1e-2) / (ratio * ratio)
         factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
     return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
 
@@ -83,9 +83,9 @@ MOST_SWITCHING = 4.0
 def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
     resolution, _ = resolutions_of(work, clock)
-    for row in range(work.tally[at.CANDIDATES]):
-        gap = work.geometry[at.NOW, row, at.GAP]
-        if 0.0 <= gap < clock[at.TOLERANCE]:
+    for row in range(work.tally.candidates):
+        gap = work.geometry[at.NOW, row].gap
+        if 0.0 <= gap < clock.tolerance:
             rate = normal_rate(work, at.NOW, row)
             if gap * rate < 0.0:
                 behind = 0.5 * touch_resolution(scene, work, at.NOW, row, resolution)
@@ -104,9 +104,9 @@ def step_to_landing(work, clock, step):
     """The step, or that which ends just before the first pair lands in it, or in which it does: by
     its end alone a step does not tell when in it that was, and would be wrong by half the way.
     Pairs that come nearer by less than the tolerance may land anywhere in it."""
-    tolerance = clock[at.TOLERANCE]
-    for row in range(work.tally[at.CANDIDATES]):
-        gap, speed = work.geometry[at.NOW, row, at.GAP], -normal_rate(work, at.NOW, row)
+    tolerance = clock.tolerance
+    for row in range(work.tally.candidates):
+        gap, speed = work.geometry[at.NOW, row].gap, -normal_rate(work, at.NOW, row)
         if gap > 0.0 and speed * step > max(gap, tolerance):
             way = gap - SHORT_OF_IT * tolerance
             lands = way <= 0.5 * SHORT_OF_IT * tolerance
@@ -115,56 +115,56 @@ def step_to_landing(work, clock, step):
 
 
 def choose_step(scene, work, clock, lists):
-    step = min(clock[at.STEP], clock[at.LARGEST_STEP])
+    step = min(clock.step, clock.largest_step)
     if lists:
         step = min(step, time_within(scene, work, share_ahead(scene, work)))
-        if clock[at.TOLERANCE] < math.inf:
-            if clock[at.ACROSS] == 0.0:
+        if clock.tolerance < math.inf:
+            if clock.across == 0.0:
                 step = imminent_switch(scene, work, clock, step)
             else:
                 step = step_to_landing(work, clock, step)
-    left = min(clock[at.UNTIL], kick_end(scene, work)) - clock[at.TIME]
+    left = min(clock.until, kick_end(scene, work)) - clock.time
     # Two even steps at the end instead of a long one and a sliver.
-    if step < left < 2.0 * step and clock[at.TOLERANCE] < math.inf:
+    if step < left < 2.0 * step and clock.tolerance < math.inf:
         return 0.5 * left
     return min(step, left)
 
 
 def room_for_time(clock, step):
     """The step, or the least one behind which the time is another number."""
-    if clock[at.TOLERANCE] == math.inf:
+    if clock.tolerance == math.inf:
         return step
-    return max(step, min(LEAST_ADVANCE * clock[at.TIME], clock[at.UNTIL] - clock[at.TIME]))
+    return max(step, min(LEAST_ADVANCE * clock.time, clock.until - clock.time))
 
 
 def moves(clock, step):
     """Whether anything can have moved in a step, which ended at the time now."""
-    if clock[at.TOLERANCE] == math.inf:
-        return clock[at.TIME] - step < clock[at.TIME]
-    return step >= SMALLEST_STEP * max(clock[at.TIME], 1e-3)
+    if clock.tolerance == math.inf:
+        return clock.time - step < clock.time
+    return step >= SMALLEST_STEP * max(clock.time, 1e-3)
 
 
 def reject(clock, counts, step, ratio, too_far):
     """Choose a smaller step; False where there is none."""
-    counts[at.REJECTED] += 1
-    clock[at.STAGED_STEP] = 0.0
+    counts.rejected += 1
+    clock.staged_step = 0.0
     failed = ratio < 0.0 or too_far
     if failed:
-        clock[at.PREVIOUS_STEP] = 0.0
-    clock[at.STEP] = 0.25 * step if failed else next_step(clock, step, ratio)
-    clock[at.REJECTED_STEP] = 0.0 if failed else step
-    clock[at.REJECTED_RATIO] = ratio
+        clock.previous_step = 0.0
+    clock.step = 0.25 * step if failed else next_step(clock, step, ratio)
+    clock.rejected_step = 0.0 if failed else step
+    clock.rejected_ratio = ratio
     # What switches late in a step across switches makes its error a jump: it comes again.
-    if ratio < 0.0 or (clock[at.ACROSS] == 1.0 and not too_far):
-        clock[at.BEARABLE_STEP] = SHARE_OF_FAILED * step
+    if ratio < 0.0 or (clock.across == 1.0 and not too_far):
+        clock.bearable_step = SHARE_OF_FAILED * step
     return moves(clock, step)
 
 
 def fastest_vibration(scene, work):
     """ω of the fastest vibration that there is [1/s]; 0 without any."""
     stiffest = 0.0
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
+    for body in range(work.poses.shape[0]):
+        if scene.bodies[body].free == 1.0:
             for axis in range(3):
                 mass = max(inertia(scene, body, axis), TINY)
                 stiffest = max(stiffest, work.jacobian[at.STIFFNESS, body, axis, axis] / mass)
@@ -181,11 +181,11 @@ def step_behind_touch(scene, work, clock):
     """The step that resolves how contacts take up the speed at which they have just touched, as far
     as that displaces bodies by the tolerance [s]."""
     pace, speed_of, later = 0.0, 0.0, 0.0
-    for row in range(work.tally[at.CANDIDATES]):
+    for row in range(work.tally.candidates):
         speed = -normal_rate(work, at.NOW, row)
-        if work.candidates[row, at.CLOSED] == at.TOUCHES and speed > 0.0:
+        if work.candidates[row].closed == at.TOUCHES and speed > 0.0:
             view = contact_view(scene, work, at.NOW, row)
-            stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
+            stiffness = pressed_stiffness(scene, view, clock.tolerance)
             pace += stiffness / view.effective_mass
             speed_of = max(speed_of, speed)
             later = max(later, speed * memory_of(work, row))
@@ -198,29 +198,29 @@ def plan(clock, step, ratio, was_cut, switched):
     """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
     if switched == OTHER_CONTACTS:
         # The forces are new, and settle about as fast as behind the last switch.
-        clock[at.PREVIOUS_STEP] = math.inf
-        clock[at.STAGED_STEP] = 0.0
-        clock[at.SETTLING] += 1.0
-        if clock[at.SETTLING] > MOST_SWITCHING and not was_cut:
+        clock.previous_step = math.inf
+        clock.staged_step = 0.0
+        clock.settling += 1.0
+        if clock.settling > MOST_SWITCHING and not was_cut:
             # A pair on the verge of touching switches step after step: they have to grow, too.
-            clock[at.STEP] = min(next_step(clock, step, ratio), clock[at.BEARABLE_STEP])
-            clock[at.SETTLED_STEP] = max(clock[at.SETTLED_STEP], step)
-        clock[at.STEP] = min(clock[at.STEP], SETTLED_GROWTH * clock[at.SETTLED_STEP])
+            clock.step = min(next_step(clock, step, ratio), clock.bearable_step)
+            clock.settled_step = max(clock.settled_step, step)
+        clock.step = min(clock.step, SETTLED_GROWTH * clock.settled_step)
     elif switched == OTHER_FRICTION:
-        clock[at.PREVIOUS_STEP] = math.inf
-        clock[at.STAGED_STEP] = 0.0
+        clock.previous_step = math.inf
+        clock.staged_step = 0.0
     elif was_cut:
         # The switch did not come: the step was too long to tell.
-        clock[at.PREVIOUS_STEP] = math.inf
-        clock[at.BEARABLE_STEP] = SHARE_OF_FAILED * clock[at.STEP]
-        clock[at.STEP] = min(clock[at.BEARABLE_STEP], LARGEST_FACTOR * step)
+        clock.previous_step = math.inf
+        clock.bearable_step = SHARE_OF_FAILED * clock.step
+        clock.step = min(clock.bearable_step, LARGEST_FACTOR * step)
     else:
-        if clock[at.SETTLING] > 0.0:
-            clock[at.SETTLED_STEP] = step
-            clock[at.SETTLING] = 0.0
-        cut = step < 0.5 * clock[at.STEP]
-        clock[at.STEP] = min(next_step(clock, step, ratio), clock[at.BEARABLE_STEP])
-        clock[at.BEARABLE_STEP] *= RECOVERY
-        clock[at.PREVIOUS_STEP] = math.inf if cut else step
-        clock[at.PREVIOUS_RATIO] = ratio
-    clock[at.REJECTED_STEP] = 0.0
+        if clock.settling > 0.0:
+            clock.settled_step = step
+            clock.settling = 0.0
+        cut = step < 0.5 * clock.step
+        clock.step = min(next_step(clock, step, ratio), clock.bearable_step)
+        clock.bearable_step *= RECOVERY
+        clock.previous_step = math.inf if cut else step
+        clock.previous_ratio = ratio
+    clock.rejected_step = 0.0

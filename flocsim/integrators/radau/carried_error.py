@@ -37,44 +37,49 @@ from flocsim.integrators.rhs.views import inertia
 def divide(scene, work, full, weight):
     """Divide CHANGE and ``weight`` times γh FORCING/M by 1 − γz, with the factors of a step of
     ``full`` [s]."""
-    motion = work.motion
     part = full / EIGENVALUES[REAL].real
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            load = inertia(scene, body, axis) / part * motion[at.CHANGE, body, at.VELOCITY + axis]
-            load += weight * motion[at.FORCING, body, at.VELOCITY + axis]
+            load = inertia(scene, body, axis) / part * work.velocity[at.CHANGE, body, axis]
+            load += weight * work.velocity[at.FORCING, body, axis]
             work.loads[REAL, 3 * body + axis] = load
     subtract_product(work, at.STIFFNESS, 1.0)
     solve_for_free(scene, work)
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            motion[at.CHANGE, body, at.VELOCITY + axis] = speed
-            motion[at.CHANGE, body, axis] += part * speed
+            work.velocity[at.CHANGE, body, axis] = speed
+            work.place[at.CHANGE, body, axis] += part * speed
 
 
 def mix(work, of_change, of_carried):
     """Make CHANGE a sum of itself and what is carried."""
-    motion = work.motion
-    for body in range(motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            change = of_change * motion[at.CHANGE, body, axis]
-            motion[at.CHANGE, body, axis] = change + of_carried * motion[at.CARRIED, body, axis]
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            change = of_change * work.place[at.CHANGE, body, axis]
+            work.place[at.CHANGE, body, axis] = (
+                change + of_carried * work.place[at.CARRIED, body, axis]
+            )
+            change = of_change * work.velocity[at.CHANGE, body, axis]
+            work.velocity[at.CHANGE, body, axis] = (
+                change + of_carried * work.velocity[at.CARRIED, body, axis]
+            )
 
 
 def add_step(work):
     """Take what has been carried, and the error that the step itself is likely to have made."""
-    motion = work.motion
-    for body in range(motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            own = motion[at.DEVIATION, body, axis]
-            motion[at.CARRIED, body, axis] = motion[at.CHANGE, body, axis] + own
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            own = work.place[at.DEVIATION, body, axis]
+            work.place[at.CARRIED, body, axis] = work.place[at.CHANGE, body, axis] + own
+            own = work.velocity[at.DEVIATION, body, axis]
+            work.velocity[at.CARRIED, body, axis] = work.velocity[at.CHANGE, body, axis] + own
 
 
 def carry_error(scene, work, clock, step):
     """Carry the error over an accepted step; the largest one of a body's outline [m]."""
     bound_carried(scene, work)
-    full = clock[at.STAGED_STEP]
+    full = clock.staged_step
     gamma = full / (EIGENVALUES[REAL].real * step)
     first = (1.0 - 3.0 * gamma) / gamma
     second = (0.5 - 3.0 * gamma + 3.0 * gamma * gamma) / (gamma * gamma)
@@ -106,17 +111,17 @@ ABOVE = 30.0
 def scatter_of(scene, work, clock, step, row):
     """How far the overlap of a contact at the end of a step lies off the line of those at the other
     stages, as far as the step does not resolve its vibrations [m]."""
-    if work.tally[at.SERIES_TERMS] > 0:
+    if work.tally.series_terms > 0:
         return 0.0
     g, span = work.geometry, NODES[1] - NODES[0]
-    slope = (g[SECOND_STAGE, row, at.GAP] - g[at.FIRST_STAGE, row, at.GAP]) / span
-    scatter = g[THIRD_STAGE, row, at.GAP] - g[SECOND_STAGE, row, at.GAP] - slope * (1.0 - NODES[1])
+    slope = (g[SECOND_STAGE, row].gap - g[at.FIRST_STAGE, row].gap) / span
+    scatter = g[THIRD_STAGE, row].gap - g[SECOND_STAGE, row].gap - slope * (1.0 - NODES[1])
     return abs(scatter) * unresolved(scene, work, clock, step, row)
 
 
 def overlap_error(scene, work, clock, row):
     """By how much the overlap of a contact is likely to be wrong [m]."""
-    return SHARE_OF_SCATTER * scatter_of(scene, work, clock, clock[at.STAGED_STEP], row)
+    return SHARE_OF_SCATTER * scatter_of(scene, work, clock, clock.staged_step, row)
 
 
 def doubt_of_release(scene, work, clock, step):
@@ -124,9 +129,9 @@ def doubt_of_release(scene, work, clock, step):
     what is allowed; it goes with the square of the step."""
     largest, g = 0.0, work.geometry
     least = ABOVE * above_rounding(work, at.NOW, 0.0)
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
-            before, after = -g[at.NOW, row, at.GAP], -g[THIRD_STAGE, row, at.GAP]
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES:
+            before, after = -g[at.NOW, row].gap, -g[THIRD_STAGE, row].gap
             scatter = scatter_of(scene, work, clock, step, row)
             if after - SHARE_OF_SCATTER * scatter < before and before > 0.0:
                 largest = max(largest, scatter / (MOST_SCATTER * max(before, -after, least)))

@@ -50,19 +50,19 @@ def cubic(weights, start, one, two, three):
     return start + change + third * (three - start)
 
 
-def weighted(work, body, axis, weights):
-    """The cubic through START and the stages."""
-    motion = work.motion
+def weighted(of, body, axis, weights):
+    """The cubic through START and the stages, ``of`` places or velocities."""
     return cubic(
-        weights, motion[at.START, body, axis], motion[at.FIRST_STAGE, body, axis],
-        motion[SECOND_STAGE, body, axis], motion[THIRD_STAGE, body, axis],
+        weights, of[at.START, body, axis], of[at.FIRST_STAGE, body, axis],
+        of[SECOND_STAGE, body, axis], of[THIRD_STAGE, body, axis],
     )  # fmt: skip
 
 
 def write_cubic(work, weights, state, body):
     """Write a body's motion at a share of the step, of these weights, into a state."""
-    for axis in range(6):
-        work.motion[state, body, axis] = weighted(work, body, axis, weights)
+    for axis in range(3):
+        work.place[state, body, axis] = weighted(work.place, body, axis, weights)
+        work.velocity[state, body, axis] = weighted(work.velocity, body, axis, weights)
 
 
 def collocate(work, step, share, body):
@@ -73,8 +73,8 @@ def collocate(work, step, share, body):
 def stiffness_of(scene, work, step):
     """How stiff a step is: the largest h² K/M + h D/M of a coordinate."""
     stiffest = 0.0
-    for body in range(work.bodies.shape[0]):
-        if scene.bodies[body, at.FREE] == 1.0:
+    for body in range(work.poses.shape[0]):
+        if scene.bodies[body].free == 1.0:
             for axis in range(3):
                 mass = inertia(scene, body, axis)
                 spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
@@ -94,50 +94,53 @@ def end_on_the_cubic(scene, work, step, ratio, share):
     if ratio > GOOD_CUBIC or any_grazes(work) or stiffness_of(scene, work, step) > STIFF:
         return False
     weights = stage_weights(share)
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         write_cubic(work, weights, at.NEW, body)
     return True
 
 
 def keep_velocities(work):
     """First guess: the velocities stay as they are."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
             for stage in range(3):
-                work.motion[at.FIRST_STAGE + stage, body, axis] = work.motion[at.NOW, body, axis]
+                work.velocity[at.FIRST_STAGE + stage, body, axis] = work.velocity[
+                    at.NOW, body, axis
+                ]
 
 
 def keep_accelerations(scene, work, step):
     """First guess: the accelerations stay as they are."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            gain = scene.bodies[body, at.FREE] * step * work.rates[at.NOW, body, at.FORCE + axis]
+            gain = scene.bodies[body].free * step * work.force[at.NOW, body, axis]
             for stage in range(3):
-                speed = work.motion[at.NOW, body, at.VELOCITY + axis]
+                speed = work.velocity[at.NOW, body, axis]
                 speed += NODES[stage] * gain / max(mass, TINY)
-                work.motion[at.FIRST_STAGE + stage, body, at.VELOCITY + axis] = speed
+                work.velocity[at.FIRST_STAGE + stage, body, axis] = speed
 
 
 def go_on_as_before(work, scale):
     """First guess: the accelerations of the last step, which was so much shorter, as a mean."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
-            speed = work.motion[at.NOW, body, axis]
-            gain = scale * (speed - work.motion[at.START, body, axis])
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            speed = work.velocity[at.NOW, body, axis]
+            gain = scale * (speed - work.velocity[at.START, body, axis])
             for stage in range(3):
                 guess = speed + NODES[stage] * gain
-                work.motion[at.FIRST_STAGE + stage, body, axis] = guess
+                work.velocity[at.FIRST_STAGE + stage, body, axis] = guess
 
 
 def is_soft(work, step):
     """Whether no pair of features acts, and drag takes little of a velocity in a step."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed + candidate.near > 0:
             return False
     shortest = math.inf
-    for body in range(work.bodies.shape[0]):
-        shortest = min(shortest, work.bodies[body, at.RELAXATION])
+    for body in range(work.poses.shape[0]):
+        shortest = min(shortest, work.errors[body].relaxation)
     return shortest >= SOFT * step
 
 
@@ -147,27 +150,27 @@ def carry_on(work, begin, scale):
     first = stage_weights(begin + one * scale)
     second = stage_weights(begin + two * scale)
     third = stage_weights(begin + three * scale)
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
             guesses = (
-                weighted(work, body, axis, first),
-                weighted(work, body, axis, second),
-                weighted(work, body, axis, third),
+                weighted(work.velocity, body, axis, first),
+                weighted(work.velocity, body, axis, second),
+                weighted(work.velocity, body, axis, third),
             )
             for stage in range(3):
-                work.motion[at.FIRST_STAGE + stage, body, axis] = guesses[stage]
+                work.velocity[at.FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
 def guess_stages(scene, work, clock, step):
     """The stages' velocities to start from, and where this step starts."""
-    staged = clock[at.STAGED_STEP]
+    staged = clock.staged_step
     if staged < 0.0:
         go_on_as_before(work, -step / staged)
     elif staged > 0.0 and step <= LONGEST_GUESS * staged:
-        carry_on(work, (clock[at.TIME] - clock[at.STAGED_AT]) / staged, step / staged)
+        carry_on(work, (clock.time - clock.staged_at) / staged, step / staged)
     elif is_soft(work, step):
         keep_accelerations(scene, work, step)
     else:
         keep_velocities(work)
     keep_start(work)
-    clock[at.STAGED_STEP], clock[at.STAGED_AT] = step, clock[at.TIME]
+    clock.staged_step, clock.staged_at = step, clock.time

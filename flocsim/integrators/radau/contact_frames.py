@@ -26,18 +26,21 @@ stiff, and drag, which is the same whatever way a pair lies, would be taken alon
 
 
 def acts(work, row):
-    return work.candidates[row, at.CLOSED] + work.candidates[row, at.NEAR] > 0
+    candidate = work.candidates[row]
+    return candidate.closed + candidate.near > 0
 
 
 def leads(scene, work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
-    if work.candidates[row, at.CLOSED] != at.OPEN:
+    candidate = work.candidates[row]
+    geometry = work.geometry[at.NOW, row]
+    if candidate.closed != at.OPEN:
         return True
-    if work.candidates[row, at.NEAR] == 0 or work.geometry[at.NOW, row, at.SHARE] <= LEADING_SHARE:
+    if candidate.near == 0 or geometry.share <= LEADING_SHARE:
         return False
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    size = min(scene.bodies[a, at.BOUNDING_RADIUS], scene.bodies[b, at.BOUNDING_RADIUS])
-    return work.geometry[at.NOW, row, at.GAP] < LEADING_GAP * size
+    a, b = candidate.vertex_body, candidate.edge_body
+    size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
+    return geometry.gap < LEADING_GAP * size
 
 
 def first_of(labels, body):
@@ -56,87 +59,91 @@ def unite(labels, a, b):
 
 def join(scene, work, pair):
     """Make one cluster of those of the bodies of a pair, if both are free."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-    work.pairs[pair, at.ACTING] = 1
-    if scene.bodies[a, at.FREE] * scene.bodies[b, at.FREE] == 1.0:
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
+    work.pairs[pair].acting = 1
+    if scene.bodies[a].free * scene.bodies[b].free == 1.0:
         unite(work.cluster, a, b)
 
 
 def gather_clusters(scene, work):
     """Name, for each free body, the first one of those that it acts on, directly or not; flag the
     pairs that act."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         work.cluster[body] = body
-    for pair in range(work.tally[at.PAIRS]):
-        work.pairs[pair, at.ACTING] = 0
+    for pair in range(work.tally.pairs):
+        work.pairs[pair].acting = 0
         if has(scene, CENTRE_FORCE):
             join(scene, work, pair)
-    for row in range(work.tally[at.CANDIDATES]):
-        if acts(work, row) and work.pairs[work.candidates[row, at.PAIR], at.ACTING] == 0:
-            join(scene, work, work.candidates[row, at.PAIR])
-    for body in range(work.bodies.shape[0]):
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if acts(work, row) and work.pairs[candidate.pair].acting == 0:
+            join(scene, work, candidate.pair)
+    for body in range(work.poses.shape[0]):
         work.cluster[body] = work.cluster[work.cluster[body]]
 
 
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
+    candidate = work.candidates[row]
     g, state = work.geometry, at.FIRST_STAGE + stage
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    across = g[at.NOW, row, at.VERTEX_ARM_N] - g[state, row, at.VERTEX_ARM_N]
-    along = g[at.NOW, row, at.VERTEX_ARM_T] - g[state, row, at.VERTEX_ARM_T]
+    a, b = candidate.vertex_body, candidate.edge_body
+    across = g[at.NOW, row].vertex_arm_n - g[state, row].vertex_arm_n
+    along = g[at.NOW, row].vertex_arm_t - g[state, row].vertex_arm_t
     add_to_body(work, row, stage, a, across, along)
-    across = g[at.NOW, row, at.EDGE_ARM_N] - g[state, row, at.EDGE_ARM_N]
-    along = g[at.NOW, row, at.EDGE_ARM_T] - g[state, row, at.EDGE_ARM_T]
+    across = g[at.NOW, row].edge_arm_n - g[state, row].edge_arm_n
+    along = g[at.NOW, row].edge_arm_t - g[state, row].edge_arm_t
     add_to_body(work, row, stage, b, across, along)
 
 
 def add_to_body(work, row, stage, body, across, along):
     """Add the turn of a pair's normal to a body's frame, and what its arms have changed by."""
     g, state = work.geometry, at.FIRST_STAGE + stage
-    ox, oy = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
-    nx, ny = g[state, row, at.NORMAL_X], g[state, row, at.NORMAL_Y]
-    frame = at.FRAMES + at.FRAME_COLUMNS * stage
-    work.bodies[body, frame + at.TURN_COSINE] += ox * nx + oy * ny
-    work.bodies[body, frame + at.TURN_SINE] += ox * ny - oy * nx
-    work.bodies[body, frame + at.SHIFT_X] += across * nx - along * ny
-    work.bodies[body, frame + at.SHIFT_Y] += across * ny + along * nx
+    ox, oy = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    nx, ny = g[state, row].normal_x, g[state, row].normal_y
+    frame = work.frames[body, stage]
+    frame.turn_cosine += ox * nx + oy * ny
+    frame.turn_sine += ox * ny - oy * nx
+    frame.shift_x += across * nx - along * ny
+    frame.shift_y += across * ny + along * nx
 
 
 def average_shifts(work):
     """Make means of the sums of s, and add each body's turns to its cluster's."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        for frame in range(at.FRAMES, at.BODY_COLUMNS, at.FRAME_COLUMNS):
-            cosine = work.bodies[body, frame + at.TURN_COSINE]
-            sine = work.bodies[body, frame + at.TURN_SINE]
+        for stage in range(at.MOST_FRAMES):
+            frame = work.frames[body, stage]
+            cosine, sine = frame.turn_cosine, frame.turn_sine
             size = length_of(cosine, sine)
             if size > 0.0:
-                work.bodies[body, frame + at.SHIFT_X] /= size
-                work.bodies[body, frame + at.SHIFT_Y] /= size
+                frame.shift_x /= size
+                frame.shift_y /= size
             if leader != body:
-                work.bodies[leader, frame + at.TURN_COSINE] += cosine
-                work.bodies[leader, frame + at.TURN_SINE] += sine
+                work.frames[leader, stage].turn_cosine += cosine
+                work.frames[leader, stage].turn_sine += sine
 
 
 def share_turns(work):
     """Give each body its cluster's turns; none where nothing touches."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        for frame in range(at.FRAMES, at.BODY_COLUMNS, at.FRAME_COLUMNS):
+        for stage in range(at.MOST_FRAMES):
+            frame = work.frames[body, stage]
             # Leaders come first, and have the cosine and sine of their sums by then.
-            cosine = work.bodies[leader, frame + at.TURN_COSINE]
-            sine = work.bodies[leader, frame + at.TURN_SINE]
+            cosine = work.frames[leader, stage].turn_cosine
+            sine = work.frames[leader, stage].turn_sine
             size = length_of(cosine, sine)
-            work.bodies[body, frame + at.TURN_COSINE] = cosine / size if size > 0.0 else 1.0
-            work.bodies[body, frame + at.TURN_SINE] = sine / size if size > 0.0 else 0.0
+            frame.turn_cosine = cosine / size if size > 0.0 else 1.0
+            frame.turn_sine = sine / size if size > 0.0 else 0.0
 
 
 def follow_contacts(scene, work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
-    for body in range(work.bodies.shape[0]):
-        for column in range(at.FRAMES, at.FRAMES + at.MOST_FRAMES * at.FRAME_COLUMNS):
-            work.bodies[body, column] = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
+    for body in range(work.poses.shape[0]):
+        for stage in range(at.MOST_FRAMES):
+            frame = work.frames[body, stage]
+            frame.turn_cosine = frame.turn_sine = frame.shift_x = frame.shift_y = 0.0
+    for row in range(work.tally.candidates):
         if leads(scene, work, row):
             for stage in range(3):
                 add_frame(work, row, stage)
@@ -146,14 +153,14 @@ def follow_contacts(scene, work):
 
 def turn_at(work, body, stage):
     """Cosine and sine of the turn of a body's frame at a stage."""
-    frame = at.FRAMES + at.FRAME_COLUMNS * stage
-    return work.bodies[body, frame + at.TURN_COSINE], work.bodies[body, frame + at.TURN_SINE]
+    frame = work.frames[body, stage]
+    return frame.turn_cosine, frame.turn_sine
 
 
 def shift_at(work, body, stage):
     """s of a body's frame at a stage [m]."""
-    frame = at.FRAMES + at.FRAME_COLUMNS * stage
-    return work.bodies[body, frame + at.SHIFT_X], work.bodies[body, frame + at.SHIFT_Y]
+    frame = work.frames[body, stage]
+    return frame.shift_x, frame.shift_y
 
 
 def velocity_on(work, body, stage, x, y):
@@ -172,22 +179,20 @@ def force_back(work, body, stage, x, y, torque):
 
 def add_shifts(scene, work, stage):
     """Add s ω less its mean over the cluster, for the changes of velocity that CHANGE holds."""
-    change, bodies = work.motion, work.bodies
-    for body in range(bodies.shape[0]):
-        bodies[body, at.MASS_SUM] = 0.0
-        for axis in range(2):
-            bodies[body, at.SHIFT_SUM + axis] = 0.0
-    for body in range(bodies.shape[0]):
-        leader = work.cluster[body]
-        mass, spin = scene.bodies[body, at.MASS], change[at.CHANGE, body, at.SPIN]
-        bodies[leader, at.MASS_SUM] += mass
-        for axis in range(2):
-            shift = spin * bodies[body, at.FRAMES + at.FRAME_COLUMNS * stage + at.SHIFT_X + axis]
-            bodies[leader, at.SHIFT_SUM + axis] += mass * shift
-            change[at.CHANGE, body, at.VELOCITY + axis] += shift
-    for body in range(bodies.shape[0]):
-        leader = work.cluster[body]
-        if scene.bodies[body, at.FREE] == 1.0:
-            for axis in range(2):
-                mean = bodies[leader, at.SHIFT_SUM + axis] / bodies[leader, at.MASS_SUM]
-                change[at.CHANGE, body, at.VELOCITY + axis] -= mean
+    for body in range(work.poses.shape[0]):
+        cluster = work.clusters[body]
+        cluster.mass = cluster.shift_x = cluster.shift_y = 0.0
+    for body in range(work.poses.shape[0]):
+        cluster, frame = work.clusters[work.cluster[body]], work.frames[body, stage]
+        mass, spin = scene.bodies[body].mass, work.velocity[at.CHANGE, body, at.ANGLE]
+        cluster.mass += mass
+        shift_x, shift_y = spin * frame.shift_x, spin * frame.shift_y
+        cluster.shift_x += mass * shift_x
+        cluster.shift_y += mass * shift_y
+        work.velocity[at.CHANGE, body, at.X] += shift_x
+        work.velocity[at.CHANGE, body, at.Y] += shift_y
+    for body in range(work.poses.shape[0]):
+        cluster = work.clusters[work.cluster[body]]
+        if scene.bodies[body].free == 1.0:
+            work.velocity[at.CHANGE, body, at.X] -= cluster.shift_x / cluster.mass
+            work.velocity[at.CHANGE, body, at.Y] -= cluster.shift_y / cluster.mass

@@ -95,7 +95,7 @@ def write_coupling(work, body, other, block, weights, both):
 def write_systems(scene, work, step, both):
     """(µ/h) M + DAMPING + (h/µ) STIFFNESS of the real system, or of both, in the pattern."""
     e, weights = work.elimination, weights_of(step)
-    n = work.bodies.shape[0]
+    n = work.poses.shape[0]
     for part in range(3 if both else 1):
         for block in range(n + e.lower[n]):
             for i in range(3):
@@ -108,9 +108,9 @@ def write_systems(scene, work, step, both):
             write_into(work, place, body, first, 3, weights, both)
             add_inertia(scene, work, place, body, first, 3, step)
             write_momentum(scene, work, body, weights, step, both)
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         if e.pairs[pair] == 1:
-            a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+            a, b = work.pairs[pair].later, work.pairs[pair].earlier
             write_coupling(work, a, b, lower_block(work, pair), weights, both)
             write_coupling(work, b, a, upper_block(work, pair), weights, both)
 
@@ -250,7 +250,7 @@ def factorise_sparse(scene, work, step, both):
         return False
     write_systems(scene, work, step, both)
     e = work.elimination
-    for row in range(work.bodies.shape[0]):
+    for row in range(work.poses.shape[0]):
         if e.body[row] != NONE and not factorise_row(e, row, both):
             return False
     return True
@@ -308,7 +308,7 @@ def subtract_others(e, loads, place, first, last, both):
 def solve_sparse(work, both):
     """Replace the load of the real system, or of ``both``, by the solution."""
     e, loads = work.elimination, work.loads
-    n = work.bodies.shape[0]
+    n = work.poses.shape[0]
     for place in range(n):
         if e.body[place] != NONE:
             subtract_others(e, loads, place, e.lower[place], e.upper[place], both)

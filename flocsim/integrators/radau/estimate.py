@@ -13,27 +13,25 @@ from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.views import inertia
 
 
-def estimated_rate(work, row, first, step):
-    """Weighted mean of the stages' increments over h, of a place or, ``first`` being VELOCITY, of a
-    velocity."""
-    body, axis = row // 3, first + row % 3
-    now = work.motion[at.NOW, body, axis]
+def estimated_rate(of, body, axis, step):
+    """Weighted mean of the stages' increments over h, ``of`` places or velocities."""
+    now = of[at.NOW, body, axis]
     total = 0.0
     for stage in range(3):
-        total += ESTIMATE[stage] * (work.motion[at.FIRST_STAGE + stage, body, axis] - now)
+        total += ESTIMATE[stage] * (of[at.FIRST_STAGE + stage, body, axis] - now)
     return total / step
 
 
 def write_error_load(scene, work, step):
     """The load of the estimate; the mean rates of places stay in CHANGE."""
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             row = 3 * body + axis
-            load = work.rates[at.NOW, body, at.FORCE + axis]
-            load += inertia(scene, body, axis) * estimated_rate(work, row, at.VELOCITY, step)
+            load = work.force[at.NOW, body, axis]
+            load += inertia(scene, body, axis) * estimated_rate(work.velocity, body, axis, step)
             work.loads[REAL, row] = load
-            drift = work.motion[at.NOW, body, at.VELOCITY + axis]
-            work.motion[at.CHANGE, body, axis] = drift + estimated_rate(work, row, at.X, step)
+            drift = work.velocity[at.NOW, body, axis]
+            work.place[at.CHANGE, body, axis] = drift + estimated_rate(work.place, body, axis, step)
     subtract_product(work, at.STIFFNESS, step / EIGENVALUES[REAL].real)
 
 
@@ -43,14 +41,15 @@ def estimate_error(scene, work, step):
     write_error_load(scene, work, step)
     solve_for_free(scene, work)
     damped = step / EIGENVALUES[REAL].real
-    for body in range(work.motion.shape[1]):
-        free = scene.bodies[body, at.FREE]
+    for body in range(work.place.shape[1]):
+        free = scene.bodies[body].free
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            drift = work.motion[at.CHANGE, body, axis]
-            work.motion[at.CHANGE, body, axis] = free * damped * (speed + drift)
-            work.motion[at.CHANGE, body, at.VELOCITY + axis] = free * speed
+            drift = work.place[at.CHANGE, body, axis]
+            work.place[at.CHANGE, body, axis] = free * damped * (speed + drift)
+            work.velocity[at.CHANGE, body, axis] = free * speed
     divide(scene, work, step, 0.0)
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.DEVIATION, body, axis] = work.motion[at.CHANGE, body, axis]
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.DEVIATION, body, axis] = work.place[at.CHANGE, body, axis]
+            work.velocity[at.DEVIATION, body, axis] = work.velocity[at.CHANGE, body, axis]

@@ -24,22 +24,23 @@ be this share of the tolerance, or it does not begin to graze."""
 
 def any_grazes(work):
     """Whether a pair grazes."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.GRAZES:
             return True
     return False
 
 
 def release_gaps(work):
     """Hold no gap."""
-    for row in range(work.tally[at.CANDIDATES]):
-        work.slip[at.GRAZING_RESISTANCE, row] = 0.0
+    for row in range(work.tally.candidates):
+        work.contacts[row].grazing_resistance = 0.0
 
 
 def response(scene, work, row):
     """The rates of the gap, and along the tangent, for every newton along the tangent of a pair, by
     the factorised system [m/(N s)]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     across, along = tangent_rows(work, row), normal_rows(work, row)
     for each in range(work.loads.shape[1]):
         work.loads[REAL, each] = 0.0
@@ -58,24 +59,26 @@ def response(scene, work, row):
 def can_begin(work, clock, row, found, sliding):
     """Whether the force of a pair that has just parted, with those responses to a newton, lifts it,
     and can take its speed away without moving the bodies much."""
-    if found * work.slip[at.GRAZING_FORCE, row] <= 0.0:
+    if found * work.contacts[row].grazing_force <= 0.0:
         return False
     way = abs(sliding * normal_rate(work, at.NOW, row)) * memory_of(work, row)
-    return way <= SHARE_OF_START * clock[at.TOLERANCE] * abs(found)
+    return way <= SHARE_OF_START * clock.tolerance * abs(found)
 
 
 def hold_gaps(scene, work, clock):
     """Say how stiffly the gaps of pairs that graze are held, by the system without that; let those
     go that their own force does not lift. Whether any has been let go."""
     opened = False
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.GRAZES:
+            contact = work.contacts[row]
             found, sliding = response(scene, work, row)
             weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
-            fresh = work.slip[at.FRESH, row] != 0.0
+            fresh = contact.fresh != 0.0
             if weak or (fresh and not can_begin(work, clock, row, found, sliding)):
-                work.candidates[row, at.CLOSED], opened = at.OPEN, True
+                candidate.closed, opened = at.OPEN, True
                 work.slip[at.NOW, row] = 0.0
             else:
-                work.slip[at.GRAZING_RESISTANCE, row] = STIFFER / found
+                contact.grazing_resistance = STIFFER / found
     return opened

@@ -32,20 +32,20 @@ WIDEST, FEW = 1.5, 8
 
 def ties(scene, work, pair):
     """Whether a pair ties two bodies of the systems to each other."""
-    a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
-    acts = work.pairs[pair, at.ACTING] == 1
-    return acts and scene.bodies[a, at.FREE] * scene.bodies[b, at.FREE] == 1.0
+    a, b = work.pairs[pair].later, work.pairs[pair].earlier
+    acts = work.pairs[pair].acting == 1
+    return acts and scene.bodies[a].free * scene.bodies[b].free == 1.0
 
 
 def holds(scene, work):
     """Whether the pattern still serves the pairs that act now."""
     e, count = work.elimination, 0
-    if e.found[PATTERN] == 0 or e.found[LISTING] != work.tally[at.REBUILDS]:
+    if e.found[PATTERN] == 0 or e.found[LISTING] != work.tally.rebuilds:
         return False
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         if e.nodes[CLUSTER, body] != work.cluster[body]:
             return False
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         if ties(scene, work, pair):
             if e.pairs[pair] == 0:
                 return False
@@ -55,17 +55,17 @@ def holds(scene, work):
 
 def count_ties(scene, work):
     """Bodies' degrees, and room for their ties; False where there is none."""
-    e, n = work.elimination, work.bodies.shape[0]
+    e, n = work.elimination, work.poses.shape[0]
     for body in range(n):
         e.nodes[DEGREE, body] = 0
         e.nodes[MARK, body] = NONE
         e.nodes[CLUSTER, body] = work.cluster[body]
     count = 0
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         e.pairs[pair] = 1 if ties(scene, work, pair) else 0
         if e.pairs[pair] == 1:
-            e.nodes[DEGREE, work.pairs[pair, at.LATER]] += 1
-            e.nodes[DEGREE, work.pairs[pair, at.EARLIER]] += 1
+            e.nodes[DEGREE, work.pairs[pair].later] += 1
+            e.nodes[DEGREE, work.pairs[pair].earlier] += 1
             count += 1
     end = 0
     for body in range(n):
@@ -73,7 +73,7 @@ def count_ties(scene, work):
         e.nodes[ROOM, body] = e.nodes[DEGREE, body] + SLACK
         end += e.nodes[ROOM, body]
         e.nodes[DEGREE, body] = 0
-    e.found[END], e.found[PATTERN], e.found[LISTING] = end, 1 + count, work.tally[at.REBUILDS]
+    e.found[END], e.found[PATTERN], e.found[LISTING] = end, 1 + count, work.tally.rebuilds
     return end <= e.graph.shape[0]
 
 
@@ -84,9 +84,9 @@ def add_tie(e, body, other):
 
 def write_ties(work):
     """The graph of the pairs that act."""
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         if work.elimination.pairs[pair] == 1:
-            a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+            a, b = work.pairs[pair].later, work.pairs[pair].earlier
             add_tie(work.elimination, a, b)
             add_tie(work.elimination, b, a)
 
@@ -178,13 +178,13 @@ def eliminate(work, place, body, end):
 def order_bodies(scene, work):
     """Give all free bodies their places, leaders last; how far ``column`` is filled with what they
     are tied to, NONE without room."""
-    e, n = work.elimination, work.bodies.shape[0]
+    e, n = work.elimination, work.poses.shape[0]
     for degree in range(n + 1):
         e.nodes[HEAD, degree] = NONE
     free = 0
     for body in range(n):
         e.place[body] = NONE
-        if scene.bodies[body, at.FREE] == 1.0:
+        if scene.bodies[body].free == 1.0:
             free += 1
             if not is_leader(work, body):
                 enter(e, body)
@@ -200,7 +200,7 @@ def order_bodies(scene, work):
             return NONE
         place, degree = place + 1, max(degree - 1, 0)
     for body in range(n):
-        if scene.bodies[body, at.FREE] == 1.0 and is_leader(work, body):
+        if scene.bodies[body].free == 1.0 and is_leader(work, body):
             end = eliminate(work, place, body, end)
             place += 1
     for rest in range(place, n):
@@ -222,7 +222,7 @@ def sort_places(e, first, last):
 def lay_out(work, end):
     """From what every body is tied to, rows of places: those left of the diagonal, then those
     right of it; False without room."""
-    e, n = work.elimination, work.bodies.shape[0]
+    e, n = work.elimination, work.poses.shape[0]
     left = e.nodes[BEGIN]
     for place in range(n):
         left[place] = 0
@@ -260,7 +260,7 @@ def lay_out(work, end):
 
 def fill_left(work):
     """Write the places left of the diagonal, in their order."""
-    e, n = work.elimination, work.bodies.shape[0]
+    e, n = work.elimination, work.poses.shape[0]
     filled = e.nodes[BEGIN]
     for place in range(n):
         sort_places(e, e.upper[place], e.lower[place + 1])
@@ -290,5 +290,5 @@ def find_pattern(scene, work):
         if end != NONE and lay_out(work, end):
             return True
     work.elimination.found[PATTERN] = 0
-    work.tally[at.FULL] = at.BLOCKS_FULL
+    work.tally.full = at.BLOCKS_FULL
     return False

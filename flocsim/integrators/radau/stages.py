@@ -56,16 +56,15 @@ tolerance, so that a pace which is far worse than expected errs by little."""
 
 
 def place_stages(work, step):
-    motion = work.motion
-    for body in range(motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
             for stage in range(3):
                 first, second, third = MATRIX[stage]
-                mean = first * motion[at.FIRST_STAGE, body, at.VELOCITY + axis]
-                mean += second * motion[SECOND_STAGE, body, at.VELOCITY + axis]
-                mean += third * motion[THIRD_STAGE, body, at.VELOCITY + axis]
-                motion[at.FIRST_STAGE + stage, body, axis] = (
-                    motion[at.NOW, body, axis] + step * mean
+                mean = first * work.velocity[at.FIRST_STAGE, body, axis]
+                mean += second * work.velocity[SECOND_STAGE, body, axis]
+                mean += third * work.velocity[THIRD_STAGE, body, axis]
+                work.place[at.FIRST_STAGE + stage, body, axis] = (
+                    work.place[at.NOW, body, axis] + step * mean
                 )
 
 
@@ -73,16 +72,16 @@ def slip_stages(scene, work, step, first, matrix):
     """Tangential displacements of the closed pairs in the stages from ``first`` on, which are
     located."""
     slip = work.slip
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES:
             for stage in range(first, 3):
                 besides = rolled_besides(scene, work, at.FIRST_STAGE + stage, row)
-                slip[at.SLIP_RATES + at.FIRST_STAGE + stage, row] = besides
+                work.slip_rate[at.FIRST_STAGE + stage, row] = besides
             for stage in range(first, 3):
                 one, two, three = matrix[stage]
-                mean = one * slip[at.SLIP_RATES + at.FIRST_STAGE, row]
-                mean += two * slip[at.SLIP_RATES + SECOND_STAGE, row]
-                mean += three * slip[at.SLIP_RATES + THIRD_STAGE, row]
+                mean = one * work.slip_rate[at.FIRST_STAGE, row]
+                mean += two * work.slip_rate[SECOND_STAGE, row]
+                mean += three * work.slip_rate[THIRD_STAGE, row]
                 state = at.FIRST_STAGE + stage
                 stuck = slip[at.NOW, row] + rolled(scene, work, state, row) + step * mean
                 slip[state, row] = slip_in(scene, work, state, row, stuck)
@@ -113,23 +112,25 @@ def change_of_forces(scene, work, step, stage, goal):
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
     largest, least, state = 0.0, above_rounding(work, at.NOW, 0.0), at.FIRST_STAGE + stage
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
-            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
-            overlap = abs(work.geometry[state, row, at.GAP])
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        geometry = work.geometry[state, row]
+        if candidate.closed == at.TOUCHES:
+            change = step * abs(along_normal(work, row, work.velocity, at.CHANGE))
+            overlap = abs(geometry.gap)
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
-        elif work.candidates[row, at.CLOSED] == at.GRAZES:
-            resistance, memory = work.slip[at.GRAZING_RESISTANCE, row], memory_of(work, row)
-            change = abs(resistance * along_normal(work, row, at.CHANGE, at.VELOCITY))
+        elif candidate.closed == at.GRAZES:
+            resistance, memory = work.contacts[row].grazing_resistance, memory_of(work, row)
+            change = abs(resistance * along_normal(work, row, work.velocity, at.CHANGE))
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
-        elif work.candidates[row, at.NEAR] == 1 and work.geometry[state, row, at.SHARE] > 0.0:
-            change = step * abs(along_normal(work, row, at.CHANGE, at.VELOCITY))
-            length = length_at(scene, work.geometry[state, row, at.GAP])
+        elif candidate.near == 1 and geometry.share > 0.0:
+            change = step * abs(along_normal(work, row, work.velocity, at.CHANGE))
+            length = length_at(scene, geometry.gap)
             allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
     return largest
@@ -140,13 +141,13 @@ def correct_stages(scene, work, step, goal):
     largest = 0.0
     for stage in range(3):
         write_changes(scene, work, stage)
-        for body in range(work.motion.shape[1]):
-            memory = step + work.bodies[body, at.MEMORY]
+        for body in range(work.place.shape[1]):
+            memory = step + work.errors[body].memory
             for axis in range(3):
-                change = work.motion[at.CHANGE, body, at.VELOCITY + axis]
+                change = work.velocity[at.CHANGE, body, axis]
                 if not abs(change) < math.inf:
                     return math.inf
-                work.motion[at.FIRST_STAGE + stage, body, at.VELOCITY + axis] += change
+                work.velocity[at.FIRST_STAGE + stage, body, axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
         largest = max(largest, change_of_forces(scene, work, step, stage, goal))
     return largest
@@ -159,7 +160,7 @@ def newton_step(scene, work, time, step, goal):
     follow_contacts(scene, work)
     write_loads(scene, work, step)
     solve_both(work)
-    work.tally[at.SOLVES] += 1
+    work.tally.solves += 1
     return correct_stages(scene, work, step, goal)
 
 
@@ -173,10 +174,10 @@ def finish_stages(scene, work, step):
 
 def expected_pace(clock, step):
     """What to expect of the second iteration before it is made."""
-    if clock[at.SEEN_PACE] == 0.0:
+    if clock.seen_pace == 0.0:
         return FIRST_PACE
-    longer = max(step / clock[at.SEEN_STEP], 1.0)
-    return min(max(DOUBTED_PACE * clock[at.SEEN_PACE] * longer * longer, LEAST_PACE), FIRST_PACE)
+    longer = max(step / clock.seen_step, 1.0)
+    return min(max(DOUBTED_PACE * clock.seen_pace * longer * longer, LEAST_PACE), FIRST_PACE)
 
 
 @apart
@@ -185,11 +186,11 @@ def solve_stages(scene, work, clock, step):
     guess_stages(scene, work, clock, step)
     expected = expected_pace(clock, step)
     allowed = step_tolerance(work, clock)
-    share = NEWTON_SHARE if allowed == clock[at.TOLERANCE] else FREE_NEWTON_SHARE
+    share = NEWTON_SHARE if allowed == clock.tolerance else FREE_NEWTON_SHARE
     # Turning makes every other iteration worse, so that the pace is taken over two of them.
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
-        change = newton_step(scene, work, clock[at.TIME], step, share * allowed)
+        change = newton_step(scene, work, clock.time, step, share * allowed)
         goal = max(share * allowed, rounding_size(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         first = before == math.inf
@@ -197,12 +198,12 @@ def solve_stages(scene, work, clock, step):
             pace = expected
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
             finish_stages(scene, work, step)
-            clock[at.PACE] = 0.0 if first else pace
+            clock.pace = 0.0 if first else pace
             if not first:
-                clock[at.SEEN_PACE], clock[at.SEEN_STEP] = pace, step
+                clock.seen_pace, clock.seen_step = pace, step
             return True
         if not change < math.inf or (earlier < math.inf and pace > 1.0):
             break
         before, earlier = change, before
-    clock[at.SEEN_PACE] = 0.0
+    clock.seen_pace = 0.0
     return False

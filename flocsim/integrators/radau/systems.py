@@ -26,12 +26,12 @@ from flocsim.integrators.rhs.views import inertia
 
 def is_dense(work):
     """Whether the systems are small."""
-    return work.bodies.shape[0] <= at.DENSE
+    return work.poses.shape[0] <= at.DENSE
 
 
 def write_block(scene, work, which, step, block, body, other):
     """Write a block of DAMPING + (h/µ) STIFFNESS to the dense system; fixed bodies stay."""
-    value, moves = EIGENVALUES[which], scene.bodies[body, at.FREE]
+    value, moves = EIGENVALUES[which], scene.bodies[body].free
     for i in range(3):
         for j in range(3):
             entry = work.jacobian[at.DAMPING, block, i, j]
@@ -42,14 +42,14 @@ def write_block(scene, work, which, step, block, body, other):
 def write_matrix(scene, work, which, step):
     """(µ/h) M + DAMPING + (h/µ) STIFFNESS for one eigenvalue µ, dense."""
     value = EIGENVALUES[which]
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         write_block(scene, work, which, step, body, body, body)
         for axis in range(3):
             row, mass = 3 * body + axis, inertia(scene, body, axis)
-            moves = scene.bodies[body, at.FREE]
+            moves = scene.bodies[body].free
             work.system[which, row, row] += value / step * mass if moves == 1.0 else 1.0
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         write_block(scene, work, which, step, lower_block(work, pair), a, b)
         write_block(scene, work, which, step, upper_block(work, pair), b, a)
     sum_matrix(work, which)
@@ -60,7 +60,7 @@ def sum_matrix(work, which):
 
     Mutual forces cancel in it, so that rounding in the solution of the rest leaves momentum alone.
     """
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
         if leader != body:
             for axis in range(2):
@@ -71,7 +71,7 @@ def sum_matrix(work, which):
 
 def sum_loads(work, which):
     """The same of a load."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
         if leader != body:
             for axis in range(2):
@@ -113,9 +113,9 @@ def solve_real(work):
 def balance_load(scene, work):
     """Make the load of the real system none for fixed bodies, and the cluster's sum for first
     ones."""
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         for axis in range(3):
-            work.loads[REAL, 3 * body + axis] *= scene.bodies[body, at.FREE]
+            work.loads[REAL, 3 * body + axis] *= scene.bodies[body].free
     sum_loads(work, REAL)
 
 
@@ -136,36 +136,32 @@ def solve_both(work):
 
 def momentum_rate(scene, work, body, axis, stage, step):
     """Mass times acceleration at a stage, from the stages' velocities."""
-    v = work.motion
     first, second, third = INVERSE[stage]
-    now = v[at.NOW, body, at.VELOCITY + axis]
-    change = first * (v[at.FIRST_STAGE, body, at.VELOCITY + axis] - now)
-    change += second * (v[SECOND_STAGE, body, at.VELOCITY + axis] - now)
-    change += third * (v[THIRD_STAGE, body, at.VELOCITY + axis] - now)
+    now = work.velocity[at.NOW, body, axis]
+    change = first * (work.velocity[at.FIRST_STAGE, body, axis] - now)
+    change += second * (work.velocity[SECOND_STAGE, body, axis] - now)
+    change += third * (work.velocity[THIRD_STAGE, body, axis] - now)
     return inertia(scene, body, axis) * change / step
 
 
 def imbalance(scene, work, body, axis, stage, step):
     """Force less mass times acceleration at a stage."""
     rate = momentum_rate(scene, work, body, axis, stage, step)
-    return work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis] - rate
+    return work.force[at.FIRST_STAGE + stage, body, axis] - rate
 
 
 def sum_balances(scene, work, stage, step):
     """Forces, and masses times accelerations, of every cluster at a stage into its first body's
-    LEADER_FORCE and LEADER_RATE; apart, so that what is mutual cancels."""
-    for body in range(work.bodies.shape[0]):
-        for axis in range(2):
-            work.bodies[body, at.LEADER_FORCE + axis] = work.bodies[body, at.LEADER_RATE + axis] = (
-                0.0
-            )
-    for body in range(work.bodies.shape[0]):
-        leader = work.cluster[body]
-        for axis in range(2):
-            force = work.rates[at.FIRST_STAGE + stage, body, at.FORCE + axis]
-            work.bodies[leader, at.LEADER_FORCE + axis] += force
-            rate = momentum_rate(scene, work, body, axis, stage, step)
-            work.bodies[leader, at.LEADER_RATE + axis] += rate
+    Cluster; forces and rates apart, so that what is mutual cancels."""
+    for body in range(work.poses.shape[0]):
+        cluster = work.clusters[body]
+        cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
+    for body in range(work.poses.shape[0]):
+        cluster, state = work.clusters[work.cluster[body]], at.FIRST_STAGE + stage
+        cluster.force_x += work.force[state, body, at.X]
+        cluster.force_y += work.force[state, body, at.Y]
+        cluster.rate_x += momentum_rate(scene, work, body, 0, stage, step)
+        cluster.rate_y += momentum_rate(scene, work, body, 1, stage, step)
 
 
 def stage_load(scene, work, body, stage, step):
@@ -175,8 +171,8 @@ def stage_load(scene, work, body, stage, step):
     torque = imbalance(scene, work, body, 2, stage, step)
     x, y, torque = force_back(work, body, stage, x, y, torque)
     if work.cluster[body] == body:
-        x = work.bodies[body, at.LEADER_FORCE] - work.bodies[body, at.LEADER_RATE]
-        y = work.bodies[body, at.LEADER_FORCE + 1] - work.bodies[body, at.LEADER_RATE + 1]
+        x = work.clusters[body].force_x - work.clusters[body].rate_x
+        y = work.clusters[body].force_y - work.clusters[body].rate_y
         x, y, _ = force_back(work, body, stage, x, y, 0.0)
     return x, y, torque
 
@@ -188,8 +184,8 @@ def write_loads(scene, work, step):
             work.loads[which, row] = 0.0
     for stage in range(3):
         sum_balances(scene, work, stage, step)
-        for body in range(work.motion.shape[1]):
-            if scene.bodies[body, at.FREE] == 1.0:
+        for body in range(work.place.shape[1]):
+            if scene.bodies[body].free == 1.0:
                 load = stage_load(scene, work, body, stage, step)
                 for axis in range(3):
                     for which in range(2):
@@ -206,11 +202,10 @@ def stage_change(work, row, stage):
 
 def write_changes(scene, work, stage):
     """The solutions for one stage, as changes of its velocities in CHANGE."""
-    changes = work.motion
-    for body in range(changes.shape[1]):
+    for body in range(work.place.shape[1]):
         x, y = stage_change(work, 3 * body, stage), stage_change(work, 3 * body + 1, stage)
         x, y = velocity_on(work, body, stage, x, y)
-        changes[at.CHANGE, body, at.VX] = x
-        changes[at.CHANGE, body, at.VY] = y
-        changes[at.CHANGE, body, at.SPIN] = stage_change(work, 3 * body + 2, stage)
+        work.velocity[at.CHANGE, body, at.X] = x
+        work.velocity[at.CHANGE, body, at.Y] = y
+        work.velocity[at.CHANGE, body, at.ANGLE] = stage_change(work, 3 * body + 2, stage)
     add_shifts(scene, work, stage)

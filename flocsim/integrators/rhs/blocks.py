@@ -10,42 +10,42 @@ import flocsim.arrays as at
 
 def block_count(work):
     """How many blocks there are."""
-    return 2 * work.bodies.shape[0] + 2 * work.tally[at.PAIRS]
+    return 2 * work.poses.shape[0] + 2 * work.tally.pairs
 
 
 def own_block(work, body):
     """The block of a body's forces in which no other free body has a share."""
-    return work.bodies.shape[0] + body
+    return work.poses.shape[0] + body
 
 
 def upper_block(work, pair):
     """The block of the earlier body's force, by the coordinates of the later one."""
-    return 2 * work.bodies.shape[0] + 2 * pair
+    return 2 * work.poses.shape[0] + 2 * pair
 
 
 def lower_block(work, pair):
     """The block of the later body's force, by the coordinates of the earlier one."""
-    return 2 * work.bodies.shape[0] + 2 * pair + 1
+    return 2 * work.poses.shape[0] + 2 * pair + 1
 
 
 def subtract(work, which, weight, block, body, other):
     """Subtract from a body's load a block, times a weight, times the other body's CHANGE."""
-    jacobian, change = work.jacobian, work.motion
+    jacobian = work.jacobian
     for i in range(3):
         load = work.loads[0, 3 * body + i]
         for j in range(3):
-            load -= weight * jacobian[which, block, i, j] * change[at.CHANGE, other, j]
+            load -= weight * jacobian[which, block, i, j] * work.place[at.CHANGE, other, j]
         work.loads[0, 3 * body + i] = load
 
 
 def subtract_product(work, which, weight):
     """Subtract a matrix, times a weight, times the places in CHANGE from the loads; every row in
     the order of its columns."""
-    for pair in range(work.tally[at.PAIRS]):
-        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
         subtract(work, which, weight, lower_block(work, pair), later, earlier)
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         subtract(work, which, weight, body, body, body)
-    for pair in range(work.tally[at.PAIRS]):
-        later, earlier = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
         subtract(work, which, weight, upper_block(work, pair), earlier, later)

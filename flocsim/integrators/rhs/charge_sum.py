@@ -125,7 +125,7 @@ def sum_charges(scene, work, a, b, x, y, cosine, sine):
     """(fx, fy, torque about b's centroid) on a metre of body a [N/m, N/m, N], in the frame of b,
     where a lies at x, y [m] turned by an angle of that cosine and sine."""
     _, strength, reach = scene.layer
-    bound, charges = scene.bodies[b, at.BOUNDING_RADIUS] + reach, scene.charges
+    bound, charges = scene.bodies[b].bounding_radius + reach, scene.charges
     total, count, grid = (0.0, 0.0, 0.0), 0, grid_of(scene, b)
     for row in range(scene.first_charge[a], scene.first_charge[a + 1]):
         px, py = charges[row, at.GROUP_X], charges[row, at.GROUP_Y]

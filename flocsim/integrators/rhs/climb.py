@@ -7,7 +7,6 @@ straight.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.hooks import CENTRE_FORCE, ORIENTED_ENERGY, centre_force, has, surface_force
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.views import pair_view
@@ -24,7 +23,7 @@ def repulsion_at(scene, work, time, a, b, distance, gap, way):
     """What the pair forces push bodies a and b apart with [N] at rest, at a distance of the centres
     and a gap of the outlines; ``way``: how far from where they are [m]."""
     force = 0.0
-    sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
+    sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
     if has(scene, CENTRE_FORCE):
         force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
     if scene.surface_reach > gap:
@@ -40,7 +39,7 @@ def can_climb(scene, work, time, a, b, distance, gap, load, needed):
     ask how bodies are turned: another way may be lower."""
     if not load < math.inf or has(scene, ORIENTED_ENERGY):
         return True
-    sizes = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
+    sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
     centres = has(scene, CENTRE_FORCE)
     climbed, way = 0.0, 0.0
     end = 2.0 * sizes + max(-gap, sizes - distance, 0.0)

@@ -24,25 +24,25 @@ and what it runs into hangs on nanometres."""
 def mean_velocity(work, axis):
     """Mean of one component over all bodies [m/s]."""
     total = 0.0
-    for body in range(work.motion.shape[1]):
-        total += work.motion[at.NOW, body, axis]
-    return total / work.motion.shape[1]
+    for body in range(work.place.shape[1]):
+        total += work.velocity[at.NOW, body, axis]
+    return total / work.place.shape[1]
 
 
 def turnover_rate(scene, work, body, mean_x, mean_y):
     """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
-    motion = work.motion
-    vx = motion[at.NOW, body, at.VX] - mean_x
-    vy = motion[at.NOW, body, at.VY] - mean_y
-    return length_of(vx, vy) / scene.bodies[body, at.BOUNDING_RADIUS] + abs(
-        motion[at.NOW, body, at.SPIN]
+    vx = work.velocity[at.NOW, body, at.X] - mean_x
+    vy = work.velocity[at.NOW, body, at.Y] - mean_y
+    return length_of(vx, vy) / scene.bodies[body].bounding_radius + abs(
+        work.velocity[at.NOW, body, at.ANGLE]
     )
 
 
 def remember_velocities(scene, work, remaining):
     """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
-    mean_x, mean_y = mean_velocity(work, at.VX), mean_velocity(work, at.VY)
+    mean_x, mean_y = mean_velocity(work, at.X), mean_velocity(work, at.Y)
     for body in range(scene.bodies.shape[0]):
+        errors = work.errors[body]
         slowest, relaxation = math.inf, 0.0
         turnover = turnover_rate(scene, work, body, mean_x, mean_y)
         for axis in range(3):
@@ -51,26 +51,26 @@ def remember_velocities(scene, work, remaining):
             relaxation = max(relaxation, mass / max(damping, TINY))
             rate = mass * (turnover + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
-        work.bodies[body, at.MEMORY] = 1.0 / slowest
-        work.bodies[body, at.RELAXATION] = relaxation
+        errors.memory = 1.0 / slowest
+        errors.relaxation = relaxation
 
 
 def end_of_run(clock):
     """When a run ends [s]."""
-    return max(clock[at.UNTIL], clock[at.HORIZON])
+    return max(clock.until, clock.horizon)
 
 
 def step_tolerance(work, clock):
     """What the error of the next step may be [m]."""
-    if least_listed_gap(work) > clock[at.TOLERANCE]:
-        return FREE_SHARE * clock[at.TOLERANCE]
-    return clock[at.TOLERANCE]
+    if least_listed_gap(work) > clock.tolerance:
+        return FREE_SHARE * clock.tolerance
+    return clock.tolerance
 
 
 def error_ratio(scene, work, clock, step):
     """The error of the step over what is allowed, −1 where it or the new state is no number."""
     error = error_size(scene, work)
-    clock[at.STEP_ERROR] = error
+    clock.step_error = error
     if not error < math.inf:
         return -1.0
     return error / max(step_tolerance(work, clock), rounding_size(scene, work, at.NEW, step))
@@ -79,16 +79,16 @@ def error_ratio(scene, work, clock, step):
 def body_error(scene, work, body):
     """The error of one body, from DEVIATION: displacement of its outline, now and later [m]; both
     parts of it are written down."""
-    e = work.motion
-    size = scene.bodies[body, at.BOUNDING_RADIUS]
-    place = length_of(e[at.DEVIATION, body, at.X], e[at.DEVIATION, body, at.Y]) + size * abs(
-        e[at.DEVIATION, body, at.ANGLE]
-    )
-    speed = length_of(e[at.DEVIATION, body, at.VX], e[at.DEVIATION, body, at.VY]) + size * abs(
-        e[at.DEVIATION, body, at.SPIN]
-    )
-    work.bodies[body, at.STEP_PLACE], work.bodies[body, at.STEP_SPEED] = place, speed
-    return place + speed * work.bodies[body, at.MEMORY]
+    errors = work.errors[body]
+    size = scene.bodies[body].bounding_radius
+    place = length_of(
+        work.place[at.DEVIATION, body, at.X], work.place[at.DEVIATION, body, at.Y]
+    ) + size * abs(work.place[at.DEVIATION, body, at.ANGLE])
+    speed = length_of(
+        work.velocity[at.DEVIATION, body, at.X], work.velocity[at.DEVIATION, body, at.Y]
+    ) + size * abs(work.velocity[at.DEVIATION, body, at.ANGLE])
+    errors.step_place, errors.step_speed = place, speed
+    return place + speed * errors.memory
 
 
 def error_size(scene, work):
@@ -106,10 +106,10 @@ def rounding_size(scene, work, state, step):
     """What rounding alone does to a step that ends in a state [m]."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
-        memory = work.bodies[body, at.MEMORY]
+        memory = work.errors[body].memory
         for axis in range(3):
-            place = abs(work.motion[state, body, axis])
-            speed = abs(work.motion[state, body, at.VELOCITY + axis])
+            place = abs(work.place[state, body, axis])
+            speed = abs(work.velocity[state, body, axis])
             size = place * (1.0 + memory / step) + speed * (step + memory)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest

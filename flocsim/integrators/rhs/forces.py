@@ -34,22 +34,24 @@ from flocsim.integrators.rhs.views import (
 
 def keep_start(work):
     """Keep the motion at the start of the step, in START."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.START, body, axis] = work.motion[at.NOW, body, axis]
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.START, body, axis] = work.place[at.NOW, body, axis]
+            work.velocity[at.START, body, axis] = work.velocity[at.NOW, body, axis]
 
 
 def take_stage(work, stage):
     """Make a stage the new state: its motion, and what closed pairs need."""
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.MOTION_COLUMNS):
-            work.motion[at.NEW, body, axis] = work.motion[stage, body, axis]
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.place[at.NEW, body, axis] = work.place[stage, body, axis]
+            work.velocity[at.NEW, body, axis] = work.velocity[stage, body, axis]
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.TOUCHES:
             work.slip[at.NEW, row] = work.slip[stage, row]
-        if work.candidates[row, at.CLOSED] != at.OPEN:
-            for column in range(at.GEOMETRY_COLUMNS):
-                work.geometry[at.NEW, row, column] = work.geometry[stage, row, column]
+        if candidate.closed != at.OPEN:
+            work.geometry[at.NEW, row] = work.geometry[stage, row]
 
 
 def add_body_forces(scene, work, time, state):
@@ -60,8 +62,8 @@ def add_body_forces(scene, work, time, state):
 
 
 def add_centre_forces(scene, work, time, state):
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         view = centre_view(scene, work, time, state, a, b)
         nx, ny, _ = soft_centre_line(scene, work, state, a, b)
         repulsion = centre_force(scene, view)
@@ -71,11 +73,11 @@ def add_centre_forces(scene, work, time, state):
 
 def add_surface_forces(scene, work, time, state):
     row = 0
-    while row < work.tally[at.CANDIDATES]:
+    while row < work.tally.candidates:
         end = run_end(work, row)
         repulsion = surface_force(scene, surface_view(scene, work, time, state, row, end))
         for each in range(row, end):
-            share = work.geometry[state, each, at.SHARE]
+            share = work.geometry[state, each].share
             if share > 0.0:
                 push_pair(work, state, each, share * repulsion, 0.0)
         row = end
@@ -83,8 +85,8 @@ def add_surface_forces(scene, work, time, state):
 
 @hook
 def add_outline_forces(scene, work, time, state):
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         fx, fy, torque_a, torque_b = outlines_in(scene, work, time, state, a, b)
         if state == at.NOW:
             # Derivatives, which are taken next, begin from it.
@@ -95,19 +97,20 @@ def add_outline_forces(scene, work, time, state):
 
 
 def add_contact_forces(scene, work, state):
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.TOUCHES:
             view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(scene, view)
             push_pair(work, state, row, normal, tangential)
-        elif work.candidates[row, at.CLOSED] == at.GRAZES:
+        elif candidate.closed == at.GRAZES:
             push_pair(work, state, row, 0.0, grazing_force(work, state, row))
 
 
 def rate_slips(work, state):
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
-            work.slip[at.SLIP_RATES + state, row] = tangential_rate(work, state, row)
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == at.TOUCHES:
+            work.slip_rate[state, row] = tangential_rate(work, state, row)
 
 
 def locate_touching(scene, work, state):
@@ -123,13 +126,12 @@ def locate_and_rate(scene, work, state):
 
 
 def sum_other_forces(scene, work, time, state):
-    """All forces and torques of a state but those of contacts into ``work.rates[state]``; its
+    """All forces and torques of a state but those of contacts into ``work.force[state]``; its
     geometry is located."""
-    work.tally[at.EVALUATIONS] += 1
-    for body in range(work.bodies.shape[0]):
+    work.tally.evaluations += 1
+    for body in range(work.poses.shape[0]):
         for axis in range(3):
-            work.rates[state, body, axis] = work.motion[state, body, at.VELOCITY + axis]
-            work.rates[state, body, at.FORCE + axis] = 0.0
+            work.force[state, body, axis] = 0.0
     if has(scene, BODY_FORCE):
         add_body_forces(scene, work, time, state)
     if has(scene, CENTRE_FORCE):
@@ -142,7 +144,7 @@ def sum_other_forces(scene, work, time, state):
 
 
 def sum_forces(scene, work, time, state):
-    """All forces and torques of a state into ``work.rates[state]``; its geometry is located."""
+    """All forces and torques of a state into ``work.force[state]``; its geometry is located."""
     sum_other_forces(scene, work, time, state)
     if has(scene, CONTACT_FORCE):
         add_contact_forces(scene, work, state)

@@ -18,9 +18,9 @@ reached what the contact can hold, L (µ k_n Δ/k_t for Coulomb friction), and w
 
     ξ = s L,  as long as  s v_t > dL/dt.
 
-Both are smooth inside a step, whose flags are frozen (SLIDING); the driver ends it where one has to
-change. ξ itself never jumps: it is the solution of dξ/dt = v_t under |ξ| ≤ L, which cutting ξ at
-the ends of steps comes near to only as fast as steps get short.
+Both are smooth inside a step, whose flags are frozen (Candidate.sliding); the driver ends it where
+one has to change. ξ itself never jumps: it is the solution of dξ/dt = v_t under |ξ| ≤ L, which
+cutting ξ at the ends of steps comes near to only as fast as steps get short.
 
 Grazing is what a contact does that closes under its load and opens under its own tangential force.
 
@@ -51,22 +51,23 @@ FULL = 1.0 - 1e-9
 def turn_of_normal(work, state, row):
     """The angle by which the normal of a pair has turned since now, within half a turn [rad]."""
     g = work.geometry
-    ox, oy = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
-    nx, ny = g[state, row, at.NORMAL_X], g[state, row, at.NORMAL_Y]
+    ox, oy = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    nx, ny = g[state, row].normal_x, g[state, row].normal_y
     return math.atan2(ox * ny - oy * nx, ox * nx + oy * ny)
 
 
 def rolled(scene, work, state, row):
     """How far the tangential displacement of a pair has grown from now to a state, at the gap of
     now [m]; both are located."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
     radius_a, radius_b = row_radii(scene, work, row)
-    gap = g[at.NOW, row, at.GAP]
-    turn_a = work.motion[state, a, at.ANGLE] - work.motion[at.NOW, a, at.ANGLE]
-    turn_b = work.motion[state, b, at.ANGLE] - work.motion[at.NOW, b, at.ANGLE]
-    inside = at.NOW if g[at.NOW, row, at.TURNING] == 0.0 else state
-    along = g[inside, row, at.SIDE] * (g[state, row, at.FOOT] - g[at.NOW, row, at.FOOT])
+    gap = g[at.NOW, row].gap
+    turn_a = work.place[state, a, at.ANGLE] - work.place[at.NOW, a, at.ANGLE]
+    turn_b = work.place[state, b, at.ANGLE] - work.place[at.NOW, b, at.ANGLE]
+    inside = at.NOW if g[at.NOW, row].turning == 0.0 else state
+    along = g[inside, row].side * (g[state, row].foot - g[at.NOW, row].foot)
     about = turn_of_normal(work, state, row) - turn_b
     rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
     return along + (radius_a + radius_b + gap) * about + rolling
@@ -74,13 +75,14 @@ def rolled(scene, work, state, row):
 
 def rolled_besides(scene, work, state, row):
     """How fast it grows besides, in a state, as the gap is another one than now [m/s]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, spin_b = work.geometry, work.motion[state, b, at.SPIN]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g, spin_b = work.geometry, work.velocity[state, b, at.ANGLE]
     radius_a, radius_b = row_radii(scene, work, row)
-    gap, apart = g[state, row, at.GAP], g[state, row, at.GAP] - g[at.NOW, row, at.GAP]
-    relative = spin_b - work.motion[state, a, at.SPIN]
+    gap, apart = g[state, row].gap, g[state, row].gap - g[at.NOW, row].gap
+    relative = spin_b - work.velocity[state, a, at.ANGLE]
     about = 0.0
-    if g[state, row, at.TURNING] != 0.0:
+    if g[state, row].turning != 0.0:
         rolling = (radius_a + 0.5 * gap) * relative
         about = (tangential_rate(work, state, row) - rolling) / (radius_a + radius_b + gap)
     return apart * (about + 0.5 * relative)
@@ -108,7 +110,7 @@ def outgrowth(scene, work, state, row, side):
 
 def slip_in(scene, work, state, row, stuck):
     """The displacement of a closed pair in a state; ``stuck``: what it is if it sticks [m]."""
-    side = work.candidates[row, at.SLIDING]
+    side = work.candidates[row].sliding
     if side == 0:
         return stuck
     return side * limit_in(scene, work, state, row)
@@ -117,7 +119,7 @@ def slip_in(scene, work, state, row, stuck):
 def side_of(scene, work, row):
     """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
     brought to its limit."""
-    limit, side = limit_in(scene, work, at.NOW, row), work.candidates[row, at.SLIDING]
+    limit, side = limit_in(scene, work, at.NOW, row), work.candidates[row].sliding
     if side == 0:
         slip = work.slip[at.NOW, row]
         if abs(slip) < FULL * limit:
@@ -132,10 +134,11 @@ def set_sliding(scene, work):
     """Flag all closed pairs that slide, now; whether any flag has changed."""
     changed = False
     if has(scene, SLIP_LIMIT):
-        for row in range(work.tally[at.CANDIDATES]):
-            side = side_of(scene, work, row) if work.candidates[row, at.CLOSED] == 1 else 0
-            changed = changed or work.candidates[row, at.SLIDING] != side
-            work.candidates[row, at.SLIDING] = side
+        for row in range(work.tally.candidates):
+            candidate = work.candidates[row]
+            side = side_of(scene, work, row) if candidate.closed == 1 else 0
+            changed = changed or candidate.sliding != side
+            candidate.sliding = side
     return changed
 
 
@@ -144,8 +147,8 @@ def limit_slips(scene, work):
     whose steps do not end where a contact begins to slide."""
     if not has(scene, SLIP_LIMIT):
         return
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == 1:
+    for row in range(work.tally.candidates):
+        if work.candidates[row].closed == 1:
             limit = limit_in(scene, work, at.NEW, row)
             work.slip[at.NEW, row] = min(max(work.slip[at.NEW, row], -limit), limit)
 
@@ -153,7 +156,7 @@ def limit_slips(scene, work):
 def beyond(scene, work, row, step):
     """(how far a pair is beyond where it ought to have begun or ceased to slide [m], the share of
     the step at which it should have); 0 at the first place where nothing is wrong."""
-    side = work.candidates[row, at.SLIDING]
+    side = work.candidates[row].sliding
     if side == 0:
         before = limit_in(scene, work, at.NOW, row) - abs(work.slip[at.NOW, row])
         after = limit_in(scene, work, at.NEW, row) - abs(work.slip[at.NEW, row])
@@ -198,33 +201,36 @@ contacts in a step."""
 
 def grazing_force(work, state, row):
     """T of a pair that grazes, in a state [N]."""
-    force = work.slip[at.GRAZING_FORCE, row]
+    contact = work.contacts[row]
+    force = contact.grazing_force
     if state == at.NOW:
         return force
-    return force - work.slip[at.GRAZING_RESISTANCE, row] * normal_rate(work, state, row)
+    return force - contact.grazing_resistance * normal_rate(work, state, row)
 
 
 def normal_mobility(scene, work, row):
     """Acceleration of the gap for every newton along the normal of a pair [1/kg]."""
+    candidate = work.candidates[row]
     total, g = 0.0, work.geometry
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    if scene.bodies[a, at.FREE] == 1.0:
-        arm = g[at.NOW, row, at.VERTEX_ARM_N]
-        total += 1.0 / scene.bodies[a, at.MASS] + arm * arm / scene.bodies[a, at.INERTIA]
-    if scene.bodies[b, at.FREE] == 1.0:
-        arm = g[at.NOW, row, at.EDGE_ARM_N]
-        total += 1.0 / scene.bodies[b, at.MASS] + arm * arm / scene.bodies[b, at.INERTIA]
+    a, b = candidate.vertex_body, candidate.edge_body
+    if scene.bodies[a].free == 1.0:
+        arm = g[at.NOW, row].vertex_arm_n
+        total += 1.0 / scene.bodies[a].mass + arm * arm / scene.bodies[a].inertia
+    if scene.bodies[b].free == 1.0:
+        arm = g[at.NOW, row].edge_arm_n
+        total += 1.0 / scene.bodies[b].mass + arm * arm / scene.bodies[b].inertia
     return total
 
 
 def coupling(scene, work, row):
     """Acceleration of the gap for every newton along the tangent of a pair [1/kg]."""
+    candidate = work.candidates[row]
     total, g = 0.0, work.geometry
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    if scene.bodies[a, at.FREE] == 1.0:
-        arms = g[at.NOW, row, at.VERTEX_ARM_N] * g[at.NOW, row, at.VERTEX_ARM_T]
-        total += arms / scene.bodies[a, at.INERTIA]
-    if scene.bodies[b, at.FREE] == 1.0:
-        arms = g[at.NOW, row, at.EDGE_ARM_N] * g[at.NOW, row, at.EDGE_ARM_T]
-        total += arms / scene.bodies[b, at.INERTIA]
+    a, b = candidate.vertex_body, candidate.edge_body
+    if scene.bodies[a].free == 1.0:
+        arms = g[at.NOW, row].vertex_arm_n * g[at.NOW, row].vertex_arm_t
+        total += arms / scene.bodies[a].inertia
+    if scene.bodies[b].free == 1.0:
+        arms = g[at.NOW, row].edge_arm_n * g[at.NOW, row].edge_arm_t
+        total += arms / scene.bodies[b].inertia
     return total

@@ -54,15 +54,15 @@ from flocsim.integrators.rhs.views import (
 def normal_rows(work, row):
     """Entries of a pair's normal direction on its two bodies, now."""
     g = work.geometry
-    nx, ny = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
-    return (nx, ny, g[at.NOW, row, at.VERTEX_ARM_N]), (-nx, -ny, -g[at.NOW, row, at.EDGE_ARM_N])
+    nx, ny = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    return (nx, ny, g[at.NOW, row].vertex_arm_n), (-nx, -ny, -g[at.NOW, row].edge_arm_n)
 
 
 def tangent_rows(work, row):
     """Entries of a pair's tangential direction on its two bodies, now."""
     g = work.geometry
-    tx, ty = -g[at.NOW, row, at.NORMAL_Y], g[at.NOW, row, at.NORMAL_X]
-    return (tx, ty, g[at.NOW, row, at.VERTEX_ARM_T]), (-tx, -ty, -g[at.NOW, row, at.EDGE_ARM_T])
+    tx, ty = -g[at.NOW, row].normal_y, g[at.NOW, row].normal_x
+    return (tx, ty, g[at.NOW, row].vertex_arm_t), (-tx, -ty, -g[at.NOW, row].edge_arm_t)
 
 
 def add_outer(work, which, block, out, by, weight):
@@ -80,15 +80,15 @@ def add_product(scene, work, which, pair, a, b, out, by, weight):
         return
     (out_a, out_b), (by_a, by_b) = out, by
     ab, ba = upper_block(work, pair), lower_block(work, pair)
-    if a == work.pairs[pair, at.LATER]:
+    if a == work.pairs[pair].later:
         ab, ba = ba, ab
     add_outer(work, which, a, out_a, by_a, weight)
     add_outer(work, which, ab, out_a, by_b, weight)
     add_outer(work, which, ba, out_b, by_a, weight)
     add_outer(work, which, b, out_b, by_b, weight)
-    if scene.bodies[a, at.FREE] == 0.0:
+    if scene.bodies[a].free == 0.0:
         add_outer(work, which, own_block(work, b), out_b, by_b, weight)
-    elif scene.bodies[b, at.FREE] == 0.0:
+    elif scene.bodies[b].free == 0.0:
         add_outer(work, which, own_block(work, a), out_a, by_a, weight)
 
 
@@ -112,13 +112,13 @@ def sliding_row(scene, work, row):
     """
     radius_a, radius_b = row_radii(scene, work, row)
     g = work.geometry
-    tx, ty = -g[at.NOW, row, at.NORMAL_Y], g[at.NOW, row, at.NORMAL_X]
+    tx, ty = -g[at.NOW, row].normal_y, g[at.NOW, row].normal_x
     difference = radius_a - radius_b
-    distance = g[at.NOW, row, at.GAP] + radius_a + radius_b
-    arm_a = g[at.NOW, row, at.VERTEX_ARM_T] + 0.5 * (distance + difference)
-    arm_b = g[at.NOW, row, at.EDGE_ARM_T] - 0.5 * (distance - difference)
+    distance = g[at.NOW, row].gap + radius_a + radius_b
+    arm_a = g[at.NOW, row].vertex_arm_t + 0.5 * (distance + difference)
+    arm_b = g[at.NOW, row].edge_arm_t - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
-    beside = distance if g[at.NOW, row, at.TURNING] == 0.0 else 0.0
+    beside = distance if g[at.NOW, row].turning == 0.0 else 0.0
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
@@ -129,17 +129,18 @@ def scaled(row, share):
 
 def add_turning(scene, work, row, normal, tangential):
     """Derivative by the places of a pair's force whose size stays the same."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, stiffness, pair = work.geometry, work.jacobian, work.candidates[row, at.PAIR]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g, stiffness, pair = work.geometry, work.jacobian, candidate.pair
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
     nx, ny, turning = (
-        g[at.NOW, row, at.NORMAL_X],
-        g[at.NOW, row, at.NORMAL_Y],
-        g[at.NOW, row, at.TURNING],
+        g[at.NOW, row].normal_x,
+        g[at.NOW, row].normal_y,
+        g[at.NOW, row].turning,
     )
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
-    torque_a = normal * arm_a - tangential * g[at.NOW, row, at.VERTEX_ARM_N]
-    torque_b = normal * arm_b - tangential * g[at.NOW, row, at.EDGE_ARM_N]
+    torque_a = normal * arm_a - tangential * g[at.NOW, row].vertex_arm_n
+    torque_b = normal * arm_b - tangential * g[at.NOW, row].edge_arm_n
     stiffness[at.STIFFNESS, a, at.ANGLE, at.ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
@@ -157,7 +158,7 @@ def sliding_slopes(scene, work, row, normal, tangential):
     """Derivatives of (normal, tangential) by the overlap of a contact that slides, ξ along."""
     view = contact_view(scene, work, at.NOW, row)
     by = 1e-3 * abs(view.overlap) + 1e-13
-    more = work.candidates[row, at.SLIDING] * limit_slope(scene, work, at.NOW, row) * by
+    more = work.candidates[row].sliding * limit_slope(scene, work, at.NOW, row) * by
     deeper = moved_contact(
         view, view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate
     )
@@ -166,18 +167,19 @@ def sliding_slopes(scene, work, row, normal, tangential):
 
 
 def add_contact(scene, work, row):
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    pair = work.candidates[row, at.PAIR]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    pair = candidate.pair
     found = contact_derivatives(scene, contact_view(scene, work, at.NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
     normal_slope, tangential_slope = found[2], found[3]
-    if work.candidates[row, at.SLIDING] != 0:
+    if candidate.sliding != 0:
         normal_slope, tangential_slope = sliding_slopes(scene, work, row, found[0], found[1])
     add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal_slope)
     add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, tangential_slope)
     for axis in range(1, 4):
         # Sliding, ξ goes with the overlap alone.
-        if axis == 2 and work.candidates[row, at.SLIDING] != 0:
+        if axis == 2 and candidate.sliding != 0:
             continue
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
@@ -185,18 +187,20 @@ def add_contact(scene, work, row):
         add_product(scene, work, which, pair, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(scene, work, which, pair, a, b, across, by, sign * found[3 + 2 * axis])
     add_turning(scene, work, row, found[0], found[1])
-    if work.candidates[row, at.SLIDING] == 0:
-        offset = work.slip[at.SLIP_OFFSET, row]
+    if candidate.sliding == 0:
+        offset = work.contacts[row].slip_offset
         add_forcing(work, a, b, along, found[6] * offset)
         add_forcing(work, a, b, across, found[7] * offset)
 
 
 def add_grazing(scene, work, row):
     """Derivatives of the force of a pair that grazes, which falls with the rate of the gap."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    pair, resistance = work.candidates[row, at.PAIR], work.slip[at.GRAZING_RESISTANCE, row]
+    candidate = work.candidates[row]
+    contact = work.contacts[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    pair, resistance = candidate.pair, contact.grazing_resistance
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    force = work.slip[at.GRAZING_FORCE, row]
+    force = contact.grazing_force
     add_product(scene, work, at.DAMPING, pair, a, b, across, along, resistance)
     add_turning(scene, work, row, 0.0, force)
     pressed, tangential = doubted(scene, work, row, force)
@@ -208,18 +212,19 @@ def add_forcing(work, a, b, out, size):
     """Add a force of a size along a direction, by which the error is carried otherwise."""
     out_a, out_b = out
     for axis in range(3):
-        work.motion[at.FORCING, a, at.VELOCITY + axis] += size * out_a[axis]
-        work.motion[at.FORCING, b, at.VELOCITY + axis] += size * out_b[axis]
+        work.velocity[at.FORCING, a, axis] += size * out_a[axis]
+        work.velocity[at.FORCING, b, axis] += size * out_b[axis]
 
 
 def add_contacts(scene, work):
-    for body in range(work.motion.shape[1]):
-        for axis in range(at.VELOCITY, at.VELOCITY + 3):
-            work.motion[at.FORCING, body, axis] = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.TOUCHES:
+    for body in range(work.place.shape[1]):
+        for axis in range(3):
+            work.velocity[at.FORCING, body, axis] = 0.0
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.TOUCHES:
             add_contact(scene, work, row)
-        elif work.candidates[row, at.CLOSED] == at.GRAZES:
+        elif candidate.closed == at.GRAZES:
             add_grazing(scene, work, row)
 
 
@@ -242,8 +247,8 @@ def add_bodies(scene, work, time):
 
 
 def add_centres(scene, work, time):
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         view = centre_view(scene, work, time, at.NOW, a, b)
         nx, ny, distance = soft_centre_line(scene, work, at.NOW, a, b)
         along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
@@ -259,10 +264,10 @@ def add_centres(scene, work, time):
 def add_surfaces(scene, work, time):
     """Derivatives of the surface forces: of the gap g̃, of the shares in it and of the normals."""
     row = 0
-    while row < work.tally[at.CANDIDATES]:
+    while row < work.tally.candidates:
         end = run_end(work, row)
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-        pair = work.candidates[row, at.PAIR]
+        a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
+        pair = work.candidates[row].pair
         view = surface_view(scene, work, time, at.NOW, row, end)
         repulsion = surface_force(scene, view)
         slope, damping = surface_derivatives(scene, view)
@@ -271,11 +276,11 @@ def add_surfaces(scene, work, time):
         add_product(scene, work, at.STIFFNESS, pair, a, b, mean, mean, -slope - spread)
         add_product(scene, work, at.DAMPING, pair, a, b, mean, mean, damping)
         for each in range(row, end):
-            share = work.geometry[at.NOW, each, at.SHARE]
+            share = work.geometry[at.NOW, each].share
             if share > 0.0:
-                c, d = work.candidates[each, at.VERTEX_BODY], work.candidates[each, at.EDGE_BODY]
+                c, d = work.candidates[each].vertex_body, work.candidates[each].edge_body
                 along = normal_rows(work, each)
-                spread = share * repulsion * sharpness(scene, work.geometry[at.NOW, each, at.GAP])
+                spread = share * repulsion * sharpness(scene, work.geometry[at.NOW, each].gap)
                 add_product(scene, work, at.STIFFNESS, pair, c, d, along, along, spread)
                 add_turning(scene, work, each, share * repulsion, 0.0)
         row = end
@@ -295,18 +300,18 @@ def add_outlines(scene, work, time):
     """Derivatives of the forces between outlines, and by how bodies are turned, by the places of
     both, from differences to what they are, which has been summed: all three follow from those by
     j's place, forces going with them."""
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         x, y = separation(scene, work, at.NOW, a, b)
-        angle_a, angle_b = work.motion[at.NOW, a, at.ANGLE], work.motion[at.NOW, b, at.ANGLE]
+        angle_a, angle_b = work.place[at.NOW, a, at.ANGLE], work.place[at.NOW, b, at.ANGLE]
         fx, fy = work.along[pair, 0], work.along[pair, 1]
         torque_a, torque_b = work.along[pair, 2], work.along[pair, 3]
         if fx == 0.0 and fy == 0.0 and torque_a == 0.0 and torque_b == 0.0:
             continue
         by = NUDGE * scene.outlines[1]
         if not outline_reach(scene) > 0.0:
-            by = OF_SIZE * scene.bodies[a, at.BOUNDING_RADIUS]
-        turn = by / scene.bodies[a, at.BOUNDING_RADIUS]
+            by = OF_SIZE * scene.bodies[a].bounding_radius
+        turn = by / scene.bodies[a].bounding_radius
         across = between_outlines(scene, work, time, a, b, x + by, y, angle_a, angle_b)
         up = between_outlines(scene, work, time, a, b, x, y + by, angle_a, angle_b)
         turned = between_outlines(scene, work, time, a, b, x, y, angle_a + turn, angle_b)

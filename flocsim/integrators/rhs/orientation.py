@@ -21,8 +21,8 @@ SHARE, LEAST = 1e-4, 1e-12
 
 
 def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
-    radius_i = scene.bodies[i, at.EQUIVALENT_RADIUS]
-    radius_j = scene.bodies[j, at.EQUIVALENT_RADIUS]
+    radius_i = scene.bodies[i].equivalent_radius
+    radius_j = scene.bodies[j].equivalent_radius
     return OrientedView(
         time, distance - radius_i - radius_j, distance, angle_i, angle_j, radius_i, radius_j,
         radius_i * radius_j / (radius_i + radius_j), effective_mass(scene, j, i),
@@ -39,7 +39,7 @@ def oriented_from(scene, time, j, i, x, y, angle_j, angle_i):
 def oriented_now(scene, work, time, j, i):
     """The same in the state NOW."""
     x, y = separation(scene, work, at.NOW, j, i)
-    angle_j, angle_i = work.motion[at.NOW, j, at.ANGLE], work.motion[at.NOW, i, at.ANGLE]
+    angle_j, angle_i = work.place[at.NOW, j, at.ANGLE], work.place[at.NOW, i, at.ANGLE]
     return oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
 
 

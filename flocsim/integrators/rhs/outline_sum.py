@@ -47,9 +47,9 @@ def list_near(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach``."""
     near, listed = work.near, work.listed
     list_within(scene.pieces, near[at.NEAR_A], scene.first_piece[a], scene.first_piece[a + 1],
-                pose, 0.0, 0.0, scene.bodies[b, at.BOUNDING_RADIUS] + reach)  # fmt: skip
+                pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
     list_within(scene.pieces, near[at.NEAR_B], scene.first_piece[b], scene.first_piece[b + 1],
-                UNMOVED, pose.x, pose.y, scene.bodies[a, at.BOUNDING_RADIUS] + reach)  # fmt: skip
+                UNMOVED, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
     keep_paired(scene.pieces, near[at.NEAR_A], pose, near[at.NEAR_B], UNMOVED, reach)
     keep_paired(scene.pieces, near[at.NEAR_B], UNMOVED, near[at.NEAR_A], pose, reach)
     listed[at.LISTED_A], listed[at.LISTED_B], listed[at.LISTED_REACH] = a, b, reach
@@ -91,7 +91,7 @@ def slack_of(scene, work, a, b, pose):
         return -1.0
     way = length_of(pose.x - listed[at.LISTED_X], pose.y - listed[at.LISTED_Y])
     c, s = pose.cosine - listed[at.LISTED_COSINE], pose.sine - listed[at.LISTED_SINE]
-    return listed[at.LISTED_REACH] - way - scene.bodies[a, at.BOUNDING_RADIUS] * length_of(c, s)
+    return listed[at.LISTED_REACH] - way - scene.bodies[a].bounding_radius * length_of(c, s)
 
 
 def gap_listed(scene, work, pose):
@@ -173,7 +173,7 @@ def add_nodes(scene, work, total, count, numbers):
 
 def radii_of(scene, a, b):
     """The equivalent radii of two bodies [m]."""
-    return scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS]
+    return scene.bodies[a].equivalent_radius, scene.bodies[b].equivalent_radius
 
 
 def acts_along(scene):
@@ -227,7 +227,7 @@ def look_around(scene, work, time, a, b, pose):
 
 def apart_for_sure(scene, a, b, pose):
     """Whether two bodies are too far from each other for anything to act along outlines."""
-    bound = scene.bodies[a, at.BOUNDING_RADIUS] + scene.bodies[b, at.BOUNDING_RADIUS]
+    bound = scene.bodies[a].bounding_radius + scene.bodies[b].bounding_radius
     return length_of(pose.x, pose.y) - bound > scene.outlines[0]
 
 
@@ -281,7 +281,7 @@ def between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b):
 def between_sized(scene, work, time, a, b, x, y, angle_a, angle_b):
     """The same of forces along outlines alone."""
     # The smaller one is gone along.
-    if scene.bodies[a, at.BOUNDING_RADIUS] > scene.bodies[b, at.BOUNDING_RADIUS]:
+    if scene.bodies[a].bounding_radius > scene.bodies[b].bounding_radius:
         fx, fy, torque_b, torque_a = between_in_order(
             scene, work, time, b, a, -x, -y, angle_b, angle_a
         )
@@ -312,7 +312,7 @@ def outlines_apart(scene, work, time, a, b, way):
     x, y = separation(scene, work, at.NOW, a, b)
     distance = length_of(x, y)
     nx, ny = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
-    angle_a, angle_b = work.motion[at.NOW, a, at.ANGLE], work.motion[at.NOW, b, at.ANGLE]
+    angle_a, angle_b = work.place[at.NOW, a, at.ANGLE], work.place[at.NOW, b, at.ANGLE]
     x, y = x + way * nx, y + way * ny
     fx, fy, _, _ = between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)
     return fx * nx + fy * ny
@@ -321,5 +321,5 @@ def outlines_apart(scene, work, time, a, b, way):
 def outlines_in(scene, work, time, state, a, b):
     """The same of two bodies in a state."""
     x, y = separation(scene, work, state, a, b)
-    angle_a, angle_b = work.motion[state, a, at.ANGLE], work.motion[state, b, at.ANGLE]
+    angle_a, angle_b = work.place[state, a, at.ANGLE], work.place[state, b, at.ANGLE]
     return between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)

@@ -83,12 +83,11 @@ def value_in(work, row, motion):
 
 def motion_in(work, state, one, two, nx, ny):
     """(v_n, v_t, spin) of both bodies in a state."""
-    m = work.motion
-    x, y = m[state, one, at.VX], m[state, one, at.VY]
-    x_2, y_2 = m[state, two, at.VX], m[state, two, at.VY]
+    x, y = work.velocity[state, one, at.X], work.velocity[state, one, at.Y]
+    x_2, y_2 = work.velocity[state, two, at.X], work.velocity[state, two, at.Y]
     return (
-        x * nx + y * ny, y * nx - x * ny, m[state, one, at.SPIN],
-        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, m[state, two, at.SPIN],
+        x * nx + y * ny, y * nx - x * ny, work.velocity[state, one, at.ANGLE],
+        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, work.velocity[state, two, at.ANGLE],
     )  # fmt: skip
 
 
@@ -105,7 +104,7 @@ def against_flow(scene, work, state, one, two, nx, ny, motion):
 def flow_in(scene, work, state, body):
     """(u_x, u_y, spin) of the flow at a body."""
     f = scene.water
-    x, y = work.motion[state, body, at.X], work.motion[state, body, at.Y]
+    x, y = work.place[state, body, at.X], work.place[state, body, at.Y]
     u = f[at.FLOW] + f[at.FLOW + 2] * x + f[at.FLOW + 3] * y
     v = f[at.FLOW + 1] + f[at.FLOW + 4] * x + f[at.FLOW + 5] * y
     return u, v, 0.5 * (f[at.FLOW + 4] - f[at.FLOW + 3])
@@ -163,13 +162,13 @@ def relative_gap(scene, work, state, between):
     spheres = max(between, 0.0)
     if scene.water[at.NEAR_CUT] == 0.0:
         return spheres, 1.0
-    if work.tally[at.CANDIDATES] == 0:
+    if work.tally.candidates == 0:
         return spheres, 0.0
     if scene.surface_reach > 0.0:
         # Forces between the two outlines have asked for it just now.
         found = work.squares[PULL, at.SOFT_GAP]
     else:
-        found, _ = soften(scene, work, state, 0, work.tally[at.CANDIDATES])
+        found, _ = soften(scene, work, state, 0, work.tally.candidates)
     near, _ = fading(found, scene.water[at.NEAR_CUT])
     outlines, mean = max(found, 0.0), scene.water[at.MEAN_RADIUS]
     lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
@@ -231,8 +230,8 @@ def add_pair_resistance(scene, work, state):
     if scene.water[at.CUT] == 0.0:
         return
     s = work.squares
-    for pair in range(work.tally[at.PAIRS]):
-        one, two = work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
+    for pair in range(work.tally.pairs):
+        one, two = work.pairs[pair].earlier, work.pairs[pair].later
         far, _, nx, ny = write_squares(scene, work, state, one, two)
         if far == 0.0:
             continue
@@ -262,8 +261,8 @@ def add_pair_damping(scene, work):
     if scene.water[at.CUT] == 0.0:
         return
     s, jacobian = work.squares, work.jacobian
-    for pair in range(work.tally[at.PAIRS]):
-        one, two = work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
+    for pair in range(work.tally.pairs):
+        one, two = work.pairs[pair].earlier, work.pairs[pair].later
         far, slope, nx, ny = write_squares(scene, work, at.NOW, one, two)
         if far == 0.0:
             continue

@@ -63,13 +63,18 @@ LONG = 1e6
 """A relaxation so many times as long as a step counts as none."""
 
 
-def carried(work, body, place, speed, step):
-    """Carry one kind of error of a body over a step."""
-    errors, lasting = work.bodies, work.bodies[body, at.RELAXATION]
+def carry_body(work, body, step):
+    """Carry the sums of a body's errors over a step."""
+    errors = work.errors[body]
+    lasting = errors.relaxation
     left = math.exp(-step / lasting) if step < LONG * lasting else 0.0
     way = step if lasting > LONG * step else lasting * (1.0 - left)
-    errors[body, place] += errors[body, speed] * way
-    errors[body, speed] *= left
+    errors.place += errors.speed * way
+    errors.speed *= left
+    errors.switch_place += errors.switch_speed * way
+    errors.switch_speed *= left
+    errors.doubt_place += errors.doubt_speed * way
+    errors.doubt_speed *= left
 
 
 def rate_of_growth(scene, work):
@@ -78,14 +83,14 @@ def rate_of_growth(scene, work):
     the more, the farther they are off. 0 where tangential displacements are wrong, too: the error
     does not follow from what it was, then."""
     pushed = size = 0.0
-    for body in range(work.motion.shape[1]):
+    for body in range(work.place.shape[1]):
         for axis in range(3):
-            if work.motion[at.FORCING, body, at.VELOCITY + axis] != 0.0:
+            if work.velocity[at.FORCING, body, axis] != 0.0:
                 return 0.0
             square = lever(scene, body, axis) ** 2
-            now, later = work.motion[at.CARRIED, body, axis], work.motion[at.CHANGE, body, axis]
-            more = work.motion[at.CHANGE, body, at.VELOCITY + axis]
-            more -= work.motion[at.CARRIED, body, at.VELOCITY + axis]
+            now, later = work.place[at.CARRIED, body, axis], work.place[at.CHANGE, body, axis]
+            more = work.velocity[at.CHANGE, body, axis]
+            more -= work.velocity[at.CARRIED, body, axis]
             pushed += 0.5 * square * (now + later) * more
             size += square * 0.25 * (now + later) ** 2
     return pushed / size if pushed > 0.0 and size > 0.0 else 0.0
@@ -95,10 +100,11 @@ def grow_sums(scene, work, step):
     """Make the sums of errors grow as the vector of them does in a step in which nothing swings:
     they know nothing else of an attraction that gets steeper."""
     rate = min(rate_of_growth(scene, work), 1.0 / step)
-    for body in range(work.bodies.shape[0]):
-        work.bodies[body, at.ERROR_SPEED] += rate * work.bodies[body, at.ERROR_PLACE]
-        work.bodies[body, at.SWITCH_SPEED] += rate * work.bodies[body, at.SWITCH_PLACE]
-        work.bodies[body, at.DOUBT_SPEED] += rate * work.bodies[body, at.DOUBT_PLACE]
+    for body in range(work.poses.shape[0]):
+        errors = work.errors[body]
+        errors.speed += rate * errors.place
+        errors.switch_speed += rate * errors.switch_place
+        errors.doubt_speed += rate * errors.doubt_place
 
 
 @hook
@@ -111,42 +117,44 @@ def carry_vector(scene, work, clock, step):
 @apart
 def carry_errors(scene, work, clock, step):
     """Carry every body's errors over a step that has been accepted, and add the step's own."""
-    known, errors = False, work.bodies
+    known = False
     # All counts that is estimated where features come to share in a surface force inside of steps,
     # and of steps across switches, of which nothing is carried on with motion.
-    across = clock[at.ACROSS] == 1.0
-    share = 1.0 if scene.surface_reach > 0.0 else clock[at.ESTIMATE_SHARE]
+    across = clock.across == 1.0
+    share = 1.0 if scene.surface_reach > 0.0 else clock.estimate_share
     weight = 1.0 / share if across else 1.0
-    for body in range(work.bodies.shape[0]):
-        carried(work, body, at.ERROR_PLACE, at.ERROR_SPEED, step)
-        carried(work, body, at.SWITCH_PLACE, at.SWITCH_SPEED, step)
-        carried(work, body, at.DOUBT_PLACE, at.DOUBT_SPEED, step)
-        errors[body, at.ERROR_PLACE] += weight * errors[body, at.STEP_PLACE]
-        errors[body, at.ERROR_SPEED] += weight * errors[body, at.STEP_SPEED]
-        known = known or errors[body, at.STEP_PLACE] + errors[body, at.STEP_SPEED] > 0.0
+    for body in range(work.poses.shape[0]):
+        errors = work.errors[body]
+        carry_body(work, body, step)
+        errors.place += weight * errors.step_place
+        errors.speed += weight * errors.step_speed
+        known = known or errors.step_place + errors.step_speed > 0.0
     largest = 0.0
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
+        errors = work.errors[body]
         if not known:
-            errors[body, at.ERROR_PLACE] += clock[at.STEP_ERROR]
-        stated = share * errors[body, at.ERROR_PLACE]
-        stated += OF_SWITCHES * (errors[body, at.SWITCH_PLACE] + errors[body, at.DOUBT_PLACE])
+            errors.place += clock.step_error
+        stated = share * errors.place
+        stated += OF_SWITCHES * (errors.switch_place + errors.doubt_place)
         largest = max(largest, stated)
         if across:
-            for axis in range(at.MOTION_COLUMNS):
-                work.motion[at.CARRIED, body, axis] += work.motion[at.DEVIATION, body, axis]
+            for axis in range(3):
+                work.place[at.CARRIED, body, axis] += work.place[at.DEVIATION, body, axis]
+                work.velocity[at.CARRIED, body, axis] += work.velocity[at.DEVIATION, body, axis]
     vector = math.inf if across else carry_vector(scene, work, clock, step)
-    clock[at.ERROR] = 0.0
-    for body in range(work.bodies.shape[0]):
+    clock.error = 0.0
+    for body in range(work.poses.shape[0]):
+        errors = work.errors[body]
         stated = largest
         if vector < math.inf:
             least = max(
-                LEAST * clock[at.TOLERANCE],
-                OF_SUMS * errors[body, at.SWITCH_PLACE],
+                LEAST * clock.tolerance,
+                OF_SUMS * errors.switch_place,
             )
             own = max(carried_size(scene, work, body), least)
             stated = min(stated, OF_VECTOR * own)
-        errors[body, at.STATED] = stated
-        clock[at.ERROR] = max(clock[at.ERROR], stated)
+        errors.stated = stated
+        clock.error = max(clock.error, stated)
 
 
 @hook
@@ -157,20 +165,20 @@ def overlap_error(scene, work, clock, row):
 
 def carried_size(scene, work, body):
     """How large a body's carried error is in the place of its outline [m]."""
-    e = work.motion
-    turn = scene.bodies[body, at.BOUNDING_RADIUS] * abs(e[at.CARRIED, body, at.ANGLE])
-    return length_of(e[at.CARRIED, body, at.X], e[at.CARRIED, body, at.Y]) + turn
+    turn = scene.bodies[body].bounding_radius * abs(work.place[at.CARRIED, body, at.ANGLE])
+    return length_of(work.place[at.CARRIED, body, at.X], work.place[at.CARRIED, body, at.Y]) + turn
 
 
 def certain_sum(work, body):
     """By how much the place of a body may be wrong, by the sums of its errors, if no contact has
     opened that may have [m]."""
-    return work.bodies[body, at.ERROR_PLACE] + OF_SWITCHES * work.bodies[body, at.SWITCH_PLACE]
+    errors = work.errors[body]
+    return errors.place + OF_SWITCHES * errors.switch_place
 
 
 def sum_of_place(work, body):
     """By how much the place of a body may be wrong, by the sums of its errors [m]."""
-    return certain_sum(work, body) + OF_SWITCHES * work.bodies[body, at.DOUBT_PLACE]
+    return certain_sum(work, body) + OF_SWITCHES * work.errors[body].doubt_place
 
 
 def hand_on(work, body, size):
@@ -178,7 +186,7 @@ def hand_on(work, body, size):
     carried error."""
     more = size - sum_of_place(work, body)
     if more > 0.0:
-        work.bodies[body, at.ERROR_PLACE] += more
+        work.errors[body].place += more
 
 
 def shorten(scene, work):
@@ -189,26 +197,27 @@ def shorten(scene, work):
     All of it by one factor, for it must not give the cluster a momentum that no step and no switch
     has given it, and velocities too: those of vibrations are what their places make them.
     """
-    for body in range(work.bodies.shape[0]):
-        work.bodies[body, at.SHORTENED], work.bodies[body, at.MOST_PLACE] = 1.0, 0.0
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
+        work.clusters[body].shortened, work.clusters[body].most_place = 1.0, 0.0
+    for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        most = max(work.bodies[leader, at.MOST_PLACE], certain_sum(work, body))
-        work.bodies[leader, at.MOST_PLACE] = most
-    for body in range(work.bodies.shape[0]):
+        most = max(work.clusters[leader].most_place, certain_sum(work, body))
+        work.clusters[leader].most_place = most
+    for body in range(work.poses.shape[0]):
         leader, size = work.cluster[body], carried_size(scene, work, body)
-        most = max(work.bodies[leader, at.MOST_PLACE], sum_of_place(work, body))
+        most = max(work.clusters[leader].most_place, sum_of_place(work, body))
         if size > most:
-            work.bodies[leader, at.SHORTENED] = min(work.bodies[leader, at.SHORTENED], most / size)
-    for body in range(work.bodies.shape[0]):
-        share = work.bodies[work.cluster[body], at.SHORTENED]
+            work.clusters[leader].shortened = min(work.clusters[leader].shortened, most / size)
+    for body in range(work.poses.shape[0]):
+        share = work.clusters[work.cluster[body]].shortened
         if share < 1.0:
-            for axis in range(at.MOTION_COLUMNS):
-                work.motion[at.CARRIED, body, axis] *= share
-    for row in range(work.tally[at.CANDIDATES]):
-        share = work.bodies[work.cluster[work.candidates[row, at.VERTEX_BODY]], at.SHORTENED]
+            for axis in range(3):
+                work.place[at.CARRIED, body, axis] *= share
+                work.velocity[at.CARRIED, body, axis] *= share
+    for row in range(work.tally.candidates):
+        share = work.clusters[work.cluster[work.candidates[row].vertex_body]].shortened
         if share < 1.0:
-            work.slip[at.SLIP_OFFSET, row] *= share
+            work.contacts[row].slip_offset *= share
 
 
 def bound_carried(scene, work):
@@ -216,51 +225,56 @@ def bound_carried(scene, work):
     again and again would make it leave; the largest one of place [m]."""
     largest = 0.0
     shorten(scene, work)
-    for body in range(work.bodies.shape[0]):
+    for body in range(work.poses.shape[0]):
         size = carried_size(scene, work, body)
         hand_on(work, body, size)
         largest = max(largest, size)
     return largest
 
 
-def add_impulse(scene, work, body, impulse, kind):
-    """Add what an impulse at its outline [N s] does to a body's velocity to SWITCH_SPEED or
-    DOUBT_SPEED."""
-    if scene.bodies[body, at.FREE] == 1.0:
-        size = scene.bodies[body, at.BOUNDING_RADIUS]
-        share = 1.0 / scene.bodies[body, at.MASS] + size * size / scene.bodies[body, at.INERTIA]
-        work.bodies[body, kind] += impulse * share
+def add_impulse(scene, work, body, impulse, switched):
+    """Add what an impulse at its outline [N s] does to a body's velocity to the errors of pairs
+    that have ``switched``, or of those that may have."""
+    errors = work.errors[body]
+    if scene.bodies[body].free == 1.0:
+        size = scene.bodies[body].bounding_radius
+        share = 1.0 / scene.bodies[body].mass + size * size / scene.bodies[body].inertia
+        if switched:
+            errors.switch_speed += impulse * share
+        else:
+            errors.doubt_speed += impulse * share
 
 
 def kick(scene, work, body, x, y, turn):
     """Add an impulse [N s, N s, N m s] to a body's carried error."""
-    if scene.bodies[body, at.FREE] == 1.0:
-        e, inertia = work.motion, scene.bodies
-        e[at.CARRIED, body, at.VX] += x / inertia[body, at.MASS]
-        e[at.CARRIED, body, at.VY] += y / inertia[body, at.MASS]
-        e[at.CARRIED, body, at.SPIN] += turn / inertia[body, at.INERTIA]
+    if scene.bodies[body].free == 1.0:
+        inertia = scene.bodies
+        work.velocity[at.CARRIED, body, at.X] += x / inertia[body].mass
+        work.velocity[at.CARRIED, body, at.Y] += y / inertia[body].mass
+        work.velocity[at.CARRIED, body, at.ANGLE] += turn / inertia[body].inertia
 
 
 def kick_pair(scene, work, row, normal, tangential):
     """Add the impulses of a contact [N s] to the carried errors of its bodies."""
+    candidate = work.candidates[row]
     g = work.geometry
-    nx, ny = g[at.NOW, row, at.NORMAL_X], g[at.NOW, row, at.NORMAL_Y]
+    nx, ny = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
     x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
-    turn = g[at.NOW, row, at.VERTEX_ARM_N] * normal + g[at.NOW, row, at.VERTEX_ARM_T] * tangential
-    back = g[at.NOW, row, at.EDGE_ARM_N] * normal + g[at.NOW, row, at.EDGE_ARM_T] * tangential
-    kick(scene, work, work.candidates[row, at.VERTEX_BODY], x, y, turn)
-    kick(scene, work, work.candidates[row, at.EDGE_BODY], -x, -y, -back)
+    turn = g[at.NOW, row].vertex_arm_n * normal + g[at.NOW, row].vertex_arm_t * tangential
+    back = g[at.NOW, row].edge_arm_n * normal + g[at.NOW, row].edge_arm_t * tangential
+    kick(scene, work, candidate.vertex_body, x, y, turn)
+    kick(scene, work, candidate.edge_body, -x, -y, -back)
 
 
 def is_closed(work, row):
     """Whether a pair is flagged as one that touches."""
-    return work.candidates[row, at.CLOSED] == at.TOUCHES
+    return work.candidates[row].closed == at.TOUCHES
 
 
 def has_switched(work, row):
     """Whether a pair touches, or no longer does, other than it is flagged."""
-    closed = at.TOUCHES if work.geometry[at.NOW, row, at.GAP] < 0.0 else at.OPEN
-    return closed != work.candidates[row, at.CLOSED]
+    closed = at.TOUCHES if work.geometry[at.NOW, row].gap < 0.0 else at.OPEN
+    return closed != work.candidates[row].closed
 
 
 def doubtful_time(work, row, step, doubt, resolved):
@@ -269,11 +283,11 @@ def doubtful_time(work, row, step, doubt, resolved):
     How finely its touch was located says nothing of that later on: a contact that rests in a hair's
     breadth of overlap, as the second one of two that an attraction presses, bears what it bears.
     """
-    gap = work.geometry[at.NOW, row, at.GAP]
+    gap = work.geometry[at.NOW, row].gap
     if has_switched(work, row):
         speed = abs(normal_rate(work, at.NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, at.DEVIATION, at.X)) * resolved)
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, work.place, at.DEVIATION)) * resolved)
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -293,10 +307,10 @@ def pressed_stiffness(scene, view, overlap):
 def unresolved(scene, work, clock, step, row):
     """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
     its vibration out, so that the load decides whether it is there."""
-    if work.tally[at.SERIES_TERMS] > 0:
+    if work.tally.series_terms > 0:
         return 0.0
     view = contact_view(scene, work, at.NOW, row)
-    stiffness = pressed_stiffness(scene, view, clock[at.TOLERANCE])
+    stiffness = pressed_stiffness(scene, view, clock.tolerance)
     if not stiffness > 0.0:
         return 0.0
     turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
@@ -305,7 +319,7 @@ def unresolved(scene, work, clock, step, row):
 
 def signed_time(work, row, step, depth, doubt):
     """The same, above 0 where the force has acted for too long, as the carried error has it."""
-    gap, wrong = work.geometry[at.NOW, row, at.GAP], along_normal(work, row, at.CARRIED, at.X)
+    gap, wrong = work.geometry[at.NOW, row].gap, along_normal(work, row, work.place, at.CARRIED)
     if has_switched(work, row):
         rate = normal_rate(work, at.NOW, row)
         late = (gap - wrong) / rate if rate != 0.0 else 0.0
@@ -326,9 +340,9 @@ def doubted(scene, work, row, tangential):
     load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
     it enlarges the error. What different contacts and times have lost must not cancel."""
     normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
-    apart = along_normal(work, row, at.CARRIED, at.X)
-    apart += memory * along_normal(work, row, at.CARRIED, at.VELOCITY)
-    along = slip_error(work, row, at.X) + memory * slip_error(work, row, at.VELOCITY)
+    apart = along_normal(work, row, work.place, at.CARRIED)
+    apart += memory * along_normal(work, row, work.velocity, at.CARRIED)
+    along = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
     share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
     return share * normal, share * tangential
 
@@ -336,38 +350,41 @@ def doubted(scene, work, row, tangential):
 def doubt_tangential(scene, work, row, step):
     """Count as an error all that the tangential force of a pair that grazes has done in a step: by
     the law the pair loses it whenever it parts, and is pressed by what it has lifted instead."""
+    candidate = work.candidates[row]
     force = grazing_force(work, at.NOW, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
     impulse *= OF_LOST / OF_SWITCHES
-    add_impulse(scene, work, work.candidates[row, at.VERTEX_BODY], impulse, at.SWITCH_SPEED)
-    add_impulse(scene, work, work.candidates[row, at.EDGE_BODY], impulse, at.SWITCH_SPEED)
+    add_impulse(scene, work, candidate.vertex_body, impulse, True)
+    add_impulse(scene, work, candidate.edge_body, impulse, True)
 
 
 def forget_offsets(work):
     """Of pairs that are open, or slide, no displacement knows of the error that there is already:
     ξ counts from where they will stick. By the law one that grazes has lost it."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.SLIDING] != 0 or not is_closed(work, row):
-            grazes = work.candidates[row, at.CLOSED] == at.GRAZES
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.sliding != 0 or not is_closed(work, row):
+            grazes = candidate.closed == at.GRAZES
             lost = OF_BOUNDS * work.slip[at.NOW, row] if grazes else 0.0
-            work.slip[at.SLIP_OFFSET, row] = lost - slip_error(work, row, at.X)
+            work.contacts[row].slip_offset = lost - slip_error(work, row, work.place)
 
 
 def add_switch_errors(scene, work, clock, step, depth):
     """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
-    for row in range(work.tally[at.CANDIDATES]):
-        if work.candidates[row, at.CLOSED] == at.GRAZES:
+    for row in range(work.tally.candidates):
+        candidate = work.candidates[row]
+        if candidate.closed == at.GRAZES:
             doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        resolved = 1.0 - unresolved(scene, work, clock, clock[at.STAGED_STEP], row)
+        resolved = 1.0 - unresolved(scene, work, clock, clock.staged_step, row)
         late = doubtful_time(work, row, step, doubt, resolved)
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
             normal, tangential = contact_force(scene, contact_view(scene, work, at.NOW, row))
             impulse = late * length_of(normal, tangential)
-            kind = at.SWITCH_SPEED if has_switched(work, row) else at.DOUBT_SPEED
-            add_impulse(scene, work, work.candidates[row, at.VERTEX_BODY], impulse, kind)
-            add_impulse(scene, work, work.candidates[row, at.EDGE_BODY], impulse, kind)
+            switched = has_switched(work, row)
+            add_impulse(scene, work, candidate.vertex_body, impulse, switched)
+            add_impulse(scene, work, candidate.edge_body, impulse, switched)
             kick_pair(scene, work, row, signed * normal, signed * tangential)

@@ -70,8 +70,8 @@ def reach_of(scene, gap):
 
 def run_end(work, row):
     """The end of the run of rows that belong to the same two bodies as this one."""
-    pair, end = work.candidates[row, at.PAIR], row + 1
-    while end < work.tally[at.CANDIDATES] and work.candidates[end, at.PAIR] == pair:
+    pair, end = work.candidates[row].pair, row + 1
+    while end < work.tally.candidates and work.candidates[end].pair == pair:
         end += 1
     return end
 
@@ -80,38 +80,38 @@ def least_row(work, state, row, end):
     """The row of two bodies with the least gap."""
     least = row
     for each in range(row + 1, end):
-        if work.geometry[state, each, at.GAP] < work.geometry[state, least, at.GAP]:
+        if work.geometry[state, each].gap < work.geometry[state, least].gap:
             least = each
     return least
 
 
 def least_gap(work, state, row, end):
     """The least gap of the rows of two bodies [m]."""
-    return work.geometry[state, least_row(work, state, row, end), at.GAP]
+    return work.geometry[state, least_row(work, state, row, end)].gap
 
 
 def flag_near(scene, work, state, step):
     """Flag the pairs that may have a share of a surface force within a step of this size [s]."""
     row = 0
-    while row < work.tally[at.CANDIDATES]:
+    while row < work.tally.candidates:
         end = run_end(work, row)
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
         way = LOOK_AHEAD * step * relative_speed(scene, work, a, b) if step > 0.0 else 0.0
         reach = reach_of(scene, least_gap(work, state, row, end)) + 2.0 * way
         for each in range(row, end):
-            near = work.geometry[state, each, at.GAP] <= reach
-            work.candidates[each, at.NEAR] = 1 if near else 0
+            near = work.geometry[state, each].gap <= reach
+            work.candidates[each].near = 1 if near else 0
         row = end
 
 
 def overlooked(scene, work):
     """Whether a pair that was not flagged has a share at the end of the step."""
     row = 0
-    while row < work.tally[at.CANDIDATES]:
+    while row < work.tally.candidates:
         end = run_end(work, row)
         reach = reach_of(scene, least_gap(work, at.NEW, row, end))
         for each in range(row, end):
-            if work.candidates[each, at.NEAR] == 0 and work.geometry[at.NEW, each, at.GAP] < reach:
+            if work.candidates[each].near == 0 and work.geometry[at.NEW, each].gap < reach:
                 return True
         row = end
     return False
@@ -119,12 +119,11 @@ def overlooked(scene, work):
 
 def way_to(scene, work, state, a, b):
     """How far the cores of two bodies may have moved against each other from now to a state [m]."""
-    m = work.motion
     x, y = separation(scene, work, state, a, b)
     x_now, y_now = separation(scene, work, at.NOW, a, b)
     way = length_of(x - x_now, y - y_now)
     for body in (a, b):
-        turn = abs(m[state, body, at.ANGLE] - m[at.NOW, body, at.ANGLE])
+        turn = abs(work.place[state, body, at.ANGLE] - work.place[at.NOW, body, at.ANGLE])
         way += turn * core_radius(scene, body)
     return way
 
@@ -134,18 +133,18 @@ def locate_sharing(scene, work, state):
     force there; the gap of others counts as without end."""
     turn_bodies(work, state)
     row = 0
-    while row < work.tally[at.CANDIDATES]:
+    while row < work.tally.candidates:
         end = run_end(work, row)
-        a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+        a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
         way = way_to(scene, work, state, a, b)
         reach = reach_of(scene, least_gap(work, at.NOW, row, end) + way) + way
         for each in range(row, end):
-            closed = work.candidates[each, at.CLOSED] != at.OPEN
-            if closed or work.candidates[each, at.NEAR] == 1:
-                if closed or work.geometry[at.NOW, each, at.GAP] <= reach:
+            closed = work.candidates[each].closed != at.OPEN
+            if closed or work.candidates[each].near == 1:
+                if closed or work.geometry[at.NOW, each].gap <= reach:
                     locate_polygons(scene, work, state, each)
                 else:
-                    work.geometry[state, each, at.GAP] = math.inf
+                    work.geometry[state, each].gap = math.inf
         row = end
 
 
@@ -154,26 +153,26 @@ def soften(scene, work, state, row, end):
     geometry = work.geometry
     least, total, rate = math.inf, 0.0, 0.0
     for each in range(row, end):
-        if work.candidates[each, at.NEAR] == 1:
-            least = min(least, geometry[state, each, at.GAP])
+        if work.candidates[each].near == 1:
+            least = min(least, geometry[state, each].gap)
     reach = reach_of(scene, least)
     for each in range(row, end):
-        gap, share = geometry[state, each, at.GAP], 0.0
-        if work.candidates[each, at.NEAR] == 1 and gap <= reach:
+        gap, share = geometry[state, each].gap, 0.0
+        if work.candidates[each].near == 1 and gap <= reach:
             share = 1.0
             if gap > least:
                 share = math.exp(measure_of(scene, least) - measure_of(scene, gap))
-        geometry[state, each, at.SHARE] = share
+        geometry[state, each].share = share
         total += share
     gap = least
     if total > 1.0:
         gap = gap_of(scene, measure_of(scene, least) - math.log(total))
     length = length_at(scene, gap)
     for each in range(row, end):
-        if geometry[state, each, at.SHARE] > 0.0:
-            own = length_at(scene, geometry[state, each, at.GAP])
-            geometry[state, each, at.SHARE] *= length / (own * total)
-            rate += geometry[state, each, at.SHARE] * normal_rate(work, state, each)
+        if geometry[state, each].share > 0.0:
+            own = length_at(scene, geometry[state, each].gap)
+            geometry[state, each].share *= length / (own * total)
+            rate += geometry[state, each].share * normal_rate(work, state, each)
     work.squares[at.SQUARES, at.SOFT_GAP] = gap
     return gap, rate
 
@@ -187,7 +186,8 @@ def sharpness(scene, gap):
 
 def surface_view(scene, work, time, state, row, end):
     """The PairView of the two bodies of a run of rows, their gap being g̃."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     gap, rate = soften(scene, work, state, row, end)
     _, _, distance = centre_line(scene, work, state, a, b)
     return pair_view(scene, time, a, b, gap, rate, distance)
@@ -195,21 +195,21 @@ def surface_view(scene, work, time, state, row, end):
 
 def mean_direction(work, row, end):
     """Derivatives of g̃ by the places of both bodies of the first row, now."""
-    g, first = work.geometry, work.candidates[row, at.VERTEX_BODY]
+    g, first = work.geometry, work.candidates[row].vertex_body
     x, y, turn_a, turn_b = 0.0, 0.0, 0.0, 0.0
     for each in range(row, end):
-        share = g[at.NOW, each, at.SHARE]
-        arm_v, arm_e = g[at.NOW, each, at.VERTEX_ARM_N], g[at.NOW, each, at.EDGE_ARM_N]
-        if work.candidates[each, at.VERTEX_BODY] == first:
+        share = g[at.NOW, each].share
+        arm_v, arm_e = g[at.NOW, each].vertex_arm_n, g[at.NOW, each].edge_arm_n
+        if work.candidates[each].vertex_body == first:
             x, y = (
-                x + share * g[at.NOW, each, at.NORMAL_X],
-                y + share * g[at.NOW, each, at.NORMAL_Y],
+                x + share * g[at.NOW, each].normal_x,
+                y + share * g[at.NOW, each].normal_y,
             )
             turn_a, turn_b = turn_a + share * arm_v, turn_b - share * arm_e
         else:
             x, y = (
-                x - share * g[at.NOW, each, at.NORMAL_X],
-                y - share * g[at.NOW, each, at.NORMAL_Y],
+                x - share * g[at.NOW, each].normal_x,
+                y - share * g[at.NOW, each].normal_y,
             )
             turn_a, turn_b = turn_a - share * arm_e, turn_b + share * arm_v
     return (x, y, turn_a), (-x, -y, turn_b)

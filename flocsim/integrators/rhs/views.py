@@ -11,112 +11,113 @@ from flocsim.hooks import hook
 
 @hook
 def body_view(scene, work, time, state, body):
-    motion, known = work.motion, scene.bodies
+    place, velocity, own, kick = work.place, work.velocity, scene.bodies[body], work.kicks[body]
     return BodyView(
         time,
-        motion[state, body, at.X], motion[state, body, at.Y], motion[state, body, at.ANGLE],
-        motion[state, body, at.VX], motion[state, body, at.VY], motion[state, body, at.SPIN],
-        known[body, at.MASS], known[body, at.BUOYANT_MASS], known[body, at.INERTIA],
-        known[body, at.EQUIVALENT_RADIUS], known[body, at.ELONGATION], known[body, at.LONG_AXIS],
-        work.bodies[body, at.KICK_X], work.bodies[body, at.KICK_X + 1],
-        work.bodies[body, at.KICK_X + 2],
-        known[body, at.RESISTANCE], known[body, at.RESISTANCE + 1],
-        known[body, at.RESISTANCE + 2], known[body, at.RESISTANCE + 3],
-        known[body, at.RESISTANCE + 4], known[body, at.RESISTANCE + 5],
-        known[body, at.RESISTANCE + 6], known[body, at.RESISTANCE + 7],
-        known[body, at.RESISTANCE + 8], known[body, at.RESISTANCE + 9],
-        known[body, at.RESISTANCE + 10], known[body, at.RESISTANCE + 11],
-        known[body, at.SHIELDING], known[body, at.SHIELDING + 1], known[body, at.SHIELDING + 2],
+        place[state, body, at.X], place[state, body, at.Y], place[state, body, at.ANGLE],
+        velocity[state, body, at.X], velocity[state, body, at.Y], velocity[state, body, at.ANGLE],
+        own.mass, own.buoyant_mass, own.inertia,
+        own.equivalent_radius, own.elongation, own.long_axis,
+        kick.x, kick.y, kick.turn,
+        own.resistance_xx, own.resistance_xy, own.resistance_yy,
+        own.resistance_xs, own.resistance_ys, own.resistance_ss,
+        own.strain_xx_x, own.strain_xx_y, own.strain_xx_s,
+        own.strain_xy_x, own.strain_xy_y, own.strain_xy_s,
+        own.shielding_xx, own.shielding_xy, own.shielding_yy,
     )  # fmt: skip
 
 
 def plain_body_view(scene, work, time, state, body):
     """The same without the numbers of its shape."""
-    motion, known = work.motion, scene.bodies
+    place, velocity, own, kick = work.place, work.velocity, scene.bodies[body], work.kicks[body]
     return PlainBodyView(
         time,
-        motion[state, body, at.X], motion[state, body, at.Y], motion[state, body, at.ANGLE],
-        motion[state, body, at.VX], motion[state, body, at.VY], motion[state, body, at.SPIN],
-        known[body, at.MASS], known[body, at.BUOYANT_MASS], known[body, at.INERTIA],
-        known[body, at.EQUIVALENT_RADIUS], known[body, at.ELONGATION], known[body, at.LONG_AXIS],
-        work.bodies[body, at.KICK_X], work.bodies[body, at.KICK_X + 1],
-        work.bodies[body, at.KICK_X + 2],
+        place[state, body, at.X], place[state, body, at.Y], place[state, body, at.ANGLE],
+        velocity[state, body, at.X], velocity[state, body, at.Y], velocity[state, body, at.ANGLE],
+        own.mass, own.buoyant_mass, own.inertia,
+        own.equivalent_radius, own.elongation, own.long_axis,
+        kick.x, kick.y, kick.turn,
     )  # fmt: skip
 
 
 def effective_mass(scene, a, b):
     """M = m_a m_b/(m_a + m_b) [kg]; the mass of the free one where the other is fixed."""
-    if scene.bodies[a, at.FREE] == 0.0:
-        return scene.bodies[b, at.MASS]
-    if scene.bodies[b, at.FREE] == 0.0:
-        return scene.bodies[a, at.MASS]
-    mass_a, mass_b = scene.bodies[a, at.MASS], scene.bodies[b, at.MASS]
+    if scene.bodies[a].free == 0.0:
+        return scene.bodies[b].mass
+    if scene.bodies[b].free == 0.0:
+        return scene.bodies[a].mass
+    mass_a, mass_b = scene.bodies[a].mass, scene.bodies[b].mass
     return mass_a * mass_b / (mass_a + mass_b)
 
 
 def smaller_radius(scene, a, b):
     """Equivalent radius of the smaller of two bodies [m]."""
-    return min(scene.bodies[a, at.EQUIVALENT_RADIUS], scene.bodies[b, at.EQUIVALENT_RADIUS])
+    return min(scene.bodies[a].equivalent_radius, scene.bodies[b].equivalent_radius)
 
 
 def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
-    radius_a = scene.bodies[a, at.EQUIVALENT_RADIUS]
-    radius_b = scene.bodies[b, at.EQUIVALENT_RADIUS]
+    radius_a = scene.bodies[a].equivalent_radius
+    radius_b = scene.bodies[b].equivalent_radius
     return PairView(
         time, gap, gap_rate, centre_distance, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
 
 
-def along_normal(work, row, kind, first):
+def along_normal(work, row, of, state):
     """n · (what the vertex's body has − what the edge's has) at a pair's contact point, in the
-    direction of now, of the three columns of a row of ``motion`` from ``first`` on: X, a change of
-    the gap by one of places [m]; VELOCITY, its rate [m/s]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, v = work.geometry, work.motion
-    change = g[at.NOW, row, at.NORMAL_X] * (v[kind, a, first] - v[kind, b, first])
-    change += g[at.NOW, row, at.NORMAL_Y] * (v[kind, a, first + 1] - v[kind, b, first + 1])
-    change += g[at.NOW, row, at.VERTEX_ARM_N] * v[kind, a, first + 2]
-    return change - g[at.NOW, row, at.EDGE_ARM_N] * v[kind, b, first + 2]
+    direction of now, ``of`` a state's places, a change of the gap [m], or velocities, its rate
+    [m/s]."""
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g = work.geometry
+    change = g[at.NOW, row].normal_x * (of[state, a, at.X] - of[state, b, at.X])
+    change += g[at.NOW, row].normal_y * (of[state, a, at.Y] - of[state, b, at.Y])
+    change += g[at.NOW, row].vertex_arm_n * of[state, a, at.ANGLE]
+    return change - g[at.NOW, row].edge_arm_n * of[state, b, at.ANGLE]
 
 
 def normal_rate(work, state, row):
     """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, motion = work.geometry, work.motion
-    rate = g[state, row, at.NORMAL_X] * (motion[state, a, at.VX] - motion[state, b, at.VX])
-    rate += g[state, row, at.NORMAL_Y] * (motion[state, a, at.VY] - motion[state, b, at.VY])
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g = work.geometry
+    rate = g[state, row].normal_x * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
+    rate += g[state, row].normal_y * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
     return (
         rate
-        + motion[state, a, at.SPIN] * g[state, row, at.VERTEX_ARM_N]
-        - motion[state, b, at.SPIN] * g[state, row, at.EDGE_ARM_N]
+        + work.velocity[state, a, at.ANGLE] * g[state, row].vertex_arm_n
+        - work.velocity[state, b, at.ANGLE] * g[state, row].edge_arm_n
     )
 
 
 def tangential_rate(work, state, row):
     """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    g, motion = work.geometry, work.motion
-    rate = g[state, row, at.NORMAL_X] * (motion[state, a, at.VY] - motion[state, b, at.VY])
-    rate -= g[state, row, at.NORMAL_Y] * (motion[state, a, at.VX] - motion[state, b, at.VX])
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    g = work.geometry
+    rate = g[state, row].normal_x * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
+    rate -= g[state, row].normal_y * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
     return (
         rate
-        + motion[state, a, at.SPIN] * g[state, row, at.VERTEX_ARM_T]
-        - motion[state, b, at.SPIN] * g[state, row, at.EDGE_ARM_T]
+        + work.velocity[state, a, at.ANGLE] * g[state, row].vertex_arm_t
+        - work.velocity[state, b, at.ANGLE] * g[state, row].edge_arm_t
     )
 
 
 def memory_of(work, row):
     """How long a velocity of either body of a pair is remembered [s]."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
-    return max(work.bodies[a, at.MEMORY], work.bodies[b, at.MEMORY])
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    return max(work.errors[a].memory, work.errors[b].memory)
 
 
 def contact_view(scene, work, state, row):
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     radius_a, radius_b = row_radii(scene, work, row)
     return ContactView(
-        -work.geometry[state, row, at.GAP], -normal_rate(work, state, row),
+        -work.geometry[state, row].gap, -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
         radius_a, radius_b, smaller_radius(scene, a, b),
     )  # fmt: skip
@@ -130,28 +131,29 @@ def pressed_view(view, overlap, overlap_rate):
 @hook
 def inertia(scene, body, axis):
     """Mass [kg], or moment of inertia [kg m²] for axis 2."""
-    return scene.bodies[body, at.INERTIA] if axis == 2 else scene.bodies[body, at.MASS]
+    return scene.bodies[body].inertia if axis == 2 else scene.bodies[body].mass
 
 
 def lever(scene, body, axis):
     """How far the outline moves for a unit of a coordinate: 1, or the bounding radius [m/rad]."""
-    return scene.bodies[body, at.BOUNDING_RADIUS] if axis == 2 else 1.0
+    return scene.bodies[body].bounding_radius if axis == 2 else 1.0
 
 
 def add_force(work, state, body, fx, fy, torque):
-    work.rates[state, body, at.FX] += fx
-    work.rates[state, body, at.FY] += fy
-    work.rates[state, body, at.TORQUE] += torque
+    work.force[state, body, at.X] += fx
+    work.force[state, body, at.Y] += fy
+    work.force[state, body, at.ANGLE] += torque
 
 
 def push_pair(work, state, row, normal, tangential):
     """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
-    a, b = work.candidates[row, at.VERTEX_BODY], work.candidates[row, at.EDGE_BODY]
+    candidate = work.candidates[row]
+    a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    fx = normal * g[state, row, at.NORMAL_X] - tangential * g[state, row, at.NORMAL_Y]
-    fy = normal * g[state, row, at.NORMAL_Y] + tangential * g[state, row, at.NORMAL_X]
-    torque_a = normal * g[state, row, at.VERTEX_ARM_N] + tangential * g[state, row, at.VERTEX_ARM_T]
-    torque_b = normal * g[state, row, at.EDGE_ARM_N] + tangential * g[state, row, at.EDGE_ARM_T]
+    fx = normal * g[state, row].normal_x - tangential * g[state, row].normal_y
+    fy = normal * g[state, row].normal_y + tangential * g[state, row].normal_x
+    torque_a = normal * g[state, row].vertex_arm_n + tangential * g[state, row].vertex_arm_t
+    torque_b = normal * g[state, row].edge_arm_n + tangential * g[state, row].edge_arm_t
     add_force(work, state, a, fx, fy, torque_a)
     add_force(work, state, b, -fx, -fy, -torque_b)
 
@@ -168,7 +170,7 @@ def centre_line(scene, work, state, a, b):
 def soft_centre_line(scene, work, state, a, b):
     """The same of d = √(d_c² + ε²), whose gradient (n_x, n_y) fades out towards d_c = 0."""
     dx, dy = separation(scene, work, state, a, b)
-    reach = scene.bodies[a, at.EQUIVALENT_RADIUS] + scene.bodies[b, at.EQUIVALENT_RADIUS]
+    reach = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
     softening = CENTRE_SOFTENING * reach
     distance = math.sqrt(dx * dx + dy * dy + softening * softening)
     return dx / distance, dy / distance, distance
@@ -177,8 +179,7 @@ def soft_centre_line(scene, work, state, a, b):
 def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
     nx, ny, distance = soft_centre_line(scene, work, state, a, b)
-    motion = work.motion
-    rate = nx * (motion[state, a, at.VX] - motion[state, b, at.VX])
-    rate += ny * (motion[state, a, at.VY] - motion[state, b, at.VY])
-    gap = distance - scene.bodies[a, at.EQUIVALENT_RADIUS] - scene.bodies[b, at.EQUIVALENT_RADIUS]
+    rate = nx * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
+    rate += ny * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
+    gap = distance - scene.bodies[a].equivalent_radius - scene.bodies[b].equivalent_radius
     return pair_view(scene, time, a, b, gap, rate, distance)

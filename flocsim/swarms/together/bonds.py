@@ -53,15 +53,15 @@ any, and the gap of its outlines [m]."""
 def list_pair(scene, work, pair, gap):
     """List and locate the features of one pair, at a gap of the outlines [m], that any force knows;
     False without room."""
-    work.tally[at.CANDIDATES] = 0
+    work.tally.candidates = 0
     cut = 0.0
     if scene.surface_reach > 0.0:
         cut = gap_of(scene, measure_of(scene, max(gap, 0.0)) + RANGE)
     if not list_polygons(scene, work, pair, cut):
         return False
-    turn_body(work, at.NOW, work.pairs[pair, at.LATER])
-    turn_body(work, at.NOW, work.pairs[pair, at.EARLIER])
-    for row in range(work.tally[at.CANDIDATES]):
+    turn_body(work, at.NOW, work.pairs[pair].later)
+    turn_body(work, at.NOW, work.pairs[pair].earlier)
+    for row in range(work.tally.candidates):
         locate_polygons(scene, work, at.NOW, row)
     return True
 
@@ -86,16 +86,14 @@ def judge_bonds(scene, work, time, elapsed, kicks, loads, kinds):
     """The ``kinds`` of the listed pairs under their ``loads``, see FORCE; False without room for
     their features. ``elapsed``: how long ago places were those in NEW [s], 0 where none is known;
     ``kicks``: k_B T [J]."""
-    for pair in range(work.tally[at.PAIRS]):
+    for pair in range(work.tally.pairs):
         if not list_pair(scene, work, pair, loads[pair, GAP]):
             return False
         load = Load(
             loads[pair, FORCE], loads[pair, DRIFT], loads[pair, DRIFT_X], loads[pair, DRIFT_Y],
             loads[pair, LEVER], loads[pair, ALONE], kicks,
         )  # fmt: skip
-        bond = bond_between(
-            scene, work, time, work.pairs[pair, at.EARLIER], work.pairs[pair, at.LATER]
-        )
+        bond = bond_between(scene, work, time, work.pairs[pair].earlier, work.pairs[pair].later)
         kinds[pair] = kind_of(scene, work, time, elapsed, bond, load)
     return True
 
@@ -158,9 +156,11 @@ class BondGauge:
         since, earlier = (time, motion) if before is None else before
         while True:
             work = self.work
-            work.motion[at.NOW], work.motion[at.NEW] = motion, earlier
-            work.pairs[: len(held.pairs), [at.LATER, at.EARLIER]] = held.pairs
-            work.tally[at.PAIRS] = len(held.pairs)
+            at.put_motion(work, at.NOW, motion)
+            at.put_motion(work, at.NEW, earlier)
+            known = work.pairs[: len(held.pairs)]
+            known["later"], known["earlier"] = held.pairs.T
+            work.tally.pairs = len(held.pairs)
             if self.judge(self.scene, work, time, time - since, self.kicks, loads, kinds):
                 return Bonds(held.pairs, kinds)
             self.work = with_room(work)

@@ -52,8 +52,8 @@ def measure_gaps(scene, work, within):
     without room."""
     if not list_near(scene, work, within):
         return False
-    for pair in range(work.tally[at.PAIRS]):
-        a, b = work.pairs[pair, at.LATER], work.pairs[pair, at.EARLIER]
+    for pair in range(work.tally.pairs):
+        a, b = work.pairs[pair].later, work.pairs[pair].earlier
         work.budget[pair] = gap_between(scene, work, a, b)
         work.along[pair, 0], work.along[pair, 1] = separation(scene, work, at.NOW, a, b)
     return True
@@ -87,12 +87,14 @@ class Gauge:
 
     def neighbours(self, position: np.ndarray, within: float = 0.0) -> Neighbours:
         """The pairs nearer than a gap [m] where the bodies are at ``position`` (n, 3)."""
-        self.work.motion[at.NOW, :, :3] = position
+        self.work.place[at.NOW] = position
         while not self.measure(self.scene, self.work, within):
             self.work = with_room(self.work)
-        gaps = self.work.budget[: self.work.tally[at.PAIRS]]
+        gaps = self.work.budget[: self.work.tally.pairs]
         near = np.flatnonzero(gaps < within if within > 0.0 else gaps <= 0.0)
-        return Neighbours(self.work.pairs[near, :2], gaps[near], self.work.along[near, :2])
+        listed = self.work.pairs[near]
+        pairs = np.column_stack([listed["later"], listed["earlier"]])
+        return Neighbours(pairs, gaps[near], self.work.along[near, :2])
 
 
 def walk_together(pairs, vectors, first, other, way, labels, places, queue):
@@ -338,12 +340,13 @@ class Shielding:
         """Write Q of all bodies at ``position`` (n, 3) into what is ``known`` of them (n, …), as
         Scene.bodies has it. What hangs together with a fixed body does not settle, and keeps the
         drag of its bodies."""
-        free = known[:, at.FREE] == 1.0
+        free = known["free"] == 1.0
         near = self.gauge.neighbours(position, self.nearly)
         label, places = placed_together(len(free), near.among(free))
         size = np.bincount(label)
         size[label[near.pairs[~free[near.pairs].all(axis=1)]]] = 1  # on a wall
-        known[:, at.SHIELDING : at.SHIELDING + 3] = at.UNSHIELDED
+        for name, alone in zip(SHIELDING, at.UNSHIELDED, strict=True):
+            known[name] = alone
         members = np.flatnonzero((size[label] > 1) & free)
         if not len(members):
             return
@@ -354,7 +357,8 @@ class Shielding:
         together = np.zeros((len(found), 2, 2))
         np.add.at(together, own_label, resistance)
         shielding = between(together, np.linalg.inv(unpacked(found)))
-        known[members, at.SHIELDING : at.SHIELDING + 3] = packed(shielding)[own_label]
+        for name, column in zip(SHIELDING, packed(shielding)[own_label].T, strict=True):
+            known[name][members] = column
 
     def resistances(self, known: np.ndarray, angle: np.ndarray, members: np.ndarray) -> np.ndarray:
         """(n, 2, 2) of every one's drag alone, held from turning, over the viscosity."""
@@ -362,8 +366,12 @@ class Shielding:
             return 6.0 * math.pi * self.radii[members, None, None] * np.eye(2)
         c, s = np.cos(angle), np.sin(angle)
         turn = np.moveaxis(np.array([[c, -s], [s, c]]), 2, 0)
-        own = unpacked(known[:, at.RESISTANCE : at.RESISTANCE + 3])
+        own = unpacked(np.column_stack([known[name] for name in RESISTANCE]))
         return turn @ own @ np.swapaxes(turn, 1, 2)
+
+
+RESISTANCE = "resistance_xx", "resistance_xy", "resistance_yy"
+SHIELDING = "shielding_xx", "shielding_xy", "shielding_yy"
 
 
 def unpacked(columns: np.ndarray) -> np.ndarray:

@@ -59,14 +59,14 @@ class Doublet:
 
     def place(self, *places):
         """Put the bodies somewhere, at rest."""
-        self.work.motion[at.NOW, :, :3], self.work.motion[at.NOW, :, 3:] = places, 0.0
+        self.work.place[at.NOW], self.work.velocity[at.NOW] = places, 0.0
         assert list_candidates(self.scene, self.work)
         locate_contacts(self.scene, self.work, at.NOW)
         set_modes(self.scene, self.work)
 
     def move(self, vx=0.0, vy=0.0, spin=0.0):
         """Let the second body move so against the first."""
-        self.work.motion[at.NOW, 1, 3:] = vx, vy, spin
+        self.work.velocity[at.NOW, 1] = vx, vy, spin
 
     @property
     def drift(self):
@@ -123,7 +123,7 @@ def test_a_doublet_that_spins_carries_its_centrifugal_load_too(tmp_path):
     mass /= sum(body.mass for body in doublet.encounter.system.bodies)
     # As a rigid body, so fast that it doubles the load.
     spin = math.sqrt(doublet.load / (mass * sum(RADII)))
-    doublet.work.motion[at.NOW, :, 5] = spin
+    doublet.work.velocity[at.NOW, :, at.ANGLE] = spin
     doublet.move(vx=spin * sum(RADII), spin=spin)
     assert doublet.bond() == NO_BOND
 
@@ -173,7 +173,7 @@ def climb(doublet):
     outer = sum(shape.equivalent_radius for shape in doublet.shapes)
     radii = [shape.equivalent_radius for shape in doublet.shapes]
     pull = force.hamaker * (radii[0] * radii[1] / outer) / (6.0 * force.d_min**2)
-    distance = math.hypot(*doublet.work.motion[at.NOW, 1, :2])
+    distance = math.hypot(*doublet.work.place[at.NOW, 1, :2])
     return (pull - SAFETY * doublet.load) * (outer - distance)
 
 
@@ -219,7 +219,7 @@ def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
     rest = doublet.observed[outcomes.REST_TIME]
     start_rest(doublet.scene, doublet.work, doublet.observed, 0.0)
-    (still, low), way = doublet.work.motion[at.NOW, :, :3].copy(), doublet.drift * rest
+    (still, low), way = doublet.work.place[at.NOW].copy(), doublet.drift * rest
     doublet.place(still, low + [1.1 * STILL * way, 0.0, 0.0])
     assert doublet.bond(1.1 * rest) == NO_BOND
     assert doublet.bond(2.0 * rest) == NO_BOND

@@ -24,7 +24,7 @@ def study(tmp_path_factory):
 
 def test_bodies_start_at_their_terminal_velocities_without_spin(study):
     encounter = study.encounter(0, 16, draws(1, 0))
-    motion = encounter.start((0.3, 2.0), 0.5).motion[at.NOW]
+    motion = at.motion_of(encounter.start((0.3, 2.0), 0.5), at.NOW)
     for body in range(2):
         radius = encounter.shapes[body].equivalent_radius
         mass = 2.0 * math.pi * radius**2
@@ -59,7 +59,7 @@ def test_times_and_gaps_that_are_given(tmp_path):
     observed = encounter.observed()
     assert encounter.time_limit() == 3.0
     assert (observed[outcomes.REST_TIME], observed[outcomes.ESCAPE]) == (0.5, 7e-6)
-    places = encounter.start((0.0, 0.0), 0.0).motion[at.NOW, :, 1]
+    places = encounter.start((0.0, 0.0), 0.0).place[at.NOW, :, at.Y]
     assert places[1] - places[0] == pytest.approx(16.41e-6 + 23.02e-6 + 3e-6, rel=1e-9)
 
 

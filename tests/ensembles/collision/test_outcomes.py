@@ -72,13 +72,13 @@ def go_on(study, condition, vertices, share, replicate, factor=11.0):
     work, observed = encounter.start(orientations(numbers), share), encounter.observed()
     integrator, driver = encounter.system.integrator, study.driver(encounter)
     clock, counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
-    clock[at.UNTIL] = factor * row["t_end"]
+    clock.until = factor * row["t_end"]
     decisions, widest, status = [], -math.inf, Status.STOPPED
     while status == Status.STOPPED:
         # The observer stops the run behind every step once it has decided.
         status = Status(driver(encounter.scene, work, observed, clock, counts, np.zeros((0, 13))))
         if status == Status.STOPPED:
-            decisions.append((int(counts[at.CODE]), float(clock[at.TIME])))
+            decisions.append((int(counts.code), float(clock.time)))
             widest = max(widest, least_listed_gap(work))
     last = gap_between(encounter.scene, work, 1, 0)
     return row, Continued(*decisions[0], widest, last, status)
@@ -192,7 +192,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     contact = sum(shape.radius for shape in encounter.shapes)
 
     def seen(gap, collided):
-        work.motion[at.NOW, 1, :2] = 0.0, -(contact + gap)
+        work.place[at.NOW, 1, :2] = 0.0, -(contact + gap)
         observed[outcomes.COLLIDED] = collided
         return watch_pair(scene, work, observed, 0.0)
 
@@ -200,7 +200,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     escape = observed[outcomes.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
-    work.motion[at.NOW, 1, 4] = 0.0
+    work.velocity[at.NOW, 1, at.Y] = 0.0
     assert seen(1.01 * escape, 1.0) == 0
 
 
@@ -210,10 +210,10 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     encounter = study.encounter(0, 1, draws(1, 0))
     work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
     spin, reach = 300.0, sum(shape.radius for shape in encounter.shapes) - 1e-12
-    work.motion[at.NOW] = 0.0
-    work.motion[at.NOW, :, 5] = spin
-    work.motion[at.NOW, 1, 1] = -reach
-    work.motion[at.NOW, 1, 3] = spin * reach
+    work.place[at.NOW] = work.velocity[at.NOW] = 0.0
+    work.velocity[at.NOW, :, at.ANGLE] = spin
+    work.place[at.NOW, 1, at.Y] = -reach
+    work.velocity[at.NOW, 1, at.X] = spin * reach
     scene = encounter.system.scene(jit=False)
     assert list_candidates(scene, work)
     locate_contacts(scene, work, at.NOW)
@@ -222,7 +222,7 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     outcomes.start_rest(scene, work, observed, 0.0)
     assert outcomes.bond_of(*known, later) == NO_BOND
     # Without the swing it does.
-    work.motion[at.NOW, :, 3:] = 0.0
+    work.velocity[at.NOW] = 0.0
     assert outcomes.bond_of(*known, later) == REST
 
 
@@ -302,7 +302,7 @@ class Falling:
 
     def seen(self, x, y, vx=0.0, vy=0.0, spin=0.0, collided=True):
         """What the observer says with the body there, at so much more than its settling speed."""
-        motion = self.work.motion[at.NOW]
+        motion = at.motion_of(self.work, at.NOW)
         motion[0, :] = 0.0
         motion[1, :3] = *(np.array([x, y]) + self.origin), 0.0
         motion[1, 3:] = vx, vy - self.fall, spin

@@ -58,13 +58,13 @@ class Pair:
 
     def put(self, x, y, drifting=True):
         """j at (x, y) from i, going along with the drift or standing still."""
-        self.work.motion[at.NOW, 0] = 0.0
-        self.work.motion[at.NOW, 1] = x, y, 0.0, 0.0, 0.0, 0.0
+        self.work.place[at.NOW] = (0.0, 0.0, 0.0), (x, y, 0.0)
+        self.work.velocity[at.NOW] = 0.0
         if drifting:
             xx, xy, yx, yy = self.encounter.system.fluid.gradient
-            self.work.motion[at.NOW, 1, 3:5] = xx * x + xy * y, yx * x + yy * y
+            self.work.velocity[at.NOW, 1, :2] = xx * x + xy * y, yx * x + yy * y
             if self.encounter.meeting == "settling":
-                self.work.motion[at.NOW, 1, 3:5] = self.encounter.drift
+                self.work.velocity[at.NOW, 1, :2] = self.encounter.drift
         assert list_candidates(self.scene, self.work)
         locate_contacts(self.scene, self.work, at.NOW)
         set_modes(self.scene, self.work)
@@ -151,7 +151,7 @@ def test_a_brownian_pair_has_missed_where_the_study_says_so(tmp_path):
 def test_a_brownian_pair_starts_in_any_direction(tmp_path):
     pair = Pair(tmp_path, BROWNIAN)
     for share in (0.0, 0.2, 0.7):
-        start = pair.encounter.start((1.0, 2.0), share).motion[at.NOW]
+        start = at.motion_of(pair.encounter.start((1.0, 2.0), share), at.NOW)
         turn = 2.0 * math.pi * share
         assert start[1, :2] == pytest.approx([6e-6 * math.cos(turn), 6e-6 * math.sin(turn)])
         assert start[:, 2].tolist() == [1.0, 2.0]
@@ -187,7 +187,7 @@ def test_energy_is_taken_off_until_it_is_used_up(tmp_path):
     i, j = pair.encounter.system.bodies
     mass = i.mass * j.mass / (i.mass + j.mass)
     for energies, kind in ((5.0, CERTIFICATE), (15.0, NO_BOND)):
-        pair.work.motion[at.NOW, 1, 3] = math.sqrt(2.0 * energies * ENERGY / mass)
+        pair.work.velocity[at.NOW, 1, at.X] = math.sqrt(2.0 * energies * ENERGY / mass)
         assert pair.bond() == kind
 
 

@@ -37,14 +37,14 @@ def test_pairs_with_a_free_body_are_listed_and_no_others(count, free, shape):
     if shape is SQUARE and count > 3 and free == (0, 1):
         count = min(count, at.ALL_PAIRS + 1)
     _, work = listed(crossing(count, free, shape))
-    pairs = work.pairs[: work.tally[at.PAIRS], [at.LATER, at.EARLIER]].tolist()
+    pairs = work.pairs[: work.tally.pairs][["later", "earlier"]].tolist()
     near = [
-        [a, b] for a in range(count) for b in range(a)
+        (a, b) for a in range(count) for b in range(a)
         if (a in free or b in free) and (count <= at.ALL_PAIRS or 2e-6 * (a - b) < 2e-5)
     ]  # fmt: skip
     assert [pair for pair in near if pair not in pairs] == []
     assert all(a in free or b in free for a, b in pairs)
-    rows = work.candidates[: work.tally[at.CANDIDATES], [at.VERTEX_BODY, at.EDGE_BODY]].tolist()
+    rows = work.candidates[: work.tally.candidates][["vertex_body", "edge_body"]].tolist()
     assert all(a in free or b in free for a, b in rows)
     assert bool(rows) == bool(free)
 

@@ -34,19 +34,19 @@ def arrays(plain, reach=-1.0, capacity=4096):
 def spend_budget(scene, work, wanted):
     """Move the bodies as wanted (n, 3), scaled so that one pair spends just all of its budget."""
     steps = np.array(wanted)[: 3 * len(scene.bodies)].reshape(-1, 3) * (1e-5, 1e-5, 1.0)
-    start = work.motion[at.NOW, :, :3].copy()
+    start = work.place[at.NOW].copy()
     within, beyond = 0.0, 2.0
     # What a motion spends is not in proportion to it where bodies turn far: bisect.
     for _ in range(40):
         share = 0.5 * (within + beyond)
-        work.motion[at.NOW, :, :3] = start + share * steps
+        work.place[at.NOW] = start + share * steps
         within, beyond = (share, beyond) if spent(scene, work, at.NOW) <= 1.0 else (within, share)
-    work.motion[at.NOW, :, :3] = start + within * steps
+    work.place[at.NOW] = start + within * steps
 
 
 def pairs_now(plain, work):
     """Every pair of the scene, near or far, where the bodies are now."""
-    places = work.motion[at.NOW, :, :3].copy()
+    places = work.place[at.NOW].copy()
     return measure(Scene(plain.bodies, places, plain.velocities), all_pairs(plain.bodies))
 
 
@@ -107,7 +107,7 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     assert list_candidates(scene, work)
     locate_contacts(scene, work, at.NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
-    assert work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2].min() < 0.0
+    assert work.geometry[at.NOW, : work.tally.candidates, 2].min() < 0.0
 
 
 REACHES = [1e-8, 4e-7, 2e-5]
@@ -120,7 +120,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
     scene, work = arrays(plain, reach)
     middle = plain.positions[:, :2].mean(axis=0)
     away = plain.positions[:, :2] - middle
-    work.motion[at.NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
+    work.place[at.NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
     assert list_candidates(scene, work)
     spend_budget(scene, work, wanted)
     locate_contacts(scene, work, at.NOW)

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import scene_of
@@ -76,14 +75,14 @@ DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0
 @given(*DRAWN, st.floats(0.01, 6.0))
 def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    assert work.tally[at.PAIRS] == 1 and list_compounds(scene, work, 0, cutoff)
-    rows = work.candidates[: work.tally[at.CANDIDATES]]
-    bodies = [at.VERTEX_BODY, at.VERTEX, at.EDGE_START, at.EDGE_END]
+    assert work.tally.pairs == 1 and list_compounds(scene, work, 0, cutoff)
+    rows = work.candidates[: work.tally.candidates]
+    names = ["vertex_body", "vertex", "edge_start", "edge_end"]
     first = scene.first
     found = set()
-    for of, vertex, start, end in rows[:, bodies].tolist():
+    for of, vertex, start, end in rows[names].tolist():
         found.add((of == 0, vertex - first[of], start - first[1 - of], end - first[1 - of]))
-    assert np.all(rows[:, at.EDGE_BODY] == 1 - rows[:, at.VERTEX_BODY]) and len(found) == len(rows)
+    assert np.all(rows["edge_body"] == 1 - rows["vertex_body"]) and len(found) == len(rows)
     gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
     clear = {key for key, gap in gaps.items() if gap < cutoff - 1e-9}
     assert clear <= found <= {key for key, gap in gaps.items() if gap < cutoff + 1e-9}
@@ -92,7 +91,7 @@ def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
 @given(*DRAWN)
 def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    contact = scene.bodies[:, at.RADIUS].sum()
+    contact = scene.bodies["radius"].sum()
     gaps = pairs_between(a, b, (0.0, 0.0, turn_a), (x, y, turn_b))
     both = [(0, 1), (1, 0)]
     for one, other in both:

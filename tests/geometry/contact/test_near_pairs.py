@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.arrays import work_of
 from flocsim.body import scene_of
@@ -94,10 +93,10 @@ def least_of(distances):
 
 def listed(scene, work, cutoff, a=1, b=0):
     """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
-    work.tally[at.CANDIDATES] = 0
+    work.tally.candidates = 0
     work.pairs[0, :2] = a, b
     assert compose(list_polygons, {})(scene, work, 0, cutoff)
-    rows = work.candidates[: work.tally[at.CANDIDATES]]
+    rows = work.candidates[: work.tally.candidates]
     first = scene.first
     return [
         (int(a), int(b), int(point - first[a]), int(start - first[b]))

@@ -11,7 +11,7 @@ from flocsim.geometry.contact.points import cosine_and_sine
 
 
 def new_work():
-    return SimpleNamespace(bodies=np.zeros((2, at.BODY_COLUMNS)))
+    return SimpleNamespace(poses=at.Pose.rows(2))
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 0.1, 4.0, 1e3, 1e5, 1e7, 1e300])

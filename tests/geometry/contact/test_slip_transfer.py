@@ -37,22 +37,22 @@ def resting_on(slab_body, body, x, height, speed):
 def pull(work):
     """Σ ξ t_x over the closed pairs, as it acts on body 1 [m]."""
     total = 0.0
-    for row in range(work.tally[at.CANDIDATES]):
-        side = 1.0 if work.candidates[row, 0] == 1 else -1.0
+    for row in range(work.tally.candidates):
+        side = 1.0 if work.candidates[row].vertex_body == 1 else -1.0
         total -= side * work.slip[at.NOW, row] * -work.geometry[at.NOW, row, 1]
     return total
 
 
 def slide(scene, work, length, passing_on=hand_over, steps=400):
     """Carry body 1 along x, its contacts with it; the pull after every step."""
-    step = length / steps / work.motion[at.NOW, 1, 3]
+    step = length / steps / work.velocity[at.NOW, 1, at.X]
     pulls = []
     for _ in range(steps):
         set_modes(scene, work)
         rate_slips(work, at.NOW)
-        closed = work.candidates[:, at.CLOSED] == 1
-        work.slip[at.NOW, closed] += step * work.slip[at.SLIP_RATES + at.NOW, closed]
-        work.motion[at.NOW, 1, 0] += length / steps
+        closed = work.candidates["closed"] == 1
+        work.slip[at.NOW, closed] += step * work.slip_rate[at.NOW, closed]
+        work.place[at.NOW, 1, at.X] += length / steps
         locate_contacts(scene, work, at.NOW)
         passing_on(scene, work)
         if spent(scene, work, at.NOW) > 0.5:
@@ -84,8 +84,8 @@ def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
 
 def forget(scene, work):
     """What no hand-over would do: an opening pair loses its displacement."""
-    opened = work.geometry[at.NOW, : work.tally[at.CANDIDATES], 2] >= 0.0
-    work.slip[at.NOW, : work.tally[at.CANDIDATES]][opened] = 0.0
+    opened = work.geometry[at.NOW, : work.tally.candidates, 2] >= 0.0
+    work.slip[at.NOW, : work.tally.candidates][opened] = 0.0
 
 
 def test_on_one_undivided_edge_the_pull_is_the_distance():
@@ -97,11 +97,11 @@ def test_the_displacement_vanishes_with_the_last_pair():
     scene, work = ball_on([-10e-6, 12e-6])
     slide(scene, work, 1e-6)
     assert pull(work) != 0.0
-    work.motion[at.NOW, 1, 1] += 2.0 * OVERLAP
+    work.place[at.NOW, 1, at.Y] += 2.0 * OVERLAP
     locate_contacts(scene, work, at.NOW)
     hand_over(scene, work)
     assert not work.slip[at.NOW].any()
-    work.motion[at.NOW, 1, 1] -= 2.0 * OVERLAP
+    work.place[at.NOW, 1, at.Y] -= 2.0 * OVERLAP
     locate_contacts(scene, work, at.NOW)
     assert pull(work) == 0.0
 
@@ -118,9 +118,9 @@ def square_on_slab(tilt):
 def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     rng = np.random.default_rng(seed)
     scene, work = square_on_slab(0.02 * rng.normal())
-    rows = work.tally[at.CANDIDATES]
+    rows = work.tally.candidates
     work.slip[at.NOW, :rows] = 1e-9 * rng.normal(size=rows)
-    work.motion[at.NOW, 1, :3] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
+    work.place[at.NOW, 1] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
     locate_contacts(scene, work, at.NOW)
     energy = np.sum(work.slip[at.NOW] ** 2)
     hand_over(scene, work)

@@ -34,7 +34,7 @@ def stepped(bodies, change, velocities):
     assert list_candidates(scene, work)
     locate_contacts(scene, work, at.NOW)
     set_modes(scene, work)
-    work.motion[at.NEW] = np.hstack([start + change, velocities[1]])
+    work.place[at.NEW], work.velocity[at.NEW] = start + change, velocities[1]
     locate_contacts(scene, work, at.NEW)
     return scene, work
 
@@ -67,7 +67,7 @@ def wandering(seed):
 
 def worst_margin(scene, work, shares):
     """The least of all that must not become negative, at every share [m]."""
-    rows = work.tally[at.CANDIDATES]
+    rows = work.tally.candidates
     closed = work.geometry[at.NOW, :rows, 2] < 0.0
     worst = []
     for share in shares:

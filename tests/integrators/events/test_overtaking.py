@@ -49,16 +49,14 @@ def between(gaps, step, closed=True):
     """Whether a corner overtakes the other one in a step of so many seconds, which takes the gaps
     of both [m] from the first to the second ones."""
     scene, work = flagged(tilted(0.0, 0.0))
-    touching = [
-        row for row in range(work.tally[at.CANDIDATES]) if work.geometry[at.NOW, row, at.GAP] < 0.0
-    ]
-    work.geometry[at.NOW, :, at.GAP] = work.geometry[at.NEW, :, at.GAP] = 1e-6
+    touching = [row for row in range(work.tally.candidates) if work.geometry[at.NOW, row].gap < 0.0]
+    work.geometry[at.NOW, :]["gap"] = work.geometry[at.NEW, :]["gap"] = 1e-6
     for state, values in zip((at.NOW, at.NEW), gaps, strict=True):
         for row, value in zip((touching[0], touching[-1]), values, strict=True):
-            work.geometry[state, row, at.GAP] = value
-    assert len(touching) > 1 and (work.candidates[touching, at.CLOSED] == at.TOUCHES).all()
+            work.geometry[state, row].gap = value
+    assert len(touching) > 1 and (work.candidates[touching].closed == at.TOUCHES).all()
     clock = Implicit(1e-9).fresh_clock()
-    clock[at.ACROSS] = 0.0 if closed else 1.0
+    clock.across = 0.0 if closed else 1.0
     return overtakes(scene, work, clock, step)
 
 

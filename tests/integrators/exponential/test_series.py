@@ -35,7 +35,7 @@ class Linked:
         self.scene = system.scene(jit=False)
         self.work = work_of(self.scene, *system.motion())
         self.clock = system.integrator.fresh_clock()
-        self.clock[at.UNTIL] = 1.0
+        self.clock.until = 1.0
         self.call(list_candidates)
         self.call(locate_contacts, at.NOW)
         self.call(set_modes)
@@ -52,7 +52,7 @@ class Linked:
 
     @property
     def terms(self):
-        return int(self.work.tally[at.SERIES_TERMS])
+        return int(self.work.tally.series_terms)
 
 
 def trapped(drag=False, **words):
@@ -78,10 +78,10 @@ def test_a_linear_swing_is_exact_however_far_it_goes(turns):
     scene = Linked(trapped())
     assert scene.step(turns / RATE) < 1e-3
     assert scene.terms > 0
-    found = scene.work.motion[at.NEW, 0]
+    found = at.motion_of(scene.work, at.NEW)[0]
     place, speed = swung(turns / RATE)
     assert found[at.X] == pytest.approx(place, abs=1e-14)
-    assert found[at.VX] == pytest.approx(speed, abs=1e-14 * RATE)
+    assert found[3] == pytest.approx(speed, abs=1e-14 * RATE)
 
 
 def test_so_is_one_that_drag_slows_down():
@@ -90,8 +90,8 @@ def test_so_is_one_that_drag_slows_down():
     damping = scene.work.jacobian[at.DAMPING, 0, 0, 0]
     assert damping > 0.01 * MASS * RATE
     place, speed = swung(3.0 / RATE, damping)
-    assert scene.work.motion[at.NEW, 0, at.X] == pytest.approx(place, abs=1e-14)
-    assert scene.work.motion[at.NEW, 0, at.VX] == pytest.approx(speed, abs=1e-14 * RATE)
+    assert scene.work.place[at.NEW, 0, at.X] == pytest.approx(place, abs=1e-14)
+    assert scene.work.velocity[at.NEW, 0, at.X] == pytest.approx(speed, abs=1e-14 * RATE)
 
 
 def test_what_does_not_move_stays_just_where_it_is():
@@ -102,8 +102,8 @@ def test_what_does_not_move_stays_just_where_it_is():
     scene = Linked(System(bodies, [Trap(STIFFNESS)], Implicit()))
     scene.step(1.0 / RATE)
     assert scene.terms > 0
-    assert scene.work.motion[at.NEW, 0, at.SPIN] == 50.0
-    assert np.array_equal(scene.work.motion[at.NEW, 1], scene.work.motion[at.NOW, 1])
+    assert scene.work.velocity[at.NEW, 0, at.ANGLE] == 50.0
+    assert np.array_equal(at.motion_of(scene.work, at.NEW)[1], at.motion_of(scene.work, at.NOW)[1])
 
 
 @attrs.frozen
@@ -130,23 +130,23 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     system = System([Body(Sphere(R), (1e-5, 0.0), surface_density=2.0)], [Pull()], Implicit())
     scene, clock = Linked(system), Implicit().fresh_clock()
     scene.clock[:], work, nudge = clock, scene.work, 1e-13
-    scene.clock[at.UNTIL] = 1.0
-    work.motion[at.CARRIED, 0, at.X], work.bodies[0, at.ERROR_PLACE] = nudge, 10.0 * nudge
+    scene.clock.until = 1.0
+    work.place[at.CARRIED, 0, at.X], work.errors[0].place = nudge, 10.0 * nudge
     time, end = 0.0, 0.99875e-3
     while time < end:
-        here = work.motion[at.NOW, 0]
-        step = min(0.15 * here[at.X] / max(-here[at.VX], 1e-2), end - time)
+        x, speed = work.place[at.NOW, 0, at.X], work.velocity[at.NOW, 0, at.X]
+        step = min(0.15 * x / max(-speed, 1e-2), end - time)
         assert scene.step(step) >= 0.0
         assert scene.terms > 0
         scene.linked(take_new_state)(work)
-        scene.clock[at.TIME] = time = time + step
-        work.motion[at.DEVIATION] = 0.0
-        sums = work.bodies[0]
-        sums[at.ERROR_PLACE] += step * sums[at.ERROR_SPEED]
+        scene.clock.time = time = time + step
+        work.place[at.DEVIATION] = work.velocity[at.DEVIATION] = 0.0
+        sums = work.errors[0]
+        sums.place += step * sums.speed
         scene.call(carry_vector, scene.clock, step)
     place = pulled(1e-5, time)
     true = pulled(1e-5 + nudge, time) - place
-    assert work.motion[at.NOW, 0, at.X] == pytest.approx(place, rel=1e-3)
+    assert work.place[at.NOW, 0, at.X] == pytest.approx(place, rel=1e-3)
     assert true > 30.0 * nudge
-    assert work.motion[at.CARRIED, 0, at.X] == pytest.approx(true, rel=0.2)
-    assert work.bodies[0, at.ERROR_PLACE] > 5.0 * true
+    assert work.place[at.CARRIED, 0, at.X] == pytest.approx(true, rel=0.2)
+    assert work.errors[0].place > 5.0 * true

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators import DormandPrince54, Implicit, Status
@@ -41,4 +40,4 @@ def test_drag_and_friction_together_come_to_rest():
     forces = [Gravity(), StokesDrag(), Contact(friction=MU)]
     run = System([floor, body], forces, Implicit()).run(5e-3, max_steps=5000)
     assert run.status == Status.FINISHED
-    assert np.abs(run.velocity[-1, 1, [0, 1]]).max() < 1e-8 and at.VY == 4
+    assert np.abs(run.velocity[-1, 1, [0, 1]]).max() < 1e-8

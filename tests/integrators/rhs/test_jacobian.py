@@ -51,38 +51,36 @@ class Differences:
         self.fast.loads(slips)
         self.scene, self.work = self.fast.scene, self.fast.work
         if not moving:
-            self.work.motion[at.NOW, :, 3:] = 0.0
+            self.work.velocity[at.NOW] = 0.0
         self.evaluate = system.compose(entry=forces_in_first, jit=False)
         self.assemble = system.compose(entry=derivatives_now, jit=False)
 
     @property
     def lever(self):
         """How far the outlines move for a unit of each coordinate (3n,)."""
-        return (self.scene.bodies[:, at.BOUNDING_RADIUS, None] ** [0, 0, 1]).ravel()
+        return (self.scene.bodies["bounding_radius"][:, None] ** [0, 0, 1]).ravel()
 
     def carried(self, body, axis):
         """Change of every pair's displacement for a unit of a coordinate."""
         work = self.work
-        kept = work.motion[at.NOW, :, 3:].copy()
-        work.motion[at.NOW, :, 3:] = 0.0
-        work.motion[at.NOW, body, 3 + axis] = 1.0
-        rows = range(work.tally[at.CANDIDATES])
-        rates = [
-            tangential_rate(work, at.NOW, row) * work.candidates[row, at.CLOSED] for row in rows
-        ]
-        work.motion[at.NOW, :, 3:] = kept
+        kept = work.velocity[at.NOW].copy()
+        work.velocity[at.NOW] = 0.0
+        work.velocity[at.NOW, body, axis] = 1.0
+        rows = range(work.tally.candidates)
+        rates = [tangential_rate(work, at.NOW, row) * work.candidates[row].closed for row in rows]
+        work.velocity[at.NOW] = kept
         return np.array(rates)
 
     def loads(self, body, axis, by):
         """All forces (3n,) with one coordinate (axis 0–2) or velocity (3–5) changed."""
         work = self.work
-        work.motion[at.FIRST_STAGE] = work.motion[at.NOW]
-        work.motion[at.FIRST_STAGE, body, axis] += by
+        at.put_motion(work, at.FIRST_STAGE, at.motion_of(work, at.NOW))
+        (work.place, work.velocity)[axis // 3][at.FIRST_STAGE, body, axis % 3] += by
         work.slip[at.FIRST_STAGE] = work.slip[at.NOW]
         if axis < 3:
-            work.slip[at.FIRST_STAGE, : work.tally[at.CANDIDATES]] += by * self.carried(body, axis)
+            work.slip[at.FIRST_STAGE, : work.tally.candidates] += by * self.carried(body, axis)
         self.evaluate(self.scene, work)
-        return work.rates[at.FIRST_STAGE, :, 3:].ravel().copy()
+        return work.force[at.FIRST_STAGE].ravel().copy()
 
     def measured(self, part, size):
         """Minus the derivatives by places (part 0) or velocities (part 3), per metre of outline."""

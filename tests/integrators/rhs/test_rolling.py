@@ -32,9 +32,9 @@ def placed(shapes, places):
 
 def gone(scene, work, places):
     """How far every listed pair has rolled when the bodies have got to other places."""
-    work.motion[LATER, :, :3] = places
+    work.place[LATER] = places
     locate_contacts(scene, work, LATER)
-    rows = range(work.tally[at.CANDIDATES])
+    rows = range(work.tally.candidates)
     besides = [0.5 * rolled_besides(scene, work, LATER, row) for row in rows]
     return np.array([rolled(scene, work, LATER, row) for row in rows]) + besides
 
@@ -54,7 +54,7 @@ def test_a_doublet_that_turns_as_one_has_no_displacement(shapes, angle):
 def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.4e-6, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [7e-7, 3.4e-6, 0.0]]))
-    closed = work.geometry[at.NOW, : len(found), at.GAP] < 0.0
+    closed = work.geometry[at.NOW, : len(found)]["gap"] < 0.0
     assert closed.sum() == 1
     assert abs(found[closed][0]) == pytest.approx(7e-7, rel=1e-12)
 
@@ -62,5 +62,5 @@ def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
 def test_a_ball_that_rolls_on_an_edge_without_slipping_has_none():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.5e-6 - 1e-12, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [5e-7, 3.5e-6 - 1e-12, -0.5]]))
-    closed = work.geometry[at.NOW, : len(found), at.GAP] < 0.0
+    closed = work.geometry[at.NOW, : len(found)]["gap"] < 0.0
     assert abs(found[closed][0]) < 1e-12

@@ -44,7 +44,7 @@ def at_start(forces):
 def stepped(scene, work, step):
     """The clock behind a step of this length [s], whose matrices are factorised."""
     clock = Implicit(1e-9).fresh_clock()
-    clock[at.STAGED_STEP] = step
+    clock.staged_step = step
     gather_clusters(scene, work)
     assert factorise_systems(scene, work, step)
     return clock
@@ -54,12 +54,12 @@ def carried(forces, place, speed, until, steps):
     """(x, vx) of an error that starts as such, carried on with no error of the steps' own."""
     scene, work = at_start(forces)
     # No sum stands in the way.
-    work.bodies[0, at.ERROR_PLACE] = work.bodies[0, at.ERROR_SPEED] = 1.0
-    work.motion[at.CARRIED, 0, [0, 3]] = place, speed
+    work.errors[0].place = work.errors[0].speed = 1.0
+    work.place[at.CARRIED, 0, 0], work.velocity[at.CARRIED, 0, 0] = place, speed
     clock = stepped(scene, work, until / steps)
     for _ in range(steps):
         carry_error(scene, work, clock, until / steps)
-    return work.motion[at.CARRIED, 0, [0, 3]]
+    return np.array([work.place[at.CARRIED, 0, 0], work.velocity[at.CARRIED, 0, 0]])
 
 
 @pytest.mark.parametrize(("steps", "precision"), [(5, 0.1), (50, 2e-3)])
@@ -74,7 +74,7 @@ def test_an_error_goes_on_as_the_motion_does(steps, precision):
 
 def test_drag_uses_up_an_error_of_velocity():
     scene, work = at_start([StokesDrag()])
-    tau = scene.bodies[0, at.MASS] / work.jacobian[at.DAMPING, 0, 0, 0]
+    tau = scene.bodies[0].mass / work.jacobian[at.DAMPING, 0, 0, 0]
     place, speed = carried([StokesDrag()], 0.0, 1e-6, 30.0 * tau, 300)
     assert place == pytest.approx(1e-6 * tau, rel=1e-3)
     assert abs(speed) < 1e-12
@@ -134,9 +134,9 @@ def test_what_a_contact_takes_up_is_no_longer_stated():
     run = system.begin(2e-4, jit=False)
     run.to_end()
     exact = attrs.evolve(system, integrator=Implicit(1e-13)).run(2e-4, jit=False)
-    states = run.work.bodies
-    sums = system.integrator.estimate_share * states[:, at.ERROR_PLACE]
-    sums += stated_error.OF_SWITCHES * states[:, at.SWITCH_PLACE]
+    errors = run.work.errors
+    sums = system.integrator.estimate_share * errors["place"]
+    sums += stated_error.OF_SWITCHES * errors["switch_place"]
     true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
-    assert abs(run.work.motion[at.CARRIED, 1, at.Y]) < 0.05 * sums.max()
+    assert abs(run.work.place[at.CARRIED, 1, at.Y]) < 0.05 * sums.max()
     assert true <= run.error <= sums.max()

@@ -46,7 +46,7 @@ class Pair:
         self.scene, self.work = self.fast.scene, self.fast.work
 
     def place(self, x, y, angle):
-        self.work.motion[at.NOW, 1, :3] = x, y, angle
+        self.work.place[at.NOW, 1] = x, y, angle
 
     def loads(self, x, y, angle):
         """Forces and torques (2, 3) with the second body there."""
@@ -67,17 +67,17 @@ class Pair:
 
     def gaps(self):
         """(g̃, gaps of all pairs that have a share) where the forces were last asked for."""
-        end = int(self.work.tally[at.CANDIDATES])
-        near = self.work.candidates[:end, at.NEAR] == 1
-        return soften(self.scene, self.work, at.NOW, 0, end)[0], self.work.geometry[
-            at.NOW, :end, at.GAP
+        end = int(self.work.tally.candidates)
+        near = self.work.candidates[:end]["near"] == 1
+        return soften(self.scene, self.work, at.NOW, 0, end)[0], self.work.geometry[at.NOW, :end][
+            "gap"
         ][near]
 
     def closest(self):
         """Vertex and edge that have the largest share in g̃."""
-        end = int(self.work.tally[at.CANDIDATES])
-        row = np.argmax(self.work.geometry[at.NOW, :end, at.SHARE])
-        return tuple(self.work.candidates[row, :4])
+        end = int(self.work.tally.candidates)
+        row = np.argmax(self.work.geometry[at.NOW, :end]["share"])
+        return self.work.candidates[row].tolist()[:4]
 
     def strength(self, gap):
         """What the force's kernel gives for a gap [N]."""

@@ -24,12 +24,12 @@ def fast():
 
 def softening(scene):
     """ε [m] of the two bodies."""
-    return CENTRE_SOFTENING * sum(scene.bodies[:, at.EQUIVALENT_RADIUS])
+    return CENTRE_SOFTENING * sum(scene.bodies["equivalent_radius"])
 
 
 def attraction(fast, x, y):
     """Force (2,) on the second body with its centroid there."""
-    fast.work.motion[at.NOW, 1, :2] = x, y
+    fast.work.place[at.NOW, 1, :2] = x, y
     return fast.loads()[1, :2]
 
 

@@ -1,0 +1,45 @@
+"""Records: rows of numbers whose names say what they are, the same for plain Python and for numba.
+
+A subclass of Record declares its fields, one in a line, as ``float`` or ``int``. ``dtype`` is
+numpy's structured type of them; an element of an array of that type (``rows``), or a record alone
+(``one``), is read and written by name: ``clock.time``, ``contacts[row].slip_offset``. The classes
+are never instantiated: they are what type checkers take such an element for.
+"""
+
+from typing import Any, ClassVar, Self, get_type_hints
+
+import numpy as np
+
+KINDS = {float: "f8", int: "i8"}
+"""What a declared type is in an array."""
+
+
+class Record:
+    """Fields with names; see the module."""
+
+    dtype: ClassVar[np.dtype[Any]]
+
+    def __init_subclass__(cls) -> None:
+        fields = [
+            (name, KINDS[kind]) for name, kind in get_type_hints(cls).items() if kind in KINDS
+        ]
+        cls.dtype = np.dtype((np.record, np.dtype(fields, align=True)))
+
+    @classmethod
+    def one(cls) -> Self:
+        """Return a record of zeros."""
+        return cls.rows(1)[0]
+
+    @classmethod
+    def rows(cls, *shape: int) -> Any:
+        """Return an array of records of zeros."""
+        return np.zeros(shape, dtype=cls.dtype)
+
+
+def clear(value: Any) -> None:
+    """Set an array of numbers or of records, or a record, to zero."""
+    if isinstance(value, np.record):
+        for name in value.dtype.names or ():
+            value[name] = 0
+    else:
+        value[...] = np.zeros((), dtype=value.dtype)
