@@ -109,7 +109,7 @@ def entangled(rng, friction):
         apart = rng.uniform(4e-6, 15e-6)
         places = [(0.0, 0.0, turns[0]), (apart * math.cos(way), apart * math.sin(way), turns[1])]
         two = TwoBodies(shapes, places, [Contact(friction=friction)])
-        gaps = [two.work.geometry[0, row, 2] for row in range(two.work.tally.candidates)]
+        gaps = [two.work.geometry[0, row].gap for row in range(two.work.tally.candidates)]
         if gaps and -2e-6 < min(gaps) < 0.0:
             return shapes, np.array(places), two
 

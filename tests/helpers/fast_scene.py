@@ -105,12 +105,12 @@ class FastScene:
         return {
             key: row
             for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)
-            if row[2] < 0.0
+            if row.gap < 0.0
         }
 
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""
-        nx, ny, across, along = row[0], row[1], row[3], row[4]
+        nx, ny, across, along = row.normal_x, row.normal_y, row.vertex_arm_n, row.vertex_arm_t
         x, y = self.work.place[at.NOW, key[0], :2]
         return np.array([x + along * nx + across * ny, y + along * ny - across * nx])
 

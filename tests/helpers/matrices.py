@@ -7,7 +7,7 @@ from flocsim.integrators.rhs.blocks import lower_block, upper_block
 
 def whole_matrix(work, which):
     """DAMPING or STIFFNESS (3 n, 3 n), from its blocks."""
-    n, blocks = len(work.bodies), work.jacobian[which]
+    n, blocks = len(work.poses), work.jacobian[which]
     matrix = np.zeros((n, 3, n, 3))
     for body in range(n):
         matrix[body, :, body] = blocks[body]

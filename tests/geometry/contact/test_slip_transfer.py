@@ -39,7 +39,7 @@ def pull(work):
     total = 0.0
     for row in range(work.tally.candidates):
         side = 1.0 if work.candidates[row].vertex_body == 1 else -1.0
-        total -= side * work.slip[at.NOW, row] * -work.geometry[at.NOW, row, 1]
+        total -= side * work.slip[at.NOW, row] * -work.geometry[at.NOW, row].normal_y
     return total
 
 
@@ -84,7 +84,7 @@ def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
 
 def forget(scene, work):
     """What no hand-over would do: an opening pair loses its displacement."""
-    opened = work.geometry[at.NOW, : work.tally.candidates, 2] >= 0.0
+    opened = work.geometry[at.NOW, : work.tally.candidates]["gap"] >= 0.0
     work.slip[at.NOW, : work.tally.candidates][opened] = 0.0
 
 
@@ -125,7 +125,7 @@ def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     energy = np.sum(work.slip[at.NOW] ** 2)
     hand_over(scene, work)
     assert np.sum(work.slip[at.NOW] ** 2) <= energy * (1.0 + 1e-12)
-    opened = work.geometry[at.NOW, :rows, 2] >= 0.0
+    opened = work.geometry[at.NOW, :rows]["gap"] >= 0.0
     assert not work.slip[at.NOW, :rows][opened].any()
 
 

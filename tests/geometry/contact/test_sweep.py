@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from flocsim.arrays import BodyPair
 from flocsim.geometry.contact.body_pairs import (
     DISC_COLUMNS,
     MOVES,
@@ -36,9 +37,9 @@ def found(discs, box, order=None):
     """The near pairs by the sweep."""
     count = len(discs)
     order = np.arange(count) if order is None else order
-    pairs = np.zeros((count * count, 2), dtype=int)
+    pairs = BodyPair.rows(count * count)
     total = near_pairs(discs, order, *box, np.zeros(count + 1, dtype=int), pairs)
-    return [tuple(pair) for pair in pairs[:total].tolist()]
+    return [(pair.later, pair.earlier) for pair in pairs[:total]]
 
 
 @pytest.mark.parametrize("box", BOXES)

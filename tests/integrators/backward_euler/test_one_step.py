@@ -175,7 +175,7 @@ def energy_of(stage, bodies, contact):
     free = np.array([not body.fixed for body in bodies])
     work = stage.work
     rows = np.arange(work.tally.candidates)
-    overlap = np.maximum(-work.geometry[at.NOW, rows].gap, 0.0)
+    overlap = np.maximum(-work.geometry[at.NOW, rows]["gap"], 0.0)
     slip = np.where(overlap > 0.0, work.slip[at.NOW, rows], 0.0)
     shear = 0.0 if contact.frictionless else contact.k_t
     springs = contact.k_n * np.sum(overlap**2) + shear * np.sum(slip**2)

@@ -68,13 +68,13 @@ def wandering(seed):
 def worst_margin(scene, work, shares):
     """The least of all that must not become negative, at every share [m]."""
     rows = work.tally.candidates
-    closed = work.geometry[at.NOW, :rows, 2] < 0.0
+    closed = work.geometry[at.NOW, :rows]["gap"] < 0.0
     worst = []
     for share in shares:
         for body in range(len(scene.bodies)):
             interpolate(work, 1.0, share, body)
         locate_contacts(scene, work, at.TRIAL)
-        gaps = work.geometry[at.TRIAL, :rows, 2]
+        gaps = work.geometry[at.TRIAL, :rows]["gap"]
         worst.append(np.where(closed, -gaps, gaps).min(initial=math.inf))
     return np.array(worst)
 

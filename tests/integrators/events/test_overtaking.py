@@ -54,7 +54,7 @@ def between(gaps, step, closed=True):
     for state, values in zip((at.NOW, at.NEW), gaps, strict=True):
         for row, value in zip((touching[0], touching[-1]), values, strict=True):
             work.geometry[state, row].gap = value
-    assert len(touching) > 1 and (work.candidates[touching].closed == at.TOUCHES).all()
+    assert len(touching) > 1 and (work.candidates[touching]["closed"] == at.TOUCHES).all()
     clock = Implicit(1e-9).fresh_clock()
     clock.across = 0.0 if closed else 1.0
     return overtakes(scene, work, clock, step)

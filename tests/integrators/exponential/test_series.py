@@ -129,7 +129,7 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     errors grow with it."""
     system = System([Body(Sphere(R), (1e-5, 0.0), surface_density=2.0)], [Pull()], Implicit())
     scene, clock = Linked(system), Implicit().fresh_clock()
-    scene.clock[:], work, nudge = clock, scene.work, 1e-13
+    scene.clock, work, nudge = clock, scene.work, 1e-13
     scene.clock.until = 1.0
     work.place[at.CARRIED, 0, at.X], work.errors[0].place = nudge, 10.0 * nudge
     time, end = 0.0, 0.99875e-3
