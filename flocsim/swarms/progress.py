@@ -299,7 +299,7 @@ class Progress:
         self.gone |= gone
         self.free &= ~gone
         swarm = self.swarm
-        swarm.bodies[gone].free = swarm.bodies[gone].mass = 0.0
+        swarm.bodies["free"][gone] = swarm.bodies["mass"][gone] = 0.0
 
     def let_leave(self) -> None:
         """Deal with what has left the box, as ``leaving`` says."""

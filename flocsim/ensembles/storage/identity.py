@@ -74,7 +74,8 @@ def method_facts(config):
     # A class of the user's own may have these as properties, whose code no kernel reaches.
     for name in ("tolerance", "first_step", "largest_step"):
         facts[f"integrator.{name}"] = plain(getattr(method, name))
-    starts = [*method.fresh_clock(), *method.fresh_counts(config.integrator.max_steps)]
+    clock, counts = method.fresh_clock(), method.fresh_counts(config.integrator.max_steps)
+    starts = [*clock.tolist(), *counts.tolist()]
     facts["start.the integrator"] = digest(np.array(starts, float))
     facts["integrator.name"] = config.integrator.label
     return facts

@@ -302,10 +302,10 @@ class Falling:
 
     def seen(self, x, y, vx=0.0, vy=0.0, spin=0.0, collided=True):
         """What the observer says with the body there, at so much more than its settling speed."""
-        motion = at.motion_of(self.work, at.NOW)
-        motion[0, :] = 0.0
-        motion[1, :3] = *(np.array([x, y]) + self.origin), 0.0
-        motion[1, 3:] = vx, vy - self.fall, spin
+        place, velocity = self.work.place[at.NOW], self.work.velocity[at.NOW]
+        place[0] = velocity[0] = 0.0
+        place[1] = *(np.array([x, y]) + self.origin), 0.0
+        velocity[1] = vx, vy - self.fall, spin
         self.work.budget[:] = -1.0
         assert list_candidates(self.scene, self.work)
         locate_contacts(self.scene, self.work, at.NOW)
