@@ -7,16 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import water
-from flocsim.arrays import (
-    NO_LAYER,
-    NO_OUTLINES,
-    RESISTANCE_COLUMNS,
-    UNSHIELDED,
-    BodyConstants,
-    Scene,
-)
 from flocsim.constants import (
     ROOM_TEMPERATURE,
     WATER_DENSITY,
@@ -41,6 +32,8 @@ from flocsim.geometry.contact.compounds import outlines_of
 from flocsim.geometry.shapes.pieces import pieces_of_bodies
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import LAWS
+from flocsim.state.bodies import RESISTANCE_COLUMNS, UNSHIELDED, BodyConstants
+from flocsim.state.scene import NEAR_CUT, NO_LAYER, NO_OUTLINES, Scene
 
 NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""
@@ -315,5 +308,5 @@ def scene_of(
         layer=layer,
         **others,
     )
-    reach = max(scene.surface_reach, scene.water[at.NEAR_CUT] or -1.0)
+    reach = max(scene.surface_reach, scene.water[NEAR_CUT] or -1.0)
     return scene._replace(listed_reach=reach)

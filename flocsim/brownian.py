@@ -18,9 +18,7 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import hooks
-from flocsim.arrays import PairView, work_of
 from flocsim.body import Body, Fluid
 from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
@@ -37,6 +35,9 @@ from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.views import centre_line
 from flocsim.io.confidence import wilson
 from flocsim.run import Run
+from flocsim.state.bodies import ANGLE, X
+from flocsim.state.views import PairView
+from flocsim.state.work import NOW, work_of
 from flocsim.system import System
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -112,9 +113,9 @@ def repulsion_of_circles(
 def pushes(scene, work, total, gaps, found):
     """The force on the second of two spheres away from the first, at each gap, into ``found``."""
     for k in range(len(gaps)):
-        work.place[at.NOW, 1, at.X] = total + gaps[k]
+        work.place[NOW, 1, X] = total + gaps[k]
         evaluate_as_they_lie(scene, work)
-        found[k] = work.force[at.NOW, 1, at.X]
+        found[k] = work.force[NOW, 1, X]
 
 
 class Profile:
@@ -211,7 +212,7 @@ def always(observed):
 
 def watch_meeting(scene, work, observed, time):
     """The observer: 0 to go on, TOUCHED or ESCAPED."""
-    _, _, distance = centre_line(scene, work, at.NOW, 1, 0)
+    _, _, distance = centre_line(scene, work, NOW, 1, 0)
     if distance >= observed[ESCAPE]:
         return ESCAPED
     return TOUCHED if gap_between(scene, work, 1, 0) <= 0.0 else 0
@@ -291,7 +292,7 @@ def placed(first: Run, near: float, seed: int, replicate: int) -> Run:
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
     numbers = 2.0 * np.pi * np.random.Generator(np.random.Philox(stream)).random(3)
     run.scene = first.scene._replace(key=key_of(seed, replicate))
-    run.work.place[at.NOW] = run.work.velocity[at.NOW] = 0.0
-    run.work.place[at.NOW, :, at.ANGLE] = numbers[:2]
-    run.work.place[at.NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
+    run.work.place[NOW] = run.work.velocity[NOW] = 0.0
+    run.work.place[NOW, :, ANGLE] = numbers[:2]
+    run.work.place[NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])
     return run

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import ContactView, PairView
 from flocsim.forces import check
 from flocsim.forces.base import BodyForce, ContactForce, names_of
 from flocsim.forces.outline import layer_along
 from flocsim.forces.pair_resistance import PairResistance
 from flocsim.forces.settling import lone_view
 from flocsim.plausibility import all_settled, plausibility_warnings, settled
+from flocsim.state.views import ContactView, PairView
 
 STIFF = 100.0
 """A scale this much shorter than the slowest one is stiff."""

@@ -22,10 +22,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.compiler.composer import compile_law
 from flocsim.compiler.fingerprint import Intrinsic
 from flocsim.compiler.linker import apart
+from flocsim.state.views import (
+    BodyView,
+    ContactView,
+    OrientedView,
+    OutlineView,
+    PairView,
+    PlainBodyView,
+)
 
 Function = TypeVar("Function", bound=Callable)
 
@@ -233,11 +240,11 @@ def outline_pressure(scene, view):
 
 
 VIEWS = (
-    *(at.BodyView,) * 3,
-    *(at.PairView,) * 4,
-    *(at.ContactView,) * 4,
-    at.OutlineView,
-    at.OrientedView,
+    *(BodyView,) * 3,
+    *(PairView,) * 4,
+    *(ContactView,) * 4,
+    OutlineView,
+    OrientedView,
 )
 """What each law is given, beside the parameters; those of bodies may be PlainBodyViews."""
 
@@ -247,7 +254,7 @@ NUMBERS = 3, 9, 9, 1, 2, 1, 2, 2, 10, 1, 1, 1, 1
 
 def view_of(index: int, plain: bool) -> Any:
     """What a law is given; ``plain``: whether no kernel reads the numbers of shapes."""
-    return at.PlainBodyView if plain and VIEWS[index] is at.BodyView else VIEWS[index]
+    return PlainBodyView if plain and VIEWS[index] is BodyView else VIEWS[index]
 
 
 @functools.cache

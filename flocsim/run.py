@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import Scene, Work, copy_of, counts_as_pair, with_room
 from flocsim.compiler.composer import compose
 from flocsim.compiler.linker import where
 from flocsim.forces.check import asked_at
@@ -24,6 +22,9 @@ from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.rhs.orientation import oriented_now
 from flocsim.integrators.rhs.surface_gap import flag_near, run_end, surface_view
 from flocsim.integrators.rhs.views import body_view, centre_view, contact_view
+from flocsim.state.clock import NOT_COMPILED, NOTHING_FULL
+from flocsim.state.scene import Scene
+from flocsim.state.work import NOW, Work, copy_of, counts_as_pair, motion_of, put_motion, with_room
 
 STEPS_AT_A_TIME = 5_000
 """Steps between two looks at whether to go on: some 50 ms."""
@@ -47,8 +48,8 @@ MAY_BE_INFINITE = ("slip_limit", "contact_event")
 def with_more(driver: Any, work: Work) -> tuple[Callable[..., int], Work]:
     """An engine and its arrays with what was lacking (Tally.full): with what it had left
     out until a run needs it, or with room."""
-    if work.tally.full == at.NOT_COMPILED:
-        work.tally.full = at.NOTHING_FULL
+    if work.tally.full == NOT_COMPILED:
+        work.tally.full = NOTHING_FULL
         return driver.whole, work
     return driver, with_room(work)
 
@@ -83,7 +84,7 @@ class Run:
 
     def row_now(self) -> np.ndarray:
         """Time and state now, as one row of a record."""
-        return np.concatenate([[self.clock.time], at.motion_of(self.work, at.NOW).ravel()])[None]
+        return np.concatenate([[self.clock.time], motion_of(self.work, NOW).ravel()])[None]
 
     def advance(self, steps: int | None = None) -> Status:
         """Go on for so many steps: PAUSED, or the Status with which the run has ended for good.
@@ -177,7 +178,7 @@ class Run:
 def locate(scene: Any, work: Work) -> bool:
     """List the pairs of outlines that are near, and where they are; False without room."""
     room = list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     return room
 
 
@@ -189,20 +190,20 @@ def views_of(
     bodies = range(len(system.bodies))
     pairs = [(a, b) for a in bodies for b in range(a) if counts_as_pair(scene.bodies, a, b)]
     views = {
-        "body": [body_view(scene, work, time, at.NOW, body) for body in bodies],
-        "centre": [centre_view(scene, work, time, at.NOW, a, b) for a, b in pairs],
+        "body": [body_view(scene, work, time, NOW, body) for body in bodies],
+        "centre": [centre_view(scene, work, time, NOW, a, b) for a, b in pairs],
         "oriented": [oriented_now(scene, work, time, a, b) for a, b in pairs],
     }
     if located(scene, work):
         rows = range(work.tally.candidates)
-        touching = [row for row in rows if work.geometry[at.NOW, row].gap < 0.0]
-        flag_near(scene, work, at.NOW, 0.0)
+        touching = [row for row in rows if work.geometry[NOW, row].gap < 0.0]
+        flag_near(scene, work, NOW, 0.0)
         first, views["surface"] = 0, []
         while first < len(rows):
             end = run_end(work, first)
-            views["surface"].append(surface_view(scene, work, time, at.NOW, first, end))
+            views["surface"].append(surface_view(scene, work, time, NOW, first, end))
             first = end
-        views["contact"] = [contact_view(scene, work, at.NOW, row) for row in touching]
+        views["contact"] = [contact_view(scene, work, NOW, row) for row in touching]
     return views
 
 
@@ -259,7 +260,7 @@ def force_to_blame(system: Any, run: Run) -> str:
     """The force of a System that gives NaN, or more than LARGEST, where a Run has ended, in words;
     or ""."""
     scene: Any = system.scene(jit=False)
-    start = at.motion_of(run.work, at.NOW)
+    start = motion_of(run.work, NOW)
     if not np.isfinite(start).all():
         return ""
     work = copy_of(run.work)
@@ -268,8 +269,8 @@ def force_to_blame(system: Any, run: Run) -> str:
     classes = [type(force) for force in used.values()]
     located = compose(locate, system.fillings(), jit=False)
     for ahead in AHEAD:
-        at.put_motion(work, at.NOW, start)
-        work.place[at.NOW] += ahead * work.velocity[at.NOW]
+        put_motion(work, NOW, start)
+        work.place[NOW] += ahead * work.velocity[NOW]
         views = views_of(system, scene, work, run.clock.time + ahead, located)
         for name, force, own in pieces:
             words = wrong_answer(force, own, views, system.fluid)

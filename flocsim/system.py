@@ -11,8 +11,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import NO_OUTLINES, Scene, copy_of, work_of
 from flocsim.body import Body, Fluid, of_forces, scene_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import KernelError, KernelWarning, PlausibilityWarning, UsageError
@@ -36,6 +34,8 @@ from flocsim.integrators.left_out import left_out
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import plausibility_warnings
 from flocsim.run import UNABLE, Run, force_to_blame
+from flocsim.state.scene import NO_OUTLINES, Scene
+from flocsim.state.work import NOW, copy_of, work_of
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 
@@ -292,7 +292,7 @@ class System:
                           KernelWarning, stacklevel=2)  # fmt: skip
         growth = None
         if amplification:
-            growth = self.amplification(run.time, run.work.place[at.NOW], max_steps, jit=jit)
+            growth = self.amplification(run.time, run.work.place[NOW], max_steps, jit=jit)
         legs = ((run.steps, end),)
         origin = Origin(self.bodies, self.forces, self.fluid, self.integrator, fresh, run, legs)
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
@@ -353,7 +353,7 @@ class System:
         def companion(bodies: list[Body]) -> np.ndarray | None:
             run = attrs.evolve(self, bodies=bodies).begin(until, max_steps=max_steps, jit=jit)
             ended = run.to_end() == Status.FINISHED
-            return run.work.place[at.NOW] if ended else None
+            return run.work.place[NOW] if ended else None
 
         return amplification_of(self.bodies, end, companion, nudge)
 

@@ -36,7 +36,7 @@ ROWS = [
     ["hydrodynamics"],
     ["geometry"],
     ["hooks"],
-    ["arrays"],
+    ["state"],
     ["compiler", "fields", "water"],
     ["constants", "errors", "process"],
 ]
@@ -52,6 +52,12 @@ INNER_ROWS = {
         ["processor"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
+    "state": [
+        ["work"],
+        ["scene"],
+        ["bodies", "clock", "contacts", "outlines", "views"],
+        ["records"],
+    ],
     "swarms": [
         ["swarm"],
         ["progress"],

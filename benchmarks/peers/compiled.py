@@ -6,7 +6,6 @@ listed pair.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import hand_over, list_ahead, outline_speed, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import observe
@@ -14,6 +13,7 @@ from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.loop.driver import too_deep
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import NOW
 
 
 def read_state(work, vector):
@@ -21,31 +21,31 @@ def read_state(work, vector):
     bodies = work.place.shape[1]
     for body in range(bodies):
         for axis in range(3):
-            work.place[at.NOW, body, axis] = vector[6 * body + axis]
-            work.velocity[at.NOW, body, axis] = vector[6 * body + 3 + axis]
+            work.place[NOW, body, axis] = vector[6 * body + axis]
+            work.velocity[NOW, body, axis] = vector[6 * body + 3 + axis]
     for row in range(work.tally.candidates):
-        work.slip[at.NOW, row] = vector[6 * bodies + row]
+        work.slip[NOW, row] = vector[6 * bodies + row]
 
 
 def rate_state(scene, work, time, vector, rates):
     """Derivative of a state vector by time, every listed pair flagged as it is there."""
     read_state(work, vector)
-    locate_and_rate(scene, work, at.NOW)
-    sum_forces(scene, work, time, at.NOW)
+    locate_and_rate(scene, work, NOW)
+    sum_forces(scene, work, time, NOW)
     bodies = work.place.shape[1]
     for body in range(bodies):
         for axis in range(3):
             gain = scene.bodies[body].free / inertia(scene, body, axis)
             rates[6 * body + axis] = vector[6 * body + 3 + axis]
-            rates[6 * body + 3 + axis] = gain * work.force[at.NOW, body, axis]
+            rates[6 * body + 3 + axis] = gain * work.force[NOW, body, axis]
     for row in range(work.tally.candidates):
         closed = work.candidates[row].closed == 1
-        rates[6 * bodies + row] = work.slip_rate[at.NOW, row] if closed else 0.0
+        rates[6 * bodies + row] = work.slip_rate[NOW, row] if closed else 0.0
 
 
 def locate_now(scene, work):
     """Geometry and flags of NOW; the smallest gap [m] (inf without pairs)."""
-    least = locate_contacts(scene, work, at.NOW)
+    least = locate_contacts(scene, work, NOW)
     set_modes(scene, work)
     return least
 
@@ -82,6 +82,6 @@ def inspect(scene, work, observed, time, vector, watch):
     least = locate_now(scene, work) if work.tally.candidates > 0 else math.inf
     opened = False
     for row in range(work.tally.candidates):
-        opened = opened or (work.candidates[row].closed == 0 and work.slip[at.NOW, row] != 0.0)
+        opened = opened or (work.candidates[row].closed == 0 and work.slip[NOW, row] != 0.0)
     code = observe(scene, work, observed, time) if watch else 0
-    return spent(scene, work, at.NOW), opened, least, too_deep(scene, work), code
+    return spent(scene, work, NOW), opened, least, too_deep(scene, work), code

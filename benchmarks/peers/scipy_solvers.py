@@ -12,12 +12,11 @@ import numpy as np
 from scipy.integrate import BDF, LSODA, Radau
 from scipy.optimize import brentq
 
-import flocsim.arrays as at
 from benchmarks.peers.compiled import inspect, list_anew, rate_state
 from benchmarks.speed.measure import Measured
-from flocsim.arrays import with_capacity, work_of
 from flocsim.constants import WATER_VISCOSITY
 from flocsim.integrators import VelocityVerlet
+from flocsim.state.work import NOW, motion_of, with_capacity, work_of
 
 SOLVERS = {"LSODA": LSODA, "BDF": BDF, "Radau": Radau}
 
@@ -71,8 +70,8 @@ class SciPyRun:
         """(state vector, longest step) with the pairs listed anew."""
         while (longest := self.pieces[1](self.scene, self.work)) < 0.0:
             self.work = with_capacity(self.work, 2 * len(self.work.candidates))
-        slips = self.work.slip[at.NOW, : self.work.tally.candidates]
-        return np.concatenate([at.motion_of(self.work, at.NOW).ravel(), slips]), longest
+        slips = self.work.slip[NOW, : self.work.tally.candidates]
+        return np.concatenate([motion_of(self.work, NOW).ravel(), slips]), longest
 
     def start_solver(self, method, time, until, tolerance, step):
         """A solver from the present state."""
@@ -139,5 +138,5 @@ class SciPyRun:
             if time.process_time() - began > budget:
                 status = status or "TIME_BUDGET"
         cpu = time.process_time() - began
-        motion = at.motion_of(self.work, at.NOW)
+        motion = motion_of(self.work, NOW)
         return Measured(motion, status or "FINISHED", cpu, steps, 0, self.evaluations), code

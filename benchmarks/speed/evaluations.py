@@ -9,13 +9,12 @@ import time
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from benchmarks.speed.scenes import rolling_pair
-from flocsim.arrays import work_of
 from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
 from flocsim.integrators import Implicit, VelocityVerlet
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import NOW, work_of
 
 STEP = 1e-7
 """Step [s]: at 25 mm/s, the relative drift of Type I under `tang2014`, 2.5 nm."""
@@ -32,11 +31,11 @@ def push(scene, work, step):
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
             gain = step * scene.bodies[body].free / inertia(scene, body, axis)
-            work.velocity[at.NOW, body, axis] += gain * work.force[at.NOW, body, axis]
-            work.place[at.NOW, body, axis] += step * work.velocity[at.NOW, body, axis]
+            work.velocity[NOW, body, axis] += gain * work.force[NOW, body, axis]
+            work.place[NOW, body, axis] += step * work.velocity[NOW, body, axis]
     for row in range(work.tally.candidates):
         if work.candidates[row].closed == 1:
-            work.slip[at.NOW, row] += step * work.slip_rate[at.NOW, row]
+            work.slip[NOW, row] += step * work.slip_rate[NOW, row]
 
 
 def evaluate_and_push(scene, work, step, count, turn):
@@ -46,10 +45,10 @@ def evaluate_and_push(scene, work, step, count, turn):
     """
     touching = 0
     for k in range(count):
-        if spent(scene, work, at.NOW) > 0.5 and not list_candidates(scene, work):
+        if spent(scene, work, NOW) > 0.5 and not list_candidates(scene, work):
             return -1
-        locate_and_rate(scene, work, at.NOW)
-        sum_forces(scene, work, 0.0, at.NOW)
+        locate_and_rate(scene, work, NOW)
+        sum_forces(scene, work, 0.0, NOW)
         hand_over(scene, work)
         for row in range(work.tally.candidates):
             if work.candidates[row].closed == 1:

@@ -5,12 +5,11 @@ import time
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import work_of
 from flocsim.integrators import DormandPrince54, Implicit, VelocityVerlet
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Status
 from flocsim.run import Run
+from flocsim.state.work import NOW, motion_of, work_of
 
 CHUNK = 100_000
 """Steps between two looks at the clock."""
@@ -47,7 +46,7 @@ def run_once(system, driver, until, budget):
             break
     cpu = time.process_time() - began
     name = "TIME_BUDGET" if status == Status.PAUSED else status.name
-    motion = at.motion_of(run.work, at.NOW)
+    motion = motion_of(run.work, NOW)
     return Measured(motion, name, cpu, run.steps, run.rejected, run.evaluations)
 
 

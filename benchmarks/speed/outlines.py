@@ -18,13 +18,13 @@ import numpy as np
 
 from benchmarks.reporting import EXAMPLES, Table, begin
 from flocsim import Body, System
-from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.geometry.contact import charges
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.state.work import work_of
 from tests.integrators.rhs.test_outline_sum import at_gap, rough
 
 GOALS = {16: 1.0, 64: 3.0}

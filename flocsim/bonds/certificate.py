@@ -24,8 +24,6 @@ All forces are those at rest: what resists an opening, as lubrication, holds not
 import math
 from typing import NamedTuple
 
-import flocsim.arrays as at
-from flocsim.arrays import moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point, least_listed_gap, separation
 from flocsim.hooks import (
@@ -41,6 +39,9 @@ from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
 from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
 from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass, pair_view
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.views import moved_contact
+from flocsim.state.work import NOW
 
 NO_BOND, CERTIFICATE, HOOK, REST = range(4)
 """Kinds of bond."""
@@ -76,18 +77,18 @@ class Load(NamedTuple):
 
 def bond_between(scene, work, time, i, j):
     """The Bond of two bodies whose features are listed and located."""
-    nx, ny, distance = centre_line(scene, work, at.NOW, j, i)
+    nx, ny, distance = centre_line(scene, work, NOW, j, i)
     gap = least_listed_gap(work)
     surface = gap
     if scene.surface_reach > 0.0 and work.tally.candidates > 0:
-        flag_near(scene, work, at.NOW, 0.0)
-        surface = surface_view(scene, work, time, at.NOW, 0, work.tally.candidates).gap
+        flag_near(scene, work, NOW, 0.0)
+        surface = surface_view(scene, work, time, NOW, 0, work.tally.candidates).gap
     return Bond(i, j, nx, ny, distance, gap, surface)
 
 
 def is_closed(work, row):
     """Whether a listed pair of features touches now."""
-    return work.geometry[at.NOW, row].gap < 0.0
+    return work.geometry[NOW, row].gap < 0.0
 
 
 def size_of(scene, i, j):
@@ -110,22 +111,22 @@ def speeds_of(scene, work, bond):
     """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
     i, j = bond.i, bond.j
     ux, uy = (
-        work.velocity[at.NOW, j, at.X] - work.velocity[at.NOW, i, at.X],
-        work.velocity[at.NOW, j, at.Y] - work.velocity[at.NOW, i, at.Y],
+        work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
+        work.velocity[NOW, j, Y] - work.velocity[NOW, i, Y],
     )
     rx, ry = bond.nx * bond.distance, bond.ny * bond.distance
-    spin = work.velocity[at.NOW, i, at.ANGLE]
+    spin = work.velocity[NOW, i, ANGLE]
     shear = math.hypot(ux + spin * ry, uy - spin * rx)
-    turning = abs(work.velocity[at.NOW, j, at.ANGLE] - spin) * size_of(scene, i, j)
+    turning = abs(work.velocity[NOW, j, ANGLE] - spin) * size_of(scene, i, j)
     return abs(ux * bond.nx + uy * bond.ny), shear + turning
 
 
 def doublet_pose(scene, work, state, i, j):
     """Place [m] and angle of body j in the frame of i, which turns with it, in a state."""
     x, y = separation(scene, work, state, j, i)
-    turn = work.place[state, i, at.ANGLE]
+    turn = work.place[state, i, ANGLE]
     c, s = math.cos(turn), math.sin(turn)
-    return c * x + s * y, c * y - s * x, work.place[state, j, at.ANGLE] - turn
+    return c * x + s * y, c * y - s * x, work.place[state, j, ANGLE] - turn
 
 
 def way_between(scene, i, j, pose, before):
@@ -145,27 +146,21 @@ def energy_of(scene, work, bond):
     their spins, and twice that of their contacts' springs."""
     i, j = bond.i, bond.j
     ux, uy = (
-        work.velocity[at.NOW, j, at.X] - work.velocity[at.NOW, i, at.X],
-        work.velocity[at.NOW, j, at.Y] - work.velocity[at.NOW, i, at.Y],
+        work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
+        work.velocity[NOW, j, Y] - work.velocity[NOW, i, Y],
     )
     total = 0.5 * effective_mass(scene, i, j) * (ux * ux + uy * uy)
     total += (
-        0.5
-        * scene.bodies[i].inertia
-        * work.velocity[at.NOW, i, at.ANGLE]
-        * work.velocity[at.NOW, i, at.ANGLE]
+        0.5 * scene.bodies[i].inertia * work.velocity[NOW, i, ANGLE] * work.velocity[NOW, i, ANGLE]
     )
     total += (
-        0.5
-        * scene.bodies[j].inertia
-        * work.velocity[at.NOW, j, at.ANGLE]
-        * work.velocity[at.NOW, j, at.ANGLE]
+        0.5 * scene.bodies[j].inertia * work.velocity[NOW, j, ANGLE] * work.velocity[NOW, j, ANGLE]
     )
     if not has(scene, CONTACT_FORCE):
         return total
     for row in range(work.tally.candidates):
         if is_closed(work, row):
-            view = contact_view(scene, work, at.NOW, row)
+            view = contact_view(scene, work, NOW, row)
             normal, tangential = contact_force(scene, resting_contact(view, view.slip))
             total += abs(normal * view.overlap) + abs(tangential * view.slip)
     return total
@@ -289,7 +284,7 @@ def is_held(scene, work, time, bond, load):
     along, shear = speeds_of(scene, work, bond)
     if not along < CALM * load.drift:
         return False
-    mass, spin = effective_mass(scene, bond.i, bond.j), work.velocity[at.NOW, bond.i, at.ANGLE]
+    mass, spin = effective_mass(scene, bond.i, bond.j), work.velocity[NOW, bond.i, ANGLE]
     needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)

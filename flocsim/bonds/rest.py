@@ -27,7 +27,6 @@ Two spheres touch at one point, and no load along their line of centres is carri
 
 import math
 
-import flocsim.arrays as at
 from flocsim.bonds.certificate import (
     CALM,
     HOOK,
@@ -46,6 +45,8 @@ from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.integrators.rhs.views import contact_view
+from flocsim.state.bodies import ANGLE
+from flocsim.state.work import NOW
 
 STILL = 1e-3
 """A pair that has moved by less than this share of the drift's way keeps its pose."""
@@ -68,7 +69,7 @@ def swings(scene, work, i, j, load):
     but may yet be thrown open. One that any load may meet turns with the flow, or its cluster."""
     outer = scene.bodies[i].bounding_radius + scene.bodies[j].bounding_radius
     turns = load.x != 0.0 or load.y != 0.0
-    return turns and abs(work.velocity[at.NOW, i, at.ANGLE]) * outer > CALM * load.drift
+    return turns and abs(work.velocity[NOW, i, ANGLE]) * outer > CALM * load.drift
 
 
 def has_shown(scene, bond, load, rested):
@@ -128,7 +129,7 @@ def grip_of(scene, work):
         return least
     for row in range(work.tally.candidates):
         if is_closed(work, row):
-            view = contact_view(scene, work, at.NOW, row)
+            view = contact_view(scene, work, NOW, row)
             slip, limit = view.overlap, math.inf
             if has(scene, SLIP_LIMIT):
                 limit = slip_limit(scene, resting_contact(view, 0.0))
@@ -145,7 +146,7 @@ def grip_of(scene, work):
 
 def normal_on(work, bond, row):
     """The unit vector along which a contact pushes body j."""
-    geometry = work.geometry[at.NOW, row]
+    geometry = work.geometry[NOW, row]
     x, y = geometry.normal_x, geometry.normal_y
     return (x, y) if work.candidates[row].vertex_body == bond.j else (-x, -y)
 

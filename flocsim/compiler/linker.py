@@ -157,7 +157,7 @@ def loops_apart(function: Callable) -> Callable:
 
 def postponed(stand_in: Callable) -> Callable:
     """Mark a function that few runs reach, and that fills a hook which is compiled apart: until it
-    is reached, ``stand_in`` is called, which tells so (flocsim.arrays: NOT_COMPILED)."""
+    is reached, ``stand_in`` is called, which tells so (flocsim.state.clock: NOT_COMPILED)."""
 
     def mark(function: Callable) -> Callable:
         function.stand_in = stand_in  # type: ignore[attr-defined]

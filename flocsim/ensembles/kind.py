@@ -36,7 +36,7 @@ ROW = np.dtype([(name, f"<{kind}") for name, (kind, _, _) in REPLICATES.items()]
 COLUMNS = tuple(REPLICATES)
 
 PHYSICS = (
-    "body.py", "arrays.py", "system.py", "fields.py", "constants.py", "hooks.py", "run.py",
+    "body.py", "state", "system.py", "fields.py", "constants.py", "hooks.py", "run.py",
     "compiler", "bonds", "hydrodynamics", "forces", "integrators", "geometry/shapes",
     "geometry/contact", "io/results/schema.py", "io/results/events.py",
     "ensembles/collision", "ensembles/study.py",

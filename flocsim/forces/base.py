@@ -1,7 +1,7 @@
 """The kinds of force. A force is a frozen attrs class around one plain kernel.
 
 The kernel is a static method on scalars: its first argument is the view of a body, a pair or a
-contact (flocsim.arrays), the others are the names of its own fields and properties, or of the
+contact (flocsim.state.views), the others are the names of its own fields and properties, or of the
 fluid's (``viscosity``, ``density``, ``flow``). It captures nothing and allocates nothing, so that
 it runs uncompiled for debugging and compiled at the speed of hand-written code. New parameter
 values never recompile.

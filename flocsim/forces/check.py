@@ -12,12 +12,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import BodyView, ContactView, OrientedView, OutlineView, PairView
 from flocsim.body import Fluid
 from flocsim.compiler.fingerprint import globals_read, made_by, tell, wrong_return
 from flocsim.compiler.linker import names_in, refuse_closure, where
 from flocsim.errors import KernelError, closest
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
+from flocsim.state.views import BodyView, ContactView, OrientedView, OutlineView, PairView
 
 SAMPLE_BODIES = (
     BodyView(

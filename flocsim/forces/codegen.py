@@ -13,14 +13,6 @@ from collections.abc import Callable, Iterable, Sequence
 
 import attrs
 
-from flocsim.arrays import (
-    NUMBERS_OF_SHAPES,
-    BodyView,
-    ContactView,
-    PairView,
-    PlainBodyView,
-    moved_contact,
-)
 from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
@@ -41,6 +33,14 @@ from flocsim.forces.outline import (
 from flocsim.forces.pair_resistance import PairResistance, stand_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import LAWS
+from flocsim.state.views import (
+    NUMBERS_OF_SHAPES,
+    BodyView,
+    ContactView,
+    PairView,
+    PlainBodyView,
+    moved_contact,
+)
 
 
 def body_change(view, axis):

@@ -11,7 +11,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import RESISTANCE_COLUMNS
 from flocsim.body import Body, Fluid
 from flocsim.compiler.disk_cache import kept
 from flocsim.compiler.processor import cpu_kind, versions
@@ -22,6 +21,7 @@ from flocsim.geometry.shapes import cores
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import rigid_bodies
 from flocsim.hydrodynamics.rigid_bodies import drag_factor, turning_factor
+from flocsim.state.bodies import RESISTANCE_COLUMNS
 
 STOKES_UP_TO = 1.0
 """Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""

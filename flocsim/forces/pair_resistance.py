@@ -8,7 +8,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.body import Body, Fluid
 from flocsim.compiler.disk_cache import kept
 from flocsim.constants import MINIMUM_GAP
@@ -19,6 +18,17 @@ from flocsim.forces.body_forces import Thermal
 from flocsim.forces.drag import StokesDrag, drag_radius, facts_of, is_permeable
 from flocsim.hydrodynamics import pair, two_spheres
 from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
+from flocsim.state.scene import (
+    CUT,
+    FIRST_RADIUS,
+    FLOOR,
+    FLOW,
+    MEAN_RADIUS,
+    NEAR_CUT,
+    NO_WATER,
+    VISCOSITY,
+    WATER_SIZE,
+)
 
 NEAR = 2.0
 """Gap of the outlines over the mean radius from which relative motion is that at the distance of
@@ -165,7 +175,7 @@ def water_between(
     forces = list(forces)
     force = resistance_of_pairs(forces)
     if force is None or len(bodies) < 2:
-        return at.NO_WATER
+        return NO_WATER
     if len(bodies) > 2:
         refuse_pair_resistance([force], f"a System of {len(bodies)} bodies")
     if any(body.fixed for body in bodies):
@@ -180,12 +190,12 @@ def water_between(
             f"h_min of PairResistance must be {pair.NEAREST:g} to .1 of the mean radius of "
             f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
         )
-    water = np.zeros(at.WATER_SIZE)
-    water[[at.VISCOSITY, at.MEAN_RADIUS, at.FLOOR]] = fluid.viscosity, mean, force.h_min
+    water = np.zeros(WATER_SIZE)
+    water[[VISCOSITY, MEAN_RADIUS, FLOOR]] = fluid.viscosity, mean, force.h_min
     spheres = all(len(body.shape.vertices) == 1 for body in bodies)
-    water[at.CUT], water[at.NEAR_CUT] = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
-    water[at.FLOW : at.FLOW + 6] = fluid.flow
-    water[at.FIRST_RADIUS : at.FIRST_RADIUS + 2] = radii
+    water[CUT], water[NEAR_CUT] = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
+    water[FLOW : FLOW + 6] = fluid.flow
+    water[FIRST_RADIUS : FIRST_RADIUS + 2] = radii
     table = unit_table(second / first) * pair.scales(fluid.viscosity, mean)[:, None]
     return table, water
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import BodyView
 from flocsim.body import Body
 from flocsim.compiler.linker import where
 from flocsim.errors import UsageError
 from flocsim.forces import drag
 from flocsim.forces.codegen import laws_of
+from flocsim.state.views import BodyView
 
 ITERATIONS = 50
 """Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""

@@ -8,8 +8,8 @@ from enum import IntEnum
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import hooks
+from flocsim.state.clock import Clock, Counts
 
 
 class Status(IntEnum):
@@ -74,7 +74,7 @@ class Integrator(ABC):
     ``across``: whether its steps go on across switches instead of ending there, for which they
     flag, as closed, the pairs that have taken part.
 
-    All that a method keeps from one step to the next lies in the arrays of flocsim.arrays, each
+    All that a method keeps from one step to the next lies in the arrays of flocsim.state, each
     column with its unit: a pause, a copy of a run, a System and a Swarm all go on from these.
     """
 
@@ -106,9 +106,9 @@ class Integrator(ABC):
             hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
         }  # fmt: skip
 
-    def fresh_clock(self) -> at.Clock:
+    def fresh_clock(self) -> Clock:
         """The float state of a run that starts at time zero."""
-        clock = at.Clock.one()
+        clock = Clock.one()
         clock.until = math.inf
         clock.step = self.first_step
         clock.tolerance = self.tolerance
@@ -120,9 +120,9 @@ class Integrator(ABC):
         clock.across = float(self.across)
         return clock
 
-    def fresh_counts(self, max_steps: int) -> at.Counts:
+    def fresh_counts(self, max_steps: int) -> Counts:
         """The integer state of a run with a step budget."""
-        counts = at.Counts.one()
+        counts = Counts.one()
         counts.max_steps = max_steps
         counts.pause_at = np.iinfo(np.int64).max
         return counts

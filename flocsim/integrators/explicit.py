@@ -4,7 +4,6 @@ of order 4, and velocity Verlet, of order 2, whose steps are fixed.
 
 import attrs
 
-import flocsim.arrays as at
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
@@ -14,6 +13,7 @@ from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces, take_sta
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import DEVIATION, FIRST_STAGE, NEW, NOW
 
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 """Where the stages lie in the step."""
@@ -38,7 +38,7 @@ ORDER_OF_ESTIMATE = 5.0
 
 def state_of(stage):
     """The state of a stage: the first one is NOW."""
-    return at.NOW if stage == 0 else at.FIRST_STAGE + stage - 1
+    return NOW if stage == 0 else FIRST_STAGE + stage - 1
 
 
 def acceleration_of(scene, work, state, body, axis):
@@ -57,8 +57,8 @@ def combine(scene, work, weights, stages, base, end):
                     state = state_of(stage)
                     way += weights[stage] * work.velocity[state, body, axis]
                     faster += weights[stage] * acceleration_of(scene, work, state, body, axis)
-            work.place[end, body, axis] = base * work.place[at.NOW, body, axis] + way
-            work.velocity[end, body, axis] = base * work.velocity[at.NOW, body, axis] + faster
+            work.place[end, body, axis] = base * work.place[NOW, body, axis] + way
+            work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + faster
 
 
 def combine_slips(scene, work, weights, stages, step, end):
@@ -68,9 +68,7 @@ def combine_slips(scene, work, weights, stages, step, end):
             total = 0.0
             for stage in range(stages):
                 total += weights[stage] * work.slip_rate[state_of(stage), row]
-            work.slip[end, row] = slip_in(
-                scene, work, end, row, work.slip[at.NOW, row] + step * total
-            )
+            work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
 
 
 def times(weights, step):
@@ -111,7 +109,7 @@ class DormandPrince54(Integrator):
         time = clock.time
         evaluate_stages(scene, work, time, step)
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
-        combine(scene, work, times(ESTIMATE, step), 7, 0.0, at.DEVIATION)
+        combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod
@@ -120,7 +118,7 @@ class DormandPrince54(Integrator):
         return step * adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
 
 
-HALFWAY = at.FIRST_STAGE
+HALFWAY = FIRST_STAGE
 """The state whose velocity is that of the middle of the step."""
 
 
@@ -128,22 +126,20 @@ def kick_and_drift(scene, work, step):
     """Half a kick into HALFWAY, whose velocity leads to the place of NEW; NEW has a whole kick."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            speed = work.velocity[at.NOW, body, axis]
-            kick = gain(scene, work, at.NOW, body, axis, step)
+            speed = work.velocity[NOW, body, axis]
+            kick = gain(scene, work, NOW, body, axis, step)
             work.velocity[HALFWAY, body, axis] = speed + 0.5 * kick
-            work.place[at.NEW, body, axis] = work.place[at.NOW, body, axis] + step * (
-                speed + 0.5 * kick
-            )
+            work.place[NEW, body, axis] = work.place[NOW, body, axis] + step * (speed + 0.5 * kick)
             # Drag at the half step's velocity would be half a step late: take a whole kick's.
-            work.velocity[at.NEW, body, axis] = speed + kick
+            work.velocity[NEW, body, axis] = speed + kick
 
 
 def finish_kick(scene, work, step):
     """The velocity of NEW: that of HALFWAY and half a kick at the force of NEW."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            kick = gain(scene, work, at.NEW, body, axis, 0.5 * step)
-            work.velocity[at.NEW, body, axis] = work.velocity[HALFWAY, body, axis] + kick
+            kick = gain(scene, work, NEW, body, axis, 0.5 * step)
+            work.velocity[NEW, body, axis] = work.velocity[HALFWAY, body, axis] + kick
 
 
 def gain(scene, work, state, body, axis, step):
@@ -162,10 +158,10 @@ class VelocityVerlet(FixedStep):
     @staticmethod
     def attempt(scene, work, clock, step):
         """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
-        evaluate(scene, work, clock.time, at.NOW)
+        evaluate(scene, work, clock.time, NOW)
         kick_and_drift(scene, work, step)
         move_slips(scene, work, step)
-        sum_forces(scene, work, clock.time + step, at.NEW)
+        sum_forces(scene, work, clock.time + step, NEW)
         finish_kick(scene, work, step)
         limit_slips(scene, work)
-        return 0.0 if all_finite(work, at.NEW) else -1.0
+        return 0.0 if all_finite(work, NEW) else -1.0

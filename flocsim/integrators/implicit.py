@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import attrs
 
-import flocsim.arrays as at
 from flocsim.fields import quantity
 from flocsim.hooks import (
     choose_method,
@@ -56,6 +55,7 @@ from flocsim.integrators.rhs.stated_error import (
     overlap_error,
 )
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import NEW, NOW, START, TRIAL
 
 ORDER_OF_ESTIMATE = 4.0
 """The estimate goes with this power of the step."""
@@ -102,7 +102,7 @@ def within(work, step, share, body):
     """Write a body's motion at a share of the step into TRIAL."""
     terms = work.tally.series_terms
     if terms > 0:
-        write_at(work, at.START, terms, step, share, at.TRIAL, body, body + 1)
+        write_at(work, START, terms, step, share, TRIAL, body, body + 1)
     else:
         collocate(work, step, share, body)
 
@@ -111,7 +111,7 @@ def end_early(scene, work, step, ratio, share):
     """Make the motion at a share of the step the new state, where it is known well enough."""
     terms = work.tally.series_terms
     if terms > 0:
-        write_at(work, at.START, terms, step, share, at.NEW, 0, work.place.shape[1])
+        write_at(work, START, terms, step, share, NEW, 0, work.place.shape[1])
         return True
     return end_on_the_cubic(scene, work, step, ratio, share)
 
@@ -189,7 +189,7 @@ class Implicit(Integrator):
         if grazes:
             release_gaps(work)
         if grazes or not is_tried_again(scene, clock):
-            evaluate_states(scene, work, time, 0.0, at.NOW, at.NOW + 1)
+            evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
             gather_clusters(scene, work)
             assemble_jacobian(scene, work, time, remaining)
         if not grazes:
@@ -201,7 +201,7 @@ class Implicit(Integrator):
             if not factorise_systems(scene, work, step):
                 return -1.0
             if hold_gaps(scene, work, clock):
-                evaluate_states(scene, work, time, 0.0, at.NOW, at.NOW + 1)
+                evaluate_states(scene, work, time, 0.0, NOW, NOW + 1)
             assemble_jacobian(scene, work, time, remaining)
         if not factorise_systems(scene, work, step):
             return -1.0

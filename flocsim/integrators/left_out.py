@@ -2,7 +2,7 @@
 
 Of few bodies: the search among many, and sparse systems; of two, also the steps across switches
 that Implicit goes over to by itself. All pairs of few bodies are watched, their systems are dense
-(flocsim.arrays: ALL_PAIRS, DENSE), and two are not handed over in a System (backward_euler/
+(flocsim.state.work: ALL_PAIRS, DENSE), and two are not handed over in a System (backward_euler/
 method.py: FEWEST). Of forces: sums along outlines, and the numbers of shapes that slow flow asks
 for, where no force is of that kind: most scenes have neither.
 """
@@ -10,7 +10,6 @@ for, where no force is of that kind: most scenes have neither.
 import math
 from collections.abc import Callable
 
-import flocsim.arrays as at
 from flocsim.geometry.contact import body_pairs
 from flocsim.hooks import choose_method, step_across
 from flocsim.integrators.backward_euler.method import FEWEST
@@ -23,6 +22,7 @@ from flocsim.integrators.rhs import (
     pair_resistance,
     views,
 )
+from flocsim.state.work import DENSE
 
 
 def list_none(scene, work, cut):
@@ -84,7 +84,7 @@ def left_out(
         found |= pair_resistance.LEFT_OUT
     if bodies < FEWEST:
         found |= {choose_method: choose_method, step_across: step_across}
-    if bodies <= at.DENSE:
+    if bodies <= DENSE:
         found |= {
             body_pairs.list_near: list_none,
             body_pairs.wandered: none_wandered,

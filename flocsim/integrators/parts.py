@@ -9,7 +9,6 @@ from collections.abc import Callable
 
 import attrs
 
-from flocsim.arrays import NEW, NOW
 from flocsim.fields import quantity
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
@@ -22,6 +21,7 @@ from flocsim.integrators.rhs.friction import limit_slips
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, tangential_rate
+from flocsim.state.work import NEW, NOW
 
 __all__ = [
     "NEW",

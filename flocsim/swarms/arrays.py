@@ -4,9 +4,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import Scene
 from flocsim.geometry.contact.body_pairs import DISC_COLUMNS
+from flocsim.state.bodies import MOTION_COLUMNS
+from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
 """Columns of ``errors``: ``place`` to ``doubt_speed`` of BodyErrors."""
@@ -78,8 +78,8 @@ class Swarm(NamedTuple):
     first: np.ndarray
     vertices: np.ndarray
     tree: np.ndarray
-    motion: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]
-    carried: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]  # the vector of the state's error
+    motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
+    carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
     errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
     steps: np.ndarray  # (n,): size of the next step [s]
     methods: np.ndarray  # (n,): 1 where steps of its island went on across switches, as ACROSS
@@ -87,8 +87,8 @@ class Swarm(NamedTuple):
     first_link: np.ndarray  # (n + 1,): where the contacts of a later body begin
     links: Annotated[np.ndarray, ("k", LINK_COLUMNS)]
     slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
-    new_motion: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]  # from here on: at the window's end
-    new_carried: Annotated[np.ndarray, ("n", at.MOTION_COLUMNS)]
+    new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
+    new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
     new_steps: np.ndarray
     new_methods: np.ndarray
@@ -112,7 +112,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         vertices=scene.vertices,
         tree=scene.tree,
         motion=motion,
-        carried=np.zeros((n, at.MOTION_COLUMNS)),
+        carried=np.zeros((n, MOTION_COLUMNS)),
         errors=np.zeros((n, ERROR_COLUMNS)),
         steps=np.full(n, clock.step),
         methods=np.full(n, clock.across),
@@ -121,7 +121,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
         slips=np.zeros((0, SLIP_COLUMNS)),
         new_motion=motion.copy(),
-        new_carried=np.zeros((n, at.MOTION_COLUMNS)),
+        new_carried=np.zeros((n, MOTION_COLUMNS)),
         new_errors=np.zeros((n, ERROR_COLUMNS)),
         new_steps=np.full(n, clock.step),
         new_methods=np.full(n, clock.across),

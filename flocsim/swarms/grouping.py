@@ -14,7 +14,6 @@ Fixed bodies do not pass on what acts on them: each is a part of all islands tha
 
 import math
 
-import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.geometry.contact.body_pairs import (
     MOVES,
@@ -29,6 +28,7 @@ from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.points import nearest_way
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.radau.contact_frames import unite
+from flocsim.state.bodies import ANGLE, SPIN, VX, VY, X, Y
 
 
 def set_disc(swarm, body, x, y, way_x, way_y, wide):
@@ -56,13 +56,13 @@ def set_discs(swarm, span, reach):
     m = swarm.motion
     for body in range(swarm.bodies.shape[0]):
         wide = disc_reach(swarm, body, reach, swarm.wander[body])
-        way_x, way_y = span * m[body, at.VX], span * m[body, at.VY]
-        set_disc(swarm, body, m[body, at.X], m[body, at.Y], way_x, way_y, wide)
+        way_x, way_y = span * m[body, VX], span * m[body, VY]
+        set_disc(swarm, body, m[body, X], m[body, Y], way_x, way_y, wide)
 
 
 def core_distance2(swarm, wall, x, y):
     """Squared distance of a point from the core of a fixed body [m²]; the point as seen from it."""
-    cosine, sine = math.cos(swarm.motion[wall, at.ANGLE]), math.sin(swarm.motion[wall, at.ANGLE])
+    cosine, sine = math.cos(swarm.motion[wall, ANGLE]), math.sin(swarm.motion[wall, ANGLE])
     x, y = cosine * x + sine * y, cosine * y - sine * x
     first, v, least = swarm.first[wall], swarm.vertices, math.inf
     points = swarm.first[wall + 1] - first
@@ -71,9 +71,7 @@ def core_distance2(swarm, wall, x, y):
         end = edge_end(first, points, start) if points > 1 else start
         if rings:
             end = start + int(v[start, ONWARD])
-        distance2 = segment_distance2(
-            x, y, v[start, at.X], v[start, at.Y], v[end, at.X], v[end, at.Y]
-        )
+        distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
         least = min(least, distance2)
     return least
 
@@ -90,10 +88,10 @@ def widest_swell(swarm, wall):
 def reaches_wall(swarm, body, wall, span, reach, width, height):
     """Whether a body can come to act on a fixed one in a window."""
     m = swarm.motion
-    x = nearest_way(m[body, at.X] - m[wall, at.X], width)
-    y = nearest_way(m[body, at.Y] - m[wall, at.Y], height)
-    way = span * math.hypot(m[body, at.VX] - m[wall, at.VX], m[body, at.VY] - m[wall, at.VY])
-    way += span * abs(m[wall, at.SPIN]) * swarm.bodies[wall].bounding_radius
+    x = nearest_way(m[body, X] - m[wall, X], width)
+    y = nearest_way(m[body, Y] - m[wall, Y], height)
+    way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
+    way += span * abs(m[wall, SPIN]) * swarm.bodies[wall].bounding_radius
     near = swarm.bodies[body].bounding_radius + swarm.bodies[wall].radius + reach
     near += way + swarm.wander[body] + widest_swell(swarm, wall)
     return core_distance2(swarm, wall, x, y) < near * near
@@ -122,9 +120,9 @@ def share_to_touch(swarm, a, b, span, width, height):
     """The share of a window after which the circles of two bodies touch, on their straight paths; 1
     where they do not in it."""
     m, bodies = swarm.motion, swarm.bodies
-    x = nearest_way(m[a, at.X] - m[b, at.X], width)
-    y = nearest_way(m[a, at.Y] - m[b, at.Y], height)
-    way_x, way_y = span * (m[a, at.VX] - m[b, at.VX]), span * (m[a, at.VY] - m[b, at.VY])
+    x = nearest_way(m[a, X] - m[b, X], width)
+    y = nearest_way(m[a, Y] - m[b, Y], height)
+    way_x, way_y = span * (m[a, VX] - m[b, VX]), span * (m[a, VY] - m[b, VY])
     near = bodies[a].bounding_radius + bodies[b].bounding_radius
     apart, closing = max(x * x + y * y - near * near, 0.0), -(x * way_x + y * way_y)
     left = closing * closing - apart * (way_x * way_x + way_y * way_y)
@@ -141,9 +139,9 @@ def widen_landing(swarm, span, width, height, pairs, total, reach):
         a, b = pairs[pair].later, pairs[pair].earlier
         share = share_to_touch(swarm, a, b, span, width, height) if both_free(swarm, a, b) else 1.0
         if share < 1.0:
-            b_goes = math.hypot(m[b, at.VX], m[b, at.VY])
-            faster = b if b_goes > math.hypot(m[a, at.VX], m[a, at.VY]) else a
-            way = span * math.hypot(m[a, at.VX] - m[b, at.VX], m[a, at.VY] - m[b, at.VY])
+            b_goes = math.hypot(m[b, VX], m[b, VY])
+            faster = b if b_goes > math.hypot(m[a, VX], m[a, VY]) else a
+            way = span * math.hypot(m[a, VX] - m[b, VX], m[a, VY] - m[b, VY])
             wide = disc_reach(swarm, faster, reach, (1.0 - share) * way)
             if wide > swarm.discs[faster, REACH]:
                 swarm.discs[faster, REACH], found = wide, True

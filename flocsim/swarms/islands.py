@@ -8,12 +8,14 @@ in which order they run, and in how many threads, changes no number.
 
 import math
 
-import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
-from flocsim.arrays import all_counting
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import keep_slips
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
+from flocsim.state.bodies import MOST_FRAMES, VX, VY, X, Y
+from flocsim.state.clock import CANDIDATES_FULL
+from flocsim.state.contacts import OPEN
+from flocsim.state.work import ALL_STATES, CARRIED, NOW, STATES, all_counting
 
 
 def box_at(stretch):
@@ -44,7 +46,7 @@ def watch_paths(scene, work, observed, time):
     first, last = stretch_at(observed, before), stretch_at(observed, time)
     for body in range(work.poses.shape[0]):
         if scene.bodies[body].free == 1.0:
-            x, y = work.place[at.NOW, body, at.X], work.place[at.NOW, body, at.Y]
+            x, y = work.place[NOW, body, X], work.place[NOW, body, Y]
             for stretch in range(first, last):
                 border = (
                     observed[0, sw.SINCE] + observed[0, sw.LENGTH] * (stretch + 1) / sw.STRETCHES
@@ -97,7 +99,7 @@ def clear_body(work, body):
     cluster.mass = cluster.shift_x = cluster.shift_y = cluster.shortened = cluster.most_place = 0.0
     cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     kick.x = kick.y = kick.turn = 0.0
-    for stage in range(at.MOST_FRAMES):
+    for stage in range(MOST_FRAMES):
         frame = work.frames[body, stage]
         frame.turn_cosine = frame.turn_sine = frame.shift_x = frame.shift_y = 0.0
 
@@ -106,19 +108,19 @@ def put_state(swarm, work, members, first):
     """The state of its bodies into its work; nothing else of that is left from before."""
     for body in range(work.poses.shape[0]):
         member = members[first + body]
-        for row in range(at.ALL_STATES):
+        for row in range(ALL_STATES):
             for axis in range(3):
                 work.place[row, body, axis] = 0.0
                 work.velocity[row, body, axis] = 0.0
-        for row in range(at.STATES):
+        for row in range(STATES):
             for axis in range(3):
                 work.force[row, body, axis] = 0.0
         clear_body(work, body)
         for axis in range(3):
-            work.place[at.NOW, body, axis] = swarm.motion[member, axis]
-            work.place[at.CARRIED, body, axis] = swarm.carried[member, axis]
-            work.velocity[at.NOW, body, axis] = swarm.motion[member, at.VX + axis]
-            work.velocity[at.CARRIED, body, axis] = swarm.carried[member, at.VX + axis]
+            work.place[NOW, body, axis] = swarm.motion[member, axis]
+            work.place[CARRIED, body, axis] = swarm.carried[member, axis]
+            work.velocity[NOW, body, axis] = swarm.motion[member, VX + axis]
+            work.velocity[CARRIED, body, axis] = swarm.carried[member, VX + axis]
         known = work.errors[body]
         known.place = swarm.errors[member, 0]
         known.speed = swarm.errors[member, 1]
@@ -179,7 +181,7 @@ def put_slips(swarm, scene, work, members, first):
 def touch_plainly(work):
     """Let no contact graze or be held: where steps go on across switches there is none of that."""
     for kept in range(work.tally.kept - 1):
-        work.kept[kept].mode = at.OPEN
+        work.kept[kept].mode = OPEN
         work.kept[kept].gap_offset = 0.0
 
 
@@ -217,11 +219,11 @@ def put_times(swarm, work, observed, clocks, counts, members, first):
             if other > across:
                 step, across = math.inf, other
             step = min(step, swarm.steps[member]) if other == across else step
-        x, y = swarm.motion[member, at.X], swarm.motion[member, at.Y]
+        x, y = swarm.motion[member, X], swarm.motion[member, Y]
         observed[body, sw.START_X] = observed[body, sw.SEEN_X] = x
         observed[body, sw.START_Y] = observed[body, sw.SEEN_Y] = y
-        observed[body, sw.PATH_VX] = swarm.motion[member, at.VX]
-        observed[body, sw.PATH_VY] = swarm.motion[member, at.VY]
+        observed[body, sw.PATH_VX] = swarm.motion[member, VX]
+        observed[body, sw.PATH_VY] = swarm.motion[member, VY]
         observed[body, sw.FURTHEST] = 0.0
         for stretch in range(sw.STRETCHES):
             box = box_at(stretch)
@@ -270,10 +272,10 @@ def take_state(swarm, work, observed, clock, members, first):
         if swarm.bodies[member].free == 0.0:
             continue
         for axis in range(3):
-            swarm.new_motion[member, axis] = work.place[at.NOW, body, axis]
-            swarm.new_carried[member, axis] = work.place[at.CARRIED, body, axis]
-            swarm.new_motion[member, at.VX + axis] = work.velocity[at.NOW, body, axis]
-            swarm.new_carried[member, at.VX + axis] = work.velocity[at.CARRIED, body, axis]
+            swarm.new_motion[member, axis] = work.place[NOW, body, axis]
+            swarm.new_carried[member, axis] = work.place[CARRIED, body, axis]
+            swarm.new_motion[member, VX + axis] = work.velocity[NOW, body, axis]
+            swarm.new_carried[member, VX + axis] = work.velocity[CARRIED, body, axis]
         known = work.errors[body]
         swarm.new_errors[member, 0] = known.place
         swarm.new_errors[member, 1] = known.speed
@@ -305,7 +307,7 @@ def run_islands(
         if watches_all(work):
             work.tally.pairs = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
-            work.tally.full = at.CANDIDATES_FULL
+            work.tally.full = CANDIDATES_FULL
             return island
         put_times(swarm, work, observed, clocks, counts, members, begin)
         if clock.across == 1.0:

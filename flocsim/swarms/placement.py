@@ -20,13 +20,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.body import Body, read_position
 from flocsim.errors import UsageError
 from flocsim.fields import in_unit
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import WallShape
+from flocsim.state.bodies import ANGLE, VY, X, Y
 from flocsim.swarms.arrays import EARLIER_BODY, LATER_BODY, Swarm, with_links
 from flocsim.swarms.together.clusters import Gauge, placed_together
 
@@ -194,13 +194,13 @@ class Leaving:
     def outside(self, swarm: Swarm, present: np.ndarray) -> np.ndarray:
         """Which bodies are outside, with all of their circles, and will not come back themselves:
         through the top only what rises."""
-        x, y = swarm.motion[:, at.X], swarm.motion[:, at.Y]
+        x, y = swarm.motion[:, X], swarm.motion[:, Y]
         reach = swarm.bodies["bounding_radius"]
         found = np.zeros(len(x), bool)
         if not self.repeats[0]:
             found |= (x < -reach) | (x > self.area[0] + reach)
         if not self.repeats[1]:
-            found |= (y > self.area[1] + reach) & (swarm.motion[:, at.VY] > 0.0)
+            found |= (y > self.area[1] + reach) & (swarm.motion[:, VY] > 0.0)
             if not self.floor:
                 found |= y < -reach
         return found & present
@@ -210,7 +210,7 @@ class Leaving:
         out = self.outside(swarm, present)
         if not out.any():
             return []
-        near = self.gauge.neighbours(swarm.motion[:, : at.ANGLE + 1]).among(present)
+        near = self.gauge.neighbours(swarm.motion[:, : ANGLE + 1]).among(present)
         labels, _ = placed_together(len(out), near)
         clusters = [np.flatnonzero(labels == label) for label in np.unique(labels[out])]
         whole = [members for members in clusters if out[members].all()]
@@ -220,7 +220,7 @@ class Leaving:
         """The swarm without some bodies (n,) bool, which lie outside from now on."""
         swarm.motion[gone] = 0.0
         apart = PARKED * max(float(swarm.bodies["bounding_radius"].max()), *self.area)
-        axis = at.X if not self.repeats[0] else at.Y
+        axis = X if not self.repeats[0] else Y
         swarm.motion[gone, axis] = -apart * (2.0 + np.arange(len(gone)))[gone]
         for array in (swarm.stated, swarm.strayed, swarm.carried, swarm.errors):
             array[gone] = 0.0

@@ -12,9 +12,9 @@ import math
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Status
+from flocsim.state.bodies import VX, VY
 from flocsim.swarms.arrays import Swarm, with_links
 from flocsim.swarms.placement import REMOVE, Leaving
 from flocsim.swarms.runner import Islands, Look, Runner
@@ -161,7 +161,7 @@ class Progress:
 
     def time_to_go(self, way: float) -> float:
         """The time in which no body goes further than that against the mean of all [s]."""
-        velocity = self.swarm.motion[self.free][:, [at.VX, at.VY]]
+        velocity = self.swarm.motion[self.free][:, [VX, VY]]
         fastest = float(np.hypot(*(velocity - velocity.mean(axis=0)).T).max())
         return way / fastest if fastest > 0.0 else math.inf
 
@@ -286,7 +286,7 @@ class Progress:
         ):  # fmt: skip
             old[free] = new[free]
         length = swarm.times[sw.END] - swarm.times[sw.BEGIN]
-        swarm.motion[~free, : at.VX] += length * swarm.motion[~free, at.VX :]
+        swarm.motion[~free, :VX] += length * swarm.motion[~free, VX:]
         strayed, wander = MORE_WANDER * swarm.strayed, LESS_WANDER * swarm.wander
         np.maximum(np.maximum(strayed, wander), self.least_wander, out=swarm.wander)
         self.swarm = with_links(swarm, finished.links, finished.slips)

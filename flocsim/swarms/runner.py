@@ -12,11 +12,13 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 import flocsim.swarms.arrays as sw
-from flocsim.arrays import Scene, Work, wider, work_of
 from flocsim.integrators.base import Integrator
 from flocsim.run import with_more
+from flocsim.state.clock import NOTHING_FULL, Clock, Counts
+from flocsim.state.contacts import BodyPair
+from flocsim.state.scene import Scene
+from flocsim.state.work import Work, wider, work_of
 from flocsim.swarms.arrays import Found, Swarm, found_of
 
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
@@ -98,7 +100,7 @@ class ThreadArrays:
             work = work_of(scene, zeros, zeros, room, pairs=pairs, blocks=blocks)
             self.by_size[size] = IslandArrays(
                 scene, work, np.zeros((size, sw.TRACK_COLUMNS)),
-                at.Clock.rows(2), at.Counts.rows(2),
+                Clock.rows(2), Counts.rows(2),
             )  # fmt: skip
         return self.by_size[size]
 
@@ -191,7 +193,7 @@ class Runner:
     integrator: Integrator
     threads: list[ThreadArrays]
     max_steps: int
-    pairs: np.ndarray = attrs.field(factory=lambda: at.BodyPair.rows(256))
+    pairs: np.ndarray = attrs.field(factory=lambda: BodyPair.rows(256))
     pool: ThreadPoolExecutor | None = None
 
     def reached(
@@ -208,7 +210,7 @@ class Runner:
         while (
             found := find(swarm, span, reach, *box, self.pairs, labels, walls, touches)
         ) > len(self.pairs):  # fmt: skip
-            self.pairs = at.BodyPair.rows(2 * found)
+            self.pairs = BodyPair.rows(2 * found)
         labels[gone] = -1
         return Reached(labels, walls, touches)
 
@@ -230,7 +232,7 @@ class Runner:
             )  # fmt: skip
             if first == last:
                 return
-            if place.work.tally.full == at.NOTHING_FULL:
+            if place.work.tally.full == NOTHING_FULL:
                 own.make_room(len(own.found.links))
             else:
                 self.driver, work = with_more(self.driver, place.work)

@@ -9,7 +9,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-from flocsim.arrays import NO_BOX
 from flocsim.body import Body, Fluid
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
@@ -25,6 +24,7 @@ from flocsim.hooks import observe
 from flocsim.integrators.base import Integrator, Status
 from flocsim.integrators.implicit import Implicit
 from flocsim.integrators.loop.kicks import HALVINGS
+from flocsim.state.scene import NO_BOX
 from flocsim.swarms.arrays import swarm_of
 from flocsim.swarms.grouping import find_islands, join_islands
 from flocsim.swarms.islands import run_islands, watch_paths

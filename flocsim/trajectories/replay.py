@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import NO_WATER, Scene, Work, copy_of, with_room
 from flocsim.body import Body, Fluid, of_forces
 from flocsim.forces.base import ContactForce, Force, names_of
 from flocsim.forces.codegen import laws_of
@@ -31,6 +29,18 @@ from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.run import Run
+from flocsim.state.scene import NO_WATER, Scene
+from flocsim.state.work import (
+    FIRST_STAGE,
+    NOW,
+    START,
+    TRIAL,
+    Work,
+    copy_of,
+    motion_of,
+    put_motion,
+    with_room,
+)
 
 Slips = dict[tuple[int, int, int, int], float]
 """{(body and core point of the vertex, body and first core point of the edge): ξ [m]}."""
@@ -86,8 +96,8 @@ class Instant:
 
     def forces(self, scene: Scene) -> np.ndarray:
         """(n, 3) force and torque on every body [N, N, N m] of a scene with these or other laws."""
-        sum_forces(scene, self.work, self.time, at.NOW)
-        return self.work.force[at.NOW].copy()
+        sum_forces(scene, self.work, self.time, NOW)
+        return self.work.force[NOW].copy()
 
     def contacts(self) -> list[Contact]:
         """All contact points."""
@@ -95,15 +105,15 @@ class Instant:
         for row in np.flatnonzero(work.candidates[: work.tally.candidates]["closed"] == 1):
             candidate = work.candidates[row]
             a, b = int(candidate.vertex_body), int(candidate.edge_body)
-            geometry, (x, y, _) = work.geometry[at.NOW, row], work.place[at.NOW, a]
+            geometry, (x, y, _) = work.geometry[NOW, row], work.place[NOW, a]
             dx, dy = contact_point(work, row, a)
             force = (0.0, 0.0)
             if has(self.scene, CONTACT_FORCE):
-                force = contact_force(self.scene, contact_view(self.scene, work, at.NOW, row))
+                force = contact_force(self.scene, contact_view(self.scene, work, NOW, row))
             found.append(Contact(
                 (a, b), (float(x + dx), float(y + dy)),
                 (float(geometry.normal_x), float(geometry.normal_y)),
-                float(-geometry.gap), float(work.slip[at.NOW, row]),
+                float(-geometry.gap), float(work.slip[NOW, row]),
                 (float(force[0]), float(force[1])),
             ))  # fmt: skip
         return found
@@ -154,7 +164,7 @@ class Replay:
             step = int(np.searchsorted(steps, time, side="right")) - 1
             if steps[step] == time:
                 self.to_step(step)
-                yield self.instant(time, at.motion_of(self.run.work, at.NOW), self.slips())
+                yield self.instant(time, motion_of(self.run.work, NOW), self.slips())
                 continue
             yield self.instant(time, *self.within(float(time), step, steps))
 
@@ -168,7 +178,7 @@ class Replay:
         ahead = copy.copy(self)
         ahead.run = self.run.copy()
         ahead.to_step(step + 1)
-        start, before, after = at.motion_of(self.run.work, at.NOW), self.slips(), ahead.slips()
+        start, before, after = motion_of(self.run.work, NOW), self.slips(), ahead.slips()
         share = (time - begin) / (end - begin)
         slips = {
             key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
@@ -180,23 +190,23 @@ class Replay:
         """The tangential displacements of all listed pairs now."""
         work = self.run.work
         rows = range(work.tally.candidates)
-        return {key_of(work, row): float(work.slip[at.NOW, row]) for row in rows}
+        return {key_of(work, row): float(work.slip[NOW, row]) for row in rows}
 
     def instant(self, time: float, motion: np.ndarray, slips: Slips) -> Instant:
         """The Instant of a motion (n, 6) near where the run is now."""
         work = copy_of(self.run.work)
-        at.put_motion(work, at.NOW, motion)
+        put_motion(work, NOW, motion)
         touching = has(self.scene, CONTACT_FORCE) or self.scene.listed_reach > 0.0
         if touching or not watches_all(work):
             while not work.tally.candidates and not list_candidates(self.scene, work):
                 work = with_room(work)
         if touching:
-            locate_contacts(self.scene, work, at.NOW)
+            locate_contacts(self.scene, work, NOW)
             set_closed(work)
             for row in range(work.tally.candidates):
-                work.slip[at.NOW, row] = slips.get(key_of(work, row), 0.0)
+                work.slip[NOW, row] = slips.get(key_of(work, row), 0.0)
             if self.scene.listed_reach > 0.0:
-                flag_near(self.scene, work, at.NOW, 0.0)
+                flag_near(self.scene, work, NOW, 0.0)
         return Instant(float(time), self.scene, work)
 
 
@@ -215,19 +225,19 @@ def step_motion(
     """
     work, clock = run.work, run.clock
     terms = int(work.tally.series_terms)
-    if terms > 0 and np.array_equal(at.motion_of(work, at.START), start):
+    if terms > 0 and np.array_equal(motion_of(work, START), start):
         whole = float(clock.series_step)
-        write_at(work, at.START, terms, whole, (time - begin) / whole, at.TRIAL, 0, len(start))
-        return at.motion_of(work, at.TRIAL)
+        write_at(work, START, terms, whole, (time - begin) / whole, TRIAL, 0, len(start))
+        return motion_of(work, TRIAL)
     stages = np.array(
-        [at.motion_of(work, each) for each in (at.START, at.FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]
+        [motion_of(work, each) for each in (START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]
     )
     whole = float(clock.staged_step)
-    if whole == 0.0 and np.array_equal(stages[3], at.motion_of(work, at.NOW)):
+    if whole == 0.0 and np.array_equal(stages[3], motion_of(work, NOW)):
         whole = end - begin
     own = origin.has_stages and clock.staged_at == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
-        return hermite(begin, end, start, at.motion_of(work, at.NOW), time)
+        return hermite(begin, end, start, motion_of(work, NOW), time)
     return cubic(stage_weights((time - begin) / whole), *stages)
 
 
@@ -294,7 +304,7 @@ def energies_of(origin: Origin, times: np.ndarray, velocity: np.ndarray) -> Ener
     free = np.array([0.0 if body.fixed else 1.0 for body in origin.bodies])[:, None]
 
     def powers(instant: Instant) -> np.ndarray:
-        rates = instant.work.velocity[at.NOW] * free
+        rates = instant.work.velocity[NOW] * free
         return np.array([np.sum(instant.forces(scene) * rates) for scene in smooth.values()])
 
     inside = times[:-1, None] + np.diff(times)[:, None] * LOBATTO

@@ -10,13 +10,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.errors import FileError, UsageError
 from flocsim.fields import check_whole, in_unit, is_number
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.amplification import MOST_AMPLIFIED
 from flocsim.integrators.base import Status
 from flocsim.run import Run
+from flocsim.state.work import NOW
 from flocsim.trajectories.replay import Contact, Energies, Origin, Replay, energies_of, motion_at
 
 ENDED_FOR_GOOD = (Status.STALLED, Status.TOO_DEEP, Status.NOT_FINITE)
@@ -324,7 +324,7 @@ def watched(run: Run, watch: Watch | None) -> Status:
     if watch is None:
         return run.to_end()
     while (status := run.advance(1)) == Status.PAUSED:
-        place, velocity = run.work.place[at.NOW].copy(), run.work.velocity[at.NOW].copy()
+        place, velocity = run.work.place[NOW].copy(), run.work.velocity[NOW].copy()
         if watch(State(float(run.clock.time), place, velocity)):
             return Status.STOPPED
     return status

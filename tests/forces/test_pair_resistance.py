@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
 from flocsim.errors import UsageError
 from flocsim.forces import Lubrication, PairResistance, StokesDrag, Thermal, VanDerWaals
 from flocsim.hydrodynamics import SpherePair
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.state.work import DAMPING
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.fast_scene import FastScene
 from tests.helpers.real_pairs import (
@@ -105,7 +105,7 @@ def resistance_at(shapes, places, law):
     fast = FastScene(system, jit=False)
     fast.loads()
     assemble_jacobian(fast.scene, fast.work, 0.0, 1.0)
-    blocks = fast.work.jacobian[at.DAMPING]
+    blocks = fast.work.jacobian[DAMPING]
     return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])
 
 

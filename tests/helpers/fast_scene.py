@@ -6,15 +6,14 @@ from functools import cache
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import work_of
 from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.parts import evaluate_as_they_lie
+from flocsim.state.work import NOW, work_of
 from tests.reference import forces as plain_forces
 from tests.reference.contacts import contacts
 from tests.reference.samples import scene_of
@@ -27,7 +26,7 @@ def flagged(system):
     work = work_of(scene, *system.motion())
     work.budget[:] = -1.0
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     set_modes(scene, work)
     return scene, work
 
@@ -85,14 +84,14 @@ class FastScene:
             # A second listing has to hand the displacements back to the same pairs.
             self.put_slips(slips)
             assert self.evaluate(self.scene, self.work)
-        return self.work.force[at.NOW].copy()
+        return self.work.force[NOW].copy()
 
     def put_slips(self, slips):
         """Write displacements {pair: ξ} into the list; every pair must be in it."""
         keys = keys_of(self.scene, self.work)
         for key, slip in slips.items():
             row = keys.index(key if key in keys else self.other_way_round(key))
-            self.work.slip[at.NOW, row] = slip
+            self.work.slip[NOW, row] = slip
 
     def other_way_round(self, key):
         """The key of two spheres' one pair, whichever is called the vertex."""
@@ -101,7 +100,7 @@ class FastScene:
 
     def overlapping(self):
         """{pair: geometry row} of the listed pairs that overlap."""
-        rows = self.work.geometry[at.NOW, : self.work.tally.candidates]
+        rows = self.work.geometry[NOW, : self.work.tally.candidates]
         return {
             key: row
             for key, row in zip(keys_of(self.scene, self.work), rows, strict=True)
@@ -111,7 +110,7 @@ class FastScene:
     def contact_point(self, key, row):
         """Middle of a pair's overlap [m], from the arms that its geometry row stores."""
         nx, ny, across, along = row.normal_x, row.normal_y, row.vertex_arm_n, row.vertex_arm_t
-        x, y = self.work.place[at.NOW, key[0], :2]
+        x, y = self.work.place[NOW, key[0], :2]
         return np.array([x + along * nx + across * ny, y + along * ny - across * nx])
 
 

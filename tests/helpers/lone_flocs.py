@@ -6,13 +6,13 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.body import Body
 from flocsim.ensembles.kind import PHYSICS, Condition, StudyKind
 from flocsim.ensembles.one_table import OneTable
 from flocsim.fields import choice, quantity
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.integrators.base import Status
+from flocsim.state.work import NOW
 from flocsim.swarms.placement import wall
 from flocsim.system import System
 
@@ -92,11 +92,11 @@ class LoneStudy(StudyKind):
         """Run a floc: how fast it sinks, and how far it drifts away."""
         until, most = self.scene.duration, self.config.integrator.max_steps
         run = self.system(condition.vertices, replicate).begin(until, max_steps=most)
-        before = run.work.place[at.NOW, 1, :2].copy()
+        before = run.work.place[NOW, 1, :2].copy()
         status = run.to_end(halted)
         if status == Status.PAUSED:
             return None, None
-        x, y = run.work.place[at.NOW, 1, :2] - before
+        x, y = run.work.place[NOW, 1, :2] - before
         failed = status != Status.FINISHED
         row = {"speed": -y / until, "drift": x, "steps": run.steps, "failed": failed}
         return row, self.note(condition, replicate, status.name) if failed else None

@@ -1,8 +1,6 @@
 """Single steps of backward Euler, uncompiled, of a few bodies."""
 
-import flocsim.arrays as at
 from flocsim import System
-from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
@@ -12,6 +10,7 @@ from flocsim.integrators.backward_euler.path import search_afar, usual_sizes
 from flocsim.integrators.backward_euler.step import euler_step, solve_step
 from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 from flocsim.integrators.radau.contact_frames import gather_clusters
+from flocsim.state.work import NOW, work_of
 
 
 def from_before(scene, work, clock, step):
@@ -66,7 +65,7 @@ class Stage:
 
     def locate(self):
         """Contacts anew, of what stands in NOW."""
-        self.linked(locate_contacts)(self.scene, self.work, at.NOW)
+        self.linked(locate_contacts)(self.scene, self.work, NOW)
 
     @property
     def time(self):
@@ -74,8 +73,8 @@ class Stage:
 
     @property
     def position(self):
-        return self.work.place[at.NOW].copy()
+        return self.work.place[NOW].copy()
 
     @property
     def velocity(self):
-        return self.work.velocity[at.NOW].copy()
+        return self.work.velocity[NOW].copy()

@@ -5,15 +5,14 @@ from functools import cache
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
-from flocsim.arrays import work_of
 from flocsim.ensembles.strength.opening import gap_of
 from flocsim.forces import PairResistance, StokesDrag
 from flocsim.geometry.fit.fit import fit_mask
 from flocsim.hydrodynamics import rigid_bodies
 from flocsim.integrators.parts import evaluate_as_they_lie
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.state.work import DAMPING, NOW, work_of
 from tests.helpers.real_images import silhouettes
 
 SIZE = 1e-5
@@ -119,9 +118,9 @@ class Resistance:
         self.entry = system.compose(entry=resistance_here, observer=None, jit=jit)
 
     def __call__(self, places):
-        self.work.place[at.NOW] = places
+        self.work.place[NOW] = places
         assert self.entry(self.scene, self.work)
-        blocks = self.work.jacobian[at.DAMPING]
+        blocks = self.work.jacobian[DAMPING]
         return np.block([[blocks[0], blocks[4]], [blocks[5], blocks[1]]])
 
 

@@ -8,12 +8,11 @@ import math
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon, System, hooks
-from flocsim.arrays import work_of
 from flocsim.forces import BodyForce, CentreForce, Contact, ContactForce, SurfaceForce
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.integrators import Status
+from flocsim.state.work import NOW, motion_of, work_of
 
 WATER_VISCOSITY = 8.9e-4
 
@@ -144,7 +143,7 @@ def watched(
         run.clock.largest_step = min(run.clock.largest_step, largest_step)
     status = run.to_end()
     return Watched(
-        motion=at.motion_of(run.work, at.NOW), status=status, time=run.time, steps=run.steps,
+        motion=motion_of(run.work, NOW), status=status, time=run.time, steps=run.steps,
         rejected=run.rejected, error=run.error,
         contacts=int(observed[CONTACTS]), deepest=float(observed[DEEPEST]),
         touch_time=float(observed[TOUCH_TIME]), touch_gap=float(observed[TOUCH_GAP]),

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
-from flocsim.arrays import work_of
 from flocsim.bonds.certificate import Load, bond_between
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
+from flocsim.state.work import NOW, work_of
 from tests.helpers.swarm_scenes import WATER
 
 ANCHOR = [(-0.5, 8), (-0.5, 1), (-3, 1), (-3, 0), (3, 0), (3, 1), (0.5, 1), (0.5, 8)]
@@ -35,7 +34,7 @@ class TwoBodies:
         motion = np.zeros((2, 3)) if motion is None else np.asarray(motion)
         self.work = work_of(self.scene, np.asarray(places, dtype=float), motion)
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, at.NOW)
+        locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
 
     @property

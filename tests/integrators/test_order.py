@@ -9,14 +9,13 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere
-from flocsim.arrays import work_of
 from flocsim.forces import Contact, StokesDrag
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.loop.driver import keep_lists, take_new_state
+from flocsim.state.work import NEW, NOW, motion_of, work_of
 from tests.helpers.methods import name_of
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import PolygonSystem, Spring, Trap, head_on, hook
@@ -31,7 +30,7 @@ def even_steps(scene, work, clock, counts, step, count):
     for _ in range(count):
         if attempt(scene, work, clock, step) < 0.0:
             return False
-        locate_contacts(scene, work, at.NEW)
+        locate_contacts(scene, work, NEW)
         take_new_state(work)
         clock.time += step
     return True
@@ -66,7 +65,7 @@ def end_of(name, integrator, count):
     clock.tolerance = min(clock.tolerance, EXACT)
     clock.until, clock.largest_step = until, until / count
     assert driver(scene, work, clock, integrator.fresh_counts(count), until / count, count)
-    return at.motion_of(work, at.NOW) * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
+    return motion_of(work, NOW) * [1.0, 1.0, 1e-5, 1e-4, 1e-4, 1e-9]
 
 
 def order_of(scene, integrator, counts, exact):

@@ -6,9 +6,7 @@ import types
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, Swarm
-from flocsim.arrays import work_of
 from flocsim.bonds.certificate import CALM, CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.constants import BOLTZMANN
@@ -19,6 +17,7 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators.events.first_event import set_modes
+from flocsim.state.work import NOW, work_of
 from flocsim.swarms.together.bonds import BondGauge, alone
 from tests.helpers.hydration import Hydration
 from tests.helpers.small_study import small_config
@@ -231,7 +230,7 @@ def test_two_bodies_are_judged_as_a_pair_of_a_study_is(tmp_path, gap, ends):
             motion[1, 3:5] = (0.0, 0.5, 0.9, 1.1)[case % 4] * calm * rng.choice([-0.7, 0.7], 2)
             work, observed = work_of(scene, places, motion[:, 3:]), encounter.observed()
             assert list_candidates(scene, work)
-            locate_contacts(scene, work, at.NOW)
+            locate_contacts(scene, work, NOW)
             set_modes(scene, work)
             start_rest(scene, work, observed, 0.0)
             time = 1.1 * observed[REST_TIME]

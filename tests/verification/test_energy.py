@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, System
 from flocsim.forces import Contact, StokesDrag
 from flocsim.integrators import Implicit, Status
+from flocsim.state.work import NOW
 from tests.helpers.methods import ADAPTIVE, name_of
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import encounter, hook, star
@@ -23,12 +23,12 @@ def energies(run):
     """(kinetic, normal, tangential) energy [J] of a Run now, its greatest overlap [m], and how many
     contacts it has."""
     work, bodies = run.work, run.scene.bodies
-    velocity, listed = work.velocity[at.NOW], int(work.tally.candidates)
+    velocity, listed = work.velocity[NOW], int(work.tally.candidates)
     speeds = bodies["mass"] * (velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
     kinetic = 0.5 * np.sum(speeds + bodies["inertia"] * velocity[:, 2] ** 2)
     closed = work.candidates[:listed]["closed"] > 0
-    overlap = -work.geometry[at.NOW, :listed]["gap"][closed]
-    slip = work.slip[at.NOW, :listed][closed]
+    overlap = -work.geometry[NOW, :listed]["gap"][closed]
+    slip = work.slip[NOW, :listed][closed]
     parts = kinetic, 0.5 * K_N * np.sum(overlap**2), 0.5 * K_T * np.sum(slip**2)
     return parts, overlap.max(initial=0.0), int(closed.sum())
 

@@ -11,11 +11,13 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.amplification import end_distance
+from flocsim.state.bodies import X, Y
+from flocsim.state.contacts import GRAZES, TOUCHES
+from flocsim.state.work import NOW
 
 HALF, RADIUS = 5e-6, 1e-6
 UNTIL = 5e-4
@@ -45,12 +47,12 @@ def energy(run, gravity):
     """Of the rod's motion, weight and springs [J]."""
     work, body = run.work, run.scene.bodies[1]
     mass, inertia = body.mass, body.inertia
-    y, (vx, vy, spin) = work.place[at.NOW, 1, at.Y], work.velocity[at.NOW, 1]
+    y, (vx, vy, spin) = work.place[NOW, 1, Y], work.velocity[NOW, 1]
     total = 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * spin**2 + mass * gravity * y
     law = Contact()
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES:
-            overlap, slip = work.geometry[at.NOW, row].gap, work.slip[at.NOW, row]
+        if work.candidates[row].closed == TOUCHES:
+            overlap, slip = work.geometry[NOW, row].gap, work.slip[NOW, row]
             total += 0.5 * law.k_n * overlap**2 + 0.5 * law.k_t * slip**2
     return total
 
@@ -61,7 +63,7 @@ def carried(system, gravity=0.0, until=UNTIL):
     grazing, energies = 0, []
     while (status := run.advance(1)) == Status.PAUSED:
         rows = run.work.candidates[: run.work.tally.candidates]
-        grazing += bool(np.any(rows["closed"] == at.GRAZES))
+        grazing += bool(np.any(rows["closed"] == GRAZES))
         energies.append(energy(run, gravity))
     assert status == Status.FINISHED
     return run, grazing, np.array(energies)
@@ -74,7 +76,7 @@ def test_the_limit_is_what_the_cycles_come_to_in_a_fraction_of_their_steps(scene
     exact, never, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
     assert grazing > 0 and never == 0
     assert 2.4 * run.steps < exact.steps
-    ends = [each.work.place[at.NOW] for each in (run, exact)]
+    ends = [each.work.place[NOW] for each in (run, exact)]
     assert end_distance(system.bodies, *ends) < run.error
 
 
@@ -88,7 +90,7 @@ def test_what_a_dozen_grazes_are_wrong_by_does_not_cancel_in_what_is_stated():
         run, grazes, _ = carried(system)
         if grazes > 0:
             exact, _, _ = carried(attrs.evolve(system, integrator=Implicit(tolerance=1e-12)))
-            ends = [each.work.place[at.NOW] for each in (run, exact)]
+            ends = [each.work.place[NOW] for each in (run, exact)]
             beyond += end_distance(system.bodies, *ends) > run.error
             grazing += 1
     assert grazing > 30 and beyond <= 0.01 * grazing
@@ -108,4 +110,4 @@ def test_without_a_tangential_force_nothing_grazes():
     for law in (Contact(friction=0.0), Contact(k_t=0.0)):
         run, grazing, _ = carried(rod_on_a_bar(0.6, 1.0, -1e-3, law=law))
         assert grazing == 0 and run.steps < 100
-        assert run.work.velocity[at.NOW, 1, at.X] == pytest.approx(-1e-3, rel=1e-12)
+        assert run.work.velocity[NOW, 1, X] == pytest.approx(-1e-3, rel=1e-12)

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.outcomes import BOUND, DEPARTED, HELD, MISSED
 from flocsim.integrators.base import Integrator, Status
@@ -33,6 +32,7 @@ from flocsim.io.results.schema import (
     REPLICATES,
 )
 from flocsim.run import UNABLE, Run, force_to_blame
+from flocsim.state.work import NOW, motion_of
 from flocsim.system import System
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ class Draw:
     def system(self) -> System:
         """Return the plain System where the replicate starts."""
         system, bodies = self.encounter.system, []
-        starts = at.motion_of(self.encounter.start(self.angles, self.share), at.NOW).tolist()
+        starts = motion_of(self.encounter.start(self.angles, self.share), NOW).tolist()
         for body, (x, y, angle, vx, vy, spin) in zip(system.bodies, starts, strict=True):
             place = {"position": (x, y), "angle": angle, "velocity": (vx, vy), "spin": spin}
             bodies.append(attrs.evolve(body, **place))

@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from flocsim.arrays import Scene, Work, begin_anew, work_of
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.compiler.by_pointer import keep
@@ -34,6 +33,8 @@ from flocsim.geometry.contact.compounds import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
+from flocsim.state.scene import Scene
+from flocsim.state.work import Work, begin_anew, work_of
 from flocsim.system import System
 
 LIMIT_TURNS = 1000.0

@@ -36,7 +36,6 @@ What is none of these goes on until it is, or is undecided at the end.
 import math
 from collections.abc import Callable
 
-import flocsim.arrays as at
 from flocsim import hooks
 from flocsim.bonds.certificate import (
     CERTIFICATE,
@@ -63,6 +62,8 @@ from flocsim.hooks import (
 )
 from flocsim.integrators.rhs.climb import repulsion_at
 from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import NOW
 
 (
     ZONE, ESCAPE, REST_TIME, DRIFT_X, DRIFT_Y, MOBILITY_I, MOBILITY_J, LOAD,
@@ -111,7 +112,7 @@ def follow(observed, distance):
 
 def watch_pair(scene, work, observed, time):
     """The observer: return 0 to go on, or BOUND, DEPARTED, MISSED, HELD."""
-    nx, ny, distance = centre_line(scene, work, at.NOW, BODY_J, BODY_I)
+    nx, ny, distance = centre_line(scene, work, NOW, BODY_J, BODY_I)
     gap = least_listed_gap(work)
     if observed[COLLIDED] == 0.0 and gap < 0.0:
         note_collision(observed, time, distance)
@@ -133,7 +134,7 @@ CLEARANCE = 0.25
 
 def apart(of, axis):
     """Return by how much j has more of a column than i."""
-    return of[at.NOW, BODY_J, axis] - of[at.NOW, BODY_I, axis]
+    return of[NOW, BODY_J, axis] - of[NOW, BODY_I, axis]
 
 
 def outer_of(scene):
@@ -143,14 +144,14 @@ def outer_of(scene):
 
 def rate_of_parting(work, nx, ny):
     """Return the speed at which j moves away from i along the unit vector between them [m/s]."""
-    return nx * apart(work.velocity, at.X) + ny * apart(work.velocity, at.Y)
+    return nx * apart(work.velocity, X) + ny * apart(work.velocity, Y)
 
 
 def speed_by_centre_forces(scene, work, observed, time):
     """Return the speed at which forces between the centres alone push the two apart [m/s]."""
     if not has(scene, CENTRE_FORCE):
         return 0.0
-    repulsion = centre_force(scene, centre_view(scene, work, time, at.NOW, BODY_J, BODY_I))
+    repulsion = centre_force(scene, centre_view(scene, work, time, NOW, BODY_J, BODY_I))
     return repulsion * (observed[MOBILITY_I] + observed[MOBILITY_J])
 
 
@@ -174,13 +175,13 @@ def is_away(scene, work, observed, distance, gap):
 def left_over(scene, work, observed):
     """Return how far j may still be carried off the drift, or the flow, by its velocity [m]."""
     ux, uy = (
-        apart(work.velocity, at.X) - observed[DRIFT_X],
-        apart(work.velocity, at.Y) - observed[DRIFT_Y],
+        apart(work.velocity, X) - observed[DRIFT_X],
+        apart(work.velocity, Y) - observed[DRIFT_Y],
     )
     if observed[IN_FLOW] != 0.0:
-        x, y = apart(work.place, at.X), apart(work.place, at.Y)
-        ux = apart(work.velocity, at.X) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
-        uy = apart(work.velocity, at.Y) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
+        x, y = apart(work.place, X), apart(work.place, Y)
+        ux = apart(work.velocity, X) - (observed[FLOW_XX] * x + observed[FLOW_XY] * y)
+        uy = apart(work.velocity, Y) - (observed[FLOW_YX] * x + observed[FLOW_YY] * y)
     # Drag uses a velocity u up over u times the relaxation time m µ.
     relaxation = max(
         scene.bodies[BODY_I].mass * observed[MOBILITY_I],
@@ -193,10 +194,10 @@ def turn_left(scene, work, time, body, passing):
     """Return how far an outline may still be moved by its turning [m] within the time of passing
     [s]."""
     outer = scene.bodies[body].bounding_radius
-    spin, damping = work.velocity[at.NOW, body, at.ANGLE], 0.0
+    spin, damping = work.velocity[NOW, body, ANGLE], 0.0
     if not has(scene, VELOCITY_DERIVATIVES) or spin == 0.0:
         return outer * abs(spin) * passing
-    view = body_view(scene, work, time, at.NOW, body)
+    view = body_view(scene, work, time, NOW, body)
     damping = -velocity_derivatives(scene, view)[8]
     if not damping > 0.0:
         return outer * abs(spin) * passing
@@ -212,7 +213,7 @@ def can_meet_again(scene, work, observed, time):
     """Return True if the outlines may come together along the drift that is left."""
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     ux, uy = observed[DRIFT_X] / drift, observed[DRIFT_Y] / drift
-    x, y = apart(work.place, at.X), apart(work.place, at.Y)
+    x, y = apart(work.place, X), apart(work.place, Y)
     along, aside = x * ux + y * uy, abs(x * uy - y * ux)
     outer = outer_of(scene)
     clear = CLEARANCE * observed[ESCAPE] + left_over(scene, work, observed)
@@ -226,8 +227,8 @@ def can_meet_again(scene, work, observed, time):
     contact = scene.bodies[BODY_I].radius + scene.bodies[BODY_J].radius
     turn_c, turn_s, x, y = pose_of(scene, work, BODY_J, BODY_I)
     c, s = (
-        math.cos(work.place[at.NOW, BODY_I, at.ANGLE]),
-        math.sin(work.place[at.NOW, BODY_I, at.ANGLE]),
+        math.cos(work.place[NOW, BODY_I, ANGLE]),
+        math.sin(work.place[NOW, BODY_I, ANGLE]),
     )
     # In the frame of i: sphere tracing of j's outline along the drift.
     ux, uy = c * ux + s * uy, c * uy - s * ux
@@ -284,14 +285,14 @@ def load_on(observed):
 def start_rest(scene, work, observed, time):
     """Note that the doublet may rest as it is from now on."""
     observed[REST_SINCE] = time
-    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
+    pose = doublet_pose(scene, work, NOW, BODY_I, BODY_J)
     observed[REST_X], observed[REST_Y], observed[REST_ANGLE] = pose
 
 
 def rest_of(scene, work, observed, time, load):
     """Return how long the doublet has kept its pose without swinging, in rest times."""
     before = observed[REST_X], observed[REST_Y], observed[REST_ANGLE]
-    pose = doublet_pose(scene, work, at.NOW, BODY_I, BODY_J)
+    pose = doublet_pose(scene, work, NOW, BODY_I, BODY_J)
     moved = way_between(scene, BODY_I, BODY_J, pose, before)
     if moved > STILL * load.drift * observed[REST_TIME]:
         start_rest(scene, work, observed, time)
@@ -323,7 +324,7 @@ def return_bound(scene, work, observed, time):
 
     exp(−v a/D) over the farther half a of the path, at the least drift v there.
     """
-    outer, x, y = outer_of(scene), apart(work.place, at.X), apart(work.place, at.Y)
+    outer, x, y = outer_of(scene), apart(work.place, X), apart(work.place, Y)
     drift = math.hypot(observed[DRIFT_X], observed[DRIFT_Y])
     along = (x * observed[DRIFT_X] + y * observed[DRIFT_Y]) / drift
     if observed[IN_FLOW] != 0.0:

@@ -11,13 +11,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.ensembles.collision.draw import FAILURES
 from flocsim.errors import FlocsimError
 from flocsim.integrators.amplification import end_distance
 from flocsim.integrators.base import Integrator
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.run import Run
+from flocsim.state.work import NOW
 
 Task = tuple[tuple[int, int, float], int]
 """A replicate: (index of its type, N, share of δ_max), and its own index."""
@@ -60,7 +60,7 @@ def ending(row: Mapping[str, Any]) -> str:
 
 def position_of(run: Run) -> np.ndarray:
     """Return where the bodies are (n, 3) [m, m, rad]."""
-    return run.work.place[at.NOW]
+    return run.work.place[NOW]
 
 
 @attrs.define(eq=False)

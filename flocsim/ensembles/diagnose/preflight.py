@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.arrays import ContactView, OrientedView, OutlineView, PairView
 from flocsim.compiler.fingerprint import refuse_interpreter
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.draw import exact_method
@@ -36,6 +35,7 @@ from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
 from flocsim.run import wrong_answer
+from flocsim.state.views import ContactView, OrientedView, OutlineView, PairView
 from flocsim.system import System
 
 Flocs = Sequence[Floc]

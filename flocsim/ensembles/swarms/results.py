@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.ensembles.contents import (
     Contents,
     Differences,
@@ -35,6 +34,7 @@ from flocsim.io.labelled import Column, about_of
 from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
+from flocsim.state.work import grown
 
 # What is saved of a replicate while it runs.
 
@@ -122,7 +122,7 @@ def joined(parts: Sequence[Mapping[str, Any]]) -> Groups:
     def column(group: str, name: str) -> np.ndarray:
         values = [each[group][name] for each in parts]
         if name in swarm_file.POINTS | swarm_file.RINGS:
-            values = [at.grown(each, 1, most) for each in values]
+            values = [grown(each, 1, most) for each in values]
         if name in PLACED:
             values = [each + first for each, first in zip(values, begun, strict=False)]
         return np.concatenate(values).astype(swarm_file.GROUPS[group].columns[name].type)

@@ -13,9 +13,11 @@ Where space repeats itself, the sweep goes on round the seam.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import length_of, nearest_way
 from flocsim.hooks import hook
+from flocsim.state.bodies import X, Y
+from flocsim.state.clock import PAIRS_FULL
+from flocsim.state.work import ALL_PAIRS, NOW
 
 WANDER = 0.25
 """How far a body may go against the mean of all, in mean bounding radii, until pairs are listed
@@ -30,7 +32,7 @@ end."""
 
 def watches_all(work):
     """Whether all pairs that count are watched."""
-    return work.poses.shape[0] <= at.ALL_PAIRS
+    return work.poses.shape[0] <= ALL_PAIRS
 
 
 def wander_of(scene):
@@ -50,9 +52,9 @@ def drift_of(scene, work, state):
         pose = work.poses[body]
         if scene.bodies[body].free == 0.0:
             return 0.0, 0.0
-        x += work.place[state, body, at.X]
+        x += work.place[state, body, X]
         x -= pose.listed_x
-        y += work.place[state, body, at.Y]
+        y += work.place[state, body, Y]
         y -= pose.listed_y
     return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
 
@@ -63,8 +65,8 @@ def mean_velocity(scene, work):
     for body in range(scene.bodies.shape[0]):
         if scene.bodies[body].free == 0.0:
             return 0.0, 0.0
-        x += work.velocity[at.NOW, body, at.X]
-        y += work.velocity[at.NOW, body, at.Y]
+        x += work.velocity[NOW, body, X]
+        y += work.velocity[NOW, body, Y]
     return x / scene.bodies.shape[0], y / scene.bodies.shape[0]
 
 
@@ -75,8 +77,8 @@ def wandered(scene, work, state):
     drift_x, drift_y = drift_of(scene, work, state)
     for body in range(scene.bodies.shape[0]):
         pose = work.poses[body]
-        x = work.place[state, body, at.X] - pose.listed_x - drift_x
-        y = work.place[state, body, at.Y] - pose.listed_y - drift_y
+        x = work.place[state, body, X] - pose.listed_x - drift_x
+        y = work.place[state, body, Y] - pose.listed_y - drift_y
         furthest = max(furthest, length_of(x, y))
     return furthest / most
 
@@ -87,8 +89,8 @@ def time_to_wander(scene, work, share):
     most, fastest = wander_of(scene), 0.0
     drift_x, drift_y = mean_velocity(scene, work)
     for body in range(scene.bodies.shape[0]):
-        x = work.velocity[at.NOW, body, at.X] - drift_x
-        y = work.velocity[at.NOW, body, at.Y] - drift_y
+        x = work.velocity[NOW, body, X] - drift_x
+        y = work.velocity[NOW, body, Y] - drift_y
         fastest = max(fastest, length_of(x, y))
     return share * most / fastest if fastest > 0.0 else math.inf
 
@@ -98,14 +100,14 @@ def list_near(scene, work, cut):
     """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
     discs, (width, height) = work.discs, scene.box
     for body in range(work.poses.shape[0]):
-        discs[body, PLACE_X] = work.place[at.NOW, body, at.X]
-        discs[body, PLACE_Y] = work.place[at.NOW, body, at.Y]
+        discs[body, PLACE_X] = work.place[NOW, body, X]
+        discs[body, PLACE_Y] = work.place[NOW, body, Y]
         discs[body, WAY_X] = discs[body, WAY_Y] = 0.0
         discs[body, REACH] = scene.bodies[body].bounding_radius + 0.5 * cut
         discs[body, MOVES] = scene.bodies[body].free
     total = near_pairs(discs, work.order, width, height, work.starts, work.pairs)
     if total > work.pairs.shape[0]:
-        work.tally.full, work.tally.pairs = at.PAIRS_FULL, 0
+        work.tally.full, work.tally.pairs = PAIRS_FULL, 0
         return False
     for pair in range(total):
         work.pairs[pair].acting = 0

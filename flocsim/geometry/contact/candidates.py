@@ -8,11 +8,13 @@ body_pairs.py.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.points import contact_point, length_of, separation
 from flocsim.hooks import hook
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.contacts import GRAZES
+from flocsim.state.work import CARRIED, NOW
 
 SKIN = 0.1
 """Pairs are listed up to a gap of this share of r_i + r_j, or up to the smaller one of …"""
@@ -89,7 +91,7 @@ def list_pair(scene, work, pair, ahead):
     """List the candidates of two bodies for steps of ``ahead`` [s]; how far they may move before it
     must be made again."""
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
-    ox, oy = separation(scene, work, at.NOW, a, b)
+    ox, oy = separation(scene, work, NOW, a, b)
     reach = scene.listed_reach
     skin = skin_of(scene, work, a, b, ahead)
     apart = length_of(ox, oy) - scene.bodies[a].bounding_radius - scene.bodies[b].bounding_radius
@@ -128,10 +130,10 @@ def moved(scene, work, state, a, b, enough):
     # Of the same image of a as now.
     ox = work.poses[a].listed_x - work.poses[b].listed_x
     oy = work.poses[a].listed_y - work.poses[b].listed_y
-    ox += dx - (work.place[state, a, at.X] - work.place[state, b, at.X])
-    oy += dy - (work.place[state, a, at.Y] - work.place[state, b, at.Y])
-    turn_a = work.place[state, a, at.ANGLE] - work.poses[a].listed_angle
-    turn_b = work.place[state, b, at.ANGLE] - work.poses[b].listed_angle
+    ox += dx - (work.place[state, a, X] - work.place[state, b, X])
+    oy += dy - (work.place[state, a, Y] - work.place[state, b, Y])
+    turn_a = work.place[state, a, ANGLE] - work.poses[a].listed_angle
+    turn_b = work.place[state, b, ANGLE] - work.poses[b].listed_angle
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
     plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
     if plain < enough:
@@ -160,12 +162,12 @@ def spent(scene, work, state):
 
 def relative_speed(scene, work, a, b):
     """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
-    x, y = separation(scene, work, at.NOW, a, b)
+    x, y = separation(scene, work, NOW, a, b)
     vx, vy = (
-        work.velocity[at.NOW, a, at.X] - work.velocity[at.NOW, b, at.X],
-        work.velocity[at.NOW, a, at.Y] - work.velocity[at.NOW, b, at.Y],
+        work.velocity[NOW, a, X] - work.velocity[NOW, b, X],
+        work.velocity[NOW, a, Y] - work.velocity[NOW, b, Y],
     )
-    spin_a, spin_b = work.velocity[at.NOW, a, at.ANGLE], work.velocity[at.NOW, b, at.ANGLE]
+    spin_a, spin_b = work.velocity[NOW, a, ANGLE], work.velocity[NOW, b, ANGLE]
     turning = abs(spin_a - spin_b)
     seen_from_b = length_of(vx + spin_b * y, vy - spin_b * x) + turning * core_radius(scene, a)
     seen_from_a = length_of(vx + spin_a * y, vy - spin_a * x) + turning * core_radius(scene, b)
@@ -174,8 +176,8 @@ def relative_speed(scene, work, a, b):
 
 def outline_speed(scene, work, body):
     """A bound of how fast the core of a body moves now [m/s]."""
-    turning = abs(work.velocity[at.NOW, body, at.ANGLE]) * core_radius(scene, body)
-    return length_of(work.velocity[at.NOW, body, at.X], work.velocity[at.NOW, body, at.Y]) + turning
+    turning = abs(work.velocity[NOW, body, ANGLE]) * core_radius(scene, body)
+    return length_of(work.velocity[NOW, body, X], work.velocity[NOW, body, Y]) + turning
 
 
 def time_within(scene, work, share):
@@ -193,12 +195,12 @@ def share_ahead(scene, work):
     few bodies, whose lists are soon made anew, most of what is left."""
     if not watches_all(work):
         return 0.5
-    return max(MOST_AHEAD - spent(scene, work, at.NOW), 0.5)
+    return max(MOST_AHEAD - spent(scene, work, NOW), 0.5)
 
 
 def outlived(scene, work, ahead):
     """Whether lists are to be made anew before a step of ``ahead`` [s]."""
-    used = spent(scene, work, at.NOW)
+    used = spent(scene, work, NOW)
     if used > 0.5:
         return True
     few = used > LEAST_USED and watches_all(work)
@@ -231,9 +233,9 @@ def list_ahead(scene, work, ahead):
     work.tally.rebuilds += 1
     for body in range(scene.bodies.shape[0]):
         pose = work.poses[body]
-        pose.listed_x = work.place[at.NOW, body, at.X]
-        pose.listed_y = work.place[at.NOW, body, at.Y]
-        pose.listed_angle = work.place[at.NOW, body, at.ANGLE]
+        pose.listed_x = work.place[NOW, body, X]
+        pose.listed_y = work.place[NOW, body, Y]
+        pose.listed_angle = work.place[NOW, body, ANGLE]
     if not list_pairs(scene, work, widest_cut(scene, work, ahead)):
         return False
     room = True
@@ -260,15 +262,15 @@ def keep_slips(work):
         contact = work.contacts[row]
         mode = candidate.closed
         # Whether there is anything to be known of a pair besides where its bodies are.
-        known = work.slip[at.NOW, row] != 0.0 or contact.gap_offset != 0.0
-        if known or contact.flights != 0.0 or mode == at.GRAZES:
+        known = work.slip[NOW, row] != 0.0 or contact.gap_offset != 0.0
+        if known or contact.flights != 0.0 or mode == GRAZES:
             a, b = candidate.vertex_body, candidate.edge_body
             work.kept[count].later = max(a, b)
             work.kept[count].earlier = min(a, b)
             work.kept[count].vertex = candidate.vertex
             work.kept[count].edge = candidate.edge_start
             work.kept[count].mode = mode
-            work.kept[count].slip = work.slip[at.NOW, row]
+            work.kept[count].slip = work.slip[NOW, row]
             work.kept[count].grazing_force = contact.grazing_force
             work.kept[count].gap_offset = contact.gap_offset
             work.kept[count].slip_offset = contact.slip_offset
@@ -292,7 +294,7 @@ def restore_slips(work, count):
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         contact = work.contacts[row]
-        work.slip[at.NOW, row] = contact.slip_offset = 0.0
+        work.slip[NOW, row] = contact.slip_offset = 0.0
         contact.gap_offset = 0.0
         contact.flight = contact.flights = 0.0
         a, b = candidate.vertex_body, candidate.edge_body
@@ -304,12 +306,12 @@ def restore_slips(work, count):
                 break
             same = work.kept[k].vertex == candidate.vertex
             if same and work.kept[k].edge == candidate.edge_start:
-                work.slip[at.NOW, row] = work.kept[k].slip
+                work.slip[NOW, row] = work.kept[k].slip
                 contact.slip_offset = work.kept[k].slip_offset
                 contact.gap_offset = work.kept[k].gap_offset
                 contact.flights = work.kept[k].flights
-                if work.kept[k].mode == at.GRAZES:
-                    candidate.closed = at.GRAZES
+                if work.kept[k].mode == GRAZES:
+                    candidate.closed = GRAZES
                     contact.grazing_force = work.kept[k].grazing_force
                     contact.fresh = 0.0
     work.tally.kept = 0
@@ -354,10 +356,10 @@ def heir_of(scene, work, row):
     for other in range(first, work.tally.candidates):
         if work.candidates[other].pair != pair:
             break
-        if work.geometry[at.NOW, other].gap < 0.0:
+        if work.geometry[NOW, other].gap < 0.0:
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
-            own = abs(work.slip[at.NOW, other])
+            own = abs(work.slip[NOW, other])
             nearer = distance < least - ONE_POINT * near
             if not (nearer or (distance <= least + ONE_POINT * near and own < displaced)):
                 continue
@@ -374,19 +376,19 @@ def hand_over(scene, work):
     Without an heir ξ vanishes. Expects the geometry of the current position.
     """
     for row in range(work.tally.candidates):
-        opened = work.geometry[at.NOW, row].gap >= 0.0
-        grazes = work.candidates[row].closed == at.GRAZES
-        if work.slip[at.NOW, row] != 0.0 and opened and not grazes:
+        opened = work.geometry[NOW, row].gap >= 0.0
+        grazes = work.candidates[row].closed == GRAZES
+        if work.slip[NOW, row] != 0.0 and opened and not grazes:
             heir = heir_of(scene, work, row)
             if heir >= 0:
-                own, given = work.slip[at.NOW, heir], work.slip[at.NOW, row]
+                own, given = work.slip[NOW, heir], work.slip[NOW, row]
                 most = math.hypot(own, given)
                 agreement = tangent_agreement(work, row, heir)
                 total = own + given * agreement
-                work.slip[at.NOW, heir] = min(max(total, -most), most)
+                work.slip[NOW, heir] = min(max(total, -most), most)
                 wrong = slip_error(work, row, work.place) + work.contacts[row].slip_offset
                 work.contacts[heir].slip_offset += wrong * agreement
-            work.slip[at.NOW, row] = 0.0
+            work.slip[NOW, row] = 0.0
 
 
 def slip_error(work, row, of):
@@ -395,10 +397,10 @@ def slip_error(work, row, of):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    along = g[at.NOW, row].normal_x * (of[at.CARRIED, a, at.Y] - of[at.CARRIED, b, at.Y])
-    along -= g[at.NOW, row].normal_y * (of[at.CARRIED, a, at.X] - of[at.CARRIED, b, at.X])
-    along += g[at.NOW, row].vertex_arm_t * of[at.CARRIED, a, at.ANGLE]
-    return along - g[at.NOW, row].edge_arm_t * of[at.CARRIED, b, at.ANGLE]
+    along = g[NOW, row].normal_x * (of[CARRIED, a, Y] - of[CARRIED, b, Y])
+    along -= g[NOW, row].normal_y * (of[CARRIED, a, X] - of[CARRIED, b, X])
+    along += g[NOW, row].vertex_arm_t * of[CARRIED, a, ANGLE]
+    return along - g[NOW, row].edge_arm_t * of[CARRIED, b, ANGLE]
 
 
 def tangent_agreement(work, row, other):
@@ -406,7 +408,7 @@ def tangent_agreement(work, row, other):
 
     A pair listed the other way round has the opposite tangent, and its slip the same sign.
     """
-    geometry = work.geometry[at.NOW]
+    geometry = work.geometry[NOW]
     cosine = (
         geometry[row].normal_x * geometry[other].normal_x
         + geometry[row].normal_y * geometry[other].normal_y

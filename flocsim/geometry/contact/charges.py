@@ -27,11 +27,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.compiler.composer import compiled
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.pieces import at_parameter, piece_at, pieces_of_shape
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.state.outlines import (
+    BEND,
+    BY_X,
+    BY_XY,
+    BY_Y,
+    CHARGE_COLUMNS,
+    FIELD_COLUMNS,
+    FIRST_CHARGE,
+    GRID_COLUMNS,
+    GRID_TILE,
+    GROUP,
+    GROUP_COUNT,
+    GROUP_EXTENT,
+    GROUP_X,
+    GROUP_Y,
+    INWARD,
+    POTENTIAL,
+    SIZE,
+    TILE,
+)
 
 DEEP = 0.6
 """Depth of charges, and their distance from each other."""
@@ -105,8 +124,8 @@ def unit_of(shape: Shape, kappa: float) -> float:
 
 def spacings(pieces, kappa):
     """How far charges behind each piece lie from each other [m], and their numbers."""
-    spacing = DEEP * np.minimum(pieces[:, at.INWARD], 1.0 / kappa)
-    bend, size = pieces[:, at.BEND], pieces[:, at.SIZE]
+    spacing = DEEP * np.minimum(pieces[:, INWARD], 1.0 / kappa)
+    bend, size = pieces[:, BEND], pieces[:, SIZE]
     lengths = np.where(bend > 0.0, 4.0 * np.arctan(size) * bend, 2.0 * size)
     # A corner that is not rounded would need infinitely many.
     with np.errstate(divide="ignore"):
@@ -191,8 +210,8 @@ def distances(points, others):
 
 
 def clusters(charges):
-    """Some charges as lists of up to at.GROUP neighbours."""
-    if len(charges) <= at.GROUP:
+    """Some charges as lists of up to GROUP neighbours."""
+    if len(charges) <= GROUP:
         return [charges]
     axis = int(np.argmax(np.ptp(charges[:, :2], axis=0)))
     order = charges[np.argsort(charges[:, axis], kind="stable")]
@@ -201,14 +220,14 @@ def clusters(charges):
 
 @lru_cache(maxsize=256)
 def rows_of_shape(shape: Shape, kappa: float) -> np.ndarray:
-    """The same as rows (groups, at.CHARGE_COLUMNS), of neighbours and a circle that holds them."""
+    """The same as rows (groups, CHARGE_COLUMNS), of neighbours and a circle that holds them."""
     found = clusters(charges_of_shape(shape, kappa))
-    rows = np.zeros((len(found), at.CHARGE_COLUMNS))
+    rows = np.zeros((len(found), CHARGE_COLUMNS))
     for row, group in zip(rows, found, strict=True):
         middle = 0.5 * (group[:, :2].min(axis=0) + group[:, :2].max(axis=0))
         extent = np.hypot(*(group[:, :2] - middle).T).max()
-        row[: at.FIRST_CHARGE] = *middle, extent, len(group)
-        row[at.FIRST_CHARGE : at.FIRST_CHARGE + group.size] = group.ravel()
+        row[:FIRST_CHARGE] = *middle, extent, len(group)
+        row[FIRST_CHARGE : FIRST_CHARGE + group.size] = group.ravel()
     return rows
 
 
@@ -221,7 +240,7 @@ class Charges(NamedTuple):
 
 def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
     """The Charges of bodies of these shapes at κ [1/m]; 0: of so many bodies with none."""
-    none = np.zeros((0, at.CHARGE_COLUMNS))
+    none = np.zeros((0, CHARGE_COLUMNS))
     rows = [rows_of_shape(shape, kappa) if kappa > 0.0 else none for shape in shapes]
     first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
     return Charges(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))
@@ -275,8 +294,8 @@ def list_groups(charges, x, y, reach, near):
     """List the rows of charges that may be within a reach [m] of a point; how many they are."""
     count = 0
     for row in range(charges.shape[0]):
-        dx, dy = x - charges[row, at.GROUP_X], y - charges[row, at.GROUP_Y]
-        most = reach + charges[row, at.GROUP_EXTENT]
+        dx, dy = x - charges[row, GROUP_X], y - charges[row, GROUP_Y]
+        most = reach + charges[row, GROUP_EXTENT]
         if dx * dx + dy * dy < most * most:
             near[count] = row
             count += 1
@@ -289,8 +308,8 @@ def at_node(charges, near, count, kappa, x, y):
     value, by_x, by_y, by_both = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
         row = near[k]
-        for each in range(int(charges[row, at.GROUP_COUNT])):
-            place = at.FIRST_CHARGE + 3 * each
+        for each in range(int(charges[row, GROUP_COUNT])):
+            place = FIRST_CHARGE + 3 * each
             dx, dy = x - charges[row, place], y - charges[row, place + 1]
             squared = kappa * kappa * (dx * dx + dy * dy)
             if squared > (FADED + 1.0) * (FADED + 1.0):
@@ -308,7 +327,7 @@ def at_node(charges, near, count, kappa, x, y):
 
 def fill(charges, kappa, step, corners, near, field):
     """Write the nodes of tiles with these lower left corners (m, 2); ``near`` is scratch."""
-    side, half = at.TILE + 1, 0.5 * at.TILE * step
+    side, half = TILE + 1, 0.5 * TILE * step
     for tile in range(corners.shape[0]):
         x, y = corners[tile, 0] + half, corners[tile, 1] + half
         reach = (FADED + 1.0) / kappa + 1.5 * half
@@ -318,10 +337,10 @@ def fill(charges, kappa, step, corners, near, field):
             y = corners[tile, 1] + step * (node // side)
             value, by_x, by_y, by_both = at_node(charges, near, count, kappa, x, y)
             row = tile * side * side + node
-            field[row, at.POTENTIAL] = value
-            field[row, at.BY_X] = step * by_x
-            field[row, at.BY_Y] = step * by_y
-            field[row, at.BY_XY] = step * step * by_both
+            field[row, POTENTIAL] = value
+            field[row, BY_X] = step * by_x
+            field[row, BY_Y] = step * by_y
+            field[row, BY_XY] = step * step * by_both
 
 
 def tiles_around(shape, kappa, step):
@@ -329,7 +348,7 @@ def tiles_around(shape, kappa, step):
     from scipy.spatial import cKDTree
 
     points, places = points_of(pieces_of_shape(shape), kappa)
-    width, reach = at.TILE * step, FADED / kappa
+    width, reach = TILE * step, FADED / kappa
     low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
     counts = np.ceil((high - low) / width).astype(int)
     x, y = (low[k] + width * (np.arange(counts[k]) + 0.5) for k in range(2))
@@ -351,15 +370,15 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     ShapeError for an outline that takes too many charges, or nodes around it.
     """
     check_length(shape, kappa)
-    step, side = STEP * unit_of(shape, kappa), at.TILE + 1
+    step, side = STEP * unit_of(shape, kappa), TILE + 1
     low, counts, used = tiles_around(shape, kappa, step)
     nodes = int(used.sum()) * side * side
     if nodes > MOST_NODES:
         raise too_long(shape, kappa, f"{nodes:.3g} nodes of its field, of {MOST_NODES}")
     tiles = np.where(used, (np.cumsum(used) - 1) * side * side, -1)
     places = np.flatnonzero(used)
-    corners = low + at.TILE * step * np.column_stack([places % counts[0], places // counts[0]])
-    field = np.empty((nodes, at.FIELD_COLUMNS))
+    corners = low + TILE * step * np.column_stack([places % counts[0], places // counts[0]])
+    field = np.empty((nodes, FIELD_COLUMNS))
     charges = rows_of_shape(shape, kappa)
     near = np.zeros(len(charges), np.int64)
     compiled(fill)(charges, kappa, step, corners, near, field)
@@ -372,9 +391,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     bounds = [shape.bounding_radius for shape in shapes]
     # The earlier one of two that are as large: outline_sum.between_outlines.
     asked = {bounds.index(max(bounds))} if len(shapes) == 2 else set(range(len(shapes)))
-    none = Field(
-        np.zeros((1, at.GRID_COLUMNS)), np.zeros(0, np.int64), np.zeros((0, at.FIELD_COLUMNS))
-    )
+    none = Field(np.zeros((1, GRID_COLUMNS)), np.zeros(0, np.int64), np.zeros((0, FIELD_COLUMNS)))
     found = [
         field_of_shape(shape, kappa) if kappa > 0.0 and body in asked else none
         for body, shape in enumerate(shapes)
@@ -383,7 +400,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     known = [each for each in found if len(each.field)]
     if len(known) == 1:  # tables are large, and not copied where they need not be
         return Field(grids, known[0].tiles, known[0].field)
-    grids[:, at.GRID_TILE] = np.cumsum([0, *[len(each.tiles) for each in found[:-1]]])
+    grids[:, GRID_TILE] = np.cumsum([0, *[len(each.tiles) for each in found[:-1]]])
     before = np.cumsum([0, *[len(each.field) for each in found[:-1]]])
     tiles = [np.where(each.tiles < 0, -1, each.tiles + first)
              for each, first in zip(found, before, strict=True)]  # fmt: skip

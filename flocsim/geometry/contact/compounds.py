@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.geometry.contact import candidates, near_pairs
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.near_pairs import (
@@ -31,6 +30,7 @@ from flocsim.geometry.contact.near_pairs import (
     tree_of,
 )
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.state.bodies import X, Y
 
 SWELL, ONWARD, BEGINS, POINT_COLUMNS = range(2, 6)
 """Columns of core points behind X and Y: [m], rows, and one of …"""
@@ -124,7 +124,7 @@ def begins_pair(vertices, point, start, is_later):
 
 def feature_distance2(vertices, pose, point, start):
     """Squared distance of the cores of a point and of what begins at another body's point [m²]."""
-    x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
+    x, y = posed(pose, vertices[point, X], vertices[point, Y])
     return edge_distance2(vertices, x, y, start, start + int(vertices[start, ONWARD]))
 
 

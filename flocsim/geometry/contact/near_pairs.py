@@ -17,11 +17,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.geometry.contact import points as contacts
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.hooks import hook
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.clock import CANDIDATES_FULL
+from flocsim.state.work import NOW
 
 LEAF = 2
 """Core points in a run that is not split any more: from this to twice as many."""
@@ -105,7 +107,7 @@ def posed(pose, x, y):
 def edge_distance2(vertices, x, y, start, end):
     """Squared distance of a point from the edge between two core points [m²]."""
     return segment_distance2(
-        x, y, vertices[start, at.X], vertices[start, at.Y], vertices[end, at.X], vertices[end, at.Y]
+        x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
     )
 
 
@@ -189,7 +191,7 @@ def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
     start_b, end_b = run_of(side_b, leaf_b)
     least2 = math.inf
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
+        x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             least2 = min(least2, edge_distance2(vertices, x, y, start, end))
@@ -244,9 +246,9 @@ def core_distance(outlines, a, b, pose):
 
 def pose_of(scene, work, a, b):
     """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
-    x, y = separation(scene, work, at.NOW, a, b)
-    turn = work.place[at.NOW, a, at.ANGLE] - work.place[at.NOW, b, at.ANGLE]
-    c, s = math.cos(work.place[at.NOW, b, at.ANGLE]), math.sin(work.place[at.NOW, b, at.ANGLE])
+    x, y = separation(scene, work, NOW, a, b)
+    turn = work.place[NOW, a, ANGLE] - work.place[NOW, b, ANGLE]
+    c, s = math.cos(work.place[NOW, b, ANGLE]), math.sin(work.place[NOW, b, ANGLE])
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
@@ -254,7 +256,7 @@ def add_pair(work, pair, a, point, b, start, end):
     """Append a pair of features to the list; False where no room is left."""
     row = work.tally.candidates
     if row == work.candidates.shape[0]:
-        work.tally.full = at.CANDIDATES_FULL
+        work.tally.full = CANDIDATES_FULL
         return False
     new = work.candidates
     new[row].vertex_body, new[row].vertex = a, point
@@ -275,7 +277,7 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
     start_b, end_b = run_of(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, at.X], vertices[point, at.Y])
+        x, y = posed(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             if edge_distance2(vertices, x, y, start, end) < reach * reach:
@@ -322,7 +324,7 @@ def list_spheres(scene, work, pair, cutoff):
 
 def sphere_gap(scene, work, a, b):
     """The gap of two spheres now [m]."""
-    ox, oy = separation(scene, work, at.NOW, a, b)
+    ox, oy = separation(scene, work, NOW, a, b)
     return length_of(ox, oy) - scene.bodies[a].radius - scene.bodies[b].radius
 
 

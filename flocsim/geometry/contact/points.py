@@ -4,7 +4,7 @@ in kernels; and of placed shapes, where they touch, and whether they overlap too
 A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
 vertex–edge method); two spheres are one pair of points.
 
-``geometry[state, row]`` is a VertexAtEdge of flocsim.arrays. The normal n points from the foot on
+``geometry[state, row]`` is a VertexAtEdge of flocsim.state. The normal n points from the foot on
 the edge to the vertex, t = (−n_y, n_x). It turns by ``turning`` for every metre by which the vertex
 is shifted along t: 0 where the foot lies inside the edge, which alone turns it then, 1/distance
 where it is an end.
@@ -26,13 +26,14 @@ from itertools import combinations, product
 
 import numpy as np
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.shapes.cores import Part, closest_share, edges_of, from_edges
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import hook
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import NOW
 
 TINY = 1e-300
 """Keeps the reciprocal of a distance finite."""
@@ -57,9 +58,9 @@ def length_of(x, y):
 @hook
 def separation(scene, work, state, a, b):
     """(x, y) of body a as seen from body b, in a state [m]."""
-    return work.place[state, a, at.X] - work.place[state, b, at.X], work.place[
-        state, a, at.Y
-    ] - work.place[state, b, at.Y]
+    return work.place[state, a, X] - work.place[state, b, X], work.place[state, a, Y] - work.place[
+        state, b, Y
+    ]
 
 
 def nearest_way(length, period):
@@ -72,8 +73,8 @@ def nearest_way(length, period):
 def nearest_image(scene, work, state, a, b):
     """The same where space repeats itself: of a's image that is nearest to b."""
     width, height = scene.box
-    x = nearest_way(work.place[state, a, at.X] - work.place[state, b, at.X], width)
-    return x, nearest_way(work.place[state, a, at.Y] - work.place[state, b, at.Y], height)
+    x = nearest_way(work.place[state, a, X] - work.place[state, b, X], width)
+    return x, nearest_way(work.place[state, a, Y] - work.place[state, b, Y], height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
@@ -103,7 +104,7 @@ def cosine_and_sine(work, body, angle):
 def turn_body(work, state, body):
     """Cosine and sine of a body's angle in a state, into ``work.poses``."""
     pose = work.poses[body]
-    cosine, sine = cosine_and_sine(work, body, work.place[state, body, at.ANGLE])
+    cosine, sine = cosine_and_sine(work, body, work.place[state, body, ANGLE])
     pose.cosine, pose.sine = cosine, sine
 
 
@@ -116,8 +117,8 @@ def turn_bodies(work, state):
 def turned(scene, work, body, point):
     """A core point relative to its body's centroid, in the frame of the scene."""
     pose = work.poses[body]
-    x = scene.vertices[point, at.X]
-    y = scene.vertices[point, at.Y]
+    x = scene.vertices[point, X]
+    y = scene.vertices[point, Y]
     c = pose.cosine
     s = pose.sine
     return c * x - s * y, s * x + c * y
@@ -222,13 +223,13 @@ def least_listed_gap(work):
     """The smallest gap among the listed pairs now (inf where none is listed)."""
     least = math.inf
     for row in range(work.tally.candidates):
-        least = min(least, work.geometry[at.NOW, row].gap)
+        least = min(least, work.geometry[NOW, row].gap)
     return least
 
 
 def contact_point(work, row, body):
     """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
-    geometry = work.geometry[at.NOW]
+    geometry = work.geometry[NOW]
     nx, ny = geometry[row].normal_x, geometry[row].normal_y
     if work.candidates[row].vertex_body == body:
         across, along = geometry[row].vertex_arm_n, geometry[row].vertex_arm_t

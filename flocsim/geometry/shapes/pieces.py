@@ -17,12 +17,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import BEND, EXTENT, PIECE_COLUMNS
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import Part, signed_area
 from flocsim.geometry.shapes.moments import exposed_arcs, exposed_chords, is_disc, pieces_of
 from flocsim.geometry.shapes.shape import Shape
+from flocsim.state.outlines import (
+    BEND,
+    EXTENT,
+    INWARD,
+    MIDDLE_X,
+    MIDDLE_Y,
+    PIECE_COLUMNS,
+    PLACE_X,
+    PLACE_Y,
+    SIZE,
+    WAY_X,
+    WAY_Y,
+)
 
 WIDEST = 0.5 * math.pi
 """No arc is longer than this angle [rad]."""
@@ -139,11 +150,11 @@ class Placed(NamedTuple):
 def piece_at(pieces, row):
     """A piece in the frame of its own body."""
     return Placed(
-        pieces[row, at.PLACE_X], pieces[row, at.PLACE_Y],
-        pieces[row, at.WAY_X], pieces[row, at.WAY_Y],
-        pieces[row, at.SIZE], pieces[row, at.BEND],
-        pieces[row, at.MIDDLE_X], pieces[row, at.MIDDLE_Y],
-        pieces[row, at.EXTENT], pieces[row, at.INWARD],
+        pieces[row, PLACE_X], pieces[row, PLACE_Y],
+        pieces[row, WAY_X], pieces[row, WAY_Y],
+        pieces[row, SIZE], pieces[row, BEND],
+        pieces[row, MIDDLE_X], pieces[row, MIDDLE_Y],
+        pieces[row, EXTENT], pieces[row, INWARD],
     )  # fmt: skip
 
 

@@ -17,8 +17,6 @@ nothing: a pair that opens is taken to be closed at the start by FADING of the t
 
 import math
 
-import flocsim.arrays as at
-from flocsim.arrays import ContactView, moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.radau.tableau import REAL
@@ -30,6 +28,8 @@ from flocsim.integrators.rhs.jacobian import (
     tangent_rows,
 )
 from flocsim.integrators.rhs.views import effective_mass, push_pair, smaller_radius, tangential_rate
+from flocsim.state.views import ContactView, moved_contact
+from flocsim.state.work import DAMPING, NEW, NOW, STIFFNESS, TRIAL
 
 FADING = 0.01
 """The tangential force of a pair that opens falls to half within a gap of this share of the
@@ -38,12 +38,12 @@ tolerance, or of its overlap at the start where that is more."""
 
 def takes_part(work, row):
     """Whether a pair is closed at the start of the step, TRIAL, or at its end, NOW."""
-    return work.geometry[at.NOW, row].gap < 0.0 or work.geometry[at.TRIAL, row].gap < 0.0
+    return work.geometry[NOW, row].gap < 0.0 or work.geometry[TRIAL, row].gap < 0.0
 
 
 def closed_share(work, row):
     """The part of the step for which a pair is closed, as its gap goes along a line."""
-    before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
+    before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
     if before < 0.0:
         return (
             1.0
@@ -55,7 +55,7 @@ def closed_share(work, row):
 
 def share_slope(work, row):
     """By how much that grows with the gap at the end [1/m]."""
-    before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
+    before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
     if before < 0.0 < after:
         return -work.interior[row].fading_gap / (work.interior[row].fading_gap + after) ** 2
     return -before / (after - before) ** 2 if after < 0.0 <= before else 0.0
@@ -63,14 +63,14 @@ def share_slope(work, row):
 
 def end_overlap(work, row):
     """Δ₁⁺ of a pair, by its gap at the end [m]."""
-    return max(-work.geometry[at.NOW, row].gap, 0.0)
+    return max(-work.geometry[NOW, row].gap, 0.0)
 
 
 def view_with(scene, work, row, step, after, slip, rate):
     """The ContactView of a pair over the step, of an overlap ``after`` at its end [m]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    pressing = (after - max(-work.geometry[at.TRIAL, row].gap, 0.0)) / step
+    pressing = (after - max(-work.geometry[TRIAL, row].gap, 0.0)) / step
     return ContactView(
         after, pressing, slip, rate, effective_mass(scene, a, b),
         scene.bodies[a].radius, scene.bodies[b].radius, smaller_radius(scene, a, b),
@@ -97,14 +97,14 @@ def bearing_of(work, row):
 def friction_view(scene, work, row, step):
     """The ContactView of a pair over the step of the overlap that its friction goes by; ξ₁ goes to
     NEW, whether it slides to SLIDING."""
-    bearing, rate = bearing_of(work, row), tangential_rate(work, at.NOW, row)
-    slip, side = work.slip[at.NOW, row] + work.interior[row].step_share * step * rate, 0
+    bearing, rate = bearing_of(work, row), tangential_rate(work, NOW, row)
+    slip, side = work.slip[NOW, row] + work.interior[row].step_share * step * rate, 0
     if has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view_with(scene, work, row, step, bearing, 0.0, 0.0))
         if abs(slip) > limit:
             side = 1 if slip > 0.0 else -1
             slip = side * limit
-    work.slip[at.NEW, row], work.candidates[row].sliding = slip, side
+    work.slip[NEW, row], work.candidates[row].sliding = slip, side
     return view_with(scene, work, row, step, bearing, slip, rate)
 
 
@@ -137,9 +137,9 @@ def add_mean_forces(scene, work, step):
             work.interior[row].step_share = closed_share(work, row)
         if takes_part(work, row):
             normal = normal_force(scene, work, row, step, work.interior[row].overlap)
-            push_pair(work, at.NOW, row, normal, friction_force(scene, work, row, step))
+            push_pair(work, NOW, row, normal, friction_force(scene, work, row, step))
         else:
-            work.slip[at.NEW, row], work.candidates[row].sliding = 0.0, 0
+            work.slip[NEW, row], work.candidates[row].sliding = 0.0, 0
 
 
 @apart
@@ -170,10 +170,10 @@ def add_slopes(scene, work, row, normal, tangential, coupled):
     a, b = candidate.vertex_body, candidate.edge_body
     pair = candidate.pair
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal)
+    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal)
     if coupled != 0.0:
-        add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, coupled)
-    add_product(scene, work, at.DAMPING, pair, a, b, across, across, tangential)
+        add_product(scene, work, STIFFNESS, pair, a, b, across, along, coupled)
+    add_product(scene, work, DAMPING, pair, a, b, across, across, tangential)
 
 
 def friction_slopes(scene, work, row, step):
@@ -184,14 +184,14 @@ def friction_slopes(scene, work, row, step):
     part, side = work.interior[row].step_share, work.candidates[row].sliding
     by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
     if side != 0:
-        by_limit = side * limit_slope(scene, work, at.NOW, row) * found[7]
+        by_limit = side * limit_slope(scene, work, NOW, row) * found[7]
         by_slip = 0.0
     elif has(scene, SLIP_LIMIT):
         limit = slip_limit(scene, view)
         if 0.0 < limit < math.inf:
             by_slip, by_rate = sticking_slopes(scene, view, limit, step)
     by_overlap = part * (found[3] + found[5] / step + by_limit)
-    by_part = found[1] - part * by_slip * step * tangential_rate(work, at.NOW, row)
+    by_part = found[1] - part * by_slip * step * tangential_rate(work, NOW, row)
     return part * (by_rate + part * step * by_slip), by_overlap, by_part
 
 
@@ -224,5 +224,5 @@ def flag_close(scene, work):
         candidate = work.candidates[row]
         a, b = candidate.vertex_body, candidate.edge_body
         near = CLOSE * (scene.bodies[a].radius + scene.bodies[b].radius)
-        if work.geometry[at.NOW, row].gap < near or work.geometry[at.TRIAL, row].gap < 0.0:
+        if work.geometry[NOW, row].gap < near or work.geometry[TRIAL, row].gap < 0.0:
             candidate.closed = 1

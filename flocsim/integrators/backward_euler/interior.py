@@ -36,7 +36,6 @@ friction nearly everywhere.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.backward_euler.contact_mean import (
@@ -49,6 +48,7 @@ from flocsim.integrators.backward_euler.contact_mean import (
 )
 from flocsim.integrators.rhs.jacobian import add_turning, normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import pressed_view, push_pair, tangential_rate
+from flocsim.state.work import CHANGE, NOW, TRIAL
 
 FAR_FROM_WALL = 0.99
 """What is to stay above 0 goes so far towards it at most in an iteration."""
@@ -88,7 +88,7 @@ def part_of_step(work, row, limited):
     over, left, before = (
         contact.overlap,
         contact.slack,
-        work.geometry[at.TRIAL, row].gap,
+        work.geometry[TRIAL, row].gap,
     )
     if before >= 0.0:
         return over / (over + before), before / (over + before) ** 2, 0.0
@@ -105,7 +105,7 @@ def press(scene, work, row, step, turns):
     nothing limits it, or there is none. Along gaps that do not ``turns`` it is limited by springs
     alone, which is smooth: together with dashpots they are clipped."""
     contact = work.interior[row]
-    overlap, rate = contact.overlap, tangential_rate(work, at.NOW, row)
+    overlap, rate = contact.overlap, tangential_rate(work, NOW, row)
     view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
     found, limit = contact_derivatives(scene, view), 0.0
     stiffness = hardness = found[2] + found[4] / step
@@ -130,7 +130,7 @@ def press(scene, work, row, step, turns):
     part = contact.step_share
     contact.normal_stiffness, contact.friction_limit = hardness, limit
     contact.stick_slope = (spring * part * step + drag) / hardness
-    contact.stick_force = spring / hardness * work.slip[at.NOW, row] + contact.stick_slope * rate
+    contact.stick_force = spring / hardness * work.slip[NOW, row] + contact.stick_slope * rate
     return found[0], stiffness
 
 
@@ -154,7 +154,7 @@ def pull(work, row, target):
     """By how much a pair's δ is to change where its gap stays [m]."""
     contact = work.interior[row]
     overlap, left = contact.overlap, contact.slack
-    off = left - work.geometry[at.NOW, row].gap - overlap
+    off = left - work.geometry[NOW, row].gap - overlap
     return (target - overlap * left + overlap * off) / (overlap + left)
 
 
@@ -202,7 +202,7 @@ def other_friction(scene, work, row, step, target):
         return force, slope, 0.0
     _, grows, falls = part_of_step(work, row, False)
     closing = pull(work, row, target)
-    leaving = closing - (contact.slack - work.geometry[at.NOW, row].gap - contact.overlap)
+    leaving = closing - (contact.slack - work.geometry[NOW, row].gap - contact.overlap)
     force += by_part * (grows * closing - falls * leaving)
     return (
         force,
@@ -227,7 +227,7 @@ def write_forces(scene, work, step, target, turns):
                 tangential, slope, coupled = limited_friction(work, row, target)
             elif contact.stick_slope > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
-            push_pair(work, at.NOW, row, normal, tangential)
+            push_pair(work, NOW, row, normal, tangential)
             works = overlap / (overlap + left)
             if works > NOTHING:
                 add_slopes(scene, work, row, works * stiffness, slope, coupled)
@@ -246,7 +246,7 @@ def change_friction(work, row, target, grown, share, go):
     contact = work.interior[row]
     limit = contact.friction_limit
     weight, change, by_limit = drag(work, row, target)
-    rate = rate_along(work, row, at.CHANGE, tangent_rows(work, row))
+    rate = rate_along(work, row, CHANGE, tangent_rows(work, row))
     stuck = contact.stick_slope * rate
     change += weight * stuck + by_limit * grown
     ahead, behind, force = (
@@ -278,9 +278,9 @@ def change_pair(work, row, step, target, share, go):
     """The same of δ and s, and of friction."""
     contact = work.interior[row]
     overlap, left = contact.overlap, contact.slack
-    opening = step * rate_along(work, row, at.CHANGE, normal_rows(work, row))
+    opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
     closing = pull(work, row, target) - overlap / (overlap + left) * opening
-    leaving = opening + closing - (left - work.geometry[at.NOW, row].gap - overlap)
+    leaving = opening + closing - (left - work.geometry[NOW, row].gap - overlap)
     if contact.friction_limit > 0.0:
         grown = closing * limit_by_overlap(work, row)
         share = change_friction(work, row, target, grown, share, go)
@@ -317,7 +317,7 @@ def let_open(work):
     for row in range(work.tally.candidates):
         if in_play(work, row):
             contact = work.interior[row]
-            wide = work.geometry[at.NOW, row].gap + contact.overlap
+            wide = work.geometry[NOW, row].gap + contact.overlap
             contact.slack = max(contact.slack, wide)
 
 
@@ -366,7 +366,7 @@ def is_off(work, row, least):
     their parts, or than a size [m]."""
     contact = work.interior[row]
     both = contact.overlap + contact.slack
-    off = contact.slack - work.geometry[at.NOW, row].gap - contact.overlap
+    off = contact.slack - work.geometry[NOW, row].gap - contact.overlap
     if abs(off) > SMALL * max(both, SMALL * least):
         return True
     limit, ahead, behind = contact.friction_limit, contact.slide_ahead, contact.slide_behind

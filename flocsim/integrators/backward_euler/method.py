@@ -18,7 +18,6 @@ from collections.abc import Callable
 
 import attrs
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import postponed
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import least_listed_gap
@@ -32,6 +31,8 @@ from flocsim.integrators.backward_euler.step import (
 )
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.views import lever
+from flocsim.state.clock import NOT_COMPILED
+from flocsim.state.work import LOOKED, NOW
 
 RESOLVED_BOUNCE = 0.003
 """Steps are this share of 1/ω0 at most while bodies touch that fly apart again."""
@@ -95,8 +96,8 @@ def largest_change(scene, work):
     for body in range(work.place.shape[1]):
         if scene.bodies[body].free == 1.0:
             for axis in range(3):
-                now = work.velocity[at.NOW, body, axis]
-                change = abs(now - work.velocity[at.LOOKED, body, axis])
+                now = work.velocity[NOW, body, axis]
+                change = abs(now - work.velocity[LOOKED, body, axis])
                 largest = max(largest, lever(scene, body, axis) * change)
     return largest
 
@@ -138,12 +139,12 @@ def hand_over(scene, work, clock, counts):
     clock.looked_at, clock.switches = clock.time, 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.velocity[at.LOOKED, body, axis] = work.velocity[at.NOW, body, axis]
+            work.velocity[LOOKED, body, axis] = work.velocity[NOW, body, axis]
 
 
 def across_not_compiled(scene, work, clock, step):
     """Tell that steps across switches have not been compiled yet."""
-    work.tally.full = at.NOT_COMPILED
+    work.tally.full = NOT_COMPILED
     return -1.0
 
 

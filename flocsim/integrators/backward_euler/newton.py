@@ -13,7 +13,6 @@ meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
@@ -33,6 +32,9 @@ from flocsim.integrators.rhs.forces import keep_start, sum_other_forces
 from flocsim.integrators.rhs.jacobian import assemble_others
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
+from flocsim.state.bodies import X, Y
+from flocsim.state.contacts import OPEN, TOUCHES
+from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
 
 NEWTON_SHARE = 0.01
 """Newton's method goes on until what is left is below this share of the tolerance."""
@@ -45,18 +47,18 @@ def begin_step(work, clock):
     """Keep the start of the step."""
     keep_start(work)
     for row in range(work.tally.candidates):
-        work.geometry[at.TRIAL, row] = work.geometry[at.NOW, row]
-        work.candidates[row].closed, work.interior[row].held_overlap = at.OPEN, 0.0
+        work.geometry[TRIAL, row] = work.geometry[NOW, row]
+        work.candidates[row].closed, work.interior[row].held_overlap = OPEN, 0.0
         least = FADING * clock.tolerance
-        work.interior[row].fading_gap = max(-work.geometry[at.NOW, row].gap, least)
+        work.interior[row].fading_gap = max(-work.geometry[NOW, row].gap, least)
 
 
 def put_back(work):
     """Go back to the motion at the start of the step."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.NOW, body, axis] = work.place[at.START, body, axis]
-            work.velocity[at.NOW, body, axis] = work.velocity[at.START, body, axis]
+            work.place[NOW, body, axis] = work.place[START, body, axis]
+            work.velocity[NOW, body, axis] = work.velocity[START, body, axis]
 
 
 def end_step(work):
@@ -64,30 +66,30 @@ def end_step(work):
     start the current one again."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.NEW, body, axis] = work.place[at.NOW, body, axis]
-            work.velocity[at.NEW, body, axis] = work.velocity[at.NOW, body, axis]
+            work.place[NEW, body, axis] = work.place[NOW, body, axis]
+            work.velocity[NEW, body, axis] = work.velocity[NOW, body, axis]
     put_back(work)
     for row in range(work.tally.candidates):
-        work.candidates[row].closed = at.TOUCHES if takes_part(work, row) else at.OPEN
-        work.geometry[at.NOW, row] = work.geometry[at.TRIAL, row]
+        work.candidates[row].closed = TOUCHES if takes_part(work, row) else OPEN
+        work.geometry[NOW, row] = work.geometry[TRIAL, row]
 
 
 def place_ends(work, step):
     """Places at the end from the velocities there."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            start = work.place[at.START, body, axis]
-            work.place[at.NOW, body, axis] = start + step * work.velocity[at.NOW, body, axis]
+            start = work.place[START, body, axis]
+            work.place[NOW, body, axis] = start + step * work.velocity[NOW, body, axis]
 
 
 @apart
 def evaluate_others(scene, work, time, step):
     """All forces at the end of the step but those of contacts, which are located."""
     place_ends(work, step)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     if scene.surface_reach > 0.0:
-        flag_near(scene, work, at.NOW, 0.0)
-    sum_other_forces(scene, work, time + step, at.NOW)
+        flag_near(scene, work, NOW, 0.0)
+    sum_other_forces(scene, work, time + step, NOW)
 
 
 def evaluate_in_play(scene, work, time, step):
@@ -97,8 +99,8 @@ def evaluate_in_play(scene, work, time, step):
         evaluate_others(scene, work, time, step)
         return
     place_ends(work, step)
-    locate_acting(scene, work, at.NOW)
-    sum_other_forces(scene, work, time + step, at.NOW)
+    locate_acting(scene, work, NOW)
+    sum_other_forces(scene, work, time + step, NOW)
 
 
 def evaluate_end(scene, work, time, step):
@@ -115,20 +117,20 @@ def is_too_deep(scene, work):
         candidate = work.candidates[row]
         a, b = candidate.vertex_body, candidate.edge_body
         size = scene.bodies[a].radius + scene.bodies[b].radius
-        if -work.geometry[at.NOW, row].gap > 0.5 * DEEPEST_OVERLAP * size:
+        if -work.geometry[NOW, row].gap > 0.5 * DEEPEST_OVERLAP * size:
             return True
     return False
 
 
 def momentum_change(scene, work, body, axis, step):
     """Mass times acceleration in the step."""
-    before = work.velocity[at.START, body, axis]
-    return inertia(scene, body, axis) * (work.velocity[at.NOW, body, axis] - before) / step
+    before = work.velocity[START, body, axis]
+    return inertia(scene, body, axis) * (work.velocity[NOW, body, axis] - before) / step
 
 
 def unbalanced(scene, work, body, axis, step):
     """Force less mass times acceleration."""
-    force = work.force[at.NOW, body, axis]
+    force = work.force[NOW, body, axis]
     return force - momentum_change(scene, work, body, axis, step)
 
 
@@ -141,8 +143,8 @@ def write_load(scene, work, step):
         cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     for body in range(n):
         cluster = work.clusters[work.cluster[body]]
-        cluster.force_x += work.force[at.NOW, body, at.X]
-        cluster.force_y += work.force[at.NOW, body, at.Y]
+        cluster.force_x += work.force[NOW, body, X]
+        cluster.force_y += work.force[NOW, body, Y]
         cluster.rate_x += momentum_change(scene, work, body, 0, step)
         cluster.rate_y += momentum_change(scene, work, body, 1, step)
     for body in range(n):
@@ -185,7 +187,7 @@ def solve_change(scene, work, step):
         memory = step + work.errors[body].memory
         for axis in range(3):
             change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body].free
-            work.velocity[at.CHANGE, body, axis] = change
+            work.velocity[CHANGE, body, axis] = change
             if not abs(change) < math.inf:
                 return math.inf
             largest = max(largest, lever(scene, body, axis) * memory * abs(change))
@@ -196,12 +198,12 @@ def go_along(work, way):
     """Add a share of the change to the velocities."""
     for body in range(work.poses.shape[0]):
         for axis in range(3):
-            work.velocity[at.NOW, body, axis] += way * work.velocity[at.CHANGE, body, axis]
+            work.velocity[NOW, body, axis] += way * work.velocity[CHANGE, body, axis]
 
 
 def goal_of(scene, work, clock, step):
     """What a change may be at most where it is the last one [m]."""
-    return max(NEWTON_SHARE * clock.tolerance, rounding_size(scene, work, at.NOW, step))
+    return max(NEWTON_SHARE * clock.tolerance, rounding_size(scene, work, NOW, step))
 
 
 @apart

@@ -8,7 +8,6 @@ which pairs close and slide, with those where they have come to.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, has
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
@@ -41,6 +40,8 @@ from flocsim.integrators.radau.systems import factorise_euler
 from flocsim.integrators.rhs.forces import sum_other_forces
 from flocsim.integrators.rhs.jacobian import normal_rows
 from flocsim.integrators.rhs.views import effective_mass
+from flocsim.state.bodies import X, Y
+from flocsim.state.work import CHANGE, NOW, START, TRIAL
 
 MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 24
 """Iterations at most: along gaps that are frozen, along true ones from then on, and along these
@@ -93,7 +94,7 @@ def usual_force(scene, work):
     total, count = 0.0, 0
     for body in range(work.poses.shape[0]):
         if scene.bodies[body].free == 1.0:
-            fx, fy = work.force[at.NOW, body, at.X], work.force[at.NOW, body, at.Y]
+            fx, fy = work.force[NOW, body, X], work.force[NOW, body, Y]
             total += math.hypot(fx, fy)
             count += 1
     return total / max(count, 1)
@@ -106,10 +107,10 @@ def usual_sizes(scene, work, step):
         if in_play(work, row):
             candidate = work.candidates[row]
             a, b = candidate.vertex_body, candidate.edge_body
-            speed = abs(rate_along(work, row, at.START, normal_rows(work, row)))
+            speed = abs(rate_along(work, row, START, normal_rows(work, row)))
             stopped += effective_mass(scene, a, b) * speed / step
             way += step * speed
-            deepest = max(deepest, -work.geometry[at.NOW, row].gap)
+            deepest = max(deepest, -work.geometry[NOW, row].gap)
             stiffness += normal_stiffness(scene, work, row, step, 1e-12)
             count += 1
     if count == 0 or not stiffness > 0.0:
@@ -123,8 +124,8 @@ def begin_anywhere(scene, work, step, usual, way):
     for row in range(work.tally.candidates):
         if in_play(work, row):
             contact = work.interior[row]
-            gap = work.geometry[at.NOW, row].gap
-            contact.overlap = max(-work.geometry[at.TRIAL, row].gap, AWAY * usual)
+            gap = work.geometry[NOW, row].gap
+            contact.overlap = max(-work.geometry[TRIAL, row].gap, AWAY * usual)
             contact.slack = max(gap + contact.overlap, AWAY * way, -gap)
             contact.held_overlap = 0.0
             press(scene, work, row, step, False)
@@ -139,9 +140,9 @@ def begin_as_before(scene, work, step, usual):
     target = (AS_BEFORE * usual) ** 2
     for row in range(work.tally.candidates):
         if in_play(work, row):
-            geometry = work.geometry[at.NOW, row]
+            geometry = work.geometry[NOW, row]
             contact = work.interior[row]
-            before = work.geometry[at.TRIAL, row].gap
+            before = work.geometry[TRIAL, row].gap
             if before < 0.0:
                 contact.overlap, contact.slack = -before, -target / before
             elif geometry.gap < 0.0:
@@ -165,8 +166,8 @@ def begin_as_before(scene, work, step, usual):
 def advance_gaps(work, share, step):
     """Gaps after a share of the change of velocities, in the directions that they had."""
     for row in range(work.tally.candidates):
-        opening = rate_along(work, row, at.CHANGE, normal_rows(work, row))
-        work.geometry[at.NOW, row].gap += share * step * opening
+        opening = rate_along(work, row, CHANGE, normal_rows(work, row))
+        work.geometry[NOW, row].gap += share * step * opening
 
 
 @apart
@@ -190,7 +191,7 @@ def iterate(scene, work, clock, step, target, turns, own):
     else:
         advance_gaps(work, share, step)
         place_ends(work, step)
-        sum_other_forces(scene, work, clock.time + step, at.NOW)
+        sum_other_forces(scene, work, clock.time + step, NOW)
     return share, first, change
 
 
@@ -268,7 +269,7 @@ def come_from_afar(scene, work, clock, step, usual, way, careful):
 def leaves_out(work):
     """Whether a pair has closed that was not in play."""
     for row in range(work.tally.candidates):
-        if work.geometry[at.NOW, row].gap < 0.0 and not in_play(work, row):
+        if work.geometry[NOW, row].gap < 0.0 and not in_play(work, row):
             return True
     return False
 

@@ -17,7 +17,6 @@ error of velocity is sent through once more, for what the next step leaves of it
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import add_held_friction, takes_part
@@ -31,6 +30,8 @@ from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_ratio
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, memory_of
+from flocsim.state.bodies import X, Y
+from flocsim.state.work import CHANGE, DEVIATION, LAST_RATES, NOW, START, STIFFNESS, TRIAL
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
 """The next step is that much shorter than would just do; bounds of the change."""
@@ -64,12 +65,8 @@ def speed_along(work, row, state):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    speed = g[at.NOW, row].normal_x * (
-        work.velocity[state, b, at.X] - work.velocity[state, a, at.X]
-    )
-    return speed + g[at.NOW, row].normal_y * (
-        work.velocity[state, b, at.Y] - work.velocity[state, a, at.Y]
-    )
+    speed = g[NOW, row].normal_x * (work.velocity[state, b, X] - work.velocity[state, a, X])
+    return speed + g[NOW, row].normal_y * (work.velocity[state, b, Y] - work.velocity[state, a, Y])
 
 
 @apart
@@ -78,13 +75,13 @@ def fastest_bounce(scene, work, clock, lasting):
     more than is allowed; of those alone that have closed in it unless ``lasting``."""
     fastest = 0.0
     for row in range(work.tally.candidates):
-        closed = work.geometry[at.TRIAL, row].gap >= 0.0 > work.geometry[at.NOW, row].gap
+        closed = work.geometry[TRIAL, row].gap >= 0.0 > work.geometry[NOW, row].gap
         if closed or (lasting and takes_part(work, row)):
-            speed = speed_along(work, row, at.START)
+            speed = speed_along(work, row, START)
             if lasting:
-                speed = max(abs(speed), abs(speed_along(work, row, at.NOW)))
+                speed = max(abs(speed), abs(speed_along(work, row, NOW)))
             if speed * memory_of(work, row) > clock.tolerance:
-                view = contact_view(scene, work, at.NOW, row)
+                view = contact_view(scene, work, NOW, row)
                 stiffness = pressed_stiffness(scene, view, clock.tolerance)
                 if stiffness > 0.0:
                     frequency = math.sqrt(stiffness / view.effective_mass)
@@ -112,7 +109,7 @@ def note_rates(scene, work, clock, step):
     if clock.rates_known == 1.0:
         write_rates(work, step)
     for row in range(work.tally.candidates):
-        before, after = work.geometry[at.TRIAL, row].gap, work.geometry[at.NOW, row].gap
+        before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
         clock.switches += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
 
 
@@ -142,14 +139,14 @@ def write_rates(work, step):
     """Write the accelerations of the step, which has begun in START, into LAST_RATES."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            change = work.velocity[at.NOW, body, axis] - work.velocity[at.START, body, axis]
-            work.velocity[at.LAST_RATES, body, axis] = change / step
+            change = work.velocity[NOW, body, axis] - work.velocity[START, body, axis]
+            work.velocity[LAST_RATES, body, axis] = change / step
 
 
 @apart
 def solve_loads(scene, work, weight):
     """The solution of the system for the loads less ``weight`` K CHANGE."""
-    subtract_product(work, at.STIFFNESS, weight)
+    subtract_product(work, STIFFNESS, weight)
     solve_for_free(scene, work)
 
 
@@ -161,10 +158,10 @@ def estimate_step(scene, work, clock, step):
         write_rates(work, step)
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            less = work.velocity[at.START, body, axis] - work.velocity[at.NOW, body, axis]
-            slower = work.velocity[at.LAST_RATES, body, axis] + less / step
+            less = work.velocity[START, body, axis] - work.velocity[NOW, body, axis]
+            slower = work.velocity[LAST_RATES, body, axis] + less / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
-            work.place[at.CHANGE, body, axis] = less
+            work.place[CHANGE, body, axis] = less
     if has(scene, CONTACT_FORCE):
         add_held_friction(scene, work, step)
     solve_loads(scene, work, 0.5 * step)
@@ -172,11 +169,11 @@ def estimate_step(scene, work, clock, step):
         free = scene.bodies[body].free
         for axis in range(3):
             speed = loads[REAL, 3 * body + axis].real
-            error = free * step * (0.5 * work.place[at.CHANGE, body, axis] + speed)
-            work.place[at.DEVIATION, body, axis] = work.place[at.CHANGE, body, axis] = error
+            error = free * step * (0.5 * work.place[CHANGE, body, axis] + speed)
+            work.place[DEVIATION, body, axis] = work.place[CHANGE, body, axis] = error
             loads[REAL, 3 * body + axis] = inertia(scene, body, axis) / step * speed
     solve_loads(scene, work, 1.0)
     for body in range(work.place.shape[1]):
         free = scene.bodies[body].free
         for axis in range(3):
-            work.velocity[at.DEVIATION, body, axis] = free * loads[REAL, 3 * body + axis].real
+            work.velocity[DEVIATION, body, axis] = free * loads[REAL, 3 * body + axis].real

@@ -14,7 +14,6 @@ is taken anew, until it is short against the vibrations, or the contacts change 
 
 import math
 
-import flocsim.arrays as at
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_polygons, row_radii, turn_body
 from flocsim.hooks import hook
@@ -22,6 +21,9 @@ from flocsim.integrators.events.resolution import release_resolution, touch_reso
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.surface_gap import least_row, run_end
 from flocsim.integrators.rhs.views import contact_view, memory_of, normal_rate
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.work import NEW, NOW, TRIAL
 
 NEVER = 2.0
 """The share of the step at which a switch comes that does not come in it."""
@@ -36,32 +38,32 @@ def interpolate(work, step, share, body):
     ends."""
     rest = 1.0 - share
     for axis in range(3):
-        change = work.place[at.NEW, body, axis] - work.place[at.NOW, body, axis]
-        start = step * work.velocity[at.NOW, body, axis] - change
-        end = change - step * work.velocity[at.NEW, body, axis]
+        change = work.place[NEW, body, axis] - work.place[NOW, body, axis]
+        start = step * work.velocity[NOW, body, axis] - change
+        end = change - step * work.velocity[NEW, body, axis]
         bend = rest * start + share * end
-        work.place[at.TRIAL, body, axis] = (
-            work.place[at.NOW, body, axis] + share * change + share * rest * bend
+        work.place[TRIAL, body, axis] = (
+            work.place[NOW, body, axis] + share * change + share * rest * bend
         )
         slope = change + (rest - share) * bend + share * rest * (end - start)
-        work.velocity[at.TRIAL, body, axis] = slope / step
+        work.velocity[TRIAL, body, axis] = slope / step
 
 
 def margin(work, state, row):
     """What must not become negative while the flags hold [m]: the gap of a pair that is open now,
     the overlap of a closed one; nothing of one that grazes."""
     gap = work.geometry[state, row].gap
-    if work.candidates[row].closed == at.GRAZES:
+    if work.candidates[row].closed == GRAZES:
         return math.inf
-    return -gap if work.geometry[at.NOW, row].gap < 0.0 else gap
+    return -gap if work.geometry[NOW, row].gap < 0.0 else gap
 
 
 def margin_rate(work, state, row):
     """Rate of change of the margin [m/s]."""
     rate = normal_rate(work, state, row)
-    if work.candidates[row].closed == at.GRAZES:
+    if work.candidates[row].closed == GRAZES:
         return 0.0
-    return -rate if work.geometry[at.NOW, row].gap < 0.0 else rate
+    return -rate if work.geometry[NOW, row].gap < 0.0 else rate
 
 
 def is_too_deep(scene, work, state, row):
@@ -75,19 +77,19 @@ def look_at(scene, work, step, share, row):
     candidate = work.candidates[row]
     for body in (candidate.vertex_body, candidate.edge_body):
         interpolate(work, step, share, body)
-        turn_body(work, at.TRIAL, body)
-    locate_polygons(scene, work, at.TRIAL, row)
-    return margin(work, at.TRIAL, row)
+        turn_body(work, TRIAL, body)
+    locate_polygons(scene, work, TRIAL, row)
+    return margin(work, TRIAL, row)
 
 
 def may_dip(work, step, row, level):
     """Whether the margin may be below a level [m] inside the step though it is not at its ends."""
-    rate_low = step * margin_rate(work, at.NOW, row)
-    rate_high = step * margin_rate(work, at.NEW, row)
+    rate_low = step * margin_rate(work, NOW, row)
+    rate_high = step * margin_rate(work, NEW, row)
     if not rate_low < 0.0 < rate_high:
         return False
     # Straight lines from both ends bound what a convex margin can fall to.
-    at_start, at_end = margin(work, at.NOW, row) - level, margin(work, at.NEW, row) - level
+    at_start, at_end = margin(work, NOW, row) - level, margin(work, NEW, row) - level
     return not (at_start + rate_low * 0.5 > 0.0 and at_end - rate_high * 0.5 > 0.0)
 
 
@@ -95,10 +97,10 @@ def speed_against(scene, work, state, row):
     """A bound of how fast any points of a pair's two bodies move against each other [m/s]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    speed = abs(work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
-    speed += abs(work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
-    speed += abs(work.velocity[state, a, at.ANGLE]) * scene.bodies[a].bounding_radius
-    return speed + abs(work.velocity[state, b, at.ANGLE]) * scene.bodies[b].bounding_radius
+    speed = abs(work.velocity[state, a, X] - work.velocity[state, b, X])
+    speed += abs(work.velocity[state, a, Y] - work.velocity[state, b, Y])
+    speed += abs(work.velocity[state, a, ANGLE]) * scene.bodies[a].bounding_radius
+    return speed + abs(work.velocity[state, b, ANGLE]) * scene.bodies[b].bounding_radius
 
 
 def lowest_share(scene, work, step, row, level):
@@ -107,14 +109,14 @@ def lowest_share(scene, work, step, row, level):
     if not may_dip(work, step, row, level):
         return NEVER
     low, high = 0.0, 1.0
-    rate_low = step * margin_rate(work, at.NOW, row)
-    rate_high = step * margin_rate(work, at.NEW, row)
+    rate_low = step * margin_rate(work, NOW, row)
+    rate_high = step * margin_rate(work, NEW, row)
     share = 0.5
     for _ in range(8):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
         share = min(max(share, 0.9 * low + 0.1 * high), 0.1 * low + 0.9 * high)
         look_at(scene, work, step, share, row)
-        rate = step * margin_rate(work, at.TRIAL, row)
+        rate = step * margin_rate(work, TRIAL, row)
         if rate < 0.0:
             low, rate_low = share, rate
         else:
@@ -128,7 +130,7 @@ def crossing(scene, work, step, row, high, at_high, resolution):
     """The share at which the margin, ``at_high`` at ``high`` and too low there, is just below
     zero."""
     low, target = 0.0, 0.5 * resolution
-    at_low = margin(work, at.NOW, row) + target
+    at_low = margin(work, NOW, row) + target
     at_high += target
     side = 0
     share = high
@@ -152,21 +154,21 @@ def crossing(scene, work, step, row, high, at_high, resolution):
 def collides(work, step, row, depth):
     """Whether an open pair that overlaps at the end of the step goes on approaching: a graze turns
     around by itself, speed²/(2 slowing) deeper."""
-    speed = -normal_rate(work, at.NEW, row)
+    speed = -normal_rate(work, NEW, row)
     if speed * step > depth:
         return True
-    slowing = (-normal_rate(work, at.NOW, row) - speed) / step
+    slowing = (-normal_rate(work, NOW, row) - speed) / step
     lasting = speed * memory_of(work, row) > depth
     return lasting and speed * speed > 2.0 * slowing * depth
 
 
 def unnoticed(scene, work, step, row, resolution, depth):
     """How far behind its switch a pair may be at the end of a step, unnoticed [m]."""
-    before, after = work.geometry[at.NOW, row].gap, work.geometry[at.NEW, row].gap
+    before, after = work.geometry[NOW, row].gap, work.geometry[NEW, row].gap
     if before < 0.0 <= after:
-        return release_resolution(scene, work, at.NEW, row, resolution)
+        return release_resolution(scene, work, NEW, row, resolution)
     if before >= 0.0 > after and collides(work, step, row, depth):
-        return touch_resolution(scene, work, at.NEW, row, resolution)
+        return touch_resolution(scene, work, NEW, row, resolution)
     return depth
 
 
@@ -174,12 +176,12 @@ def switch_of(scene, work, step, row, earliest, resolution, depth):
     """The earlier one of the switch of a row and the earliest so far, as shares of the step."""
     high, limit = min(earliest, 1.0), unnoticed(scene, work, step, row, resolution, depth)
     resolution = min(resolution, limit)
-    if margin(work, at.NEW, row) >= -limit:
+    if margin(work, NEW, row) >= -limit:
         lowest = lowest_share(scene, work, step, row, 0.0)
         if lowest > high:
             return earliest
         high = lowest
-        if work.tally.series_terms > 0 and work.geometry[at.NOW, row].gap < 0.0:
+        if work.tally.series_terms > 0 and work.geometry[NOW, row].gap < 0.0:
             # It has opened, and what pulls it shut again is a law that ends there.
             limit = resolution
     at_high = look_at(scene, work, step, high, row)
@@ -192,7 +194,7 @@ def may_switch(scene, work, step, resolution, depth):
     """Whether a pair may switch in a step before its end, as seen from both ends of it."""
     for row in range(work.tally.candidates):
         limit = unnoticed(scene, work, step, row, resolution, depth)
-        if margin(work, at.NEW, row) < -limit or may_dip(work, step, row, 0.0):
+        if margin(work, NEW, row) < -limit or may_dip(work, step, row, 0.0):
             return True
     return False
 
@@ -205,9 +207,9 @@ def passes_within(scene, work, step, depth):
         return False
     for row in range(work.tally.candidates):
         if (
-            min(g[at.NOW, row].gap, g[at.NEW, row].gap) > reach
+            min(g[NOW, row].gap, g[NEW, row].gap) > reach
             and lowest_share(scene, work, step, row, reach) < 1.0
-            and g[at.TRIAL, row].gap < reach - depth
+            and g[TRIAL, row].gap < reach - depth
         ):
             return True
     return False
@@ -216,7 +218,7 @@ def passes_within(scene, work, step, depth):
 def touches(work):
     """Whether any listed pair does."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed != at.OPEN:
+        if work.candidates[row].closed != OPEN:
             return True
     return False
 
@@ -226,8 +228,8 @@ def changes_sides(work):
     which is told of a touch by its end alone."""
     g = work.geometry
     for row in range(work.tally.candidates):
-        along = g[at.NOW, row].normal_x * g[at.NEW, row].normal_x
-        along += g[at.NOW, row].normal_y * g[at.NEW, row].normal_y
+        along = g[NOW, row].normal_x * g[NEW, row].normal_x
+        along += g[NOW, row].normal_y * g[NEW, row].normal_y
         if along < 0.0:
             return True
     return False
@@ -244,9 +246,9 @@ def first_switch(scene, work, step, resolution, depth):
         pair = work.candidates[row].pair
         if pair != before:
             before = pair
-            way = 0.5 * step * speed_against(scene, work, at.NOW, row)
-            back = 0.5 * step * speed_against(scene, work, at.NEW, row)
-        if not (margin(work, at.NOW, row) > way and margin(work, at.NEW, row) > back):
+            way = 0.5 * step * speed_against(scene, work, NOW, row)
+            back = 0.5 * step * speed_against(scene, work, NEW, row)
+        if not (margin(work, NOW, row) > way and margin(work, NEW, row) > back):
             earliest = switch_of(scene, work, step, row, earliest, resolution, depth)
     return earliest
 
@@ -264,7 +266,7 @@ def deepest_of(work, state, row, end):
     deepest = -1
     for each in range(row, end):
         gap = work.geometry[state, each].gap
-        if work.candidates[each].closed == at.TOUCHES and (
+        if work.candidates[each].closed == TOUCHES and (
             deepest < 0 or gap < work.geometry[state, deepest].gap
         ):
             deepest = each
@@ -275,16 +277,16 @@ def overtaken(work, row, end, closed):
     """The row of the two bodies that has been the deepest before and is overtaken by much; −1
     without."""
     if closed:
-        old, new = deepest_of(work, at.NOW, row, end), deepest_of(work, at.NEW, row, end)
+        old, new = deepest_of(work, NOW, row, end), deepest_of(work, NEW, row, end)
     else:
-        old, new = least_row(work, at.NOW, row, end), least_row(work, at.NEW, row, end)
+        old, new = least_row(work, NOW, row, end), least_row(work, NEW, row, end)
     if old < 0 or old == new:
         return -1
     g = work.geometry
-    deep, deeper = -g[at.NOW, old].gap, -g[at.NEW, new].gap
+    deep, deeper = -g[NOW, old].gap, -g[NEW, new].gap
     if not (deep > 0.0 and deeper > 0.0):
         return -1
-    way = min(g[at.NOW, new].gap, 0.0) + deep + min(g[at.NEW, old].gap, 0.0) + deeper
+    way = min(g[NOW, new].gap, 0.0) + deep + min(g[NEW, old].gap, 0.0) + deeper
     return old if way > LARGE * (deep + deeper) else -1
 
 
@@ -296,7 +298,7 @@ def overtakes(scene, work, clock, step):
         end = run_end(work, row)
         old = overtaken(work, row, end, closed)
         if old >= 0:
-            view = contact_view(scene, work, at.NOW, old)
+            view = contact_view(scene, work, NOW, old)
             stiffness = pressed_stiffness(scene, view, clock.tolerance)
             if step * step * stiffness > RESOLVED * RESOLVED * view.effective_mass:
                 return True

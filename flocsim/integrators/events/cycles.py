@@ -16,11 +16,12 @@ displacements at its end scatter; where they do no more than that, they stay as 
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.grazes import hums, takes_part
 from flocsim.integrators.events.resolution import above_rounding
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import CARRIED, CYCLE_BEFORE, CYCLE_LAST, NOW
 
 MOST_SWITCHES = 64
 """A cycle of more switches is none."""
@@ -72,31 +73,31 @@ def share_of_second(scene):
 def coordinate(scene, work, state, which):
     """A coordinate of the pair: place (x, y) and angle of the second body as seen from the first,
     velocities (x, y, spin) of both along its axes, then its angle, and the place of the pair."""
-    turn = work.place[state, 0, at.ANGLE]
+    turn = work.place[state, 0, ANGLE]
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = (
-        work.place[state, 1, at.X] - work.place[state, 0, at.X],
-        work.place[state, 1, at.Y] - work.place[state, 0, at.Y],
+        work.place[state, 1, X] - work.place[state, 0, X],
+        work.place[state, 1, Y] - work.place[state, 0, Y],
     )
     if which == 0:
         return c * dx + s * dy
     if which == 1:
         return c * dy - s * dx
     if which == 2:
-        return work.place[state, 1, at.ANGLE] - turn
+        return work.place[state, 1, ANGLE] - turn
     if which < WHOLE:
         body, axis = (which - 3) // 3, (which - 3) % 3
         if axis == 0:
-            return c * work.velocity[state, body, at.X] + s * work.velocity[state, body, at.Y]
+            return c * work.velocity[state, body, X] + s * work.velocity[state, body, Y]
         if axis == 1:
-            return c * work.velocity[state, body, at.Y] - s * work.velocity[state, body, at.X]
-        return work.velocity[state, body, at.ANGLE]
+            return c * work.velocity[state, body, Y] - s * work.velocity[state, body, X]
+        return work.velocity[state, body, ANGLE]
     if which == WHOLE:
         return turn
     share = share_of_second(scene)
     if which == WHOLE + 1:
-        return work.place[state, 0, at.X] + share * dx
-    return work.place[state, 0, at.Y] + share * dy
+        return work.place[state, 0, X] + share * dx
+    return work.place[state, 0, Y] + share * dy
 
 
 def place_by(scene, work):
@@ -105,21 +106,21 @@ def place_by(scene, work):
     turn, share = q[9], share_of_second(scene)
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = c * q[0] - s * q[1], s * q[0] + c * q[1]
-    work.place[at.NOW, 0, at.X], work.place[at.NOW, 0, at.Y] = (
+    work.place[NOW, 0, X], work.place[NOW, 0, Y] = (
         q[10] - share * dx,
         q[11] - share * dy,
     )
-    work.place[at.NOW, 1, at.X], work.place[at.NOW, 1, at.Y] = (
-        work.place[at.NOW, 0, at.X] + dx,
-        work.place[at.NOW, 0, at.Y] + dy,
+    work.place[NOW, 1, X], work.place[NOW, 1, Y] = (
+        work.place[NOW, 0, X] + dx,
+        work.place[NOW, 0, Y] + dy,
     )
-    work.place[at.NOW, 0, at.ANGLE], work.place[at.NOW, 1, at.ANGLE] = turn, turn + q[2]
-    work.velocity[at.NOW, 0, at.X], work.velocity[at.NOW, 0, at.Y] = (
+    work.place[NOW, 0, ANGLE], work.place[NOW, 1, ANGLE] = turn, turn + q[2]
+    work.velocity[NOW, 0, X], work.velocity[NOW, 0, Y] = (
         c * q[3] - s * q[4],
         s * q[3] + c * q[4],
     )
-    work.velocity[at.NOW, 0, at.ANGLE], work.velocity[at.NOW, 1, at.ANGLE] = q[5], q[8]
-    work.velocity[at.NOW, 1, at.X], work.velocity[at.NOW, 1, at.Y] = (
+    work.velocity[NOW, 0, ANGLE], work.velocity[NOW, 1, ANGLE] = q[5], q[8]
+    work.velocity[NOW, 1, X], work.velocity[NOW, 1, Y] = (
         c * q[6] - s * q[7],
         s * q[6] + c * q[7],
     )
@@ -154,16 +155,16 @@ def end_cycle(work, clock, counts):
     """Keep the state at the end of a cycle beside that of the end before."""
     for body in range(2):
         for axis in range(3):
-            work.place[at.CYCLE_BEFORE, body, axis] = work.place[at.CYCLE_LAST, body, axis]
-            work.place[at.CYCLE_LAST, body, axis] = work.place[at.NOW, body, axis]
-            work.velocity[at.CYCLE_BEFORE, body, axis] = work.velocity[at.CYCLE_LAST, body, axis]
-            work.velocity[at.CYCLE_LAST, body, axis] = work.velocity[at.NOW, body, axis]
+            work.place[CYCLE_BEFORE, body, axis] = work.place[CYCLE_LAST, body, axis]
+            work.place[CYCLE_LAST, body, axis] = work.place[NOW, body, axis]
+            work.velocity[CYCLE_BEFORE, body, axis] = work.velocity[CYCLE_LAST, body, axis]
+            work.velocity[CYCLE_LAST, body, axis] = work.velocity[NOW, body, axis]
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
         contact.cycle_slip_before = contact.cycle_slip
-        contact.cycle_slip = work.slip[at.NOW, row]
+        contact.cycle_slip = work.slip[NOW, row]
         contact.cycle_gap_before = contact.cycle_gap
-        contact.cycle_gap = work.geometry[at.NOW, row].gap
+        contact.cycle_gap = work.geometry[NOW, row].gap
     clock.cycle_at_before, clock.cycle_at = clock.cycle_at, clock.time
     clock.cycle_error = clock.error
     counts.cycle_code_before, counts.cycle_code = counts.cycle_code, 0
@@ -213,22 +214,22 @@ def sizes_of(work):
     gaps = slips = 0.0
     for row in range(work.tally.candidates):
         if takes_part(work, row):
-            gaps = max(gaps, abs(work.geometry[at.NOW, row].gap))
-            slips = max(slips, abs(work.slip[at.NOW, row]))
+            gaps = max(gaps, abs(work.geometry[NOW, row].gap))
+            slips = max(slips, abs(work.slip[NOW, row]))
     return gaps, slips
 
 
 def cycles_of_form(work):
     """How many cycles leave gaps and displacements about as they are."""
-    least, most = above_rounding(work, at.NOW, 0.0), MOST_AT_ONCE
+    least, most = above_rounding(work, NOW, 0.0), MOST_AT_ONCE
     gaps, slips = sizes_of(work)
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
-        now, last = work.geometry[at.NOW, row].gap, contact.cycle_gap
+        now, last = work.geometry[NOW, row].gap, contact.cycle_gap
         size = gaps if takes_part(work, row) else now
         most = allowed(most, now, last, contact.cycle_gap_before, size, least)
         if takes_part(work, row):
-            now, last = work.slip[at.NOW, row], contact.cycle_slip
+            now, last = work.slip[NOW, row], contact.cycle_slip
             most = allowed(most, now, last, contact.cycle_slip_before, slips, least)
     return most
 
@@ -251,9 +252,9 @@ def rates_of(scene, work, clock, which):
     """Rate of change of a coordinate over the last cycle [1/s], and of that rate [1/s²]: what moves
     evenly does so in time, wherever in it a cycle has been found to end."""
     late, early = lasted(clock)
-    now = coordinate(scene, work, at.NOW, which)
-    last = coordinate(scene, work, at.CYCLE_LAST, which)
-    before = coordinate(scene, work, at.CYCLE_BEFORE, which)
+    now = coordinate(scene, work, NOW, which)
+    last = coordinate(scene, work, CYCLE_LAST, which)
+    before = coordinate(scene, work, CYCLE_BEFORE, which)
     rate = (now - last) / late
     return rate, 2.0 * (rate - (last - before) / early) / (late + early)
 
@@ -310,21 +311,21 @@ def leave_out(scene, work, clock, many):
     bent = 0.5 * time * (time + lasted(clock)[0])
     for which in range(COORDINATES):
         rate, more = rates_of(scene, work, clock, which)
-        now = coordinate(scene, work, at.NOW, which) + rate * time
+        now = coordinate(scene, work, NOW, which) + rate * time
         work.coordinates[which] = now + bent * more if which >= WHOLE else now
     place_by(scene, work)
     gaps, slips = sizes_of(work)
-    least = above_rounding(work, at.NOW, 0.0)
+    least = above_rounding(work, NOW, 0.0)
     for row in range(work.tally.candidates):
         if takes_part(work, row):
             contact = work.contacts[row]
-            slip, gap = work.slip[at.NOW, row], work.geometry[at.NOW, row].gap
+            slip, gap = work.slip[NOW, row], work.geometry[NOW, row].gap
             last, before = contact.cycle_slip, contact.cycle_slip_before
-            work.slip[at.NOW, row] += many * trend(slip, last, before, slips, least)
+            work.slip[NOW, row] += many * trend(slip, last, before, slips, least)
             last, before = contact.cycle_gap, contact.cycle_gap_before
             contact.cycle_gap = gap + many * trend(gap, last, before, gaps, least)
     clock.time += time
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
 
 
 def restore_gaps(work):
@@ -332,7 +333,7 @@ def restore_gaps(work):
     by is far below them."""
     for row in range(work.tally.candidates):
         if takes_part(work, row):
-            geometry = work.geometry[at.NOW, row]
+            geometry = work.geometry[NOW, row]
             contact = work.contacts[row]
             contact.gap_offset += geometry.gap - contact.cycle_gap
             geometry.gap = contact.cycle_gap
@@ -350,8 +351,8 @@ def carry_on_errors(work, clock, many, more):
             errors.doubt_place *= factor
             errors.stated *= factor
             for axis in range(3):
-                work.place[at.CARRIED, body, axis] *= factor
-                work.velocity[at.CARRIED, body, axis] *= factor
+                work.place[CARRIED, body, axis] *= factor
+                work.velocity[CARRIED, body, axis] *= factor
         clock.error *= factor
 
 

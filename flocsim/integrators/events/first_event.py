@@ -11,7 +11,6 @@ the forces are smooth functions of the state; the driver ends the step where one
 
 import math
 
-import flocsim.arrays as at
 from flocsim.constants import SHALLOWEST_TOUCH
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has, hook
 from flocsim.integrators.events.crossings import NEVER, first_switch
@@ -20,6 +19,8 @@ from flocsim.integrators.events.resolution import furthest_place
 from flocsim.integrators.rhs.error import step_tolerance
 from flocsim.integrators.rhs.friction import beyond, set_sliding
 from flocsim.integrators.rhs.views import contact_view, pressed_view
+from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.work import NEW, NOW
 
 RESOLUTION = 1e-3
 """A switch is located to this share of the tolerance, …"""
@@ -42,7 +43,7 @@ def deepest_overlap(work):
     """The largest overlap of a listed pair now [m], at least 0."""
     deepest = 0.0
     for row in range(work.tally.candidates):
-        deepest = max(deepest, -work.geometry[at.NOW, row].gap)
+        deepest = max(deepest, -work.geometry[NOW, row].gap)
     return deepest
 
 
@@ -53,7 +54,7 @@ def resolutions_of(work, clock):
     deepest = deepest_overlap(work)
     if deepest > 0.0:
         resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
-    resolution = max(resolution, ROUNDING * furthest_place(work, at.NEW))
+    resolution = max(resolution, ROUNDING * furthest_place(work, NEW))
     if deepest > 0.0:
         return resolution, resolution
     return resolution, max(resolution, min(SHALLOWEST_TOUCH, clock.tolerance))
@@ -62,9 +63,9 @@ def resolutions_of(work, clock):
 def event_share(scene, work, row, which):
     """The share of the step at which one contact passes one of its kinks, by linear interpolation;
     2.0 where it does not, or is as good as there at either end."""
-    view = contact_view(scene, work, at.NOW, row)
+    view = contact_view(scene, work, NOW, row)
     before = contact_event(scene, view, which)
-    after = contact_event(scene, contact_view(scene, work, at.NEW, row), which)
+    after = contact_event(scene, contact_view(scene, work, NEW, row), which)
     nearer, further = min(abs(before), abs(after)), max(abs(before), abs(after))
     at_rest = contact_event(scene, pressed_view(view, view.overlap, 0.0), which)
     as_good_as_there = max(KINK_FINENESS * further, KINK_ROUNDING * abs(at_rest))
@@ -122,15 +123,15 @@ SAME, OTHER_FRICTION, OTHER_CONTACTS = range(3)
 which pairs touch."""
 
 
-def set_closed(work, state=at.NOW):
+def set_closed(work, state=NOW):
     """Flag every listed pair by its gap in a state, but for those that graze; whether
     any has changed."""
     changed = False
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == at.GRAZES:
+        if candidate.closed == GRAZES:
             continue
-        closed = at.TOUCHES if work.geometry[state, row].gap < 0.0 else at.OPEN
+        closed = TOUCHES if work.geometry[state, row].gap < 0.0 else OPEN
         changed = changed or candidate.closed != closed
         candidate.closed = closed
     return changed

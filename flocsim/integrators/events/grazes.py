@@ -10,7 +10,6 @@ followed, and left out (cycles.py). Where the tolerance resolves these, the law 
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import contact_derivatives, contact_force
@@ -24,6 +23,8 @@ from flocsim.integrators.rhs.views import (
     pressed_view,
     tangential_rate,
 )
+from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.work import NEW, NOW
 
 SHARE_OF_FLIGHT = 0.1
 """The speed with which a pair parts may lift it by this share of the tolerance, where it has done
@@ -79,9 +80,9 @@ def begins(scene, work, clock, row):
     """Whether a pair that has just parted grazes from now on."""
     if work.candidates[row].sliding != 0 or rattles(work, row):
         return False
-    view = contact_view(scene, work, at.NOW, row)
+    view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
-    speed, pull = normal_rate(work, at.NOW, row), abs(force) * pull_of(scene, work, row)
+    speed, pull = normal_rate(work, NOW, row), abs(force) * pull_of(scene, work, row)
     share = SHARE_OF_FLIGHT if hums(work, row) else SHARE_OF_FIRST
     if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
@@ -116,8 +117,8 @@ def shares_point(work, row, other):
     touch are up to four rows, of both bodies' edges."""
     if work.candidates[row].pair != work.candidates[other].pair:
         return False
-    if abs(work.geometry[at.NOW, row].gap - work.geometry[at.NOW, other].gap) > above_rounding(
-        work, at.NOW, 0.0
+    if abs(work.geometry[NOW, row].gap - work.geometry[NOW, other].gap) > above_rounding(
+        work, NOW, 0.0
     ):
         return False
     return near(work, row, other)
@@ -126,8 +127,8 @@ def shares_point(work, row, other):
 def enter(scene, work, row):
     """Let a pair graze."""
     contact = work.contacts[row]
-    _, force = contact_force(scene, contact_view(scene, work, at.NOW, row))
-    work.candidates[row].closed = at.GRAZES
+    _, force = contact_force(scene, contact_view(scene, work, NOW, row))
+    work.candidates[row].closed = GRAZES
     contact.grazing_force = force
     contact.fresh = 1.0
 
@@ -135,46 +136,46 @@ def enter(scene, work, row):
 def share_forces(work):
     """Rows of one contact point bear the same force."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.GRAZES:
+        if work.candidates[row].closed == GRAZES:
             total, count = 0.0, 0
             for other in range(work.tally.candidates):
-                if work.candidates[other].closed == at.GRAZES and shares_point(work, row, other):
+                if work.candidates[other].closed == GRAZES and shares_point(work, row, other):
                     total, count = total + work.contacts[other].grazing_force, count + 1
             work.contacts[row].grazing_resistance = total / max(count, 1)
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.GRAZES:
+        if work.candidates[row].closed == GRAZES:
             contact = work.contacts[row]
             contact.grazing_force = contact.grazing_resistance
 
 
 def hold_gap(work, row, gap):
     """Count the gap that a pair has now as another one."""
-    geometry = work.geometry[at.NOW, row]
+    geometry = work.geometry[NOW, row]
     work.contacts[row].gap_offset += geometry.gap - gap
     geometry.gap = gap
 
 
 def sliding_speed(work, row):
     """How fast the bodies of a pair that grazes slide against its force [m/s]."""
-    speed = tangential_rate(work, at.NOW, row)
+    speed = tangential_rate(work, NOW, row)
     return -speed if work.contacts[row].grazing_force > 0.0 else speed
 
 
 def sticks(scene, work, row):
     """Whether a pair that grazes has ceased to slide; its spring takes the force over then, as far
     as it held that before. Without a spring the law's whole force is what it needs then."""
-    view = contact_view(scene, work, at.NOW, row)
+    view = contact_view(scene, work, NOW, row)
     force, spring = work.contacts[row].grazing_force, spring_of(scene, view)
     if spring == 0.0:
         _, whole = contact_force(scene, view)
         return whole * force <= force * force
     if sliding_speed(work, row) >= 0.0:
         return False
-    needed, held = -force / spring, work.slip[at.NOW, row]
+    needed, held = -force / spring, work.slip[NOW, row]
     if needed * held <= 0.0:
-        work.slip[at.NOW, row] = 0.0
+        work.slip[NOW, row] = 0.0
     elif abs(needed) < abs(held):
-        work.slip[at.NOW, row] = needed
+        work.slip[NOW, row] = needed
     return True
 
 
@@ -191,21 +192,21 @@ def go_on(scene, work, row):
         # Its first step takes what is left of the gap's rate away, of which no load tells.
         contact.fresh = 0.0
         return True
-    before, rate = contact.grazing_force, normal_rate(work, at.NOW, row)
+    before, rate = contact.grazing_force, normal_rate(work, NOW, row)
     after = before - contact.grazing_resistance * rate
     contact.grazing_force = after
     if after * before <= 0.0:
-        leave(work, row, at.OPEN, 0.0)
+        leave(work, row, OPEN, 0.0)
         return False
     if sticks(scene, work, row):
-        leave(work, row, at.TOUCHES, TOUCHING_GAP)
+        leave(work, row, TOUCHES, TOUCHING_GAP)
         return False
     return True
 
 
 def forget_gap(work, row):
     """The gap of a pair that has gone far from where it grazed counts as it is."""
-    geometry = work.geometry[at.NOW, row]
+    geometry = work.geometry[NOW, row]
     contact = work.contacts[row]
     offset = contact.gap_offset
     if offset != 0.0 and geometry.gap > FAR * abs(offset):
@@ -233,7 +234,7 @@ def rattles(work, row):
 
 def takes_part(work, row):
     """Whether a pair touches, or has done so a moment ago."""
-    return work.candidates[row].closed != at.OPEN or work.contacts[row].flights > 0.0
+    return work.candidates[row].closed != OPEN or work.contacts[row].flights > 0.0
 
 
 def count_flight(work, clock, step, row):
@@ -245,7 +246,7 @@ def count_flight(work, clock, step, row):
     contact = work.contacts[row]
     flight = contact.flight
     if flight == 0.0:
-        flight = 0.25 * step * abs(normal_rate(work, at.NOW, row))
+        flight = 0.25 * step * abs(normal_rate(work, NOW, row))
     if flight > SHARE_OF_FLIGHT * clock.tolerance:
         contact.flights = 0.0
     elif flight > 0.0:
@@ -257,7 +258,7 @@ def count_flight(work, clock, step, row):
 def note_flight(work, clock, row):
     """Keep how far a pair that is apart has been since it parted; far enough, it hums no more."""
     contact = work.contacts[row]
-    flight = max(contact.flight, work.geometry[at.NOW, row].gap)
+    flight = max(contact.flight, work.geometry[NOW, row].gap)
     contact.flight = flight
     if flight > SHARE_OF_FLIGHT * clock.tolerance:
         contact.flights = 0.0
@@ -268,7 +269,7 @@ def part(scene, work, clock, row):
     if not begins(scene, work, clock, row):
         return False
     for other in range(work.tally.candidates):
-        if work.candidates[other].closed == at.TOUCHES and shares_point(work, row, other):
+        if work.candidates[other].closed == TOUCHES and shares_point(work, row, other):
             enter(scene, work, other)
     return True
 
@@ -279,20 +280,20 @@ def settle(scene, work, clock, step):
     changed, entered = False, False
     for row in range(work.tally.candidates):
         mode = work.candidates[row].closed
-        if mode == at.GRAZES:
+        if mode == GRAZES:
             changed = not go_on(scene, work, row) or changed
-        elif mode == at.OPEN:
+        elif mode == OPEN:
             forget_gap(work, row)
             note_flight(work, clock, row)
-            if work.geometry[at.NOW, row].gap < 0.0:
+            if work.geometry[NOW, row].gap < 0.0:
                 count_flight(work, clock, step, row)
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES and work.geometry[at.NOW, row].gap >= 0.0:
+        if work.candidates[row].closed == TOUCHES and work.geometry[NOW, row].gap >= 0.0:
             entered = part(scene, work, clock, row) or entered
     if entered:
         share_forces(work)
         for row in range(work.tally.candidates):
-            if work.candidates[row].closed == at.GRAZES:
+            if work.candidates[row].closed == GRAZES:
                 hold_gap(work, row, 0.0)
     return changed or entered
 
@@ -301,10 +302,10 @@ def force_needed(work, row):
     """T of a pair that grazes at the end of a step; in its first one without what takes the rate
     away with which the pair has parted."""
     contact = work.contacts[row]
-    after = grazing_force(work, at.NEW, row)
+    after = grazing_force(work, NEW, row)
     if contact.fresh != 0.0:
         resistance = contact.grazing_resistance
-        after += resistance / STIFFER * normal_rate(work, at.NOW, row)
+        after += resistance / STIFFER * normal_rate(work, NOW, row)
     return after
 
 
@@ -325,8 +326,8 @@ def share_left(work, clock, step, row):
         return NEVER
     share = before / (before - after) if before * after < 0.0 else NEVER
     side = 1.0 if before > 0.0 else -1.0
-    slow = -side * tangential_rate(work, at.NOW, row)
-    slower = -side * tangential_rate(work, at.NEW, row)
+    slow = -side * tangential_rate(work, NOW, row)
+    slower = -side * tangential_rate(work, NEW, row)
     if contact.fresh != 0.0 and -slower * step > LATE * clock.tolerance:
         # It may have stuck before, and parted by rounding.
         slow = max(slow, 0.0)
@@ -339,16 +340,13 @@ def leave_early(scene, work, clock, step):
     """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
     changed = False
     for row in range(work.tally.candidates):
-        if (
-            work.candidates[row].closed == at.GRAZES
-            and share_left(work, clock, step, row) < AT_ONCE
-        ):
+        if work.candidates[row].closed == GRAZES and share_left(work, clock, step, row) < AT_ONCE:
             contact = work.contacts[row]
             fresh = contact.fresh != 0.0
             if fresh or contact.grazing_force * force_needed(work, row) < 0.0:
-                leave(work, row, at.OPEN, 0.0)
+                leave(work, row, OPEN, 0.0)
             else:
-                leave(work, row, at.TOUCHES, TOUCHING_GAP)
+                leave(work, row, TOUCHES, TOUCHING_GAP)
             changed = True
     return changed
 
@@ -356,6 +354,6 @@ def leave_early(scene, work, clock, step):
 def grazing_share(work, clock, step, share):
     """The share of the step at which the first pair ceases to graze, or the given one before."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.GRAZES:
+        if work.candidates[row].closed == GRAZES:
             share = min(share, BEHIND * share_left(work, clock, step, row))
     return share

@@ -9,7 +9,6 @@ exact for linear forces, however often they swing in the step (Hochbruck & Oster
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.integrators.exponential.series import (
     STIFFEST,
@@ -35,6 +34,19 @@ from flocsim.integrators.rhs.error import (
 )
 from flocsim.integrators.rhs.forces import keep_start, sum_forces, take_stage
 from flocsim.integrators.rhs.views import inertia, lever
+from flocsim.state.work import (
+    CARRIED,
+    CHANGE,
+    CHANGED,
+    DAMPING,
+    DEVIATION,
+    FIRST_STAGE,
+    FORCING,
+    MOTION,
+    NOW,
+    START,
+    STIFFNESS,
+)
 
 ROOT = 5.0**0.5
 
@@ -77,11 +89,11 @@ def guess_remainder(work, clock, step, known):
         scale, begin = step / staged, (clock.time - clock.staged_at) / staged
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            third = remainder[at.MOTION, 3, body, axis]
-            second = remainder[at.MOTION, 2, body, axis] + 3.0 * begin * third
-            remainder[at.MOTION, 1, body, axis] *= scale
-            remainder[at.MOTION, 2, body, axis] = second * scale * scale
-            remainder[at.MOTION, 3, body, axis] = third * scale * scale * scale
+            third = remainder[MOTION, 3, body, axis]
+            second = remainder[MOTION, 2, body, axis] + 3.0 * begin * third
+            remainder[MOTION, 1, body, axis] *= scale
+            remainder[MOTION, 2, body, axis] = second * scale * scale
+            remainder[MOTION, 3, body, axis] = third * scale * scale * scale
 
 
 def subtract_linear(work, stage, block, body, other):
@@ -89,21 +101,21 @@ def subtract_linear(work, stage, block, body, other):
     there, in CHANGE."""
     jacobian = work.jacobian
     for i in range(3):
-        total = work.velocity[at.CHANGE, body, i]
+        total = work.velocity[CHANGE, body, i]
         for j in range(3):
-            moved = work.place[stage, other, j] - work.place[at.NOW, other, j]
-            faster = work.velocity[stage, other, j] - work.velocity[at.NOW, other, j]
-            total += jacobian[at.STIFFNESS, block, i, j] * moved
-            total += jacobian[at.DAMPING, block, i, j] * faster
-        work.velocity[at.CHANGE, body, i] = total
+            moved = work.place[stage, other, j] - work.place[NOW, other, j]
+            faster = work.velocity[stage, other, j] - work.velocity[NOW, other, j]
+            total += jacobian[STIFFNESS, block, i, j] * moved
+            total += jacobian[DAMPING, block, i, j] * faster
+        work.velocity[CHANGE, body, i] = total
 
 
 def write_remainder(work, stage):
     """R at a point, in the columns of velocities of CHANGE."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            force = work.force[stage, body, axis] - work.force[at.NOW, body, axis]
-            work.velocity[at.CHANGE, body, axis] = force
+            force = work.force[stage, body, axis] - work.force[NOW, body, axis]
+            work.velocity[CHANGE, body, axis] = force
         subtract_linear(work, stage, body, body, body)
     for pair in range(work.tally.pairs):
         later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
@@ -119,13 +131,13 @@ def effect_of(scene, work, step, stage, goal):
     for body in range(work.place.shape[1]):
         memory = step + work.errors[body].memory
         for axis in range(3):
-            mean = one * work.force[at.FIRST_STAGE, body, axis]
-            mean += two * work.force[at.FIRST_STAGE + 1, body, axis]
-            mean += three * work.force[at.FIRST_STAGE + 2, body, axis]
+            mean = one * work.force[FIRST_STAGE, body, axis]
+            mean += two * work.force[FIRST_STAGE + 1, body, axis]
+            mean += three * work.force[FIRST_STAGE + 2, body, axis]
             speed = scene.bodies[body].free * step / inertia(scene, body, axis) * mean
             if not abs(speed) < math.inf:
                 return math.inf
-            work.velocity[at.CHANGE, body, axis] = speed
+            work.velocity[CHANGE, body, axis] = speed
             largest = max(largest, lever(scene, body, axis) * memory * abs(speed))
     return max(largest, change_of_forces(scene, work, step, stage, goal))
 
@@ -139,16 +151,16 @@ def amend_remainder(work, body, axis, one, two, three):
     square = first - third * (NODES[0] + NODES[1])
     linear = by_one - NODES[0] * (square + NODES[0] * third)
     remainder = work.remainder
-    remainder[at.CHANGED, 1, body, axis] = linear
-    remainder[at.CHANGED, 2, body, axis] = square
-    remainder[at.CHANGED, 3, body, axis] = third
-    remainder[at.MOTION, 1, body, axis] += linear
-    remainder[at.MOTION, 2, body, axis] += square
-    remainder[at.MOTION, 3, body, axis] += third
+    remainder[CHANGED, 1, body, axis] = linear
+    remainder[CHANGED, 2, body, axis] = square
+    remainder[CHANGED, 3, body, axis] = third
+    remainder[MOTION, 1, body, axis] += linear
+    remainder[MOTION, 2, body, axis] += square
+    remainder[MOTION, 3, body, axis] += third
 
 
 def remainder_at(work, share, body, axis):
-    r, which = work.remainder, at.MOTION
+    r, which = work.remainder, MOTION
     cubic = r[which, 2, body, axis] + share * r[which, 3, body, axis]
     return share * (r[which, 1, body, axis] + share * cubic)
 
@@ -157,46 +169,46 @@ def remainder_at(work, share, body, axis):
 def evaluate_points(scene, work, time, step):
     """Forces at the three points."""
     for stage in range(3):
-        locate_state(scene, work, at.FIRST_STAGE + stage)
+        locate_state(scene, work, FIRST_STAGE + stage)
     slip_stages(scene, work, step, 0, MATRIX)
     for stage in range(3):
-        sum_forces(scene, work, time + NODES[stage] * step, at.FIRST_STAGE + stage)
+        sum_forces(scene, work, time + NODES[stage] * step, FIRST_STAGE + stage)
 
 
 def iterate(scene, work, time, terms, step, goal):
     """Amend R by the motion that it leads to; what changes by that (see effect_of)."""
     for stage in range(3):
-        write_all_at(work, terms, step, NODES[stage], at.FIRST_STAGE + stage)
+        write_all_at(work, terms, step, NODES[stage], FIRST_STAGE + stage)
     evaluate_points(scene, work, time, step)
     largest = 0.0
     for stage in range(3):
-        write_remainder(work, at.FIRST_STAGE + stage)
+        write_remainder(work, FIRST_STAGE + stage)
         for body in range(work.place.shape[1]):
             for axis in range(3):
-                change = work.velocity[at.CHANGE, body, axis]
+                change = work.velocity[CHANGE, body, axis]
                 change -= remainder_at(work, NODES[stage], body, axis)
                 # The force at the point is not needed any more.
-                work.force[at.FIRST_STAGE + stage, body, axis] = change
+                work.force[FIRST_STAGE + stage, body, axis] = change
     for stage in range(3):
         largest = max(largest, effect_of(scene, work, step, stage, goal))
     for body in range(work.place.shape[1]):
         for axis in range(3):
             amend_remainder(
-                work, body, axis, work.force[at.FIRST_STAGE, body, axis],
-                work.force[at.FIRST_STAGE + 1, body, axis],
-                work.force[at.FIRST_STAGE + 2, body, axis],
+                work, body, axis, work.force[FIRST_STAGE, body, axis],
+                work.force[FIRST_STAGE + 1, body, axis],
+                work.force[FIRST_STAGE + 2, body, axis],
             )  # fmt: skip
     return largest
 
 
 def write_all_at(work, terms, step, share, state):
-    write_at(work, at.NOW, terms, step, share, state, 0, work.place.shape[1])
+    write_at(work, NOW, terms, step, share, state, 0, work.place.shape[1])
 
 
 def finish(scene, work, terms, step):
     """The end of the step, and the tangential displacements there, are NEW; it began at START."""
     keep_start(work)
-    last = at.FIRST_STAGE + 2
+    last = FIRST_STAGE + 2
     write_all_at(work, terms, step, 1.0, last)
     locate_state(scene, work, last)
     slip_stages(scene, work, step, 2, MATRIX)
@@ -211,8 +223,8 @@ def solve_series(scene, work, clock, step, known):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = max(inertia(scene, body, axis), TINY)
-            spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
-            damping = abs(work.jacobian[at.DAMPING, body, axis, axis])
+            spring = abs(work.jacobian[STIFFNESS, body, axis, axis])
+            damping = abs(work.jacobian[DAMPING, body, axis, axis])
             if step * (step * spring + damping) > STIFFEST * mass:
                 return 0
     guess_remainder(work, clock, step, known)
@@ -224,7 +236,7 @@ def solve_series(scene, work, clock, step, known):
         if terms == 0:
             return 0
         change = iterate(scene, work, clock.time, terms, step, ITERATION_SHARE * allowed)
-        goal = max(ITERATION_SHARE * allowed, rounding_size(scene, work, at.FIRST_STAGE + 2, step))
+        goal = max(ITERATION_SHARE * allowed, rounding_size(scene, work, FIRST_STAGE + 2, step))
         pace = expected if before == math.inf else change / before
         if not (change < math.inf and pace < 1.0):
             break
@@ -248,8 +260,8 @@ def error_of_radau(scene, work, terms, step):
     series = work.series
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.DEVIATION, body, axis] = 0.0
-            work.velocity[at.DEVIATION, body, axis] = 0.0
+            work.place[DEVIATION, body, axis] = 0.0
+            work.velocity[DEVIATION, body, axis] = 0.0
     before, damped = 0.0, step / EIGENVALUES[REAL].real
     one, two = RADAU[0] ** 3, RADAU[1] ** 3
     for k in range(4, terms):
@@ -257,9 +269,9 @@ def error_of_radau(scene, work, terms, step):
         here = (ESTIMATE[0] * one + ESTIMATE[1] * two + ESTIMATE[2]) / step
         for body in range(work.place.shape[1]):
             for axis in range(3):
-                term = damped * series[at.MOTION, k, body, axis]
-                work.place[at.DEVIATION, body, axis] += here * term
-                work.velocity[at.DEVIATION, body, axis] += before * k / step * term
+                term = damped * series[MOTION, k, body, axis]
+                work.place[DEVIATION, body, axis] += here * term
+                work.velocity[DEVIATION, body, axis] += before * k / step * term
         before = here
     return error_size(scene, work)
 
@@ -269,13 +281,13 @@ def estimate(work, step):
     remainder = work.remainder
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            cubic = remainder[at.MOTION, 3, body, axis]
-            remainder[at.CHANGED, 0, body, axis] = 0.0
-            remainder[at.CHANGED, 1, body, axis] = NODES[0] * cubic
-            remainder[at.CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
-            remainder[at.CHANGED, 3, body, axis] = cubic
+            cubic = remainder[MOTION, 3, body, axis]
+            remainder[CHANGED, 0, body, axis] = 0.0
+            remainder[CHANGED, 1, body, axis] = NODES[0] * cubic
+            remainder[CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
+            remainder[CHANGED, 3, body, axis] = cubic
     begin_change(work)
-    write_change(work, 1, step, 1.0, at.DEVIATION)
+    write_change(work, 1, step, 1.0, DEVIATION)
 
 
 def add_last_term(work, step):
@@ -283,9 +295,9 @@ def add_last_term(work, step):
     last = work.tally.series_terms - 1
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            term = work.series[at.MOTION, last, body, axis]
-            work.place[at.DEVIATION, body, axis] += term
-            work.velocity[at.DEVIATION, body, axis] += last / step * term
+            term = work.series[MOTION, last, body, axis]
+            work.place[DEVIATION, body, axis] += term
+            work.velocity[DEVIATION, body, axis] += last / step * term
 
 
 @apart
@@ -313,10 +325,10 @@ def errors_over_ways(work, share):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             force = remainder_at(work, 1.0, body, axis)
-            way = force * (work.place[at.NOW, body, axis] - work.place[at.START, body, axis])
+            way = force * (work.place[NOW, body, axis] - work.place[START, body, axis])
             along, every = along + way, every + abs(way)
-            before += force * work.place[at.CARRIED, body, axis]
-            after += force * work.place[at.CHANGE, body, axis]
+            before += force * work.place[CARRIED, body, axis]
+            after += force * work.place[CHANGE, body, axis]
     if abs(along) <= LEAST_ALONG * every:
         return 0.0, 0.0
     return before * share / along, after * share / along
@@ -329,16 +341,16 @@ def begin_carrying(work, step, before, after):
     more = after - before
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            series[at.CHANGED, 0, body, axis] = work.place[at.CARRIED, body, axis]
-            series[at.CHANGED, 1, body, axis] = step * work.velocity[at.CARRIED, body, axis]
-            one = remainder[at.MOTION, 1, body, axis]
-            two = 2.0 * remainder[at.MOTION, 2, body, axis]
-            three = 3.0 * remainder[at.MOTION, 3, body, axis]
-            forcing = work.velocity[at.FORCING, body, axis]
-            remainder[at.CHANGED, 0, body, axis] = forcing + before * one
-            remainder[at.CHANGED, 1, body, axis] = before * two + more * one
-            remainder[at.CHANGED, 2, body, axis] = before * three + more * two
-            remainder[at.CHANGED, 3, body, axis] = more * three
+            series[CHANGED, 0, body, axis] = work.place[CARRIED, body, axis]
+            series[CHANGED, 1, body, axis] = step * work.velocity[CARRIED, body, axis]
+            one = remainder[MOTION, 1, body, axis]
+            two = 2.0 * remainder[MOTION, 2, body, axis]
+            three = 3.0 * remainder[MOTION, 3, body, axis]
+            forcing = work.velocity[FORCING, body, axis]
+            remainder[CHANGED, 0, body, axis] = forcing + before * one
+            remainder[CHANGED, 1, body, axis] = before * two + more * one
+            remainder[CHANGED, 2, body, axis] = before * three + more * two
+            remainder[CHANGED, 3, body, axis] = more * three
 
 
 @apart
@@ -350,11 +362,11 @@ def carry_known(work, clock, step, share):
     grows as their speed does: with R, as far as the error lies on their way.
     """
     begin_carrying(work, step, 0.0, 0.0)
-    write_change(work, 0, step, share, at.CHANGE)
+    write_change(work, 0, step, share, CHANGE)
     if nothing_swings(clock):
         for _ in range(2):
             before, after = errors_over_ways(work, share)
             if before == 0.0 and after == 0.0:
                 return
             begin_carrying(work, step, before, before + (after - before) / share)
-            write_change(work, 0, step, share, at.CHANGE)
+            write_change(work, 0, step, share, CHANGE)

@@ -8,7 +8,6 @@ other (events/crossings.py).
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.hooks import SLIP_LIMIT, contact_event, has
@@ -17,6 +16,9 @@ from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.exponential.series import shorten, write_at
 from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
 from flocsim.integrators.rhs.views import contact_view, lever, normal_rate
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.contacts import OPEN, TOUCHES
+from flocsim.state.work import FIRST_STAGE, MOTION, NEW, NOW, TRIAL
 
 A_PART = 1.6
 """Rates times the length of a part: what vibrates swings by a quarter of a turn in it."""
@@ -53,48 +55,48 @@ def write_ways(scene, work, terms):
         for axis in range(3):
             size = lever(scene, body, axis)
             for k in range(1, terms):
-                way += size * abs(work.series[at.MOTION, k, body, axis])
+                way += size * abs(work.series[MOTION, k, body, axis])
         work.poses[body].way = way
 
 
 def may_meet(work, row):
     """Whether a pair may come to where it switches in the step, or rub otherwise."""
     candidate = work.candidates[row]
-    if candidate.closed == at.TOUCHES:
+    if candidate.closed == TOUCHES:
         return True
     a, b = candidate.vertex_body, candidate.edge_body
-    return margin(work, at.NOW, row) <= work.poses[a].way + work.poses[b].way
+    return margin(work, NOW, row) <= work.poses[a].way + work.poses[b].way
 
 
 def look(scene, work, terms, step, share):
     """Put the bodies where they are at a share of the step, in TRIAL."""
-    write_at(work, at.NOW, terms, step, share, at.TRIAL, 0, work.place.shape[1])
+    write_at(work, NOW, terms, step, share, TRIAL, 0, work.place.shape[1])
     for body in range(work.place.shape[1]):
-        turn_body(work, at.TRIAL, body)
+        turn_body(work, TRIAL, body)
 
 
 def has_switched(work, row, depth):
     """Whether a pair has in TRIAL: one that was apart where it is so deep there [m]."""
-    least = -depth if work.candidates[row].closed == at.OPEN else 0.0
-    return margin(work, at.TRIAL, row) < least
+    least = -depth if work.candidates[row].closed == OPEN else 0.0
+    return margin(work, TRIAL, row) < least
 
 
 def lowest(scene, work, terms, step, low, high, row, depth):
     """Where between two shares of the step a row, the margin of which falls at the first and rises
     at the second, has switched; 2 where it has not."""
     contact = work.contacts[row]
-    rate_low, rate_high = contact.sampled_rate, margin_rate(work, at.TRIAL, row)
+    rate_low, rate_high = contact.sampled_rate, margin_rate(work, TRIAL, row)
     span = step * (high - low)
     if min(contact.sampled + 0.5 * span * rate_low,
-           margin(work, at.TRIAL, row) - 0.5 * span * rate_high) >= 0.0:  # fmt: skip
+           margin(work, TRIAL, row) - 0.5 * span * rate_high) >= 0.0:  # fmt: skip
         return 2.0
     for _ in range(TRIES):
         share = (low * rate_high - high * rate_low) / (rate_high - rate_low)
         look(scene, work, terms, step, share)
-        locate_polygons(scene, work, at.TRIAL, row)
+        locate_polygons(scene, work, TRIAL, row)
         if has_switched(work, row, depth):
             return share
-        rate = margin_rate(work, at.TRIAL, row)
+        rate = margin_rate(work, TRIAL, row)
         if rate < 0.0:
             low, rate_low = share, rate
         else:
@@ -106,17 +108,17 @@ def rubs_otherwise(scene, work, row, resolution):
     """Whether a closed pair slides that has stuck, sticks that has slid, or has passed a kink of
     its law in TRIAL."""
     if has(scene, SLIP_LIMIT):
-        work.slip[at.TRIAL, row] = work.slip[at.NOW, row] + rolled(scene, work, at.TRIAL, row)
+        work.slip[TRIAL, row] = work.slip[NOW, row] + rolled(scene, work, TRIAL, row)
         side = work.candidates[row].sliding
         if side == 0:
-            beyond = abs(work.slip[at.TRIAL, row]) - limit_in(scene, work, at.TRIAL, row)
+            beyond = abs(work.slip[TRIAL, row]) - limit_in(scene, work, TRIAL, row)
             if beyond > resolution:
                 return True
-        elif outgrowth(scene, work, at.TRIAL, row, side) < 0.0:
+        elif outgrowth(scene, work, TRIAL, row, side) < 0.0:
             return True
     for which in range(scene.events):
-        before = contact_event(scene, contact_view(scene, work, at.NOW, row), which)
-        if before * contact_event(scene, contact_view(scene, work, at.TRIAL, row), which) < 0.0:
+        before = contact_event(scene, contact_view(scene, work, NOW, row), which)
+        if before * contact_event(scene, contact_view(scene, work, TRIAL, row), which) < 0.0:
             return True
     return False
 
@@ -129,8 +131,8 @@ def first_seen(scene, work, parts, step, resolution, depth):
     write_ways(scene, work, terms)
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
-        contact.sampled = margin(work, at.NOW, row)
-        contact.sampled_rate = margin_rate(work, at.NOW, row)
+        contact.sampled = margin(work, NOW, row)
+        contact.sampled_rate = margin_rate(work, NOW, row)
     for part in range(1, parts + 1):
         low, high = (part - 1.0) / parts, part / parts
         look(scene, work, terms, step, high)
@@ -138,11 +140,11 @@ def first_seen(scene, work, parts, step, resolution, depth):
             contact = work.contacts[row]
             if not may_meet(work, row):
                 continue
-            locate_polygons(scene, work, at.TRIAL, row)
-            value, rate = margin(work, at.TRIAL, row), margin_rate(work, at.TRIAL, row)
+            locate_polygons(scene, work, TRIAL, row)
+            value, rate = margin(work, TRIAL, row), margin_rate(work, TRIAL, row)
             if has_switched(work, row, depth):
                 return high
-            if work.candidates[row].closed == at.TOUCHES and rubs_otherwise(
+            if work.candidates[row].closed == TOUCHES and rubs_otherwise(
                 scene, work, row, resolution
             ):
                 return high
@@ -160,8 +162,8 @@ def first_too_deep(scene, work):
     where none is before the end."""
     for stage in range(2):
         for row in range(work.tally.candidates):
-            touches = work.candidates[row].closed == at.TOUCHES
-            if touches and is_too_deep(scene, work, at.FIRST_STAGE + stage, row):
+            touches = work.candidates[row].closed == TOUCHES
+            if touches and is_too_deep(scene, work, FIRST_STAGE + stage, row):
                 return NODES[stage]
     return 1.0
 
@@ -178,10 +180,10 @@ def parts_of_way(scene, work):
         if pair != before:
             before = pair
             a, b = candidate.vertex_body, candidate.edge_body
-            way = abs(way_of(work, a, at.X) - way_of(work, b, at.X))
-            way += abs(way_of(work, a, at.Y) - way_of(work, b, at.Y))
-            way += abs(way_of(work, a, at.ANGLE)) * scene.bodies[a].bounding_radius
-            way += abs(way_of(work, b, at.ANGLE)) * scene.bodies[b].bounding_radius
+            way = abs(way_of(work, a, X) - way_of(work, b, X))
+            way += abs(way_of(work, a, Y) - way_of(work, b, Y))
+            way += abs(way_of(work, a, ANGLE)) * scene.bodies[a].bounding_radius
+            way += abs(way_of(work, b, ANGLE)) * scene.bodies[b].bounding_radius
             size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
             parts = max(parts, int(way / (A_WAY * size)) + 1)
     return parts
@@ -189,13 +191,13 @@ def parts_of_way(scene, work):
 
 def way_of(work, body, axis):
     """By how much a body's place changes in the step [m or rad]."""
-    return work.place[at.NEW, body, axis] - work.place[at.NOW, body, axis]
+    return work.place[NEW, body, axis] - work.place[NOW, body, axis]
 
 
 def has_parted(work, step, row):
     """Whether a pair is apart, and goes further than it is in a step."""
-    way = step * normal_rate(work, at.NOW, row)
-    return work.candidates[row].closed == at.OPEN and way > work.geometry[at.NOW, row].gap
+    way = step * normal_rate(work, NOW, row)
+    return work.candidates[row].closed == OPEN and way > work.geometry[NOW, row].gap
 
 
 def share_to_return(scene, work, step):
@@ -207,9 +209,9 @@ def share_to_return(scene, work, step):
             if not looked:
                 look(scene, work, work.tally.series_terms, step, SOON)
                 looked = True
-            locate_polygons(scene, work, at.TRIAL, row)
-            rate = normal_rate(work, at.NOW, row)
-            slower = rate - normal_rate(work, at.TRIAL, row)
+            locate_polygons(scene, work, TRIAL, row)
+            rate = normal_rate(work, NOW, row)
+            slower = rate - normal_rate(work, TRIAL, row)
             if slower > 0.0:
                 earliest = min(earliest, 2.0 * SOON * rate / slower)
     return earliest
@@ -223,7 +225,7 @@ def first_return(scene, work, step, depth):
         look(scene, work, work.tally.series_terms, step, share)
         for row in range(work.tally.candidates):
             if has_parted(work, step, row):
-                locate_polygons(scene, work, at.TRIAL, row)
+                locate_polygons(scene, work, TRIAL, row)
                 if has_switched(work, row, depth):
                     return share
         share *= 2.0
@@ -242,5 +244,5 @@ def cut(scene, work, clock, step, resolution, depth):
         shorten(work, terms, share)
         clock.staged_step *= share
         clock.series_step = clock.staged_step
-        write_at(work, at.NOW, terms, share * step, 1.0, at.NEW, 0, work.place.shape[1])
+        write_at(work, NOW, terms, share * step, 1.0, NEW, 0, work.place.shape[1])
     return share

@@ -10,9 +10,9 @@ above h times the fastest rate. Small changes of the motion, and of R, follow fr
 
 import math
 
-import flocsim.arrays as at
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia, lever
+from flocsim.state.work import CHANGED, DAMPING, LEVER, MOTION, MOVED, NOW, STIFFNESS, TERMS
 
 SHARE = 1e-3
 """The series of a motion ends where two terms in a row are below this share of what a step may be
@@ -36,12 +36,12 @@ def scale_block(work, block, body, other, step):
     """Write by how much a step's acceleration of a body changes with another one's place and
     velocity, both in a step."""
     for i in range(3):
-        share = work.weights[at.MOVED, body, i]
+        share = work.weights[MOVED, body, i]
         for j in range(3):
-            stiffness = work.jacobian[at.STIFFNESS, block, i, j]
-            damping = work.jacobian[at.DAMPING, block, i, j] / step
-            work.linear[at.STIFFNESS, body, other, i, j] = share * stiffness
-            work.linear[at.DAMPING, body, other, i, j] = share * damping
+            stiffness = work.jacobian[STIFFNESS, block, i, j]
+            damping = work.jacobian[DAMPING, block, i, j] / step
+            work.linear[STIFFNESS, body, other, i, j] = share * stiffness
+            work.linear[DAMPING, body, other, i, j] = share * damping
 
 
 def scale_derivatives(scene, work, step):
@@ -49,8 +49,8 @@ def scale_derivatives(scene, work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             share = scene.bodies[body].free * step * step / inertia(scene, body, axis)
-            work.weights[at.MOVED, body, axis] = share
-            work.weights[at.LEVER, body, axis] = lever(scene, body, axis)
+            work.weights[MOVED, body, axis] = share
+            work.weights[LEVER, body, axis] = lever(scene, body, axis)
         scale_block(work, body, body, body, step)
     for pair in range(work.tally.pairs):
         later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
@@ -65,24 +65,24 @@ def write_term(work, which, k):
     for body in range(work.place.shape[1]):
         first = second = third = 0.0
         if k < 4:
-            first = work.remainder[which, k, body, 0] * weights[at.MOVED, body, 0]
-            second = work.remainder[which, k, body, 1] * weights[at.MOVED, body, 1]
-            third = work.remainder[which, k, body, 2] * weights[at.MOVED, body, 2]
+            first = work.remainder[which, k, body, 0] * weights[MOVED, body, 0]
+            second = work.remainder[which, k, body, 1] * weights[MOVED, body, 1]
+            third = work.remainder[which, k, body, 2] * weights[MOVED, body, 2]
         for other in range(work.place.shape[1]):
             for j in range(3):
                 place = series[which, k, other, j]
                 speed = after * series[which, k + 1, other, j]
-                first -= linear[at.STIFFNESS, body, other, 0, j] * place
-                first -= linear[at.DAMPING, body, other, 0, j] * speed
-                second -= linear[at.STIFFNESS, body, other, 1, j] * place
-                second -= linear[at.DAMPING, body, other, 1, j] * speed
-                third -= linear[at.STIFFNESS, body, other, 2, j] * place
-                third -= linear[at.DAMPING, body, other, 2, j] * speed
+                first -= linear[STIFFNESS, body, other, 0, j] * place
+                first -= linear[DAMPING, body, other, 0, j] * speed
+                second -= linear[STIFFNESS, body, other, 1, j] * place
+                second -= linear[DAMPING, body, other, 1, j] * speed
+                third -= linear[STIFFNESS, body, other, 2, j] * place
+                third -= linear[DAMPING, body, other, 2, j] * speed
         first, second, third = factor * first, factor * second, factor * third
         series[which, k + 2, body, 0] = first
         series[which, k + 2, body, 1] = second
         series[which, k + 2, body, 2] = third
-        turning = weights[at.LEVER, body, 2] * abs(third)
+        turning = weights[LEVER, body, 2] * abs(third)
         largest = max(largest, abs(first), abs(second), turning)
     return largest
 
@@ -101,11 +101,11 @@ def begin(scene, work, step):
     series = work.series
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            series[at.MOTION, 0, body, axis] = 0.0
-            speed = work.velocity[at.NOW, body, axis]
-            series[at.MOTION, 1, body, axis] = step * speed
-            force = 0.5 * work.force[at.NOW, body, axis]
-            series[at.MOTION, 2, body, axis] = work.weights[at.MOVED, body, axis] * force
+            series[MOTION, 0, body, axis] = 0.0
+            speed = work.velocity[NOW, body, axis]
+            series[MOTION, 1, body, axis] = step * speed
+            force = 0.5 * work.force[NOW, body, axis]
+            series[MOTION, 2, body, axis] = work.weights[MOVED, body, axis] * force
 
 
 def reach(last, late, early, goal):
@@ -115,7 +115,7 @@ def reach(last, late, early, goal):
     if not (late > 0.0 and 0.0 < early < math.inf):
         return math.inf
     squared, term, k = late / early * last * (last - 1.0), late, last
-    while k < at.TERMS - 2:
+    while k < TERMS - 2:
         term *= squared / ((k + 1.0) * (k + 2.0))
         k += 2
     return (goal / max(term, TINY * goal)) ** (1.0 / k)
@@ -130,9 +130,9 @@ def turns_of(work):
             total = 0.0
             for other in range(work.place.shape[1]):
                 for j in range(3):
-                    size = abs(work.linear[at.STIFFNESS, body, other, axis, j])
-                    total += size / weights[at.LEVER, other, j]
-            largest = max(largest, total * weights[at.LEVER, body, axis])
+                    size = abs(work.linear[STIFFNESS, body, other, axis, j])
+                    total += size / weights[LEVER, other, j]
+            largest = max(largest, total * weights[LEVER, body, axis])
     return math.sqrt(largest)
 
 
@@ -142,9 +142,9 @@ def expand(scene, work, clock, step, goal):
     begin(scene, work, step)
     goal, small, later = SHARE * goal, 0, longest_memory(work) / step
     one, two, three, size = math.inf, math.inf, math.inf, math.inf
-    for k in range(1, at.TERMS - 2):
+    for k in range(1, TERMS - 2):
         three, two, one = two, one, size
-        size = write_term(work, at.MOTION, k) * (1.0 + later * (k + 2.0))
+        size = write_term(work, MOTION, k) * (1.0 + later * (k + 2.0))
         small = small + 1 if size <= goal else 0
         if small >= 2 and k + 3 >= LEAST_TERMS:
             longer = reach(k + 2, max(size, one), max(two, three), goal)
@@ -161,7 +161,7 @@ def begin_change(work):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             for k in range(3):
-                work.series[at.CHANGED, k, body, axis] = 0.0
+                work.series[CHANGED, k, body, axis] = 0.0
 
 
 def amend(work, terms, step, goal):
@@ -170,14 +170,14 @@ def amend(work, terms, step, goal):
     series, goal, small = work.series, SHARE * goal, 0
     later = longest_memory(work) / step
     begin_change(work)
-    for k in range(1, at.TERMS - 2):
-        size = write_term(work, at.CHANGED, k) * (1.0 + later * (k + 2.0))
+    for k in range(1, TERMS - 2):
+        size = write_term(work, CHANGED, k) * (1.0 + later * (k + 2.0))
         small = small + 1 if size <= goal else 0
         for body in range(work.place.shape[1]):
             for axis in range(3):
-                before = series[at.MOTION, k + 2, body, axis] if k + 2 < terms else 0.0
-                change = series[at.CHANGED, k + 2, body, axis]
-                series[at.MOTION, k + 2, body, axis] = before + change
+                before = series[MOTION, k + 2, body, axis] if k + 2 < terms else 0.0
+                change = series[CHANGED, k + 2, body, axis]
+                series[MOTION, k + 2, body, axis] = before + change
         if small >= 2 and k + 3 >= LEAST_TERMS:
             return max(terms, k + 3)
         if not size < math.inf:
@@ -191,17 +191,17 @@ def write_change(work, first, step, share, kind):
     series = work.series
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[kind, body, axis] = series[at.CHANGED, 0, body, axis]
-            work.place[kind, body, axis] += share * series[at.CHANGED, 1, body, axis]
-            work.velocity[kind, body, axis] = series[at.CHANGED, 1, body, axis] / step
+            work.place[kind, body, axis] = series[CHANGED, 0, body, axis]
+            work.place[kind, body, axis] += share * series[CHANGED, 1, body, axis]
+            work.velocity[kind, body, axis] = series[CHANGED, 1, body, axis] / step
     largest, small, power = 0.0, 0, share**first
-    for k in range(first, at.TERMS - 2):
+    for k in range(first, TERMS - 2):
         # In velocities, which outlast places.
-        size = (k + 2.0) * write_term(work, at.CHANGED, k)
+        size = (k + 2.0) * write_term(work, CHANGED, k)
         rate, power = (k + 2.0) * power * share / step, power * share
         for body in range(work.place.shape[1]):
             for axis in range(3):
-                term = series[at.CHANGED, k + 2, body, axis]
+                term = series[CHANGED, k + 2, body, axis]
                 work.place[kind, body, axis] += power * share * term
                 work.velocity[kind, body, axis] += rate * term
         largest = max(largest, size)
@@ -217,18 +217,18 @@ def shorten(work, terms, share):
         power *= share
         for body in range(work.place.shape[1]):
             for axis in range(3):
-                work.series[at.MOTION, k, body, axis] *= power
+                work.series[MOTION, k, body, axis] *= power
     for body in range(work.place.shape[1]):
         for axis in range(3):
             power = 1.0
             for k in range(1, 4):
                 power *= share
-                work.remainder[at.MOTION, k, body, axis] *= power
-            work.weights[at.MOVED, body, axis] *= share * share
+                work.remainder[MOTION, k, body, axis] *= power
+            work.weights[MOVED, body, axis] *= share * share
             for other in range(work.place.shape[1]):
                 for j in range(3):
-                    work.linear[at.STIFFNESS, body, other, axis, j] *= share * share
-                    work.linear[at.DAMPING, body, other, axis, j] *= share
+                    work.linear[STIFFNESS, body, other, axis, j] *= share * share
+                    work.linear[DAMPING, body, other, axis, j] *= share
 
 
 def write_at(work, start, terms, step, share, state, first, end):
@@ -244,12 +244,12 @@ def write_at(work, start, terms, step, share, state, first, end):
         power *= share
         for body in range(first, end):
             for axis in range(3):
-                term = series[at.MOTION, k, body, axis]
+                term = series[MOTION, k, body, axis]
                 work.place[state, body, axis] += power * term
                 work.velocity[state, body, axis] += rate * term
     for body in range(first, end):
         for axis in range(3):
             # In changes, so that what does not move stays just where it is.
-            work.place[state, body, axis] += share * series[at.MOTION, 1, body, axis]
+            work.place[state, body, axis] += share * series[MOTION, 1, body, axis]
             work.place[state, body, axis] += work.place[start, body, axis]
             work.velocity[state, body, axis] += work.velocity[start, body, axis]

@@ -2,7 +2,6 @@
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.body_pairs import watches_all
 from flocsim.geometry.contact.candidates import hand_over, list_ahead, outlived, spent, too_wide
@@ -52,6 +51,10 @@ from flocsim.integrators.loop.step_size import (
 from flocsim.integrators.rhs.friction import rolled, rolled_besides, slip_in
 from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
 from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
+from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
+from flocsim.state.clock import NOTHING_FULL
+from flocsim.state.contacts import TOUCHES
+from flocsim.state.work import NEW, NOW
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10
@@ -69,7 +72,7 @@ def too_deep(scene, work):
     """Whether any listed pair overlaps past the limit of the contact law."""
     deep = False
     for row in range(work.tally.candidates):
-        deep = deep or is_too_deep(scene, work, at.NOW, row)
+        deep = deep or is_too_deep(scene, work, NOW, row)
     return deep
 
 
@@ -77,12 +80,12 @@ def take_new_state(work):
     """Make the new state the current one."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.NOW, body, axis] = work.place[at.NEW, body, axis]
-            work.velocity[at.NOW, body, axis] = work.velocity[at.NEW, body, axis]
+            work.place[NOW, body, axis] = work.place[NEW, body, axis]
+            work.velocity[NOW, body, axis] = work.velocity[NEW, body, axis]
     for row in range(work.tally.candidates):
-        work.geometry[at.NOW, row] = work.geometry[at.NEW, row]
+        work.geometry[NOW, row] = work.geometry[NEW, row]
         if work.candidates[row].closed == 1:
-            work.slip[at.NOW, row] = work.slip[at.NEW, row]
+            work.slip[NOW, row] = work.slip[NEW, row]
 
 
 @apart
@@ -131,12 +134,12 @@ def stands_still(clock, counts, step):
 def record_row(work, clock, counts, record):
     """Write the current state to the record (rows of time, then six numbers for each body)."""
     row = counts.recorded
-    record[row, at.RECORD_TIME] = clock.time
+    record[row, RECORD_TIME] = clock.time
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            column = at.RECORD_MOTION + 6 * body + axis
-            record[row, column] = work.place[at.NOW, body, axis]
-            record[row, column + 3] = work.velocity[at.NOW, body, axis]
+            column = RECORD_MOTION + 6 * body + axis
+            record[row, column] = work.place[NOW, body, axis]
+            record[row, column + 3] = work.velocity[NOW, body, axis]
     counts.recorded = row + 1
 
 
@@ -158,7 +161,7 @@ def keep_lists(scene, work, counts, ahead):
     if outlived(scene, work, ahead) or too_wide(scene, work, ahead):
         if not list_ahead(scene, work, ahead):
             return False
-        locate_contacts(scene, work, at.NOW)
+        locate_contacts(scene, work, NOW)
         set_modes(scene, work)
         counts.cycle_modes = 0
     return True
@@ -167,9 +170,9 @@ def keep_lists(scene, work, counts, ahead):
 def went_too_far(scene, work, clock, step):
     """Locate all pairs at the end of the step; whether what was listed or flagged is not enough, or
     it is not known where surface forces act."""
-    if spent(scene, work, at.NEW) > 1.0:
+    if spent(scene, work, NEW) > 1.0:
         return True
-    locate_contacts(scene, work, at.NEW)
+    locate_contacts(scene, work, NEW)
     if clock.across == 1.0 and changes_sides(work):
         return True
     if scene.listed_reach <= 0.0 or clock.tolerance == math.inf:
@@ -182,10 +185,10 @@ def went_too_far(scene, work, clock, step):
 def roll_slips(scene, work, step):
     """Tangential displacements of the closed pairs in NEW, which is located, after a step."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES:
-            besides = 0.5 * step * rolled_besides(scene, work, at.NEW, row)
-            stuck = work.slip[at.NOW, row] + rolled(scene, work, at.NEW, row) + besides
-            work.slip[at.NEW, row] = slip_in(scene, work, at.NEW, row, stuck)
+        if work.candidates[row].closed == TOUCHES:
+            besides = 0.5 * step * rolled_besides(scene, work, NEW, row)
+            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row) + besides
+            work.slip[NEW, row] = slip_in(scene, work, NEW, row, stuck)
 
 
 def ends_early(scene, work, clock, step, ratio, share):
@@ -195,7 +198,7 @@ def ends_early(scene, work, clock, step, ratio, share):
         return False
     if not end_within(scene, work, step, ratio, share):
         return False
-    locate_contacts(scene, work, at.NEW)
+    locate_contacts(scene, work, NEW)
     roll_slips(scene, work, share * step)
     # A long step may have run through a body: what came first is seen from a nearer end alone.
     resolution, depth = resolutions_of(work, clock)
@@ -230,9 +233,9 @@ def advance(scene, work, observed, clock, counts, record):
         renew_kicks(scene, work, clock)
         step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
         if scene.listed_reach > 0.0:
-            flag_near(scene, work, at.NOW, step)
+            flag_near(scene, work, NOW, step)
         ratio = attempt(scene, work, clock, step)
-        if work.tally.full != at.NOTHING_FULL:
+        if work.tally.full != NOTHING_FULL:
             return NO_ROOM
         if ratio < 0.0 and clock.tolerance == math.inf:
             return NOT_FINITE
@@ -253,7 +256,7 @@ def advance(scene, work, observed, clock, counts, record):
             if kept < 1.0:
                 step *= kept
                 trials += 1
-                locate_contacts(scene, work, at.NEW)
+                locate_contacts(scene, work, NEW)
                 roll_slips(scene, work, step)
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:

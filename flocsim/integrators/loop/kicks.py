@@ -21,8 +21,8 @@ Source: Salmon, Moraes, Dror and Shaw (2011), Parallel random numbers: as easy a
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import length_of, separation
+from flocsim.state.work import NOW
 
 KICK, HALVINGS, SPREAD, LEAST_WAY = range(4)
 """Places in ``Scene.kicks``: how long the longest kick is [s], 0 where there are none; how often it
@@ -68,7 +68,7 @@ def listed_gap(work, pair):
     least = math.inf
     for row in range(work.tally.candidates):
         if work.candidates[row].pair == pair:
-            least = min(least, work.geometry[at.NOW, row].gap)
+            least = min(least, work.geometry[NOW, row].gap)
     return least if least < math.inf else max(0.5 * work.budget[pair], 0.0)
 
 
@@ -77,7 +77,7 @@ def nearest(scene, work):
     least = math.inf
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
-        x, y = separation(scene, work, at.NOW, a, b)
+        x, y = separation(scene, work, NOW, a, b)
         gap = length_of(x, y)
         gap -= scene.bodies[a].bounding_radius + scene.bodies[b].bounding_radius
         if gap <= 0.0:

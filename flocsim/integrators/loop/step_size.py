@@ -2,7 +2,6 @@
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import share_ahead, time_within
 from flocsim.hooks import first_step, next_step
 from flocsim.integrators.events.first_event import OTHER_CONTACTS, OTHER_FRICTION, resolutions_of
@@ -10,6 +9,8 @@ from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
 from flocsim.integrators.rhs.stated_error import pressed_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, memory_of, normal_rate
+from flocsim.state.contacts import TOUCHES
+from flocsim.state.work import NOW, STIFFNESS
 
 SAFETY = 0.9
 """Aim that far below the step at which the error would meet the tolerance."""
@@ -84,11 +85,11 @@ def imminent_switch(scene, work, clock, step):
     """The step, or the much shorter one behind which a pair is just about to switch."""
     resolution, _ = resolutions_of(work, clock)
     for row in range(work.tally.candidates):
-        gap = work.geometry[at.NOW, row].gap
+        gap = work.geometry[NOW, row].gap
         if 0.0 <= gap < clock.tolerance:
-            rate = normal_rate(work, at.NOW, row)
+            rate = normal_rate(work, NOW, row)
             if gap * rate < 0.0:
-                behind = 0.5 * touch_resolution(scene, work, at.NOW, row, resolution)
+                behind = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
                 ahead = (abs(gap) + behind) / abs(rate)
                 if ahead < IMMINENT * step:
                     step = ahead
@@ -106,7 +107,7 @@ def step_to_landing(work, clock, step):
     Pairs that come nearer by less than the tolerance may land anywhere in it."""
     tolerance = clock.tolerance
     for row in range(work.tally.candidates):
-        gap, speed = work.geometry[at.NOW, row].gap, -normal_rate(work, at.NOW, row)
+        gap, speed = work.geometry[NOW, row].gap, -normal_rate(work, NOW, row)
         if gap > 0.0 and speed * step > max(gap, tolerance):
             way = gap - SHORT_OF_IT * tolerance
             lands = way <= 0.5 * SHORT_OF_IT * tolerance
@@ -167,7 +168,7 @@ def fastest_vibration(scene, work):
         if scene.bodies[body].free == 1.0:
             for axis in range(3):
                 mass = max(inertia(scene, body, axis), TINY)
-                stiffest = max(stiffest, work.jacobian[at.STIFFNESS, body, axis, axis] / mass)
+                stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
     return math.sqrt(stiffest)
 
 
@@ -182,9 +183,9 @@ def step_behind_touch(scene, work, clock):
     as that displaces bodies by the tolerance [s]."""
     pace, speed_of, later = 0.0, 0.0, 0.0
     for row in range(work.tally.candidates):
-        speed = -normal_rate(work, at.NOW, row)
-        if work.candidates[row].closed == at.TOUCHES and speed > 0.0:
-            view = contact_view(scene, work, at.NOW, row)
+        speed = -normal_rate(work, NOW, row)
+        if work.candidates[row].closed == TOUCHES and speed > 0.0:
+            view = contact_view(scene, work, NOW, row)
             stiffness = pressed_stiffness(scene, view, clock.tolerance)
             pace += stiffness / view.effective_mass
             speed_of = max(speed_of, speed)

@@ -25,13 +25,14 @@ a force that is wrong by several times itself where little presses, which decide
 opens. The stages show it: their overlaps lie on no line.
 """
 
-import flocsim.arrays as at
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, NODES, REAL, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.stated_error import bound_carried, unresolved
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.contacts import TOUCHES
+from flocsim.state.work import CARRIED, CHANGE, DEVIATION, FIRST_STAGE, FORCING, NOW, STIFFNESS
 
 
 def divide(scene, work, full, weight):
@@ -40,29 +41,27 @@ def divide(scene, work, full, weight):
     part = full / EIGENVALUES[REAL].real
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            load = inertia(scene, body, axis) / part * work.velocity[at.CHANGE, body, axis]
-            load += weight * work.velocity[at.FORCING, body, axis]
+            load = inertia(scene, body, axis) / part * work.velocity[CHANGE, body, axis]
+            load += weight * work.velocity[FORCING, body, axis]
             work.loads[REAL, 3 * body + axis] = load
-    subtract_product(work, at.STIFFNESS, 1.0)
+    subtract_product(work, STIFFNESS, 1.0)
     solve_for_free(scene, work)
     for body in range(work.place.shape[1]):
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            work.velocity[at.CHANGE, body, axis] = speed
-            work.place[at.CHANGE, body, axis] += part * speed
+            work.velocity[CHANGE, body, axis] = speed
+            work.place[CHANGE, body, axis] += part * speed
 
 
 def mix(work, of_change, of_carried):
     """Make CHANGE a sum of itself and what is carried."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            change = of_change * work.place[at.CHANGE, body, axis]
-            work.place[at.CHANGE, body, axis] = (
-                change + of_carried * work.place[at.CARRIED, body, axis]
-            )
-            change = of_change * work.velocity[at.CHANGE, body, axis]
-            work.velocity[at.CHANGE, body, axis] = (
-                change + of_carried * work.velocity[at.CARRIED, body, axis]
+            change = of_change * work.place[CHANGE, body, axis]
+            work.place[CHANGE, body, axis] = change + of_carried * work.place[CARRIED, body, axis]
+            change = of_change * work.velocity[CHANGE, body, axis]
+            work.velocity[CHANGE, body, axis] = (
+                change + of_carried * work.velocity[CARRIED, body, axis]
             )
 
 
@@ -70,10 +69,10 @@ def add_step(work):
     """Take what has been carried, and the error that the step itself is likely to have made."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            own = work.place[at.DEVIATION, body, axis]
-            work.place[at.CARRIED, body, axis] = work.place[at.CHANGE, body, axis] + own
-            own = work.velocity[at.DEVIATION, body, axis]
-            work.velocity[at.CARRIED, body, axis] = work.velocity[at.CHANGE, body, axis] + own
+            own = work.place[DEVIATION, body, axis]
+            work.place[CARRIED, body, axis] = work.place[CHANGE, body, axis] + own
+            own = work.velocity[DEVIATION, body, axis]
+            work.velocity[CARRIED, body, axis] = work.velocity[CHANGE, body, axis] + own
 
 
 def carry_error(scene, work, clock, step):
@@ -114,7 +113,7 @@ def scatter_of(scene, work, clock, step, row):
     if work.tally.series_terms > 0:
         return 0.0
     g, span = work.geometry, NODES[1] - NODES[0]
-    slope = (g[SECOND_STAGE, row].gap - g[at.FIRST_STAGE, row].gap) / span
+    slope = (g[SECOND_STAGE, row].gap - g[FIRST_STAGE, row].gap) / span
     scatter = g[THIRD_STAGE, row].gap - g[SECOND_STAGE, row].gap - slope * (1.0 - NODES[1])
     return abs(scatter) * unresolved(scene, work, clock, step, row)
 
@@ -128,10 +127,10 @@ def doubt_of_release(scene, work, clock, step):
     """By how much it is in doubt whether contacts that may be relieved in a step still press, over
     what is allowed; it goes with the square of the step."""
     largest, g = 0.0, work.geometry
-    least = ABOVE * above_rounding(work, at.NOW, 0.0)
+    least = ABOVE * above_rounding(work, NOW, 0.0)
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES:
-            before, after = -g[at.NOW, row].gap, -g[THIRD_STAGE, row].gap
+        if work.candidates[row].closed == TOUCHES:
+            before, after = -g[NOW, row].gap, -g[THIRD_STAGE, row].gap
             scatter = scatter_of(scene, work, clock, step, row)
             if after - SHARE_OF_SCATTER * scatter < before and before > 0.0:
                 largest = max(largest, scatter / (MOST_SCATTER * max(before, -after, least)))

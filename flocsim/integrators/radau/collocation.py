@@ -3,11 +3,11 @@ switches, the guess for the next."""
 
 import math
 
-import flocsim.arrays as at
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import keep_start
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import DAMPING, FIRST_STAGE, NEW, NOW, START, STIFFNESS, TRIAL
 
 GOOD_CUBIC = 0.1
 """A step whose error is at most this share of what is allowed may end anywhere on its cubic."""
@@ -53,7 +53,7 @@ def cubic(weights, start, one, two, three):
 def weighted(of, body, axis, weights):
     """The cubic through START and the stages, ``of`` places or velocities."""
     return cubic(
-        weights, of[at.START, body, axis], of[at.FIRST_STAGE, body, axis],
+        weights, of[START, body, axis], of[FIRST_STAGE, body, axis],
         of[SECOND_STAGE, body, axis], of[THIRD_STAGE, body, axis],
     )  # fmt: skip
 
@@ -67,7 +67,7 @@ def write_cubic(work, weights, state, body):
 
 def collocate(work, step, share, body):
     """Write a body's motion at a share of the step into TRIAL: the cubic through the stages."""
-    write_cubic(work, stage_weights(share), at.TRIAL, body)
+    write_cubic(work, stage_weights(share), TRIAL, body)
 
 
 def stiffness_of(scene, work, step):
@@ -77,8 +77,8 @@ def stiffness_of(scene, work, step):
         if scene.bodies[body].free == 1.0:
             for axis in range(3):
                 mass = inertia(scene, body, axis)
-                spring = abs(work.jacobian[at.STIFFNESS, body, axis, axis])
-                damping = abs(work.jacobian[at.DAMPING, body, axis, axis])
+                spring = abs(work.jacobian[STIFFNESS, body, axis, axis])
+                damping = abs(work.jacobian[DAMPING, body, axis, axis])
                 stiffest = max(stiffest, step * (step * spring + damping) / max(mass, TINY))
     return stiffest
 
@@ -95,7 +95,7 @@ def end_on_the_cubic(scene, work, step, ratio, share):
         return False
     weights = stage_weights(share)
     for body in range(work.place.shape[1]):
-        write_cubic(work, weights, at.NEW, body)
+        write_cubic(work, weights, NEW, body)
     return True
 
 
@@ -104,9 +104,7 @@ def keep_velocities(work):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             for stage in range(3):
-                work.velocity[at.FIRST_STAGE + stage, body, axis] = work.velocity[
-                    at.NOW, body, axis
-                ]
+                work.velocity[FIRST_STAGE + stage, body, axis] = work.velocity[NOW, body, axis]
 
 
 def keep_accelerations(scene, work, step):
@@ -114,22 +112,22 @@ def keep_accelerations(scene, work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            gain = scene.bodies[body].free * step * work.force[at.NOW, body, axis]
+            gain = scene.bodies[body].free * step * work.force[NOW, body, axis]
             for stage in range(3):
-                speed = work.velocity[at.NOW, body, axis]
+                speed = work.velocity[NOW, body, axis]
                 speed += NODES[stage] * gain / max(mass, TINY)
-                work.velocity[at.FIRST_STAGE + stage, body, axis] = speed
+                work.velocity[FIRST_STAGE + stage, body, axis] = speed
 
 
 def go_on_as_before(work, scale):
     """First guess: the accelerations of the last step, which was so much shorter, as a mean."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            speed = work.velocity[at.NOW, body, axis]
-            gain = scale * (speed - work.velocity[at.START, body, axis])
+            speed = work.velocity[NOW, body, axis]
+            gain = scale * (speed - work.velocity[START, body, axis])
             for stage in range(3):
                 guess = speed + NODES[stage] * gain
-                work.velocity[at.FIRST_STAGE + stage, body, axis] = guess
+                work.velocity[FIRST_STAGE + stage, body, axis] = guess
 
 
 def is_soft(work, step):
@@ -158,7 +156,7 @@ def carry_on(work, begin, scale):
                 weighted(work.velocity, body, axis, third),
             )
             for stage in range(3):
-                work.velocity[at.FIRST_STAGE + stage, body, axis] = guesses[stage]
+                work.velocity[FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
 def guess_stages(scene, work, clock, step):

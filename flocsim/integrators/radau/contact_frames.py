@@ -12,9 +12,11 @@ and the mean, weighted by the masses, are those of all bodies that act on one an
 Newton's method adds keeps their momentum however far it has come.
 """
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import length_of
 from flocsim.hooks import CENTRE_FORCE, has
+from flocsim.state.bodies import ANGLE, MOST_FRAMES, X, Y
+from flocsim.state.contacts import OPEN
+from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
 LEADING_SHARE = 0.2
 """Share of a surface force from which on a pair's normal counts among those that bodies follow,
@@ -33,8 +35,8 @@ def acts(work, row):
 def leads(scene, work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
     candidate = work.candidates[row]
-    geometry = work.geometry[at.NOW, row]
-    if candidate.closed != at.OPEN:
+    geometry = work.geometry[NOW, row]
+    if candidate.closed != OPEN:
         return True
     if candidate.near == 0 or geometry.share <= LEADING_SHARE:
         return False
@@ -85,20 +87,20 @@ def gather_clusters(scene, work):
 def add_frame(work, row, stage):
     """Add how a pair's normal has turned, and its contact point wandered, to both of its bodies."""
     candidate = work.candidates[row]
-    g, state = work.geometry, at.FIRST_STAGE + stage
+    g, state = work.geometry, FIRST_STAGE + stage
     a, b = candidate.vertex_body, candidate.edge_body
-    across = g[at.NOW, row].vertex_arm_n - g[state, row].vertex_arm_n
-    along = g[at.NOW, row].vertex_arm_t - g[state, row].vertex_arm_t
+    across = g[NOW, row].vertex_arm_n - g[state, row].vertex_arm_n
+    along = g[NOW, row].vertex_arm_t - g[state, row].vertex_arm_t
     add_to_body(work, row, stage, a, across, along)
-    across = g[at.NOW, row].edge_arm_n - g[state, row].edge_arm_n
-    along = g[at.NOW, row].edge_arm_t - g[state, row].edge_arm_t
+    across = g[NOW, row].edge_arm_n - g[state, row].edge_arm_n
+    along = g[NOW, row].edge_arm_t - g[state, row].edge_arm_t
     add_to_body(work, row, stage, b, across, along)
 
 
 def add_to_body(work, row, stage, body, across, along):
     """Add the turn of a pair's normal to a body's frame, and what its arms have changed by."""
-    g, state = work.geometry, at.FIRST_STAGE + stage
-    ox, oy = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    g, state = work.geometry, FIRST_STAGE + stage
+    ox, oy = g[NOW, row].normal_x, g[NOW, row].normal_y
     nx, ny = g[state, row].normal_x, g[state, row].normal_y
     frame = work.frames[body, stage]
     frame.turn_cosine += ox * nx + oy * ny
@@ -111,7 +113,7 @@ def average_shifts(work):
     """Make means of the sums of s, and add each body's turns to its cluster's."""
     for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        for stage in range(at.MOST_FRAMES):
+        for stage in range(MOST_FRAMES):
             frame = work.frames[body, stage]
             cosine, sine = frame.turn_cosine, frame.turn_sine
             size = length_of(cosine, sine)
@@ -127,7 +129,7 @@ def share_turns(work):
     """Give each body its cluster's turns; none where nothing touches."""
     for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        for stage in range(at.MOST_FRAMES):
+        for stage in range(MOST_FRAMES):
             frame = work.frames[body, stage]
             # Leaders come first, and have the cosine and sine of their sums by then.
             cosine = work.frames[leader, stage].turn_cosine
@@ -140,7 +142,7 @@ def share_turns(work):
 def follow_contacts(scene, work):
     """Frames of all bodies at the three stages: the means over their acting pairs."""
     for body in range(work.poses.shape[0]):
-        for stage in range(at.MOST_FRAMES):
+        for stage in range(MOST_FRAMES):
             frame = work.frames[body, stage]
             frame.turn_cosine = frame.turn_sine = frame.shift_x = frame.shift_y = 0.0
     for row in range(work.tally.candidates):
@@ -184,15 +186,15 @@ def add_shifts(scene, work, stage):
         cluster.mass = cluster.shift_x = cluster.shift_y = 0.0
     for body in range(work.poses.shape[0]):
         cluster, frame = work.clusters[work.cluster[body]], work.frames[body, stage]
-        mass, spin = scene.bodies[body].mass, work.velocity[at.CHANGE, body, at.ANGLE]
+        mass, spin = scene.bodies[body].mass, work.velocity[CHANGE, body, ANGLE]
         cluster.mass += mass
         shift_x, shift_y = spin * frame.shift_x, spin * frame.shift_y
         cluster.shift_x += mass * shift_x
         cluster.shift_y += mass * shift_y
-        work.velocity[at.CHANGE, body, at.X] += shift_x
-        work.velocity[at.CHANGE, body, at.Y] += shift_y
+        work.velocity[CHANGE, body, X] += shift_x
+        work.velocity[CHANGE, body, Y] += shift_y
     for body in range(work.poses.shape[0]):
         cluster = work.clusters[work.cluster[body]]
         if scene.bodies[body].free == 1.0:
-            work.velocity[at.CHANGE, body, at.X] -= cluster.shift_x / cluster.mass
-            work.velocity[at.CHANGE, body, at.Y] -= cluster.shift_y / cluster.mass
+            work.velocity[CHANGE, body, X] -= cluster.shift_x / cluster.mass
+            work.velocity[CHANGE, body, Y] -= cluster.shift_y / cluster.mass

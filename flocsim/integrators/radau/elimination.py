@@ -10,13 +10,13 @@ The rows of x and y of a cluster's first body are the sums of all its bodies'. W
 each other cancels in these, so that they are written without it, and momentum is exact.
 """
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import loops_apart
 from flocsim.hooks import hook
 from flocsim.integrators.radau.ordering import NONE, find_pattern, is_leader
 from flocsim.integrators.radau.tableau import EIGENVALUES, PAIR, REAL
 from flocsim.integrators.rhs.blocks import lower_block, own_block, upper_block
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import DAMPING, STIFFNESS
 
 REAL_PART, PAIR_RE, PAIR_IM = range(3)
 """Parts of ``blocks``: the real system, the complex one's real and imaginary parts. In each lie the
@@ -56,8 +56,8 @@ def write_into(work, to, block, first_row, last_row, weights, both):
     blocks, (of_real, re, im) = work.elimination.blocks, weights
     for i in range(first_row, last_row):
         for j in range(3):
-            damping = work.jacobian[at.DAMPING, block, i, j]
-            stiffness = work.jacobian[at.STIFFNESS, block, i, j]
+            damping = work.jacobian[DAMPING, block, i, j]
+            stiffness = work.jacobian[STIFFNESS, block, i, j]
             blocks[REAL_PART, to, i, j] = damping + of_real * stiffness
             if both:
                 blocks[PAIR_RE, to, i, j] = damping + re * stiffness

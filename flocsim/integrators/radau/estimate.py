@@ -5,20 +5,20 @@ IV.8.20): where a contact is pressed, the forces that it balances are so large t
 wrong by would else count as a velocity that lasts.
 """
 
-import flocsim.arrays as at
 from flocsim.integrators.radau.carried_error import divide
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.work import CHANGE, DEVIATION, FIRST_STAGE, NOW, STIFFNESS
 
 
 def estimated_rate(of, body, axis, step):
     """Weighted mean of the stages' increments over h, ``of`` places or velocities."""
-    now = of[at.NOW, body, axis]
+    now = of[NOW, body, axis]
     total = 0.0
     for stage in range(3):
-        total += ESTIMATE[stage] * (of[at.FIRST_STAGE + stage, body, axis] - now)
+        total += ESTIMATE[stage] * (of[FIRST_STAGE + stage, body, axis] - now)
     return total / step
 
 
@@ -27,12 +27,12 @@ def write_error_load(scene, work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             row = 3 * body + axis
-            load = work.force[at.NOW, body, axis]
+            load = work.force[NOW, body, axis]
             load += inertia(scene, body, axis) * estimated_rate(work.velocity, body, axis, step)
             work.loads[REAL, row] = load
-            drift = work.velocity[at.NOW, body, axis]
-            work.place[at.CHANGE, body, axis] = drift + estimated_rate(work.place, body, axis, step)
-    subtract_product(work, at.STIFFNESS, step / EIGENVALUES[REAL].real)
+            drift = work.velocity[NOW, body, axis]
+            work.place[CHANGE, body, axis] = drift + estimated_rate(work.place, body, axis, step)
+    subtract_product(work, STIFFNESS, step / EIGENVALUES[REAL].real)
 
 
 def estimate_error(scene, work, step):
@@ -45,11 +45,11 @@ def estimate_error(scene, work, step):
         free = scene.bodies[body].free
         for axis in range(3):
             speed = work.loads[REAL, 3 * body + axis].real
-            drift = work.place[at.CHANGE, body, axis]
-            work.place[at.CHANGE, body, axis] = free * damped * (speed + drift)
-            work.velocity[at.CHANGE, body, axis] = free * speed
+            drift = work.place[CHANGE, body, axis]
+            work.place[CHANGE, body, axis] = free * damped * (speed + drift)
+            work.velocity[CHANGE, body, axis] = free * speed
     divide(scene, work, step, 0.0)
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.DEVIATION, body, axis] = work.place[at.CHANGE, body, axis]
-            work.velocity[at.DEVIATION, body, axis] = work.velocity[at.CHANGE, body, axis]
+            work.place[DEVIATION, body, axis] = work.place[CHANGE, body, axis]
+            work.velocity[DEVIATION, body, axis] = work.velocity[CHANGE, body, axis]

@@ -7,7 +7,7 @@ of it, because its row holds the momentum of all (systems.py) and would otherwis
 The order and the pattern are kept until other pairs act, or clusters are others.
 """
 
-import flocsim.arrays as at
+from flocsim.state.clock import BLOCKS_FULL
 
 (
     HEAD, NEXT, PREVIOUS, DEGREE, BEGIN, ROOM, MARK, CLUSTER, NODE_ROWS,
@@ -290,5 +290,5 @@ def find_pattern(scene, work):
         if end != NONE and lay_out(work, end):
             return True
     work.elimination.found[PATTERN] = 0
-    work.tally.full = at.BLOCKS_FULL
+    work.tally.full = BLOCKS_FULL
     return False

@@ -7,7 +7,6 @@ real and one complex system of 3n equations.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.integrators.events.resolution import above_rounding
 from flocsim.integrators.radau.collocation import guess_stages
@@ -19,6 +18,8 @@ from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_sta
 from flocsim.integrators.rhs.friction import STIFFER, grazing_force, rolled, rolled_besides, slip_in
 from flocsim.integrators.rhs.surface_gap import length_at, locate_sharing
 from flocsim.integrators.rhs.views import along_normal, lever, memory_of
+from flocsim.state.contacts import GRAZES, TOUCHES
+from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
 MOST_ITERATIONS = 10
 """Newton steps before a step is given up and made smaller."""
@@ -60,11 +61,11 @@ def place_stages(work, step):
         for axis in range(3):
             for stage in range(3):
                 first, second, third = MATRIX[stage]
-                mean = first * work.velocity[at.FIRST_STAGE, body, axis]
+                mean = first * work.velocity[FIRST_STAGE, body, axis]
                 mean += second * work.velocity[SECOND_STAGE, body, axis]
                 mean += third * work.velocity[THIRD_STAGE, body, axis]
-                work.place[at.FIRST_STAGE + stage, body, axis] = (
-                    work.place[at.NOW, body, axis] + step * mean
+                work.place[FIRST_STAGE + stage, body, axis] = (
+                    work.place[NOW, body, axis] + step * mean
                 )
 
 
@@ -73,23 +74,23 @@ def slip_stages(scene, work, step, first, matrix):
     located."""
     slip = work.slip
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES:
+        if work.candidates[row].closed == TOUCHES:
             for stage in range(first, 3):
-                besides = rolled_besides(scene, work, at.FIRST_STAGE + stage, row)
-                work.slip_rate[at.FIRST_STAGE + stage, row] = besides
+                besides = rolled_besides(scene, work, FIRST_STAGE + stage, row)
+                work.slip_rate[FIRST_STAGE + stage, row] = besides
             for stage in range(first, 3):
                 one, two, three = matrix[stage]
-                mean = one * work.slip_rate[at.FIRST_STAGE, row]
+                mean = one * work.slip_rate[FIRST_STAGE, row]
                 mean += two * work.slip_rate[SECOND_STAGE, row]
                 mean += three * work.slip_rate[THIRD_STAGE, row]
-                state = at.FIRST_STAGE + stage
-                stuck = slip[at.NOW, row] + rolled(scene, work, state, row) + step * mean
+                state = FIRST_STAGE + stage
+                stuck = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
                 slip[state, row] = slip_in(scene, work, state, row, stuck)
 
 
 def locate_state(scene, work, state):
     """Geometry of NOW, or of a stage, of the pairs through which forces act there."""
-    if state == at.NOW or scene.listed_reach <= 0.0:
+    if state == NOW or scene.listed_reach <= 0.0:
         locate_touching(scene, work, state)
     else:
         locate_sharing(scene, work, state)
@@ -100,10 +101,10 @@ def evaluate_states(scene, work, time, step, first, last):
     """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
     for state in range(first, last):
         locate_state(scene, work, state)
-    if first == at.FIRST_STAGE:
+    if first == FIRST_STAGE:
         slip_stages(scene, work, step, 0, MATRIX)
     for state in range(first, last):
-        node = 0.0 if state == at.NOW else NODES[state - at.FIRST_STAGE]
+        node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
 
 
@@ -111,25 +112,25 @@ def change_of_forces(scene, work, step, stage, goal):
     """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
-    largest, least, state = 0.0, above_rounding(work, at.NOW, 0.0), at.FIRST_STAGE + stage
+    largest, least, state = 0.0, above_rounding(work, NOW, 0.0), FIRST_STAGE + stage
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         geometry = work.geometry[state, row]
-        if candidate.closed == at.TOUCHES:
-            change = step * abs(along_normal(work, row, work.velocity, at.CHANGE))
+        if candidate.closed == TOUCHES:
+            change = step * abs(along_normal(work, row, work.velocity, CHANGE))
             overlap = abs(geometry.gap)
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
-        elif candidate.closed == at.GRAZES:
+        elif candidate.closed == GRAZES:
             resistance, memory = work.contacts[row].grazing_resistance, memory_of(work, row)
-            change = abs(resistance * along_normal(work, row, work.velocity, at.CHANGE))
+            change = abs(resistance * along_normal(work, row, work.velocity, CHANGE))
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
         elif candidate.near == 1 and geometry.share > 0.0:
-            change = step * abs(along_normal(work, row, work.velocity, at.CHANGE))
+            change = step * abs(along_normal(work, row, work.velocity, CHANGE))
             length = length_at(scene, geometry.gap)
             allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
@@ -144,10 +145,10 @@ def correct_stages(scene, work, step, goal):
         for body in range(work.place.shape[1]):
             memory = step + work.errors[body].memory
             for axis in range(3):
-                change = work.velocity[at.CHANGE, body, axis]
+                change = work.velocity[CHANGE, body, axis]
                 if not abs(change) < math.inf:
                     return math.inf
-                work.velocity[at.FIRST_STAGE + stage, body, axis] += change
+                work.velocity[FIRST_STAGE + stage, body, axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
         largest = max(largest, change_of_forces(scene, work, step, stage, goal))
     return largest
@@ -156,7 +157,7 @@ def correct_stages(scene, work, step, goal):
 def newton_step(scene, work, time, step, goal):
     """One iteration; the largest change it makes in place [m]."""
     place_stages(work, step)
-    evaluate_states(scene, work, time, step, at.FIRST_STAGE, at.FIRST_STAGE + 3)
+    evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
     follow_contacts(scene, work)
     write_loads(scene, work, step)
     solve_both(work)

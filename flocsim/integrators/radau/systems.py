@@ -5,7 +5,6 @@ contacts (contact_frames.py). The systems of few bodies are factorised as they s
 those of many in an order in which little fills in (elimination.py).
 """
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.integrators.radau.contact_frames import add_shifts, force_back, velocity_on
 from flocsim.integrators.radau.dense import factorise, solve_dense
@@ -22,11 +21,13 @@ from flocsim.integrators.radau.tableau import (
 )
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import CHANGE, DAMPING, DENSE, FIRST_STAGE, NOW, STIFFNESS
 
 
 def is_dense(work):
     """Whether the systems are small."""
-    return work.poses.shape[0] <= at.DENSE
+    return work.poses.shape[0] <= DENSE
 
 
 def write_block(scene, work, which, step, block, body, other):
@@ -34,8 +35,8 @@ def write_block(scene, work, which, step, block, body, other):
     value, moves = EIGENVALUES[which], scene.bodies[body].free
     for i in range(3):
         for j in range(3):
-            entry = work.jacobian[at.DAMPING, block, i, j]
-            entry = entry + step / value * work.jacobian[at.STIFFNESS, block, i, j]
+            entry = work.jacobian[DAMPING, block, i, j]
+            entry = entry + step / value * work.jacobian[STIFFNESS, block, i, j]
             work.system[which, 3 * body + i, 3 * other + j] = moves * entry
 
 
@@ -137,8 +138,8 @@ def solve_both(work):
 def momentum_rate(scene, work, body, axis, stage, step):
     """Mass times acceleration at a stage, from the stages' velocities."""
     first, second, third = INVERSE[stage]
-    now = work.velocity[at.NOW, body, axis]
-    change = first * (work.velocity[at.FIRST_STAGE, body, axis] - now)
+    now = work.velocity[NOW, body, axis]
+    change = first * (work.velocity[FIRST_STAGE, body, axis] - now)
     change += second * (work.velocity[SECOND_STAGE, body, axis] - now)
     change += third * (work.velocity[THIRD_STAGE, body, axis] - now)
     return inertia(scene, body, axis) * change / step
@@ -147,7 +148,7 @@ def momentum_rate(scene, work, body, axis, stage, step):
 def imbalance(scene, work, body, axis, stage, step):
     """Force less mass times acceleration at a stage."""
     rate = momentum_rate(scene, work, body, axis, stage, step)
-    return work.force[at.FIRST_STAGE + stage, body, axis] - rate
+    return work.force[FIRST_STAGE + stage, body, axis] - rate
 
 
 def sum_balances(scene, work, stage, step):
@@ -157,9 +158,9 @@ def sum_balances(scene, work, stage, step):
         cluster = work.clusters[body]
         cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     for body in range(work.poses.shape[0]):
-        cluster, state = work.clusters[work.cluster[body]], at.FIRST_STAGE + stage
-        cluster.force_x += work.force[state, body, at.X]
-        cluster.force_y += work.force[state, body, at.Y]
+        cluster, state = work.clusters[work.cluster[body]], FIRST_STAGE + stage
+        cluster.force_x += work.force[state, body, X]
+        cluster.force_y += work.force[state, body, Y]
         cluster.rate_x += momentum_rate(scene, work, body, 0, stage, step)
         cluster.rate_y += momentum_rate(scene, work, body, 1, stage, step)
 
@@ -205,7 +206,7 @@ def write_changes(scene, work, stage):
     for body in range(work.place.shape[1]):
         x, y = stage_change(work, 3 * body, stage), stage_change(work, 3 * body + 1, stage)
         x, y = velocity_on(work, body, stage, x, y)
-        work.velocity[at.CHANGE, body, at.X] = x
-        work.velocity[at.CHANGE, body, at.Y] = y
-        work.velocity[at.CHANGE, body, at.ANGLE] = stage_change(work, 3 * body + 2, stage)
+        work.velocity[CHANGE, body, X] = x
+        work.velocity[CHANGE, body, Y] = y
+        work.velocity[CHANGE, body, ANGLE] = stage_change(work, 3 * body + 2, stage)
     add_shifts(scene, work, stage)

@@ -5,9 +5,9 @@ along their vectors, as in RADAU5 (Hairer & Wanner, Solving Ordinary Differentia
 1996, section IV.8).
 """
 
-import flocsim.arrays as at
+from flocsim.state.work import FIRST_STAGE
 
-SECOND_STAGE, THIRD_STAGE = at.FIRST_STAGE + 1, at.FIRST_STAGE + 2
+SECOND_STAGE, THIRD_STAGE = FIRST_STAGE + 1, FIRST_STAGE + 2
 """States of the later stages; the third one is the end of the step."""
 
 ROOT = 6.0**0.5

@@ -5,7 +5,7 @@ other free body has a share in (forces of the fluid, of walls), the only ones th
 momentum of bodies that act on each other; then two for each row of ``Work.pairs``.
 """
 
-import flocsim.arrays as at
+from flocsim.state.work import CHANGE
 
 
 def block_count(work):
@@ -34,7 +34,7 @@ def subtract(work, which, weight, block, body, other):
     for i in range(3):
         load = work.loads[0, 3 * body + i]
         for j in range(3):
-            load -= weight * jacobian[which, block, i, j] * work.place[at.CHANGE, other, j]
+            load -= weight * jacobian[which, block, i, j] * work.place[CHANGE, other, j]
         work.loads[0, 3 * body + i] = load
 
 

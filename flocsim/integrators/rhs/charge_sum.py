@@ -7,9 +7,35 @@ flocsim.geometry.contact.charges. The two sums of forces between outlines share 
 
 from typing import NamedTuple
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart, loops_apart
 from flocsim.hooks import hook
+from flocsim.state.outlines import (
+    BY_Y,
+    CELL_X,
+    CELL_Y,
+    FIELD_COLUMNS,
+    FIRST_CHARGE,
+    FIRST_CORNER,
+    GRID_ACROSS,
+    GRID_FINENESS,
+    GRID_TILE,
+    GRID_UP,
+    GRID_X,
+    GRID_Y,
+    GROUP,
+    GROUP_COUNT,
+    GROUP_EXTENT,
+    GROUP_X,
+    GROUP_Y,
+    MOST_NODES,
+    NODE_NORMAL_X,
+    NODE_NORMAL_Y,
+    NODE_WEIGHT,
+    NODE_X,
+    NODE_Y,
+    TILE,
+    TILE_BITS,
+)
 
 
 def cubics(t):
@@ -39,10 +65,10 @@ class Grid(NamedTuple):
 def grid_of(scene, body):
     """The Grid of a body's field."""
     grid = scene.grids
-    across, up = grid[body, at.GRID_ACROSS], grid[body, at.GRID_UP]
+    across, up = grid[body, GRID_ACROSS], grid[body, GRID_UP]
     return Grid(
-        grid[body, at.GRID_X], grid[body, at.GRID_Y], grid[body, at.GRID_FINENESS], int(across),
-        at.TILE * across, at.TILE * up, int(grid[body, at.GRID_TILE]),
+        grid[body, GRID_X], grid[body, GRID_Y], grid[body, GRID_FINENESS], int(across),
+        TILE * across, TILE * up, int(grid[body, GRID_TILE]),
     )  # fmt: skip
 
 
@@ -54,11 +80,11 @@ def cell_of(tiles, grid, x, y):
         return -1, 0.0, 0.0
     # Tiles and steps are counted from the corner, by whole numbers that are not below 0.
     i, j = int(across), int(up)
-    first = tiles[grid.tile + (j >> at.TILE_BITS) * grid.across + (i >> at.TILE_BITS)]
+    first = tiles[grid.tile + (j >> TILE_BITS) * grid.across + (i >> TILE_BITS)]
     if first < 0:
         return -1, 0.0, 0.0
-    within = at.TILE - 1
-    return first + (j & within) * (at.TILE + 1) + (i & within), across - i, up - j
+    within = TILE - 1
+    return first + (j & within) * (TILE + 1) + (i & within), across - i, up - j
 
 
 def put_charge(scene, nodes, count, grid, x, y, charge):
@@ -67,14 +93,14 @@ def put_charge(scene, nodes, count, grid, x, y, charge):
     node, across, up = cell_of(scene.tiles, grid, x, y)
     if node < 0:
         return count
-    nodes[at.NODE_X, count], nodes[at.NODE_Y, count] = x, y
-    nodes[at.NODE_WEIGHT, count] = charge
-    nodes[at.CELL_X, count], nodes[at.CELL_Y, count] = across, up
+    nodes[NODE_X, count], nodes[NODE_Y, count] = x, y
+    nodes[NODE_WEIGHT, count] = charge
+    nodes[CELL_X, count], nodes[CELL_Y, count] = across, up
     for corner in range(4):
         # Two beside each other, and the two above them.
-        place = node + (corner >> 1) * (at.TILE + 1) + (corner & 1)
-        row = at.FIRST_CORNER + corner * at.FIELD_COLUMNS
-        for column in range(at.FIELD_COLUMNS):
+        place = node + (corner >> 1) * (TILE + 1) + (corner & 1)
+        row = FIRST_CORNER + corner * FIELD_COLUMNS
+        for column in range(FIELD_COLUMNS):
             nodes[row + column, count] = scene.field[place, column]
     return count + 1
 
@@ -82,18 +108,18 @@ def put_charge(scene, nodes, count, grid, x, y, charge):
 def along_side(nodes, k, row, x):
     """What is known at two corners of a cell, ``row`` being the first one's, blended along x: φ
     from its rows, its derivative by y from those that follow."""
-    first, second = nodes[row, k], nodes[row + at.FIELD_COLUMNS, k]
-    slope, slope_2 = nodes[row + 1, k], nodes[row + at.FIELD_COLUMNS + 1, k]
+    first, second = nodes[row, k], nodes[row + FIELD_COLUMNS, k]
+    slope, slope_2 = nodes[row + 1, k], nodes[row + FIELD_COLUMNS + 1, k]
     return x[0] * first + x[1] * second + x[2] * slope + x[3] * slope_2
 
 
 def between_corners(nodes, k, x, y):
     """φ in a cell, or its derivative by x or y, of a step, ``x`` and ``y`` being the cubics or
     their slopes."""
-    low, high = at.FIRST_CORNER, at.FIRST_CORNER + 2 * at.FIELD_COLUMNS
+    low, high = FIRST_CORNER, FIRST_CORNER + 2 * FIELD_COLUMNS
     value, value_2 = along_side(nodes, k, low, x), along_side(nodes, k, high, x)
-    rise = along_side(nodes, k, low + at.BY_Y, x)
-    rise_2 = along_side(nodes, k, high + at.BY_Y, x)
+    rise = along_side(nodes, k, low + BY_Y, x)
+    rise_2 = along_side(nodes, k, high + BY_Y, x)
     return y[0] * value + y[1] * value_2 + y[2] * rise + y[3] * rise_2
 
 
@@ -101,11 +127,11 @@ def between_corners(nodes, k, x, y):
 def write_forces(nodes, count):
     """Write the forces on so many charges, times a step, to where nodes have their normals."""
     for k in range(count):
-        tx, ty = nodes[at.CELL_X, k], nodes[at.CELL_Y, k]
+        tx, ty = nodes[CELL_X, k], nodes[CELL_Y, k]
         across = between_corners(nodes, k, slopes_of_cubics(tx), cubics(ty))
         up = between_corners(nodes, k, cubics(tx), slopes_of_cubics(ty))
-        nodes[at.NODE_NORMAL_X, k] = -nodes[at.NODE_WEIGHT, k] * across
-        nodes[at.NODE_NORMAL_Y, k] = -nodes[at.NODE_WEIGHT, k] * up
+        nodes[NODE_NORMAL_X, k] = -nodes[NODE_WEIGHT, k] * across
+        nodes[NODE_NORMAL_Y, k] = -nodes[NODE_WEIGHT, k] * up
 
 
 def add_forces(nodes, total, count):
@@ -113,9 +139,9 @@ def add_forces(nodes, total, count):
     fx, fy, torque = total
     write_forces(nodes, count)
     for k in range(count):
-        across, up = nodes[at.NODE_NORMAL_X, k], nodes[at.NODE_NORMAL_Y, k]
+        across, up = nodes[NODE_NORMAL_X, k], nodes[NODE_NORMAL_Y, k]
         fx, fy = fx + across, fy + up
-        torque += nodes[at.NODE_X, k] * up - nodes[at.NODE_Y, k] * across
+        torque += nodes[NODE_X, k] * up - nodes[NODE_Y, k] * across
     return fx, fy, torque
 
 
@@ -128,17 +154,17 @@ def sum_charges(scene, work, a, b, x, y, cosine, sine):
     bound, charges = scene.bodies[b].bounding_radius + reach, scene.charges
     total, count, grid = (0.0, 0.0, 0.0), 0, grid_of(scene, b)
     for row in range(scene.first_charge[a], scene.first_charge[a + 1]):
-        px, py = charges[row, at.GROUP_X], charges[row, at.GROUP_Y]
-        most = bound + charges[row, at.GROUP_EXTENT]
+        px, py = charges[row, GROUP_X], charges[row, GROUP_Y]
+        most = bound + charges[row, GROUP_EXTENT]
         mx, my = x + cosine * px - sine * py, y + sine * px + cosine * py
         if mx * mx + my * my > most * most:
             continue
-        for k in range(int(charges[row, at.GROUP_COUNT])):
-            place = at.FIRST_CHARGE + 3 * k
+        for k in range(int(charges[row, GROUP_COUNT])):
+            place = FIRST_CHARGE + 3 * k
             px, py = charges[row, place], charges[row, place + 1]
             ax, ay = x + cosine * px - sine * py, y + sine * px + cosine * py
             count = put_charge(scene, work.nodes, count, grid, ax, ay, charges[row, place + 2])
-        if count > at.MOST_NODES - at.GROUP:
+        if count > MOST_NODES - GROUP:
             total = add_forces(work.nodes, total, count)
             count = 0
     fx, fy, torque = add_forces(work.nodes, total, count)

@@ -6,9 +6,10 @@ A velocity error e displaces a body by e·T until drag, or the next encounter, h
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import least_listed_gap, length_of
 from flocsim.integrators.rhs.views import inertia, lever
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import DAMPING, DEVIATION, NEW, NOW
 
 ROUNDING = 1e-15
 """A few units in the last place of a number."""
@@ -25,29 +26,29 @@ def mean_velocity(work, axis):
     """Mean of one component over all bodies [m/s]."""
     total = 0.0
     for body in range(work.place.shape[1]):
-        total += work.velocity[at.NOW, body, axis]
+        total += work.velocity[NOW, body, axis]
     return total / work.place.shape[1]
 
 
 def turnover_rate(scene, work, body, mean_x, mean_y):
     """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
-    vx = work.velocity[at.NOW, body, at.X] - mean_x
-    vy = work.velocity[at.NOW, body, at.Y] - mean_y
+    vx = work.velocity[NOW, body, X] - mean_x
+    vy = work.velocity[NOW, body, Y] - mean_y
     return length_of(vx, vy) / scene.bodies[body].bounding_radius + abs(
-        work.velocity[at.NOW, body, at.ANGLE]
+        work.velocity[NOW, body, ANGLE]
     )
 
 
 def remember_velocities(scene, work, remaining):
     """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
-    mean_x, mean_y = mean_velocity(work, at.X), mean_velocity(work, at.Y)
+    mean_x, mean_y = mean_velocity(work, X), mean_velocity(work, Y)
     for body in range(scene.bodies.shape[0]):
         errors = work.errors[body]
         slowest, relaxation = math.inf, 0.0
         turnover = turnover_rate(scene, work, body, mean_x, mean_y)
         for axis in range(3):
             mass = inertia(scene, body, axis)
-            damping = max(work.jacobian[at.DAMPING, body, axis, axis], 0.0)
+            damping = max(work.jacobian[DAMPING, body, axis, axis], 0.0)
             relaxation = max(relaxation, mass / max(damping, TINY))
             rate = mass * (turnover + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
@@ -73,7 +74,7 @@ def error_ratio(scene, work, clock, step):
     clock.step_error = error
     if not error < math.inf:
         return -1.0
-    return error / max(step_tolerance(work, clock), rounding_size(scene, work, at.NEW, step))
+    return error / max(step_tolerance(work, clock), rounding_size(scene, work, NEW, step))
 
 
 def body_error(scene, work, body):
@@ -81,12 +82,12 @@ def body_error(scene, work, body):
     parts of it are written down."""
     errors = work.errors[body]
     size = scene.bodies[body].bounding_radius
-    place = length_of(
-        work.place[at.DEVIATION, body, at.X], work.place[at.DEVIATION, body, at.Y]
-    ) + size * abs(work.place[at.DEVIATION, body, at.ANGLE])
+    place = length_of(work.place[DEVIATION, body, X], work.place[DEVIATION, body, Y]) + size * abs(
+        work.place[DEVIATION, body, ANGLE]
+    )
     speed = length_of(
-        work.velocity[at.DEVIATION, body, at.X], work.velocity[at.DEVIATION, body, at.Y]
-    ) + size * abs(work.velocity[at.DEVIATION, body, at.ANGLE])
+        work.velocity[DEVIATION, body, X], work.velocity[DEVIATION, body, Y]
+    ) + size * abs(work.velocity[DEVIATION, body, ANGLE])
     errors.step_place, errors.step_speed = place, speed
     return place + speed * errors.memory
 

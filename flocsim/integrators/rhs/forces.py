@@ -4,7 +4,6 @@ Forces act through the listed pairs that are flagged as closed, or as near (surf
 An integrator that freezes these flags for a step has a smooth right-hand side in it.
 """
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import locate_acting
 from flocsim.hooks import (
     BODY_FORCE,
@@ -30,28 +29,30 @@ from flocsim.integrators.rhs.views import (
     soft_centre_line,
     tangential_rate,
 )
+from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.work import NEW, NOW, START
 
 
 def keep_start(work):
     """Keep the motion at the start of the step, in START."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.START, body, axis] = work.place[at.NOW, body, axis]
-            work.velocity[at.START, body, axis] = work.velocity[at.NOW, body, axis]
+            work.place[START, body, axis] = work.place[NOW, body, axis]
+            work.velocity[START, body, axis] = work.velocity[NOW, body, axis]
 
 
 def take_stage(work, stage):
     """Make a stage the new state: its motion, and what closed pairs need."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[at.NEW, body, axis] = work.place[stage, body, axis]
-            work.velocity[at.NEW, body, axis] = work.velocity[stage, body, axis]
+            work.place[NEW, body, axis] = work.place[stage, body, axis]
+            work.velocity[NEW, body, axis] = work.velocity[stage, body, axis]
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == at.TOUCHES:
-            work.slip[at.NEW, row] = work.slip[stage, row]
-        if candidate.closed != at.OPEN:
-            work.geometry[at.NEW, row] = work.geometry[stage, row]
+        if candidate.closed == TOUCHES:
+            work.slip[NEW, row] = work.slip[stage, row]
+        if candidate.closed != OPEN:
+            work.geometry[NEW, row] = work.geometry[stage, row]
 
 
 def add_body_forces(scene, work, time, state):
@@ -88,7 +89,7 @@ def add_outline_forces(scene, work, time, state):
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
         fx, fy, torque_a, torque_b = outlines_in(scene, work, time, state, a, b)
-        if state == at.NOW:
+        if state == NOW:
             # Derivatives, which are taken next, begin from it.
             work.along[pair, 0], work.along[pair, 1] = fx, fy
             work.along[pair, 2], work.along[pair, 3] = torque_a, torque_b
@@ -99,17 +100,17 @@ def add_outline_forces(scene, work, time, state):
 def add_contact_forces(scene, work, state):
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == at.TOUCHES:
+        if candidate.closed == TOUCHES:
             view = contact_view(scene, work, state, row)
             normal, tangential = contact_force(scene, view)
             push_pair(work, state, row, normal, tangential)
-        elif candidate.closed == at.GRAZES:
+        elif candidate.closed == GRAZES:
             push_pair(work, state, row, 0.0, grazing_force(work, state, row))
 
 
 def rate_slips(work, state):
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == at.TOUCHES:
+        if work.candidates[row].closed == TOUCHES:
             work.slip_rate[state, row] = tangential_rate(work, state, row)
 
 

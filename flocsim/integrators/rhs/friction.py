@@ -39,10 +39,11 @@ where it ceases to slide it sticks again, T being taken over by its spring.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import row_radii
 from flocsim.hooks import SLIP_LIMIT, has, slip_limit
 from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.state.bodies import ANGLE
+from flocsim.state.work import NEW, NOW
 
 FULL = 1.0 - 1e-9
 """A displacement is at its limit from this share of it on."""
@@ -51,7 +52,7 @@ FULL = 1.0 - 1e-9
 def turn_of_normal(work, state, row):
     """The angle by which the normal of a pair has turned since now, within half a turn [rad]."""
     g = work.geometry
-    ox, oy = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    ox, oy = g[NOW, row].normal_x, g[NOW, row].normal_y
     nx, ny = g[state, row].normal_x, g[state, row].normal_y
     return math.atan2(ox * ny - oy * nx, ox * nx + oy * ny)
 
@@ -63,11 +64,11 @@ def rolled(scene, work, state, row):
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
     radius_a, radius_b = row_radii(scene, work, row)
-    gap = g[at.NOW, row].gap
-    turn_a = work.place[state, a, at.ANGLE] - work.place[at.NOW, a, at.ANGLE]
-    turn_b = work.place[state, b, at.ANGLE] - work.place[at.NOW, b, at.ANGLE]
-    inside = at.NOW if g[at.NOW, row].turning == 0.0 else state
-    along = g[inside, row].side * (g[state, row].foot - g[at.NOW, row].foot)
+    gap = g[NOW, row].gap
+    turn_a = work.place[state, a, ANGLE] - work.place[NOW, a, ANGLE]
+    turn_b = work.place[state, b, ANGLE] - work.place[NOW, b, ANGLE]
+    inside = NOW if g[NOW, row].turning == 0.0 else state
+    along = g[inside, row].side * (g[state, row].foot - g[NOW, row].foot)
     about = turn_of_normal(work, state, row) - turn_b
     rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
     return along + (radius_a + radius_b + gap) * about + rolling
@@ -77,10 +78,10 @@ def rolled_besides(scene, work, state, row):
     """How fast it grows besides, in a state, as the gap is another one than now [m/s]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    g, spin_b = work.geometry, work.velocity[state, b, at.ANGLE]
+    g, spin_b = work.geometry, work.velocity[state, b, ANGLE]
     radius_a, radius_b = row_radii(scene, work, row)
-    gap, apart = g[state, row].gap, g[state, row].gap - g[at.NOW, row].gap
-    relative = spin_b - work.velocity[state, a, at.ANGLE]
+    gap, apart = g[state, row].gap, g[state, row].gap - g[NOW, row].gap
+    relative = spin_b - work.velocity[state, a, ANGLE]
     about = 0.0
     if g[state, row].turning != 0.0:
         rolling = (radius_a + 0.5 * gap) * relative
@@ -119,15 +120,15 @@ def slip_in(scene, work, state, row, stuck):
 def side_of(scene, work, row):
     """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
     brought to its limit."""
-    limit, side = limit_in(scene, work, at.NOW, row), work.candidates[row].sliding
+    limit, side = limit_in(scene, work, NOW, row), work.candidates[row].sliding
     if side == 0:
-        slip = work.slip[at.NOW, row]
+        slip = work.slip[NOW, row]
         if abs(slip) < FULL * limit:
             return 0
-        rate = tangential_rate(work, at.NOW, row)
+        rate = tangential_rate(work, NOW, row)
         side = 1 if slip > 0.0 or (slip == 0.0 and rate > 0.0) else -1
-    work.slip[at.NOW, row] = side * limit
-    return side if outgrowth(scene, work, at.NOW, row, side) > 0.0 else 0
+    work.slip[NOW, row] = side * limit
+    return side if outgrowth(scene, work, NOW, row, side) > 0.0 else 0
 
 
 def set_sliding(scene, work):
@@ -149,8 +150,8 @@ def limit_slips(scene, work):
         return
     for row in range(work.tally.candidates):
         if work.candidates[row].closed == 1:
-            limit = limit_in(scene, work, at.NEW, row)
-            work.slip[at.NEW, row] = min(max(work.slip[at.NEW, row], -limit), limit)
+            limit = limit_in(scene, work, NEW, row)
+            work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
 
 
 def beyond(scene, work, row, step):
@@ -158,13 +159,13 @@ def beyond(scene, work, row, step):
     the step at which it should have); 0 at the first place where nothing is wrong."""
     side = work.candidates[row].sliding
     if side == 0:
-        before = limit_in(scene, work, at.NOW, row) - abs(work.slip[at.NOW, row])
-        after = limit_in(scene, work, at.NEW, row) - abs(work.slip[at.NEW, row])
+        before = limit_in(scene, work, NOW, row) - abs(work.slip[NOW, row])
+        after = limit_in(scene, work, NEW, row) - abs(work.slip[NEW, row])
         if after >= 0.0:
             return 0.0, 1.0
         return -after, root(scene, work, row, step, before, after)
-    before = outgrowth(scene, work, at.NOW, row, side)
-    after = outgrowth(scene, work, at.NEW, row, side)
+    before = outgrowth(scene, work, NOW, row, side)
+    after = outgrowth(scene, work, NEW, row, side)
     if after >= 0.0:
         return 0.0, 1.0
     share = max(before, 0.0) / (max(before, 0.0) - after)
@@ -174,9 +175,9 @@ def beyond(scene, work, row, step):
 def root(scene, work, row, step, before, after):
     """Where in the step the room that a sticking pair has left, ``before`` and ``after``, is used
     up, by the cubic through its values and rates at both ends."""
-    side = 1.0 if work.slip[at.NEW, row] > 0.0 else -1.0
-    fall = step * outgrowth(scene, work, at.NOW, row, side)
-    end = step * outgrowth(scene, work, at.NEW, row, side)
+    side = 1.0 if work.slip[NEW, row] > 0.0 else -1.0
+    fall = step * outgrowth(scene, work, NOW, row, side)
+    end = step * outgrowth(scene, work, NEW, row, side)
     before = max(before, 0.0)
     low, high = 0.0, 1.0
     for _ in range(40):
@@ -203,7 +204,7 @@ def grazing_force(work, state, row):
     """T of a pair that grazes, in a state [N]."""
     contact = work.contacts[row]
     force = contact.grazing_force
-    if state == at.NOW:
+    if state == NOW:
         return force
     return force - contact.grazing_resistance * normal_rate(work, state, row)
 
@@ -214,10 +215,10 @@ def normal_mobility(scene, work, row):
     total, g = 0.0, work.geometry
     a, b = candidate.vertex_body, candidate.edge_body
     if scene.bodies[a].free == 1.0:
-        arm = g[at.NOW, row].vertex_arm_n
+        arm = g[NOW, row].vertex_arm_n
         total += 1.0 / scene.bodies[a].mass + arm * arm / scene.bodies[a].inertia
     if scene.bodies[b].free == 1.0:
-        arm = g[at.NOW, row].edge_arm_n
+        arm = g[NOW, row].edge_arm_n
         total += 1.0 / scene.bodies[b].mass + arm * arm / scene.bodies[b].inertia
     return total
 
@@ -228,9 +229,9 @@ def coupling(scene, work, row):
     total, g = 0.0, work.geometry
     a, b = candidate.vertex_body, candidate.edge_body
     if scene.bodies[a].free == 1.0:
-        arms = g[at.NOW, row].vertex_arm_n * g[at.NOW, row].vertex_arm_t
+        arms = g[NOW, row].vertex_arm_n * g[NOW, row].vertex_arm_t
         total += arms / scene.bodies[a].inertia
     if scene.bodies[b].free == 1.0:
-        arms = g[at.NOW, row].edge_arm_n * g[at.NOW, row].edge_arm_t
+        arms = g[NOW, row].edge_arm_n * g[NOW, row].edge_arm_t
         total += arms / scene.bodies[b].inertia
     return total

@@ -11,8 +11,6 @@ edge's body, the same holds for an end of the edge; on its inside the foot slide
 the torque changes by N σ.
 """
 
-import flocsim.arrays as at
-from flocsim.arrays import moved_contact
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import row_radii, separation
 from flocsim.hooks import (
@@ -49,20 +47,24 @@ from flocsim.integrators.rhs.views import (
     contact_view,
     soft_centre_line,
 )
+from flocsim.state.bodies import ANGLE
+from flocsim.state.contacts import GRAZES, TOUCHES
+from flocsim.state.views import moved_contact
+from flocsim.state.work import DAMPING, FORCING, NOW, STIFFNESS
 
 
 def normal_rows(work, row):
     """Entries of a pair's normal direction on its two bodies, now."""
     g = work.geometry
-    nx, ny = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
-    return (nx, ny, g[at.NOW, row].vertex_arm_n), (-nx, -ny, -g[at.NOW, row].edge_arm_n)
+    nx, ny = g[NOW, row].normal_x, g[NOW, row].normal_y
+    return (nx, ny, g[NOW, row].vertex_arm_n), (-nx, -ny, -g[NOW, row].edge_arm_n)
 
 
 def tangent_rows(work, row):
     """Entries of a pair's tangential direction on its two bodies, now."""
     g = work.geometry
-    tx, ty = -g[at.NOW, row].normal_y, g[at.NOW, row].normal_x
-    return (tx, ty, g[at.NOW, row].vertex_arm_t), (-tx, -ty, -g[at.NOW, row].edge_arm_t)
+    tx, ty = -g[NOW, row].normal_y, g[NOW, row].normal_x
+    return (tx, ty, g[NOW, row].vertex_arm_t), (-tx, -ty, -g[NOW, row].edge_arm_t)
 
 
 def add_outer(work, which, block, out, by, weight):
@@ -112,13 +114,13 @@ def sliding_row(scene, work, row):
     """
     radius_a, radius_b = row_radii(scene, work, row)
     g = work.geometry
-    tx, ty = -g[at.NOW, row].normal_y, g[at.NOW, row].normal_x
+    tx, ty = -g[NOW, row].normal_y, g[NOW, row].normal_x
     difference = radius_a - radius_b
-    distance = g[at.NOW, row].gap + radius_a + radius_b
-    arm_a = g[at.NOW, row].vertex_arm_t + 0.5 * (distance + difference)
-    arm_b = g[at.NOW, row].edge_arm_t - 0.5 * (distance - difference)
+    distance = g[NOW, row].gap + radius_a + radius_b
+    arm_a = g[NOW, row].vertex_arm_t + 0.5 * (distance + difference)
+    arm_b = g[NOW, row].edge_arm_t - 0.5 * (distance - difference)
     # An end goes with its body; along an edge that turns, the vertex slides by its own arm.
-    beside = distance if g[at.NOW, row].turning == 0.0 else 0.0
+    beside = distance if g[NOW, row].turning == 0.0 else 0.0
     return (tx, ty, arm_a), (-tx, -ty, -arm_b - beside), arm_a, arm_b
 
 
@@ -134,31 +136,31 @@ def add_turning(scene, work, row, normal, tangential):
     g, stiffness, pair = work.geometry, work.jacobian, candidate.pair
     slide_a, slide_b, arm_a, arm_b = sliding_row(scene, work, row)
     nx, ny, turning = (
-        g[at.NOW, row].normal_x,
-        g[at.NOW, row].normal_y,
-        g[at.NOW, row].turning,
+        g[NOW, row].normal_x,
+        g[NOW, row].normal_y,
+        g[NOW, row].turning,
     )
     fx, fy = -normal * ny - tangential * nx, normal * nx - tangential * ny
-    torque_a = normal * arm_a - tangential * g[at.NOW, row].vertex_arm_n
-    torque_b = normal * arm_b - tangential * g[at.NOW, row].edge_arm_n
-    stiffness[at.STIFFNESS, a, at.ANGLE, at.ANGLE] += torque_a
+    torque_a = normal * arm_a - tangential * g[NOW, row].vertex_arm_n
+    torque_b = normal * arm_b - tangential * g[NOW, row].edge_arm_n
+    stiffness[STIFFNESS, a, ANGLE, ANGLE] += torque_a
     if turning == 0.0:
         out = (fx, fy, torque_a), (-fx, -fy, 0.0)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
+        add_product(scene, work, STIFFNESS, pair, a, b, out, (NOTHING, (0.0, 0.0, 1.0)), -1.0)
         on_b = NOTHING, (0.0, 0.0, 1.0)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
+        add_product(scene, work, STIFFNESS, pair, a, b, on_b, (slide_a, slide_b), -normal)
     else:
         out = (fx, fy, torque_a), (-fx, -fy, -torque_b)
         by = scaled(slide_a, turning), scaled(slide_b, turning)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, out, by, -1.0)
-        stiffness[at.STIFFNESS, b, at.ANGLE, at.ANGLE] -= torque_b
+        add_product(scene, work, STIFFNESS, pair, a, b, out, by, -1.0)
+        stiffness[STIFFNESS, b, ANGLE, ANGLE] -= torque_b
 
 
 def sliding_slopes(scene, work, row, normal, tangential):
     """Derivatives of (normal, tangential) by the overlap of a contact that slides, ξ along."""
-    view = contact_view(scene, work, at.NOW, row)
+    view = contact_view(scene, work, NOW, row)
     by = 1e-3 * abs(view.overlap) + 1e-13
-    more = work.candidates[row].sliding * limit_slope(scene, work, at.NOW, row) * by
+    more = work.candidates[row].sliding * limit_slope(scene, work, NOW, row) * by
     deeper = moved_contact(
         view, view.overlap + by, view.overlap_rate, view.slip + more, view.slip_rate
     )
@@ -170,20 +172,20 @@ def add_contact(scene, work, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     pair = candidate.pair
-    found = contact_derivatives(scene, contact_view(scene, work, at.NOW, row))
+    found = contact_derivatives(scene, contact_view(scene, work, NOW, row))
     along, across = normal_rows(work, row), tangent_rows(work, row)
     normal_slope, tangential_slope = found[2], found[3]
     if candidate.sliding != 0:
         normal_slope, tangential_slope = sliding_slopes(scene, work, row, found[0], found[1])
-    add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, normal_slope)
-    add_product(scene, work, at.STIFFNESS, pair, a, b, across, along, tangential_slope)
+    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal_slope)
+    add_product(scene, work, STIFFNESS, pair, a, b, across, along, tangential_slope)
     for axis in range(1, 4):
         # Sliding, ξ goes with the overlap alone.
         if axis == 2 and candidate.sliding != 0:
             continue
         # An overlap grows against the normal, a slip along the tangent.
         sign, by = (1.0, along) if axis < 2 else (-1.0, across)
-        which = at.STIFFNESS if axis % 2 == 0 else at.DAMPING
+        which = STIFFNESS if axis % 2 == 0 else DAMPING
         add_product(scene, work, which, pair, a, b, along, by, sign * found[2 + 2 * axis])
         add_product(scene, work, which, pair, a, b, across, by, sign * found[3 + 2 * axis])
     add_turning(scene, work, row, found[0], found[1])
@@ -201,7 +203,7 @@ def add_grazing(scene, work, row):
     pair, resistance = candidate.pair, contact.grazing_resistance
     along, across = normal_rows(work, row), tangent_rows(work, row)
     force = contact.grazing_force
-    add_product(scene, work, at.DAMPING, pair, a, b, across, along, resistance)
+    add_product(scene, work, DAMPING, pair, a, b, across, along, resistance)
     add_turning(scene, work, row, 0.0, force)
     pressed, tangential = doubted(scene, work, row, force)
     add_forcing(work, a, b, along, pressed)
@@ -212,19 +214,19 @@ def add_forcing(work, a, b, out, size):
     """Add a force of a size along a direction, by which the error is carried otherwise."""
     out_a, out_b = out
     for axis in range(3):
-        work.velocity[at.FORCING, a, axis] += size * out_a[axis]
-        work.velocity[at.FORCING, b, axis] += size * out_b[axis]
+        work.velocity[FORCING, a, axis] += size * out_a[axis]
+        work.velocity[FORCING, b, axis] += size * out_b[axis]
 
 
 def add_contacts(scene, work):
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.velocity[at.FORCING, body, axis] = 0.0
+            work.velocity[FORCING, body, axis] = 0.0
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == at.TOUCHES:
+        if candidate.closed == TOUCHES:
             add_contact(scene, work, row)
-        elif candidate.closed == at.GRAZES:
+        elif candidate.closed == GRAZES:
             add_grazing(scene, work, row)
 
 
@@ -239,26 +241,26 @@ def add_body(work, which, body, derivatives):
 
 def add_bodies(scene, work, time):
     for body in range(scene.bodies.shape[0]):
-        view = body_view(scene, work, time, at.NOW, body)
+        view = body_view(scene, work, time, NOW, body)
         if has(scene, VELOCITY_DERIVATIVES):
-            add_body(work, at.DAMPING, body, velocity_derivatives(scene, view))
+            add_body(work, DAMPING, body, velocity_derivatives(scene, view))
         if has(scene, POSITION_DERIVATIVES):
-            add_body(work, at.STIFFNESS, body, position_derivatives(scene, view))
+            add_body(work, STIFFNESS, body, position_derivatives(scene, view))
 
 
 def add_centres(scene, work, time):
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
-        view = centre_view(scene, work, time, at.NOW, a, b)
-        nx, ny, distance = soft_centre_line(scene, work, at.NOW, a, b)
+        view = centre_view(scene, work, time, NOW, a, b)
+        nx, ny, distance = soft_centre_line(scene, work, NOW, a, b)
         along = ((nx, ny, 0.0), (-nx, -ny, 0.0))
         slope, damping = centre_derivatives(scene, view)
         # The gradient (x, y)/d turns and, near d_c = 0, grows by (1 − n nᵀ)/d.
         turning = -centre_force(scene, view) / distance
-        add_product(scene, work, at.STIFFNESS, pair, a, b, along, along, -slope - turning)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
-        add_product(scene, work, at.DAMPING, pair, a, b, along, along, damping)
+        add_product(scene, work, STIFFNESS, pair, a, b, along, along, -slope - turning)
+        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_X, SHIFT_OF_X, turning)
+        add_product(scene, work, STIFFNESS, pair, a, b, SHIFT_OF_Y, SHIFT_OF_Y, turning)
+        add_product(scene, work, DAMPING, pair, a, b, along, along, damping)
 
 
 def add_surfaces(scene, work, time):
@@ -268,20 +270,20 @@ def add_surfaces(scene, work, time):
         end = run_end(work, row)
         a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
         pair = work.candidates[row].pair
-        view = surface_view(scene, work, time, at.NOW, row, end)
+        view = surface_view(scene, work, time, NOW, row, end)
         repulsion = surface_force(scene, view)
         slope, damping = surface_derivatives(scene, view)
         mean = mean_direction(work, row, end)
         spread = repulsion * sharpness(scene, view.gap)
-        add_product(scene, work, at.STIFFNESS, pair, a, b, mean, mean, -slope - spread)
-        add_product(scene, work, at.DAMPING, pair, a, b, mean, mean, damping)
+        add_product(scene, work, STIFFNESS, pair, a, b, mean, mean, -slope - spread)
+        add_product(scene, work, DAMPING, pair, a, b, mean, mean, damping)
         for each in range(row, end):
-            share = work.geometry[at.NOW, each].share
+            share = work.geometry[NOW, each].share
             if share > 0.0:
                 c, d = work.candidates[each].vertex_body, work.candidates[each].edge_body
                 along = normal_rows(work, each)
-                spread = share * repulsion * sharpness(scene, work.geometry[at.NOW, each].gap)
-                add_product(scene, work, at.STIFFNESS, pair, c, d, along, along, spread)
+                spread = share * repulsion * sharpness(scene, work.geometry[NOW, each].gap)
+                add_product(scene, work, STIFFNESS, pair, c, d, along, along, spread)
                 add_turning(scene, work, each, share * repulsion, 0.0)
         row = end
 
@@ -302,8 +304,8 @@ def add_outlines(scene, work, time):
     j's place, forces going with them."""
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
-        x, y = separation(scene, work, at.NOW, a, b)
-        angle_a, angle_b = work.place[at.NOW, a, at.ANGLE], work.place[at.NOW, b, at.ANGLE]
+        x, y = separation(scene, work, NOW, a, b)
+        angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
         fx, fy = work.along[pair, 0], work.along[pair, 1]
         torque_a, torque_b = work.along[pair, 2], work.along[pair, 3]
         if fx == 0.0 and fy == 0.0 and torque_a == 0.0 and torque_b == 0.0:
@@ -334,7 +336,7 @@ def add_outlines(scene, work, time):
             ((NOTHING, TURN), by_b, on_b_b),
         ):
             out = on_a, (-on_a[0], -on_a[1], on_b)
-            add_product(scene, work, at.STIFFNESS, pair, a, b, out, column, -1.0)
+            add_product(scene, work, STIFFNESS, pair, a, b, out, column, -1.0)
 
 
 def weigh_velocities(scene, work, time, remaining):

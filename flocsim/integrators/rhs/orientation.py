@@ -7,11 +7,12 @@ line turns where j moves aside; torques are −∂U/∂α.
 
 import math
 
-import flocsim.arrays as at
-from flocsim.arrays import OrientedView
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.hooks import oriented_energy
 from flocsim.integrators.rhs.views import effective_mass
+from flocsim.state.bodies import ANGLE
+from flocsim.state.views import OrientedView
+from flocsim.state.work import NOW
 
 TURN = 1e-4
 """Angle by which bodies are turned for a difference [rad]: its square is what differences leave."""
@@ -38,8 +39,8 @@ def oriented_from(scene, time, j, i, x, y, angle_j, angle_i):
 
 def oriented_now(scene, work, time, j, i):
     """The same in the state NOW."""
-    x, y = separation(scene, work, at.NOW, j, i)
-    angle_j, angle_i = work.place[at.NOW, j, at.ANGLE], work.place[at.NOW, i, at.ANGLE]
+    x, y = separation(scene, work, NOW, j, i)
+    angle_j, angle_i = work.place[NOW, j, ANGLE], work.place[NOW, i, ANGLE]
     return oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
 
 

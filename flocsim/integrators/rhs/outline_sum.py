@@ -7,8 +7,6 @@ one is gone along. All is in the frame of the other.
 
 import math
 
-import flocsim.arrays as at
-from flocsim.arrays import MOST_NODES, MOST_ORDER, OutlineView
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.attraction import add_arc, add_segment, find_plates
 from flocsim.geometry.contact.points import length_of, separation
@@ -26,6 +24,32 @@ from flocsim.integrators.rhs.charge_sum import sum_charges
 from flocsim.integrators.rhs.orientation import between_oriented
 from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, growth_at, put_side
 from flocsim.integrators.rhs.views import effective_mass
+from flocsim.state.bodies import ANGLE
+from flocsim.state.outlines import (
+    AROUND,
+    CELL_X,
+    LISTED_A,
+    LISTED_B,
+    LISTED_COSINE,
+    LISTED_REACH,
+    LISTED_SINE,
+    LISTED_X,
+    LISTED_Y,
+    MOST_NODES,
+    MOST_ORDER,
+    NEAR_A,
+    NEAR_B,
+    NODE_GAP,
+    NODE_NORMAL_X,
+    NODE_NORMAL_Y,
+    NODE_PLATES,
+    NODE_WEIGHT,
+    NODE_X,
+    NODE_Y,
+    SEEN,
+)
+from flocsim.state.views import OutlineView
+from flocsim.state.work import NOW
 
 LENS = 300.0
 """Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
@@ -46,15 +70,15 @@ AT_ONCE = 8
 def list_near(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach``."""
     near, listed = work.near, work.listed
-    list_within(scene.pieces, near[at.NEAR_A], scene.first_piece[a], scene.first_piece[a + 1],
+    list_within(scene.pieces, near[NEAR_A], scene.first_piece[a], scene.first_piece[a + 1],
                 pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
-    list_within(scene.pieces, near[at.NEAR_B], scene.first_piece[b], scene.first_piece[b + 1],
+    list_within(scene.pieces, near[NEAR_B], scene.first_piece[b], scene.first_piece[b + 1],
                 UNMOVED, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
-    keep_paired(scene.pieces, near[at.NEAR_A], pose, near[at.NEAR_B], UNMOVED, reach)
-    keep_paired(scene.pieces, near[at.NEAR_B], UNMOVED, near[at.NEAR_A], pose, reach)
-    listed[at.LISTED_A], listed[at.LISTED_B], listed[at.LISTED_REACH] = a, b, reach
-    listed[at.LISTED_X], listed[at.LISTED_Y] = pose.x, pose.y
-    listed[at.LISTED_COSINE], listed[at.LISTED_SINE] = pose.cosine, pose.sine
+    keep_paired(scene.pieces, near[NEAR_A], pose, near[NEAR_B], UNMOVED, reach)
+    keep_paired(scene.pieces, near[NEAR_B], UNMOVED, near[NEAR_A], pose, reach)
+    listed[LISTED_A], listed[LISTED_B], listed[LISTED_REACH] = a, b, reach
+    listed[LISTED_X], listed[LISTED_Y] = pose.x, pose.y
+    listed[LISTED_COSINE], listed[LISTED_SINE] = pose.cosine, pose.sine
 
 
 def list_within(pieces, rows, first, last, pose, x, y, reach):
@@ -87,20 +111,20 @@ def slack_of(scene, work, a, b, pose):
     """How near to each other pieces have to be so that they are listed, as bodies lie by now [m];
     below 0 where none are."""
     listed = work.listed
-    if listed[at.LISTED_A] != a or listed[at.LISTED_B] != b:
+    if listed[LISTED_A] != a or listed[LISTED_B] != b:
         return -1.0
-    way = length_of(pose.x - listed[at.LISTED_X], pose.y - listed[at.LISTED_Y])
-    c, s = pose.cosine - listed[at.LISTED_COSINE], pose.sine - listed[at.LISTED_SINE]
-    return listed[at.LISTED_REACH] - way - scene.bodies[a].bounding_radius * length_of(c, s)
+    way = length_of(pose.x - listed[LISTED_X], pose.y - listed[LISTED_Y])
+    c, s = pose.cosine - listed[LISTED_COSINE], pose.sine - listed[LISTED_SINE]
+    return listed[LISTED_REACH] - way - scene.bodies[a].bounding_radius * length_of(c, s)
 
 
 def gap_listed(scene, work, pose):
     """The least gap of the pieces that are listed [m]; inf where none are."""
     near, least = work.near, math.inf
-    for i in range(near[at.NEAR_A, 0]):
-        one = placed(scene.pieces, near[at.NEAR_A, 1 + i], pose)
-        for j in range(near[at.NEAR_B, 0]):
-            other = piece_at(scene.pieces, near[at.NEAR_B, 1 + j])
+    for i in range(near[NEAR_A, 0]):
+        one = placed(scene.pieces, near[NEAR_A, 1 + i], pose)
+        for j in range(near[NEAR_B, 0]):
+            other = piece_at(scene.pieces, near[NEAR_B, 1 + j])
             if may_be_within(one, other, least):
                 squared, _, _, _, _ = between_cores(one, other)
                 least = min(least, math.sqrt(squared) - one.inward - other.inward)
@@ -111,13 +135,13 @@ def look_around_piece(scene, work, piece, lens):
     """List the pieces of the other body that may be within ``lens`` of one, and add them to those
     that have been so far; how many they are."""
     near, count = work.near, 0
-    for j in range(near[at.NEAR_B, 0]):
-        row = near[at.NEAR_B, 1 + j]
+    for j in range(near[NEAR_B, 0]):
+        row = near[NEAR_B, 1 + j]
         if may_be_within(piece, piece_at(scene.pieces, row), lens):
             count += 1
-            near[at.AROUND, count] = row
-            add_row(near[at.SEEN], row)
-    near[at.AROUND, 0] = count
+            near[AROUND, count] = row
+            add_row(near[SEEN], row)
+    near[AROUND, 0] = count
     return count
 
 
@@ -134,8 +158,8 @@ def look_from(scene, work, count, inset, lens):
     """Look from so many nodes at the pieces that are around any: how far they are, and at which gap
     plates attract each other as they do."""
     near = work.near
-    for j in range(near[at.SEEN, 0]):
-        piece = piece_at(scene.pieces, near[at.SEEN, 1 + j])
+    for j in range(near[SEEN, 0]):
+        piece = piece_at(scene.pieces, near[SEEN, 1 + j])
         if piece.bend > 0.0:
             add_arc(work.nodes, count, piece, inset, lens)
         else:
@@ -150,23 +174,23 @@ def add_nodes(scene, work, total, count, numbers):
     nodes = work.nodes
     # Several are looked from at once: as if there were some more, of no weight.
     whole = -(-count // AT_ONCE) * AT_ONCE
-    for row in range(at.CELL_X):
+    for row in range(CELL_X):
         for k in range(count, whole):
             nodes[row, k] = nodes[row, count - 1]
     look_from(scene, work, whole, inset, lens)
     for k in range(count):
-        gap = nodes[at.NODE_GAP, k]
+        gap = nodes[NODE_GAP, k]
         if gap < lens:
-            parted, plates = gap + inset, nodes[at.NODE_PLATES, k]
+            parted, plates = gap + inset, nodes[NODE_PLATES, k]
             # The more an outline bends away, the more of what attracts is near: of circles the
             # share of a depth is that of plates within 1 % up to a gap of a third of it.
             point = OutlineView(
                 view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
                 view.radius_j, view.reduced_radius, view.effective_mass,
             )  # fmt: skip
-            size = -outline_pressure(scene, point) * nodes[at.NODE_WEIGHT, k]
-            x, y = nodes[at.NODE_X, k], nodes[at.NODE_Y, k]
-            across, up = size * nodes[at.NODE_NORMAL_X, k], size * nodes[at.NODE_NORMAL_Y, k]
+            size = -outline_pressure(scene, point) * nodes[NODE_WEIGHT, k]
+            x, y = nodes[NODE_X, k], nodes[NODE_Y, k]
+            across, up = size * nodes[NODE_NORMAL_X, k], size * nodes[NODE_NORMAL_Y, k]
             fx, fy, torque = fx + across, fy + up, torque + x * up - y * across
     return fx, fy, torque
 
@@ -242,9 +266,9 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     inset, lens, view = numbers
     if lens == 0.0:
         return total
-    count, least, work.near[at.SEEN, 0] = 0, view.gap + inset, 0
-    for i in range(work.near[at.NEAR_A, 0]):
-        piece = placed(scene.pieces, work.near[at.NEAR_A, 1 + i], pose)
+    count, least, work.near[SEEN, 0] = 0, view.gap + inset, 0
+    for i in range(work.near[NEAR_A, 0]):
+        piece = placed(scene.pieces, work.near[NEAR_A, 1 + i], pose)
         if look_around_piece(scene, work, piece, lens) == 0:
             continue
         feet = find_feet(scene, work, piece, inset, lens)
@@ -309,10 +333,10 @@ def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
 def outlines_apart(scene, work, time, a, b, way):
     """What pushes two bodies apart along the line of centres [N], a being moved out along it from
     where it is now by a way [m]."""
-    x, y = separation(scene, work, at.NOW, a, b)
+    x, y = separation(scene, work, NOW, a, b)
     distance = length_of(x, y)
     nx, ny = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
-    angle_a, angle_b = work.place[at.NOW, a, at.ANGLE], work.place[at.NOW, b, at.ANGLE]
+    angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
     x, y = x + way * nx, y + way * ny
     fx, fy, _, _ = between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)
     return fx * nx + fy * ny
@@ -321,5 +345,5 @@ def outlines_apart(scene, work, time, a, b, way):
 def outlines_in(scene, work, time, state, a, b):
     """The same of two bodies in a state."""
     x, y = separation(scene, work, state, a, b)
-    angle_a, angle_b = work.place[state, a, at.ANGLE], work.place[state, b, at.ANGLE]
+    angle_a, angle_b = work.place[state, a, ANGLE], work.place[state, b, ANGLE]
     return between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)

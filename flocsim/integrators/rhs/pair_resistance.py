@@ -11,7 +11,6 @@ of the tables is the earlier one of a pair.
 import math
 from collections.abc import Callable
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.hooks import hook
 from flocsim.hydrodynamics.pair import COLUMNS, NEAREST, NODES_A_UNIT
@@ -19,6 +18,9 @@ from flocsim.hydrodynamics.two_spheres import fading
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.surface_gap import soften
 from flocsim.integrators.rhs.views import add_force, centre_line
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.scene import CUT, FIRST_RADIUS, FLOOR, FLOW, MEAN_RADIUS, NEAR_CUT, VISCOSITY
+from flocsim.state.work import DAMPING, NOW, SOFT_GAP, SQUARES, STIFFNESS
 
 (
     N_1, N_2, A_V1, A_V2, A_W1, A_W2, B_V1, B_V2, B_W1, B_W2, K_N, K_A, K_B,
@@ -30,7 +32,7 @@ LOAD = 6
 """Column of ``Work.squares`` behind those of the velocities (v_n, v_t, spin) of both bodies, along
 and across the line of centres."""
 
-COMMON, RELATIVE, PULL = 0, 3, at.SQUARES
+COMMON, RELATIVE, PULL = 0, 3, SQUARES
 """First rows of ``Work.squares`` of the two parts, and the row of what a strain pulls with."""
 
 LEAN, LEAN_FALLS, LEAN_MOST = 1.5, 0.9, 0.8
@@ -44,7 +46,7 @@ SPHERE_DRAG, SPHERE_TURN = 6.0 * math.pi, 8.0 * math.pi
 
 def interval_of(scene, gap):
     """(interval, share of it) of the tables at a gap [m]; at an end where they do not reach."""
-    place = math.log(gap / (scene.water[at.MEAN_RADIUS] * NEAREST)) * NODES_A_UNIT
+    place = math.log(gap / (scene.water[MEAN_RADIUS] * NEAREST)) * NODES_A_UNIT
     last = scene.pair_table.shape[0] - 1
     interval = int(min(max(place, 0.0), last))
     return interval, min(max(place - interval, 0.0), 1.0)
@@ -83,11 +85,11 @@ def value_in(work, row, motion):
 
 def motion_in(work, state, one, two, nx, ny):
     """(v_n, v_t, spin) of both bodies in a state."""
-    x, y = work.velocity[state, one, at.X], work.velocity[state, one, at.Y]
-    x_2, y_2 = work.velocity[state, two, at.X], work.velocity[state, two, at.Y]
+    x, y = work.velocity[state, one, X], work.velocity[state, one, Y]
+    x_2, y_2 = work.velocity[state, two, X], work.velocity[state, two, Y]
     return (
-        x * nx + y * ny, y * nx - x * ny, work.velocity[state, one, at.ANGLE],
-        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, work.velocity[state, two, at.ANGLE],
+        x * nx + y * ny, y * nx - x * ny, work.velocity[state, one, ANGLE],
+        x_2 * nx + y_2 * ny, y_2 * nx - x_2 * ny, work.velocity[state, two, ANGLE],
     )  # fmt: skip
 
 
@@ -104,17 +106,17 @@ def against_flow(scene, work, state, one, two, nx, ny, motion):
 def flow_in(scene, work, state, body):
     """(u_x, u_y, spin) of the flow at a body."""
     f = scene.water
-    x, y = work.place[state, body, at.X], work.place[state, body, at.Y]
-    u = f[at.FLOW] + f[at.FLOW + 2] * x + f[at.FLOW + 3] * y
-    v = f[at.FLOW + 1] + f[at.FLOW + 4] * x + f[at.FLOW + 5] * y
-    return u, v, 0.5 * (f[at.FLOW + 4] - f[at.FLOW + 3])
+    x, y = work.place[state, body, X], work.place[state, body, Y]
+    u = f[FLOW] + f[FLOW + 2] * x + f[FLOW + 3] * y
+    v = f[FLOW + 1] + f[FLOW + 4] * x + f[FLOW + 5] * y
+    return u, v, 0.5 * (f[FLOW + 4] - f[FLOW + 3])
 
 
 def strain_along(scene, nx, ny):
     """(E_nn, E_nt) of the flow [1/s], t being n turned counter-clockwise."""
     f = scene.water
-    e_xx = 0.5 * (f[at.FLOW + 2] - f[at.FLOW + 5])
-    e_xy = 0.5 * (f[at.FLOW + 3] + f[at.FLOW + 4])
+    e_xx = 0.5 * (f[FLOW + 2] - f[FLOW + 5])
+    e_xy = 0.5 * (f[FLOW + 3] + f[FLOW + 4])
     cosine, sine = nx * nx - ny * ny, 2.0 * nx * ny
     return e_xx * cosine + e_xy * sine, e_xy * cosine - e_xx * sine
 
@@ -150,7 +152,7 @@ def write_relative(scene, work, place, arm, arm_2):
 
 def water_radius(scene, body):
     """Of the sphere that has the body's drag [m]."""
-    return scene.water[at.FIRST_RADIUS + body]
+    return scene.water[FIRST_RADIUS + body]
 
 
 def relative_gap(scene, work, state, between):
@@ -160,17 +162,17 @@ def relative_gap(scene, work, state, between):
     Far outlines are of no account, and at touch theirs is the gap.
     """
     spheres = max(between, 0.0)
-    if scene.water[at.NEAR_CUT] == 0.0:
+    if scene.water[NEAR_CUT] == 0.0:
         return spheres, 1.0
     if work.tally.candidates == 0:
         return spheres, 0.0
     if scene.surface_reach > 0.0:
         # Forces between the two outlines have asked for it just now.
-        found = work.squares[PULL, at.SOFT_GAP]
+        found = work.squares[PULL, SOFT_GAP]
     else:
         found, _ = soften(scene, work, state, 0, work.tally.candidates)
-    near, _ = fading(found, scene.water[at.NEAR_CUT])
-    outlines, mean = max(found, 0.0), scene.water[at.MEAN_RADIUS]
+    near, _ = fading(found, scene.water[NEAR_CUT])
+    outlines, mean = max(found, 0.0), scene.water[MEAN_RADIUS]
     lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
     factor = math.exp(LEAN * mean / (mean + LEAN_FALLS * outlines) * lean)
     return near * outlines * factor + (1.0 - near) * spheres, near * factor
@@ -184,10 +186,10 @@ def write_squares(scene, work, state, one, two):
     nx, ny, distance = centre_line(scene, work, state, two, one)
     radius = water_radius(scene, one)
     sizes = radius + water_radius(scene, two)
-    far, _ = fading(distance - sizes, scene.water[at.CUT])
+    far, _ = fading(distance - sizes, scene.water[CUT])
     if far == 0.0:
         return 0.0, 0.0, nx, ny
-    floor, slope = scene.water[at.FLOOR], 0.0
+    floor, slope = scene.water[FLOOR], 0.0
     gap = max(distance - sizes, floor)
     e_nn, e_nt = strain_along(scene, nx, ny)
     write_common(scene, work, interval_of(scene, gap), e_nn, e_nt)
@@ -203,7 +205,7 @@ def write_squares(scene, work, state, one, two):
     t_n, t_t, t_s = pull_at(scene, place, distance / (sizes + found))
     t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
     one_pull, two_pull = (-t_n, -t_t, -arm * t_t - t_s), (t_n, t_t, (arm - distance) * t_t + t_s)
-    write_row(work, PULL, one_pull, two_pull, work.squares[PULL, at.SOFT_GAP])
+    write_row(work, PULL, one_pull, two_pull, work.squares[PULL, SOFT_GAP])
     return far, slope, nx, ny
 
 
@@ -219,7 +221,7 @@ def pull_at(scene, place, size):
 
 def own_drag(scene, body):
     """(of velocities, of the spin) Stokes drag of the sphere of its drag [N s/m, N m s]."""
-    radius, viscosity = water_radius(scene, body), scene.water[at.VISCOSITY]
+    radius, viscosity = water_radius(scene, body), scene.water[VISCOSITY]
     return SPHERE_DRAG * viscosity * radius, SPHERE_TURN * viscosity * radius**3
 
 
@@ -227,7 +229,7 @@ def own_drag(scene, body):
 def add_pair_resistance(scene, work, state):
     """Add what the water between two bodies puts on them in a state, which is located, beside their
     Stokes drag."""
-    if scene.water[at.CUT] == 0.0:
+    if scene.water[CUT] == 0.0:
         return
     s = work.squares
     for pair in range(work.tally.pairs):
@@ -240,7 +242,7 @@ def add_pair_resistance(scene, work, state):
         (drag, turn), (drag_2, turn_2) = own_drag(scene, one), own_drag(scene, two)
         n, t, spin = drag * against[0], drag * against[1], turn * against[2]
         n_2, t_2, spin_2 = drag_2 * against[3], drag_2 * against[4], turn_2 * against[5]
-        for row in range(at.SQUARES + 1):
+        for row in range(SQUARES + 1):
             size = 1.0
             if row < RELATIVE:
                 size = s[row, LOAD] - value_in(work, row, against)
@@ -258,30 +260,30 @@ def add_pair_resistance(scene, work, state):
 def add_pair_damping(scene, work):
     """Its derivatives now: by the velocities all of them, by the places that of the resistance
     along the gap of the outlines, which grows without bounds."""
-    if scene.water[at.CUT] == 0.0:
+    if scene.water[CUT] == 0.0:
         return
     s, jacobian = work.squares, work.jacobian
     for pair in range(work.tally.pairs):
         one, two = work.pairs[pair].earlier, work.pairs[pair].later
-        far, slope, nx, ny = write_squares(scene, work, at.NOW, one, two)
+        far, slope, nx, ny = write_squares(scene, work, NOW, one, two)
         if far == 0.0:
             continue
         blocks = (one, upper_block(work, pair), lower_block(work, pair), two)
-        opening = slope * value_in(work, RELATIVE, motion_in(work, at.NOW, one, two, nx, ny))
-        for row in range(at.SQUARES):
+        opening = slope * value_in(work, RELATIVE, motion_in(work, NOW, one, two, nx, ny))
+        for row in range(SQUARES):
             for first in (0, 3):
                 n, t = s[row, first], s[row, first + 1]
                 s[row, first], s[row, first + 1] = n * nx - t * ny, n * ny + t * nx
-            add_square(work, at.DAMPING, blocks, row, far)
+            add_square(work, DAMPING, blocks, row, far)
         for body in (one, two):
             drag, turn = own_drag(scene, body)
-            jacobian[at.DAMPING, body, 0, 0] -= far * drag
-            jacobian[at.DAMPING, body, 1, 1] -= far * drag
-            jacobian[at.DAMPING, body, 2, 2] -= far * turn
+            jacobian[DAMPING, body, 0, 0] -= far * drag
+            jacobian[DAMPING, body, 1, 1] -= far * drag
+            jacobian[DAMPING, body, 2, 2] -= far * turn
         size = s[RELATIVE, 3] * s[RELATIVE, 3] + s[RELATIVE, 4] * s[RELATIVE, 4]
         if opening != 0.0 and size > 0.0:
             # Resistance to the rate of the gap grows as it closes.
-            add_square(work, at.STIFFNESS, blocks, RELATIVE, opening / (size * math.sqrt(size)))
+            add_square(work, STIFFNESS, blocks, RELATIVE, opening / (size * math.sqrt(size)))
 
 
 def add_square(work, kind, blocks, row, weight):

@@ -21,7 +21,6 @@ or the other, is told by a nudged companion alone.
 
 import math
 
-import flocsim.arrays as at
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.candidates import slip_error
 from flocsim.geometry.contact.points import length_of
@@ -35,6 +34,9 @@ from flocsim.integrators.rhs.views import (
     normal_rate,
     pressed_view,
 )
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.work import CARRIED, CHANGE, DEVIATION, FORCING, NOW
 
 OF_SWITCHES = 1.5
 """By how much motion may have made the errors of switches grow."""
@@ -85,12 +87,12 @@ def rate_of_growth(scene, work):
     pushed = size = 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            if work.velocity[at.FORCING, body, axis] != 0.0:
+            if work.velocity[FORCING, body, axis] != 0.0:
                 return 0.0
             square = lever(scene, body, axis) ** 2
-            now, later = work.place[at.CARRIED, body, axis], work.place[at.CHANGE, body, axis]
-            more = work.velocity[at.CHANGE, body, axis]
-            more -= work.velocity[at.CARRIED, body, axis]
+            now, later = work.place[CARRIED, body, axis], work.place[CHANGE, body, axis]
+            more = work.velocity[CHANGE, body, axis]
+            more -= work.velocity[CARRIED, body, axis]
             pushed += 0.5 * square * (now + later) * more
             size += square * 0.25 * (now + later) ** 2
     return pushed / size if pushed > 0.0 and size > 0.0 else 0.0
@@ -139,8 +141,8 @@ def carry_errors(scene, work, clock, step):
         largest = max(largest, stated)
         if across:
             for axis in range(3):
-                work.place[at.CARRIED, body, axis] += work.place[at.DEVIATION, body, axis]
-                work.velocity[at.CARRIED, body, axis] += work.velocity[at.DEVIATION, body, axis]
+                work.place[CARRIED, body, axis] += work.place[DEVIATION, body, axis]
+                work.velocity[CARRIED, body, axis] += work.velocity[DEVIATION, body, axis]
     vector = math.inf if across else carry_vector(scene, work, clock, step)
     clock.error = 0.0
     for body in range(work.poses.shape[0]):
@@ -165,8 +167,8 @@ def overlap_error(scene, work, clock, row):
 
 def carried_size(scene, work, body):
     """How large a body's carried error is in the place of its outline [m]."""
-    turn = scene.bodies[body].bounding_radius * abs(work.place[at.CARRIED, body, at.ANGLE])
-    return length_of(work.place[at.CARRIED, body, at.X], work.place[at.CARRIED, body, at.Y]) + turn
+    turn = scene.bodies[body].bounding_radius * abs(work.place[CARRIED, body, ANGLE])
+    return length_of(work.place[CARRIED, body, X], work.place[CARRIED, body, Y]) + turn
 
 
 def certain_sum(work, body):
@@ -212,8 +214,8 @@ def shorten(scene, work):
         share = work.clusters[work.cluster[body]].shortened
         if share < 1.0:
             for axis in range(3):
-                work.place[at.CARRIED, body, axis] *= share
-                work.velocity[at.CARRIED, body, axis] *= share
+                work.place[CARRIED, body, axis] *= share
+                work.velocity[CARRIED, body, axis] *= share
     for row in range(work.tally.candidates):
         share = work.clusters[work.cluster[work.candidates[row].vertex_body]].shortened
         if share < 1.0:
@@ -249,31 +251,31 @@ def kick(scene, work, body, x, y, turn):
     """Add an impulse [N s, N s, N m s] to a body's carried error."""
     if scene.bodies[body].free == 1.0:
         inertia = scene.bodies
-        work.velocity[at.CARRIED, body, at.X] += x / inertia[body].mass
-        work.velocity[at.CARRIED, body, at.Y] += y / inertia[body].mass
-        work.velocity[at.CARRIED, body, at.ANGLE] += turn / inertia[body].inertia
+        work.velocity[CARRIED, body, X] += x / inertia[body].mass
+        work.velocity[CARRIED, body, Y] += y / inertia[body].mass
+        work.velocity[CARRIED, body, ANGLE] += turn / inertia[body].inertia
 
 
 def kick_pair(scene, work, row, normal, tangential):
     """Add the impulses of a contact [N s] to the carried errors of its bodies."""
     candidate = work.candidates[row]
     g = work.geometry
-    nx, ny = g[at.NOW, row].normal_x, g[at.NOW, row].normal_y
+    nx, ny = g[NOW, row].normal_x, g[NOW, row].normal_y
     x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
-    turn = g[at.NOW, row].vertex_arm_n * normal + g[at.NOW, row].vertex_arm_t * tangential
-    back = g[at.NOW, row].edge_arm_n * normal + g[at.NOW, row].edge_arm_t * tangential
+    turn = g[NOW, row].vertex_arm_n * normal + g[NOW, row].vertex_arm_t * tangential
+    back = g[NOW, row].edge_arm_n * normal + g[NOW, row].edge_arm_t * tangential
     kick(scene, work, candidate.vertex_body, x, y, turn)
     kick(scene, work, candidate.edge_body, -x, -y, -back)
 
 
 def is_closed(work, row):
     """Whether a pair is flagged as one that touches."""
-    return work.candidates[row].closed == at.TOUCHES
+    return work.candidates[row].closed == TOUCHES
 
 
 def has_switched(work, row):
     """Whether a pair touches, or no longer does, other than it is flagged."""
-    closed = at.TOUCHES if work.geometry[at.NOW, row].gap < 0.0 else at.OPEN
+    closed = TOUCHES if work.geometry[NOW, row].gap < 0.0 else OPEN
     return closed != work.candidates[row].closed
 
 
@@ -283,11 +285,11 @@ def doubtful_time(work, row, step, doubt, resolved):
     How finely its touch was located says nothing of that later on: a contact that rests in a hair's
     breadth of overlap, as the second one of two that an attraction presses, bears what it bears.
     """
-    gap = work.geometry[at.NOW, row].gap
+    gap = work.geometry[NOW, row].gap
     if has_switched(work, row):
-        speed = abs(normal_rate(work, at.NOW, row))
+        speed = abs(normal_rate(work, NOW, row))
         return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, work.place, at.DEVIATION)) * resolved)
+    deepest = max(doubt, DOUBT * abs(along_normal(work, row, work.place, DEVIATION)) * resolved)
     return step if -deepest < gap < 0.0 else 0.0
 
 
@@ -309,7 +311,7 @@ def unresolved(scene, work, clock, step, row):
     its vibration out, so that the load decides whether it is there."""
     if work.tally.series_terms > 0:
         return 0.0
-    view = contact_view(scene, work, at.NOW, row)
+    view = contact_view(scene, work, NOW, row)
     stiffness = pressed_stiffness(scene, view, clock.tolerance)
     if not stiffness > 0.0:
         return 0.0
@@ -319,9 +321,9 @@ def unresolved(scene, work, clock, step, row):
 
 def signed_time(work, row, step, depth, doubt):
     """The same, above 0 where the force has acted for too long, as the carried error has it."""
-    gap, wrong = work.geometry[at.NOW, row].gap, along_normal(work, row, work.place, at.CARRIED)
+    gap, wrong = work.geometry[NOW, row].gap, along_normal(work, row, work.place, CARRIED)
     if has_switched(work, row):
-        rate = normal_rate(work, at.NOW, row)
+        rate = normal_rate(work, NOW, row)
         late = (gap - wrong) / rate if rate != 0.0 else 0.0
         if rate != 0.0:
             late += math.copysign(doubt / rate, late)
@@ -340,8 +342,8 @@ def doubted(scene, work, row, tangential):
     load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
     it enlarges the error. What different contacts and times have lost must not cancel."""
     normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
-    apart = along_normal(work, row, work.place, at.CARRIED)
-    apart += memory * along_normal(work, row, work.velocity, at.CARRIED)
+    apart = along_normal(work, row, work.place, CARRIED)
+    apart += memory * along_normal(work, row, work.velocity, CARRIED)
     along = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
     share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
     return share * normal, share * tangential
@@ -351,7 +353,7 @@ def doubt_tangential(scene, work, row, step):
     """Count as an error all that the tangential force of a pair that grazes has done in a step: by
     the law the pair loses it whenever it parts, and is pressed by what it has lifted instead."""
     candidate = work.candidates[row]
-    force = grazing_force(work, at.NOW, row)
+    force = grazing_force(work, NOW, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
     impulse *= OF_LOST / OF_SWITCHES
     add_impulse(scene, work, candidate.vertex_body, impulse, True)
@@ -364,8 +366,8 @@ def forget_offsets(work):
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         if candidate.sliding != 0 or not is_closed(work, row):
-            grazes = candidate.closed == at.GRAZES
-            lost = OF_BOUNDS * work.slip[at.NOW, row] if grazes else 0.0
+            grazes = candidate.closed == GRAZES
+            lost = OF_BOUNDS * work.slip[NOW, row] if grazes else 0.0
             work.contacts[row].slip_offset = lost - slip_error(work, row, work.place)
 
 
@@ -374,7 +376,7 @@ def add_switch_errors(scene, work, clock, step, depth):
     those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == at.GRAZES:
+        if candidate.closed == GRAZES:
             doubt_tangential(scene, work, row, step)
             continue
         doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
@@ -382,7 +384,7 @@ def add_switch_errors(scene, work, clock, step, depth):
         late = doubtful_time(work, row, step, doubt, resolved)
         signed = signed_time(work, row, step, depth, doubt)
         if late > 0.0 or signed != 0.0:
-            normal, tangential = contact_force(scene, contact_view(scene, work, at.NOW, row))
+            normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
             impulse = late * length_of(normal, tangential)
             switched = has_switched(work, row)
             add_impulse(scene, work, candidate.vertex_body, impulse, switched)

@@ -14,10 +14,12 @@ g̃ = −ℓ ln Σ exp(−g_k/ℓ). The force is off by no more than LARGEST_BIA
 
 import math
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.candidates import core_radius, relative_speed
 from flocsim.geometry.contact.points import length_of, locate_polygons, separation, turn_bodies
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
+from flocsim.state.bodies import ANGLE
+from flocsim.state.contacts import OPEN
+from flocsim.state.work import NEW, NOW, SOFT_GAP, SQUARES
 
 RANGE = 40.0
 """Pairs whose u is so much above the least have no share: exp(−40) is below rounding."""
@@ -109,9 +111,9 @@ def overlooked(scene, work):
     row = 0
     while row < work.tally.candidates:
         end = run_end(work, row)
-        reach = reach_of(scene, least_gap(work, at.NEW, row, end))
+        reach = reach_of(scene, least_gap(work, NEW, row, end))
         for each in range(row, end):
-            if work.candidates[each].near == 0 and work.geometry[at.NEW, each].gap < reach:
+            if work.candidates[each].near == 0 and work.geometry[NEW, each].gap < reach:
                 return True
         row = end
     return False
@@ -120,10 +122,10 @@ def overlooked(scene, work):
 def way_to(scene, work, state, a, b):
     """How far the cores of two bodies may have moved against each other from now to a state [m]."""
     x, y = separation(scene, work, state, a, b)
-    x_now, y_now = separation(scene, work, at.NOW, a, b)
+    x_now, y_now = separation(scene, work, NOW, a, b)
     way = length_of(x - x_now, y - y_now)
     for body in (a, b):
-        turn = abs(work.place[state, body, at.ANGLE] - work.place[at.NOW, body, at.ANGLE])
+        turn = abs(work.place[state, body, ANGLE] - work.place[NOW, body, ANGLE])
         way += turn * core_radius(scene, body)
     return way
 
@@ -137,11 +139,11 @@ def locate_sharing(scene, work, state):
         end = run_end(work, row)
         a, b = work.candidates[row].vertex_body, work.candidates[row].edge_body
         way = way_to(scene, work, state, a, b)
-        reach = reach_of(scene, least_gap(work, at.NOW, row, end) + way) + way
+        reach = reach_of(scene, least_gap(work, NOW, row, end) + way) + way
         for each in range(row, end):
-            closed = work.candidates[each].closed != at.OPEN
+            closed = work.candidates[each].closed != OPEN
             if closed or work.candidates[each].near == 1:
-                if closed or work.geometry[at.NOW, each].gap <= reach:
+                if closed or work.geometry[NOW, each].gap <= reach:
                     locate_polygons(scene, work, state, each)
                 else:
                     work.geometry[state, each].gap = math.inf
@@ -173,7 +175,7 @@ def soften(scene, work, state, row, end):
             own = length_at(scene, geometry[state, each].gap)
             geometry[state, each].share *= length / (own * total)
             rate += geometry[state, each].share * normal_rate(work, state, each)
-    work.squares[at.SQUARES, at.SOFT_GAP] = gap
+    work.squares[SQUARES, SOFT_GAP] = gap
     return gap, rate
 
 
@@ -198,18 +200,18 @@ def mean_direction(work, row, end):
     g, first = work.geometry, work.candidates[row].vertex_body
     x, y, turn_a, turn_b = 0.0, 0.0, 0.0, 0.0
     for each in range(row, end):
-        share = g[at.NOW, each].share
-        arm_v, arm_e = g[at.NOW, each].vertex_arm_n, g[at.NOW, each].edge_arm_n
+        share = g[NOW, each].share
+        arm_v, arm_e = g[NOW, each].vertex_arm_n, g[NOW, each].edge_arm_n
         if work.candidates[each].vertex_body == first:
             x, y = (
-                x + share * g[at.NOW, each].normal_x,
-                y + share * g[at.NOW, each].normal_y,
+                x + share * g[NOW, each].normal_x,
+                y + share * g[NOW, each].normal_y,
             )
             turn_a, turn_b = turn_a + share * arm_v, turn_b - share * arm_e
         else:
             x, y = (
-                x - share * g[at.NOW, each].normal_x,
-                y - share * g[at.NOW, each].normal_y,
+                x - share * g[NOW, each].normal_x,
+                y - share * g[NOW, each].normal_y,
             )
             turn_a, turn_b = turn_a - share * arm_e, turn_b + share * arm_v
     return (x, y, turn_a), (-x, -y, turn_b)

@@ -2,11 +2,12 @@
 
 import math
 
-import flocsim.arrays as at
-from flocsim.arrays import BodyView, ContactView, PairView, PlainBodyView, moved_contact
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import length_of, row_radii, separation
 from flocsim.hooks import hook
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.views import BodyView, ContactView, PairView, PlainBodyView, moved_contact
+from flocsim.state.work import NOW
 
 
 @hook
@@ -14,8 +15,8 @@ def body_view(scene, work, time, state, body):
     place, velocity, own, kick = work.place, work.velocity, scene.bodies[body], work.kicks[body]
     return BodyView(
         time,
-        place[state, body, at.X], place[state, body, at.Y], place[state, body, at.ANGLE],
-        velocity[state, body, at.X], velocity[state, body, at.Y], velocity[state, body, at.ANGLE],
+        place[state, body, X], place[state, body, Y], place[state, body, ANGLE],
+        velocity[state, body, X], velocity[state, body, Y], velocity[state, body, ANGLE],
         own.mass, own.buoyant_mass, own.inertia,
         own.equivalent_radius, own.elongation, own.long_axis,
         kick.x, kick.y, kick.turn,
@@ -32,8 +33,8 @@ def plain_body_view(scene, work, time, state, body):
     place, velocity, own, kick = work.place, work.velocity, scene.bodies[body], work.kicks[body]
     return PlainBodyView(
         time,
-        place[state, body, at.X], place[state, body, at.Y], place[state, body, at.ANGLE],
-        velocity[state, body, at.X], velocity[state, body, at.Y], velocity[state, body, at.ANGLE],
+        place[state, body, X], place[state, body, Y], place[state, body, ANGLE],
+        velocity[state, body, X], velocity[state, body, Y], velocity[state, body, ANGLE],
         own.mass, own.buoyant_mass, own.inertia,
         own.equivalent_radius, own.elongation, own.long_axis,
         kick.x, kick.y, kick.turn,
@@ -71,10 +72,10 @@ def along_normal(work, row, of, state):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    change = g[at.NOW, row].normal_x * (of[state, a, at.X] - of[state, b, at.X])
-    change += g[at.NOW, row].normal_y * (of[state, a, at.Y] - of[state, b, at.Y])
-    change += g[at.NOW, row].vertex_arm_n * of[state, a, at.ANGLE]
-    return change - g[at.NOW, row].edge_arm_n * of[state, b, at.ANGLE]
+    change = g[NOW, row].normal_x * (of[state, a, X] - of[state, b, X])
+    change += g[NOW, row].normal_y * (of[state, a, Y] - of[state, b, Y])
+    change += g[NOW, row].vertex_arm_n * of[state, a, ANGLE]
+    return change - g[NOW, row].edge_arm_n * of[state, b, ANGLE]
 
 
 def normal_rate(work, state, row):
@@ -82,12 +83,12 @@ def normal_rate(work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    rate = g[state, row].normal_x * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
-    rate += g[state, row].normal_y * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
+    rate = g[state, row].normal_x * (work.velocity[state, a, X] - work.velocity[state, b, X])
+    rate += g[state, row].normal_y * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
     return (
         rate
-        + work.velocity[state, a, at.ANGLE] * g[state, row].vertex_arm_n
-        - work.velocity[state, b, at.ANGLE] * g[state, row].edge_arm_n
+        + work.velocity[state, a, ANGLE] * g[state, row].vertex_arm_n
+        - work.velocity[state, b, ANGLE] * g[state, row].edge_arm_n
     )
 
 
@@ -96,12 +97,12 @@ def tangential_rate(work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    rate = g[state, row].normal_x * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
-    rate -= g[state, row].normal_y * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
+    rate = g[state, row].normal_x * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
+    rate -= g[state, row].normal_y * (work.velocity[state, a, X] - work.velocity[state, b, X])
     return (
         rate
-        + work.velocity[state, a, at.ANGLE] * g[state, row].vertex_arm_t
-        - work.velocity[state, b, at.ANGLE] * g[state, row].edge_arm_t
+        + work.velocity[state, a, ANGLE] * g[state, row].vertex_arm_t
+        - work.velocity[state, b, ANGLE] * g[state, row].edge_arm_t
     )
 
 
@@ -140,9 +141,9 @@ def lever(scene, body, axis):
 
 
 def add_force(work, state, body, fx, fy, torque):
-    work.force[state, body, at.X] += fx
-    work.force[state, body, at.Y] += fy
-    work.force[state, body, at.ANGLE] += torque
+    work.force[state, body, X] += fx
+    work.force[state, body, Y] += fy
+    work.force[state, body, ANGLE] += torque
 
 
 def push_pair(work, state, row, normal, tangential):
@@ -179,7 +180,7 @@ def soft_centre_line(scene, work, state, a, b):
 def centre_view(scene, work, time, state, a, b):
     """The PairView of two bodies, their gap being that of the equivalent spheres."""
     nx, ny, distance = soft_centre_line(scene, work, state, a, b)
-    rate = nx * (work.velocity[state, a, at.X] - work.velocity[state, b, at.X])
-    rate += ny * (work.velocity[state, a, at.Y] - work.velocity[state, b, at.Y])
+    rate = nx * (work.velocity[state, a, X] - work.velocity[state, b, X])
+    rate += ny * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
     gap = distance - scene.bodies[a].equivalent_radius - scene.bodies[b].equivalent_radius
     return pair_view(scene, time, a, b, gap, rate, distance)

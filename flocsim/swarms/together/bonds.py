@@ -18,8 +18,6 @@ from typing import Any
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import with_room, work_of
 from flocsim.bonds.certificate import (
     CERTIFICATE,
     NO_BOND,
@@ -40,6 +38,7 @@ from flocsim.forces.settling import free_mobilities, least_mobility, terminal_mo
 from flocsim.geometry.contact.near_pairs import list_polygons
 from flocsim.geometry.contact.points import locate_polygons, turn_body
 from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
+from flocsim.state.work import NEW, NOW, put_motion, with_room, work_of
 from flocsim.swarms.together.clusters import Neighbours, placed_together
 
 KINDS = ("touching", "certificate", "hook", "rest")
@@ -59,10 +58,10 @@ def list_pair(scene, work, pair, gap):
         cut = gap_of(scene, measure_of(scene, max(gap, 0.0)) + RANGE)
     if not list_polygons(scene, work, pair, cut):
         return False
-    turn_body(work, at.NOW, work.pairs[pair].later)
-    turn_body(work, at.NOW, work.pairs[pair].earlier)
+    turn_body(work, NOW, work.pairs[pair].later)
+    turn_body(work, NOW, work.pairs[pair].earlier)
     for row in range(work.tally.candidates):
-        locate_polygons(scene, work, at.NOW, row)
+        locate_polygons(scene, work, NOW, row)
     return True
 
 
@@ -74,7 +73,7 @@ def kind_of(scene, work, time, elapsed, bond, load):
     elif is_certain(scene, work, time, bond, load):
         return CERTIFICATE
     i, j = bond.i, bond.j
-    now, before = doublet_pose(scene, work, at.NOW, i, j), doublet_pose(scene, work, at.NEW, i, j)
+    now, before = doublet_pose(scene, work, NOW, i, j), doublet_pose(scene, work, NEW, i, j)
     moved = way_between(scene, i, j, now, before)
     if not moved < STILL * load.drift * elapsed or swings(scene, work, i, j, load):
         return NO_BOND
@@ -156,8 +155,8 @@ class BondGauge:
         since, earlier = (time, motion) if before is None else before
         while True:
             work = self.work
-            at.put_motion(work, at.NOW, motion)
-            at.put_motion(work, at.NEW, earlier)
+            put_motion(work, NOW, motion)
+            put_motion(work, NEW, earlier)
             known = work.pairs[: len(held.pairs)]
             known["later"], known["earlier"] = held.pairs.T
             work.tally.pairs = len(held.pairs)

@@ -19,8 +19,6 @@ from collections.abc import Callable, Sequence
 import attrs
 import numpy as np
 
-import flocsim.arrays as at
-from flocsim.arrays import Scene, with_room, work_of
 from flocsim.body import Body
 from flocsim.compiler.composer import compiled, compose
 from flocsim.forces.base import Force
@@ -29,6 +27,9 @@ from flocsim.geometry.contact.body_pairs import list_near
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import separation
 from flocsim.hydrodynamics.rigid_bodies import mobilities
+from flocsim.state.bodies import UNSHIELDED
+from flocsim.state.scene import Scene
+from flocsim.state.work import NOW, with_room, work_of
 
 ROUNDING = 1e-6
 """Ways round a cluster that differ by less than this share of its extent differ by rounding: the
@@ -55,7 +56,7 @@ def measure_gaps(scene, work, within):
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
         work.budget[pair] = gap_between(scene, work, a, b)
-        work.along[pair, 0], work.along[pair, 1] = separation(scene, work, at.NOW, a, b)
+        work.along[pair, 0], work.along[pair, 1] = separation(scene, work, NOW, a, b)
     return True
 
 
@@ -87,7 +88,7 @@ class Gauge:
 
     def neighbours(self, position: np.ndarray, within: float = 0.0) -> Neighbours:
         """The pairs nearer than a gap [m] where the bodies are at ``position`` (n, 3)."""
-        self.work.place[at.NOW] = position
+        self.work.place[NOW] = position
         while not self.measure(self.scene, self.work, within):
             self.work = with_room(self.work)
         gaps = self.work.budget[: self.work.tally.pairs]
@@ -345,7 +346,7 @@ class Shielding:
         label, places = placed_together(len(free), near.among(free))
         size = np.bincount(label)
         size[label[near.pairs[~free[near.pairs].all(axis=1)]]] = 1  # on a wall
-        for name, alone in zip(SHIELDING, at.UNSHIELDED, strict=True):
+        for name, alone in zip(SHIELDING, UNSHIELDED, strict=True):
             known[name] = alone
         members = np.flatnonzero((size[label] > 1) & free)
         if not len(members):

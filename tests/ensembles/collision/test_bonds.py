@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import (
     CALM,
@@ -28,6 +27,8 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.io.results.schema import BONDS
+from flocsim.state.bodies import ANGLE
+from flocsim.state.work import NOW
 from tests.helpers.small_study import small_config
 from tests.helpers.two_bodies import ANCHOR, CHANNEL, polygon
 
@@ -59,14 +60,14 @@ class Doublet:
 
     def place(self, *places):
         """Put the bodies somewhere, at rest."""
-        self.work.place[at.NOW], self.work.velocity[at.NOW] = places, 0.0
+        self.work.place[NOW], self.work.velocity[NOW] = places, 0.0
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, at.NOW)
+        locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
 
     def move(self, vx=0.0, vy=0.0, spin=0.0):
         """Let the second body move so against the first."""
-        self.work.velocity[at.NOW, 1] = vx, vy, spin
+        self.work.velocity[NOW, 1] = vx, vy, spin
 
     @property
     def drift(self):
@@ -123,7 +124,7 @@ def test_a_doublet_that_spins_carries_its_centrifugal_load_too(tmp_path):
     mass /= sum(body.mass for body in doublet.encounter.system.bodies)
     # As a rigid body, so fast that it doubles the load.
     spin = math.sqrt(doublet.load / (mass * sum(RADII)))
-    doublet.work.velocity[at.NOW, :, at.ANGLE] = spin
+    doublet.work.velocity[NOW, :, ANGLE] = spin
     doublet.move(vx=spin * sum(RADII), spin=spin)
     assert doublet.bond() == NO_BOND
 
@@ -173,7 +174,7 @@ def climb(doublet):
     outer = sum(shape.equivalent_radius for shape in doublet.shapes)
     radii = [shape.equivalent_radius for shape in doublet.shapes]
     pull = force.hamaker * (radii[0] * radii[1] / outer) / (6.0 * force.d_min**2)
-    distance = math.hypot(*doublet.work.place[at.NOW, 1, :2])
+    distance = math.hypot(*doublet.work.place[NOW, 1, :2])
     return (pull - SAFETY * doublet.load) * (outer - distance)
 
 
@@ -219,7 +220,7 @@ def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
     rest = doublet.observed[outcomes.REST_TIME]
     start_rest(doublet.scene, doublet.work, doublet.observed, 0.0)
-    (still, low), way = doublet.work.place[at.NOW].copy(), doublet.drift * rest
+    (still, low), way = doublet.work.place[NOW].copy(), doublet.drift * rest
     doublet.place(still, low + [1.1 * STILL * way, 0.0, 0.0])
     assert doublet.bond(1.1 * rest) == NO_BOND
     assert doublet.bond(2.0 * rest) == NO_BOND

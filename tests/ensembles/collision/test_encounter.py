@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.draw import draws, orientations
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
+from flocsim.state.bodies import Y
+from flocsim.state.work import NOW, motion_of
 from tests.helpers.rounding import to_rounding
 from tests.helpers.small_study import small_config, small_study
 
@@ -24,7 +25,7 @@ def study(tmp_path_factory):
 
 def test_bodies_start_at_their_terminal_velocities_without_spin(study):
     encounter = study.encounter(0, 16, draws(1, 0))
-    motion = at.motion_of(encounter.start((0.3, 2.0), 0.5), at.NOW)
+    motion = motion_of(encounter.start((0.3, 2.0), 0.5), NOW)
     for body in range(2):
         radius = encounter.shapes[body].equivalent_radius
         mass = 2.0 * math.pi * radius**2
@@ -59,7 +60,7 @@ def test_times_and_gaps_that_are_given(tmp_path):
     observed = encounter.observed()
     assert encounter.time_limit() == 3.0
     assert (observed[outcomes.REST_TIME], observed[outcomes.ESCAPE]) == (0.5, 7e-6)
-    places = encounter.start((0.0, 0.0), 0.0).place[at.NOW, :, at.Y]
+    places = encounter.start((0.0, 0.0), 0.0).place[NOW, :, Y]
     assert places[1] - places[0] == pytest.approx(16.41e-6 + 23.02e-6 + 3e-6, rel=1e-9)
 
 

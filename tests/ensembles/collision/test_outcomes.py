@@ -6,7 +6,6 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import NO_BOND, REST
 from flocsim.ensembles.collision import outcomes
@@ -29,6 +28,8 @@ from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
 from flocsim.io.results.schema import NOT_APPLICABLE, OUTCOMES
+from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.work import NOW
 from tests.helpers.small_study import small_config, small_study
 from tests.helpers.tabulate import tabulate
 from tests.helpers.tiers import rest_slow
@@ -192,7 +193,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     contact = sum(shape.radius for shape in encounter.shapes)
 
     def seen(gap, collided):
-        work.place[at.NOW, 1, :2] = 0.0, -(contact + gap)
+        work.place[NOW, 1, :2] = 0.0, -(contact + gap)
         observed[outcomes.COLLIDED] = collided
         return watch_pair(scene, work, observed, 0.0)
 
@@ -200,7 +201,7 @@ def test_a_pair_apart_and_parting_has_departed(study):
     escape = observed[outcomes.ESCAPE]
     assert (seen(0.99 * escape, 0.0), seen(1.01 * escape, 0.0)) == (0, outcomes.MISSED)
     assert (seen(0.99 * escape, 1.0), seen(1.01 * escape, 1.0)) == (0, DEPARTED)
-    work.velocity[at.NOW, 1, at.Y] = 0.0
+    work.velocity[NOW, 1, Y] = 0.0
     assert seen(1.01 * escape, 1.0) == 0
 
 
@@ -210,19 +211,19 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     encounter = study.encounter(0, 1, draws(1, 0))
     work, observed = encounter.start((0.0, 0.0), 0.0), encounter.observed()
     spin, reach = 300.0, sum(shape.radius for shape in encounter.shapes) - 1e-12
-    work.place[at.NOW] = work.velocity[at.NOW] = 0.0
-    work.velocity[at.NOW, :, at.ANGLE] = spin
-    work.place[at.NOW, 1, at.Y] = -reach
-    work.velocity[at.NOW, 1, at.X] = spin * reach
+    work.place[NOW] = work.velocity[NOW] = 0.0
+    work.velocity[NOW, :, ANGLE] = spin
+    work.place[NOW, 1, Y] = -reach
+    work.velocity[NOW, 1, X] = spin * reach
     scene = encounter.system.scene(jit=False)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     observed[outcomes.LOAD] = 1.0  # more than any attraction
     known, later = (scene, work, observed), 2.0 * observed[outcomes.REST_TIME]
     outcomes.start_rest(scene, work, observed, 0.0)
     assert outcomes.bond_of(*known, later) == NO_BOND
     # Without the swing it does.
-    work.velocity[at.NOW] = 0.0
+    work.velocity[NOW] = 0.0
     assert outcomes.bond_of(*known, later) == REST
 
 
@@ -302,13 +303,13 @@ class Falling:
 
     def seen(self, x, y, vx=0.0, vy=0.0, spin=0.0, collided=True):
         """What the observer says with the body there, at so much more than its settling speed."""
-        place, velocity = self.work.place[at.NOW], self.work.velocity[at.NOW]
+        place, velocity = self.work.place[NOW], self.work.velocity[NOW]
         place[0] = velocity[0] = 0.0
         place[1] = *(np.array([x, y]) + self.origin), 0.0
         velocity[1] = vx, vy - self.fall, spin
         self.work.budget[:] = -1.0
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, at.NOW)
+        locate_contacts(self.scene, self.work, NOW)
         self.observed[outcomes.COLLIDED] = float(collided)
         return watch_pair(self.scene, self.work, self.observed, 0.0)
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.special import erfc, ive, kve
 
-import flocsim.arrays as at
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import CERTIFICATE, NO_BOND, REST
 from flocsim.constants import BOLTZMANN
@@ -29,6 +28,8 @@ from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.climb import BARRIER
+from flocsim.state.bodies import X
+from flocsim.state.work import NOW, motion_of
 from tests.helpers.small_study import small_config
 
 ENERGY = BOLTZMANN * 298.15
@@ -58,15 +59,15 @@ class Pair:
 
     def put(self, x, y, drifting=True):
         """j at (x, y) from i, going along with the drift or standing still."""
-        self.work.place[at.NOW] = (0.0, 0.0, 0.0), (x, y, 0.0)
-        self.work.velocity[at.NOW] = 0.0
+        self.work.place[NOW] = (0.0, 0.0, 0.0), (x, y, 0.0)
+        self.work.velocity[NOW] = 0.0
         if drifting:
             xx, xy, yx, yy = self.encounter.system.fluid.gradient
-            self.work.velocity[at.NOW, 1, :2] = xx * x + xy * y, yx * x + yy * y
+            self.work.velocity[NOW, 1, :2] = xx * x + xy * y, yx * x + yy * y
             if self.encounter.meeting == "settling":
-                self.work.velocity[at.NOW, 1, :2] = self.encounter.drift
+                self.work.velocity[NOW, 1, :2] = self.encounter.drift
         assert list_candidates(self.scene, self.work)
-        locate_contacts(self.scene, self.work, at.NOW)
+        locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
         return self
 
@@ -151,7 +152,7 @@ def test_a_brownian_pair_has_missed_where_the_study_says_so(tmp_path):
 def test_a_brownian_pair_starts_in_any_direction(tmp_path):
     pair = Pair(tmp_path, BROWNIAN)
     for share in (0.0, 0.2, 0.7):
-        start = at.motion_of(pair.encounter.start((1.0, 2.0), share), at.NOW)
+        start = motion_of(pair.encounter.start((1.0, 2.0), share), NOW)
         turn = 2.0 * math.pi * share
         assert start[1, :2] == pytest.approx([6e-6 * math.cos(turn), 6e-6 * math.sin(turn)])
         assert start[:, 2].tolist() == [1.0, 2.0]
@@ -187,7 +188,7 @@ def test_energy_is_taken_off_until_it_is_used_up(tmp_path):
     i, j = pair.encounter.system.bodies
     mass = i.mass * j.mass / (i.mass + j.mass)
     for energies, kind in ((5.0, CERTIFICATE), (15.0, NO_BOND)):
-        pair.work.velocity[at.NOW, 1, at.X] = math.sqrt(2.0 * energies * ENERGY / mass)
+        pair.work.velocity[NOW, 1, X] = math.sqrt(2.0 * energies * ENERGY / mass)
         assert pair.bond() == kind
 
 

@@ -4,10 +4,10 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.forces.body_forces import key_of
 from flocsim.run import Run
+from flocsim.state.work import NOW, motion_of
 from tests.helpers.small_study import small_study
 
 WARM = {
@@ -35,7 +35,7 @@ def end_of(study, replicate, share, until=0.0015):
     run = draw.begin(driver, 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
-    return at.motion_of(run.work, at.NOW)
+    return motion_of(run.work, NOW)
 
 
 def test_a_replicate_has_a_key_of_its_own_at_every_condition(study):
@@ -70,5 +70,5 @@ def test_kicks_move_a_pair_off_its_way(study):
     driver = cold.system.compose(observer=OBSERVER, jit=False)
     run = attrs.evolve(draw, encounter=cold).begin(driver, 10**6, 0.0015)
     run.to_end()
-    moved = np.abs(warm[:, :2] - run.work.place[at.NOW, :, :2]).max()
+    moved = np.abs(warm[:, :2] - run.work.place[NOW, :, :2]).max()
     assert 1e-10 < moved < 2e-6

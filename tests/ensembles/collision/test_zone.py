@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from flocsim.arrays import PairView
 from flocsim.ensembles.collision.start import (
     LARGEST_RATIO,
     attraction_ratio,
@@ -19,6 +18,7 @@ from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.ensembles.study import Study
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
+from flocsim.state.views import PairView
 from tests.helpers.small_study import small_config
 
 PAPER = (1e-18, 15e-3, 0.98e-6, 78.5)

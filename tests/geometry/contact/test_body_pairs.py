@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.forces import CentreForce, Contact
 from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.state.work import ALL_PAIRS, work_of
 from flocsim.system import System
 
 SQUARE = SpheroPolygon([(-1e-5, -1e-5), (1e-5, -1e-5), (1e-5, 1e-5), (-1e-5, 1e-5)], 1e-6)
@@ -31,16 +30,16 @@ def listed(bodies):
 
 
 @pytest.mark.parametrize("shape", [Sphere(1e-5), SQUARE], ids=["spheres", "polygons"])
-@pytest.mark.parametrize("count", [2, 3, at.ALL_PAIRS, at.ALL_PAIRS + 1, 20])
+@pytest.mark.parametrize("count", [2, 3, ALL_PAIRS, ALL_PAIRS + 1, 20])
 @pytest.mark.parametrize("free", [(), (0,), (1,), (0, 1)])
 def test_pairs_with_a_free_body_are_listed_and_no_others(count, free, shape):
     if shape is SQUARE and count > 3 and free == (0, 1):
-        count = min(count, at.ALL_PAIRS + 1)
+        count = min(count, ALL_PAIRS + 1)
     _, work = listed(crossing(count, free, shape))
     pairs = work.pairs[: work.tally.pairs][["later", "earlier"]].tolist()
     near = [
         (a, b) for a in range(count) for b in range(a)
-        if (a in free or b in free) and (count <= at.ALL_PAIRS or 2e-6 * (a - b) < 2e-5)
+        if (a in free or b in free) and (count <= ALL_PAIRS or 2e-6 * (a - b) < 2e-5)
     ]  # fmt: skip
     assert [pair for pair in near if pair not in pairs] == []
     assert all(a in free or b in free for a, b in pairs)
@@ -57,7 +56,7 @@ class Push(CentreForce):
         return 1e-12
 
 
-@pytest.mark.parametrize("count", [2, at.ALL_PAIRS, at.ALL_PAIRS + 3])
+@pytest.mark.parametrize("count", [2, ALL_PAIRS, ALL_PAIRS + 3])
 def test_centre_forces_do_not_act_between_fixed_bodies(count):
     """The force on each free body is the sum over the others; a fixed one feels free ones alone."""
     bodies = [

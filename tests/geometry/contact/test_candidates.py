@@ -7,14 +7,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-import flocsim.arrays as at
-from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import (
     list_candidates,
     spent,
 )
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.state.work import NOW, work_of
 from tests.helpers.fast_scene import bodies_of, keys_of
 from tests.reference import scenes
 from tests.reference.contacts import all_pairs, measure
@@ -34,19 +33,19 @@ def arrays(plain, reach=-1.0, capacity=4096):
 def spend_budget(scene, work, wanted):
     """Move the bodies as wanted (n, 3), scaled so that one pair spends just all of its budget."""
     steps = np.array(wanted)[: 3 * len(scene.bodies)].reshape(-1, 3) * (1e-5, 1e-5, 1.0)
-    start = work.place[at.NOW].copy()
+    start = work.place[NOW].copy()
     within, beyond = 0.0, 2.0
     # What a motion spends is not in proportion to it where bodies turn far: bisect.
     for _ in range(40):
         share = 0.5 * (within + beyond)
-        work.place[at.NOW] = start + share * steps
-        within, beyond = (share, beyond) if spent(scene, work, at.NOW) <= 1.0 else (within, share)
-    work.place[at.NOW] = start + within * steps
+        work.place[NOW] = start + share * steps
+        within, beyond = (share, beyond) if spent(scene, work, NOW) <= 1.0 else (within, share)
+    work.place[NOW] = start + within * steps
 
 
 def pairs_now(plain, work):
     """Every pair of the scene, near or far, where the bodies are now."""
-    places = work.place[at.NOW].copy()
+    places = work.place[NOW].copy()
     return measure(Scene(plain.bodies, places, plain.velocities), all_pairs(plain.bodies))
 
 
@@ -105,9 +104,9 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     plain = Scene((bar, stub), np.array([[0, 0, 0], [0, 51.5e-6, np.pi / 2]]), np.zeros((2, 3)))
     scene, work = arrays(plain)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
-    assert work.geometry[at.NOW, : work.tally.candidates, 2].min() < 0.0
+    assert work.geometry[NOW, : work.tally.candidates, 2].min() < 0.0
 
 
 REACHES = [1e-8, 4e-7, 2e-5]
@@ -120,10 +119,10 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
     scene, work = arrays(plain, reach)
     middle = plain.positions[:, :2].mean(axis=0)
     away = plain.positions[:, :2] - middle
-    work.place[at.NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
+    work.place[NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
     assert list_candidates(scene, work)
     spend_budget(scene, work, wanted)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     every, listed = pairs_now(plain, work), keys_of(scene, work)
     for two in {frozenset(pair) for pair in every.pair[:, ::2].tolist()}:
         least = min(
@@ -132,9 +131,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
             if {pair[0], pair[2]} == two
         )
         known = [
-            work.geometry[at.NOW, row, 2]
-            for row, key in enumerate(listed)
-            if {key[0], key[2]} == two
+            work.geometry[NOW, row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two
         ]
         if least < reach:
             assert min(known, default=np.inf) == pytest.approx(least, rel=1e-9, abs=1e-17)

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact import compounds
@@ -20,6 +19,7 @@ from flocsim.geometry.contact.near_pairs import (
 )
 from flocsim.geometry.contact.points import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
+from flocsim.state.work import work_of
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, framed
 
 list_compounds = compose(list_polygons, compounds.FILLINGS, jit=False)

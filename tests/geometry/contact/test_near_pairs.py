@@ -8,7 +8,6 @@ import pytest
 from hypothesis import strategies as st
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.near_pairs import (
@@ -16,6 +15,7 @@ from flocsim.geometry.contact.near_pairs import (
     list_polygons,
 )
 from flocsim.geometry.shapes.cores import edges_of, from_edges
+from flocsim.state.work import work_of
 from tests.helpers.tiers import given_often
 
 COUNTS = (1, 2, 3, 4, 5, 7, 16, 33, 64, 512)

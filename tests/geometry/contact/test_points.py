@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
+from flocsim.state.work import NOW, work_of
 
 
 def arrays(*bodies):
@@ -27,7 +26,7 @@ def sphere(radius, x, y):
 def test_a_vertex_right_on_an_edge_gets_a_unit_normal_and_no_nan():
     square = SpheroPolygon(np.array([[-2, -2], [2, -2], [2, 2], [-2, 2]]) * 1e-6, 1e-6)
     scene, work = arrays(Body(square, surface_density=2.0), sphere(1e-6, 2e-6, 0.0))
-    assert locate_contacts(scene, work, at.NOW) == pytest.approx(-2e-6)
-    listed = work.geometry[at.NOW, : work.tally.candidates]
+    assert locate_contacts(scene, work, NOW) == pytest.approx(-2e-6)
+    listed = work.geometry[NOW, : work.tally.candidates]
     assert np.isfinite(listed).all()
     assert np.hypot(listed[:, 0], listed[:, 1]) == pytest.approx(np.ones(len(listed)))

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim.geometry.contact.points import cosine_and_sine
+from flocsim.state.bodies import Pose
 
 
 def new_work():
-    return SimpleNamespace(poses=at.Pose.rows(2))
+    return SimpleNamespace(poses=Pose.rows(2))
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 0.1, 4.0, 1e3, 1e5, 1e7, 1e300])

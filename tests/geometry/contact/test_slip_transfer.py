@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.forces import rate_slips
+from flocsim.state.bodies import X, Y
+from flocsim.state.work import NOW, work_of
 
 OVERLAP, RADIUS, BALL = 5e-8, 1e-6, 2e-6
 
@@ -30,7 +30,7 @@ def resting_on(slab_body, body, x, height, speed):
     velocity = np.array([[0.0, 0.0, 0.0], [speed, 0.0, 0.0]])
     work = work_of(scene, position, velocity)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     return scene, work
 
 
@@ -39,25 +39,25 @@ def pull(work):
     total = 0.0
     for row in range(work.tally.candidates):
         side = 1.0 if work.candidates[row].vertex_body == 1 else -1.0
-        total -= side * work.slip[at.NOW, row] * -work.geometry[at.NOW, row].normal_y
+        total -= side * work.slip[NOW, row] * -work.geometry[NOW, row].normal_y
     return total
 
 
 def slide(scene, work, length, passing_on=hand_over, steps=400):
     """Carry body 1 along x, its contacts with it; the pull after every step."""
-    step = length / steps / work.velocity[at.NOW, 1, at.X]
+    step = length / steps / work.velocity[NOW, 1, X]
     pulls = []
     for _ in range(steps):
         set_modes(scene, work)
-        rate_slips(work, at.NOW)
+        rate_slips(work, NOW)
         closed = work.candidates["closed"] == 1
-        work.slip[at.NOW, closed] += step * work.slip_rate[at.NOW, closed]
-        work.place[at.NOW, 1, at.X] += length / steps
-        locate_contacts(scene, work, at.NOW)
+        work.slip[NOW, closed] += step * work.slip_rate[NOW, closed]
+        work.place[NOW, 1, X] += length / steps
+        locate_contacts(scene, work, NOW)
         passing_on(scene, work)
-        if spent(scene, work, at.NOW) > 0.5:
+        if spent(scene, work, NOW) > 0.5:
             assert list_candidates(scene, work)
-            locate_contacts(scene, work, at.NOW)
+            locate_contacts(scene, work, NOW)
         pulls.append(pull(work))
     return np.array(pulls)
 
@@ -84,8 +84,8 @@ def test_the_pull_of_a_sliding_contact_does_not_jump_where_edges_meet():
 
 def forget(scene, work):
     """What no hand-over would do: an opening pair loses its displacement."""
-    opened = work.geometry[at.NOW, : work.tally.candidates]["gap"] >= 0.0
-    work.slip[at.NOW, : work.tally.candidates][opened] = 0.0
+    opened = work.geometry[NOW, : work.tally.candidates]["gap"] >= 0.0
+    work.slip[NOW, : work.tally.candidates][opened] = 0.0
 
 
 def test_on_one_undivided_edge_the_pull_is_the_distance():
@@ -97,12 +97,12 @@ def test_the_displacement_vanishes_with_the_last_pair():
     scene, work = ball_on([-10e-6, 12e-6])
     slide(scene, work, 1e-6)
     assert pull(work) != 0.0
-    work.place[at.NOW, 1, at.Y] += 2.0 * OVERLAP
-    locate_contacts(scene, work, at.NOW)
+    work.place[NOW, 1, Y] += 2.0 * OVERLAP
+    locate_contacts(scene, work, NOW)
     hand_over(scene, work)
-    assert not work.slip[at.NOW].any()
-    work.place[at.NOW, 1, at.Y] -= 2.0 * OVERLAP
-    locate_contacts(scene, work, at.NOW)
+    assert not work.slip[NOW].any()
+    work.place[NOW, 1, Y] -= 2.0 * OVERLAP
+    locate_contacts(scene, work, NOW)
     assert pull(work) == 0.0
 
 
@@ -119,14 +119,14 @@ def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     rng = np.random.default_rng(seed)
     scene, work = square_on_slab(0.02 * rng.normal())
     rows = work.tally.candidates
-    work.slip[at.NOW, :rows] = 1e-9 * rng.normal(size=rows)
-    work.place[at.NOW, 1] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
-    locate_contacts(scene, work, at.NOW)
-    energy = np.sum(work.slip[at.NOW] ** 2)
+    work.slip[NOW, :rows] = 1e-9 * rng.normal(size=rows)
+    work.place[NOW, 1] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
+    locate_contacts(scene, work, NOW)
+    energy = np.sum(work.slip[NOW] ** 2)
     hand_over(scene, work)
-    assert np.sum(work.slip[at.NOW] ** 2) <= energy * (1.0 + 1e-12)
-    opened = work.geometry[at.NOW, :rows]["gap"] >= 0.0
-    assert not work.slip[at.NOW, :rows][opened].any()
+    assert np.sum(work.slip[NOW] ** 2) <= energy * (1.0 + 1e-12)
+    opened = work.geometry[NOW, :rows]["gap"] >= 0.0
+    assert not work.slip[NOW, :rows][opened].any()
 
 
 def test_listing_anew_keeps_every_displacement():
@@ -135,5 +135,5 @@ def test_listing_anew_keeps_every_displacement():
     before = pull(work)
     for _ in range(3):
         assert list_candidates(scene, work)
-        locate_contacts(scene, work, at.NOW)
+        locate_contacts(scene, work, NOW)
         assert pull(work) == before

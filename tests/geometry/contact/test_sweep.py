@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.arrays import BodyPair
 from flocsim.geometry.contact.body_pairs import (
     DISC_COLUMNS,
     MOVES,
@@ -17,6 +16,7 @@ from flocsim.geometry.contact.body_pairs import (
     come_near,
     near_pairs,
 )
+from flocsim.state.contacts import BodyPair
 
 BOXES = [(math.inf, math.inf), (10.0, math.inf), (math.inf, 8.0), (10.0, 8.0)]
 

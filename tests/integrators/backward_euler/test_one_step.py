@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere
 from flocsim.forces import Contact, Gravity, StokesDrag
 from flocsim.integrators.rhs.error import FREE_SHARE
+from flocsim.state.work import NOW
 from flocsim.swarms.placement import floor
 from tests.helpers.one_step import Stage, from_anywhere, from_before
 from tests.helpers.swarm_scenes import WATER, R, forces
@@ -175,8 +175,8 @@ def energy_of(stage, bodies, contact):
     free = np.array([not body.fixed for body in bodies])
     work = stage.work
     rows = np.arange(work.tally.candidates)
-    overlap = np.maximum(-work.geometry[at.NOW, rows]["gap"], 0.0)
-    slip = np.where(overlap > 0.0, work.slip[at.NOW, rows], 0.0)
+    overlap = np.maximum(-work.geometry[NOW, rows]["gap"], 0.0)
+    slip = np.where(overlap > 0.0, work.slip[NOW, rows], 0.0)
     shear = 0.0 if contact.frictionless else contact.k_t
     springs = contact.k_n * np.sum(overlap**2) + shear * np.sum(slip**2)
     return 0.5 * (np.sum(mass[free] * stage.velocity[free] ** 2) + springs)

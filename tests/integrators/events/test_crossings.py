@@ -7,14 +7,13 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere
-from flocsim.arrays import work_of
 from flocsim.body import scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate
 from flocsim.integrators.events.first_event import set_modes
+from flocsim.state.work import NEW, NOW, TRIAL, work_of
 from tests.helpers.fast_scene import bodies_of
 from tests.helpers.methods import by_adaptive
 from tests.helpers.tiers import rest_slow
@@ -32,10 +31,10 @@ def stepped(bodies, change, velocities):
     start = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, start, velocities[0], capacity=4096)
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     set_modes(scene, work)
-    work.place[at.NEW], work.velocity[at.NEW] = start + change, velocities[1]
-    locate_contacts(scene, work, at.NEW)
+    work.place[NEW], work.velocity[NEW] = start + change, velocities[1]
+    locate_contacts(scene, work, NEW)
     return scene, work
 
 
@@ -68,13 +67,13 @@ def wandering(seed):
 def worst_margin(scene, work, shares):
     """The least of all that must not become negative, at every share [m]."""
     rows = work.tally.candidates
-    closed = work.geometry[at.NOW, :rows]["gap"] < 0.0
+    closed = work.geometry[NOW, :rows]["gap"] < 0.0
     worst = []
     for share in shares:
         for body in range(len(scene.bodies)):
             interpolate(work, 1.0, share, body)
-        locate_contacts(scene, work, at.TRIAL)
-        gaps = work.geometry[at.TRIAL, :rows]["gap"]
+        locate_contacts(scene, work, TRIAL)
+        gaps = work.geometry[TRIAL, :rows]["gap"]
         worst.append(np.where(closed, -gaps, gaps).min(initial=math.inf))
     return np.array(worst)
 

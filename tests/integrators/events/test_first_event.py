@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.forces import Contact
 from flocsim.integrators import Implicit
+from flocsim.state.bodies import ANGLE, Y
 
 RADIUS = 5e-6
 
@@ -23,6 +23,6 @@ def test_a_sliding_sphere_that_is_thrown_off_keeps_the_same_motion_at_any_tolera
     ]
     assert all(end.status.name == "FINISHED" for end in ends)
     apart = np.abs(ends[0].position[-1, 1] - ends[1].position[-1, 1])
-    assert ends[1].position[-1, 1, at.Y] > 2.0 * RADIUS
+    assert ends[1].position[-1, 1, Y] > 2.0 * RADIUS
     assert apart[:2].max() < 1e-9
-    assert ends[1].velocity[-1, 1, at.ANGLE] != 0.0
+    assert ends[1].velocity[-1, 1, ANGLE] != 0.0

@@ -4,11 +4,12 @@ import math
 
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.events.crossings import overtakes
+from flocsim.state.contacts import TOUCHES
+from flocsim.state.work import NEW, NOW
 from tests.helpers.fast_scene import flagged
 
 OVERLAP = 0.9e-9
@@ -49,12 +50,12 @@ def between(gaps, step, closed=True):
     """Whether a corner overtakes the other one in a step of so many seconds, which takes the gaps
     of both [m] from the first to the second ones."""
     scene, work = flagged(tilted(0.0, 0.0))
-    touching = [row for row in range(work.tally.candidates) if work.geometry[at.NOW, row].gap < 0.0]
-    work.geometry[at.NOW, :]["gap"] = work.geometry[at.NEW, :]["gap"] = 1e-6
-    for state, values in zip((at.NOW, at.NEW), gaps, strict=True):
+    touching = [row for row in range(work.tally.candidates) if work.geometry[NOW, row].gap < 0.0]
+    work.geometry[NOW, :]["gap"] = work.geometry[NEW, :]["gap"] = 1e-6
+    for state, values in zip((NOW, NEW), gaps, strict=True):
         for row, value in zip((touching[0], touching[-1]), values, strict=True):
             work.geometry[state, row].gap = value
-    assert len(touching) > 1 and (work.candidates[touching]["closed"] == at.TOUCHES).all()
+    assert len(touching) > 1 and (work.candidates[touching]["closed"] == TOUCHES).all()
     clock = Implicit(1e-9).fresh_clock()
     clock.across = 0.0 if closed else 1.0
     return overtakes(scene, work, clock, step)

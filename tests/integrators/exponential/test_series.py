@@ -6,9 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.forces import BodyForce, StokesDrag
 from flocsim.geometry.contact.candidates import list_candidates
@@ -18,6 +16,8 @@ from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.loop.driver import take_new_state
 from flocsim.integrators.rhs.stated_error import carry_vector
+from flocsim.state.bodies import ANGLE, X
+from flocsim.state.work import CARRIED, DAMPING, DEVIATION, NEW, NOW, motion_of, work_of
 from tests.helpers.trial_scenes import Trap
 
 R = 5e-6
@@ -37,7 +37,7 @@ class Linked:
         self.clock = system.integrator.fresh_clock()
         self.clock.until = 1.0
         self.call(list_candidates)
-        self.call(locate_contacts, at.NOW)
+        self.call(locate_contacts, NOW)
         self.call(set_modes)
 
     def linked(self, function):
@@ -78,20 +78,20 @@ def test_a_linear_swing_is_exact_however_far_it_goes(turns):
     scene = Linked(trapped())
     assert scene.step(turns / RATE) < 1e-3
     assert scene.terms > 0
-    found = at.motion_of(scene.work, at.NEW)[0]
+    found = motion_of(scene.work, NEW)[0]
     place, speed = swung(turns / RATE)
-    assert found[at.X] == pytest.approx(place, abs=1e-14)
+    assert found[X] == pytest.approx(place, abs=1e-14)
     assert found[3] == pytest.approx(speed, abs=1e-14 * RATE)
 
 
 def test_so_is_one_that_drag_slows_down():
     scene = Linked(trapped(drag=True))
     scene.step(3.0 / RATE)
-    damping = scene.work.jacobian[at.DAMPING, 0, 0, 0]
+    damping = scene.work.jacobian[DAMPING, 0, 0, 0]
     assert damping > 0.01 * MASS * RATE
     place, speed = swung(3.0 / RATE, damping)
-    assert scene.work.place[at.NEW, 0, at.X] == pytest.approx(place, abs=1e-14)
-    assert scene.work.velocity[at.NEW, 0, at.X] == pytest.approx(speed, abs=1e-14 * RATE)
+    assert scene.work.place[NEW, 0, X] == pytest.approx(place, abs=1e-14)
+    assert scene.work.velocity[NEW, 0, X] == pytest.approx(speed, abs=1e-14 * RATE)
 
 
 def test_what_does_not_move_stays_just_where_it_is():
@@ -102,8 +102,8 @@ def test_what_does_not_move_stays_just_where_it_is():
     scene = Linked(System(bodies, [Trap(STIFFNESS)], Implicit()))
     scene.step(1.0 / RATE)
     assert scene.terms > 0
-    assert scene.work.velocity[at.NEW, 0, at.ANGLE] == 50.0
-    assert np.array_equal(at.motion_of(scene.work, at.NEW)[1], at.motion_of(scene.work, at.NOW)[1])
+    assert scene.work.velocity[NEW, 0, ANGLE] == 50.0
+    assert np.array_equal(motion_of(scene.work, NEW)[1], motion_of(scene.work, NOW)[1])
 
 
 @attrs.frozen
@@ -131,22 +131,22 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     scene, clock = Linked(system), Implicit().fresh_clock()
     scene.clock, work, nudge = clock, scene.work, 1e-13
     scene.clock.until = 1.0
-    work.place[at.CARRIED, 0, at.X], work.errors[0].place = nudge, 10.0 * nudge
+    work.place[CARRIED, 0, X], work.errors[0].place = nudge, 10.0 * nudge
     time, end = 0.0, 0.99875e-3
     while time < end:
-        x, speed = work.place[at.NOW, 0, at.X], work.velocity[at.NOW, 0, at.X]
+        x, speed = work.place[NOW, 0, X], work.velocity[NOW, 0, X]
         step = min(0.15 * x / max(-speed, 1e-2), end - time)
         assert scene.step(step) >= 0.0
         assert scene.terms > 0
         scene.linked(take_new_state)(work)
         scene.clock.time = time = time + step
-        work.place[at.DEVIATION] = work.velocity[at.DEVIATION] = 0.0
+        work.place[DEVIATION] = work.velocity[DEVIATION] = 0.0
         sums = work.errors[0]
         sums.place += step * sums.speed
         scene.call(carry_vector, scene.clock, step)
     place = pulled(1e-5, time)
     true = pulled(1e-5 + nudge, time) - place
-    assert work.place[at.NOW, 0, at.X] == pytest.approx(place, rel=1e-3)
+    assert work.place[NOW, 0, X] == pytest.approx(place, rel=1e-3)
     assert true > 30.0 * nudge
-    assert work.place[at.CARRIED, 0, at.X] == pytest.approx(true, rel=0.2)
+    assert work.place[CARRIED, 0, X] == pytest.approx(true, rel=0.2)
     assert work.errors[0].place > 5.0 * true

@@ -6,10 +6,11 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import DormandPrince54, Implicit, Status, VelocityVerlet
+from flocsim.state.bodies import X
+from flocsim.state.work import NOW
 from tests.helpers.methods import by_adaptive, by_method, is_adaptive
 from tests.helpers.tiers import rest_slow
 from tests.helpers.trial_scenes import (
@@ -144,7 +145,7 @@ def test_pairs_that_switch_within_rounding_of_the_time_switch_together(integrato
     run.clock.time = 1.0
     assert run.to_end() is Status.FINISHED
     assert run.steps + run.rejected < 1000
-    assert run.work.velocity[at.NOW, 1:, at.X] == pytest.approx([-speed, speed], rel=1e-3)
+    assert run.work.velocity[NOW, 1:, X] == pytest.approx([-speed, speed], rel=1e-3)
 
 
 def test_every_status_says_what_happened_in_one_line():

@@ -8,7 +8,6 @@ from scipy.integrate import quad
 from scipy.special import k0, k1
 
 from flocsim import Body, Sphere, System
-from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.constants import VACUUM_PERMITTIVITY
 from flocsim.errors import RangeError, ShapeError, UsageError
@@ -16,6 +15,7 @@ from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import samples_of
 from flocsim.geometry.contact.charges import layer_energy
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.state.work import work_of
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import (
     SIZE,

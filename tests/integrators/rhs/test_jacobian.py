@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body
 from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
+from flocsim.state.work import DAMPING, FIRST_STAGE, NOW, STIFFNESS, motion_of, put_motion
 from tests.helpers.fast_scene import FORCES, GAPS, FastScene, random_case
 from tests.helpers.matrices import whole_matrix
 from tests.helpers.tiers import rest_slow
@@ -33,8 +33,8 @@ ALL = {gap: tuple(name for name in FORCES if not name.endswith(gap)) for gap in 
 
 def forces_in_first(scene, work):
     """Forces in state FIRST_STAGE by the flags that are there."""
-    locate_and_rate(scene, work, at.FIRST_STAGE)
-    sum_forces(scene, work, 0.0, at.FIRST_STAGE)
+    locate_and_rate(scene, work, FIRST_STAGE)
+    sum_forces(scene, work, 0.0, FIRST_STAGE)
 
 
 def derivatives_now(scene, work):
@@ -51,7 +51,7 @@ class Differences:
         self.fast.loads(slips)
         self.scene, self.work = self.fast.scene, self.fast.work
         if not moving:
-            self.work.velocity[at.NOW] = 0.0
+            self.work.velocity[NOW] = 0.0
         self.evaluate = system.compose(entry=forces_in_first, jit=False)
         self.assemble = system.compose(entry=derivatives_now, jit=False)
 
@@ -63,24 +63,24 @@ class Differences:
     def carried(self, body, axis):
         """Change of every pair's displacement for a unit of a coordinate."""
         work = self.work
-        kept = work.velocity[at.NOW].copy()
-        work.velocity[at.NOW] = 0.0
-        work.velocity[at.NOW, body, axis] = 1.0
+        kept = work.velocity[NOW].copy()
+        work.velocity[NOW] = 0.0
+        work.velocity[NOW, body, axis] = 1.0
         rows = range(work.tally.candidates)
-        rates = [tangential_rate(work, at.NOW, row) * work.candidates[row].closed for row in rows]
-        work.velocity[at.NOW] = kept
+        rates = [tangential_rate(work, NOW, row) * work.candidates[row].closed for row in rows]
+        work.velocity[NOW] = kept
         return np.array(rates)
 
     def loads(self, body, axis, by):
         """All forces (3n,) with one coordinate (axis 0–2) or velocity (3–5) changed."""
         work = self.work
-        at.put_motion(work, at.FIRST_STAGE, at.motion_of(work, at.NOW))
-        (work.place, work.velocity)[axis // 3][at.FIRST_STAGE, body, axis % 3] += by
-        work.slip[at.FIRST_STAGE] = work.slip[at.NOW]
+        put_motion(work, FIRST_STAGE, motion_of(work, NOW))
+        (work.place, work.velocity)[axis // 3][FIRST_STAGE, body, axis % 3] += by
+        work.slip[FIRST_STAGE] = work.slip[NOW]
         if axis < 3:
-            work.slip[at.FIRST_STAGE, : work.tally.candidates] += by * self.carried(body, axis)
+            work.slip[FIRST_STAGE, : work.tally.candidates] += by * self.carried(body, axis)
         self.evaluate(self.scene, work)
-        return work.force[at.FIRST_STAGE].ravel().copy()
+        return work.force[FIRST_STAGE].ravel().copy()
 
     def measured(self, part, size):
         """Minus the derivatives by places (part 0) or velocities (part 3), per metre of outline."""
@@ -102,7 +102,7 @@ class Differences:
 
     def miss(self, which, size):
         """The largest difference, as a share of the largest entry."""
-        found = self.measured(3 if which == at.DAMPING else 0, size)
+        found = self.measured(3 if which == DAMPING else 0, size)
         scale = np.abs(found).max()
         return np.abs(self.assembled(which) - found).max() / scale if scale > 0.0 else 0.0
 
@@ -121,13 +121,13 @@ ARMS = 2e-3
 @pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("gap", GAPS)
 def test_stiffness_of_all_forces_together(seed, gap):
-    assert differences(seed, ALL[gap], False).miss(at.STIFFNESS, 1e-12) < ARMS
+    assert differences(seed, ALL[gap], False).miss(STIFFNESS, 1e-12) < ARMS
 
 
 @pytest.mark.parametrize("seed", rest_slow(SCENES, lambda seed: seed < 8))
 @pytest.mark.parametrize("gap", GAPS)
 def test_damping_of_all_forces_together(seed, gap):
-    assert differences(seed, ALL[gap], True).miss(at.DAMPING, 1e-6) < 1e-5
+    assert differences(seed, ALL[gap], True).miss(DAMPING, 1e-6) < 1e-5
 
 
 def own_scene():
@@ -139,7 +139,7 @@ def own_scene():
 
 
 @pytest.mark.parametrize(
-    ("which", "moving", "size"), [(at.STIFFNESS, False, 1e-12), (at.DAMPING, True, 1e-6)]
+    ("which", "moving", "size"), [(STIFFNESS, False, 1e-12), (DAMPING, True, 1e-6)]
 )
 def test_forces_of_a_user_are_differenced(which, moving, size):
     assert Differences(own_scene(), moving=moving).miss(which, size) < 2e-3

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon, System
-from flocsim.arrays import work_of
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import OrientedForce, StokesDrag
 from flocsim.integrators import DormandPrince54
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.state.work import work_of
 from flocsim.swarms.swarm import Swarm
 
 MOMENT = 2e-33

@@ -6,9 +6,7 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Fluid, Sphere, SpheroPolygon, System
-from flocsim.arrays import work_of
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import quantity
@@ -19,6 +17,7 @@ from flocsim.geometry.shapes.pieces import outline_pieces
 from flocsim.integrators.rhs.forces import add_outline_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.state.work import NOW, STIFFNESS, work_of
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.matrices import whole_matrix
 from tests.helpers.tiers import rest_slow
@@ -218,7 +217,7 @@ def test_a_swarm_refuses_them():
 
 
 def derivatives(scene, work):
-    add_outline_forces(scene, work, 0.0, at.NOW)
+    add_outline_forces(scene, work, 0.0, NOW)
     assemble_jacobian(scene, work, 0.0, 1.0)
 
 
@@ -228,7 +227,7 @@ def test_the_jacobian_has_their_derivatives():
     pair = Pair(other, one, pose, VanDerWaals(HAMAKER, law="outline"))
     compose_ = pair.system.compose(entry=derivatives)
     compose_(pair.scene, pair.work)
-    stiffness = whole_matrix(pair.work, at.STIFFNESS)
+    stiffness = whole_matrix(pair.work, STIFFNESS)
     found, step = np.zeros((6, 6)), 1e-11
 
     def all_loads(moved):

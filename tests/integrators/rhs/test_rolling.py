@@ -5,15 +5,14 @@ import math
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, SpheroPolygon
-from flocsim.arrays import work_of
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import list_candidates
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.rhs.friction import rolled, rolled_besides
+from flocsim.state.work import FIRST_STAGE, NOW, work_of
 
-LATER = at.FIRST_STAGE
+LATER = FIRST_STAGE
 """The state that places are compared in."""
 
 SQUARE = SpheroPolygon(2e-6 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]]), 5e-7)
@@ -26,7 +25,7 @@ def placed(shapes, places):
     scene = scene_of(bodies, Fluid(), [])
     work = work_of(scene, np.array(places, dtype=float), np.zeros((2, 3)))
     assert list_candidates(scene, work)
-    locate_contacts(scene, work, at.NOW)
+    locate_contacts(scene, work, NOW)
     return scene, work
 
 
@@ -54,7 +53,7 @@ def test_a_doublet_that_turns_as_one_has_no_displacement(shapes, angle):
 def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.4e-6, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [7e-7, 3.4e-6, 0.0]]))
-    closed = work.geometry[at.NOW, : len(found)]["gap"] < 0.0
+    closed = work.geometry[NOW, : len(found)]["gap"] < 0.0
     assert closed.sum() == 1
     assert abs(found[closed][0]) == pytest.approx(7e-7, rel=1e-12)
 
@@ -62,5 +61,5 @@ def test_a_vertex_that_slides_along_an_edge_has_gone_as_far_as_it_slid():
 def test_a_ball_that_rolls_on_an_edge_without_slipping_has_none():
     scene, work = placed((SQUARE, Sphere(1e-6)), [[0.0, 0.0, 0.0], [0.0, 3.5e-6 - 1e-12, 0.0]])
     found = gone(scene, work, np.array([[0.0, 0.0, 0.0], [5e-7, 3.5e-6 - 1e-12, -0.5]]))
-    closed = work.geometry[at.NOW, : len(found)]["gap"] < 0.0
+    closed = work.geometry[NOW, : len(found)]["gap"] < 0.0
     assert abs(found[closed][0]) < 1e-12

@@ -4,9 +4,7 @@ import attrs
 import numpy as np
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, Sphere, System
-from flocsim.arrays import work_of
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
@@ -15,6 +13,8 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
+from flocsim.state.bodies import Y
+from flocsim.state.work import CARRIED, DAMPING, work_of
 from tests.helpers.tiers import rest_slow
 
 RATE = 2e3
@@ -55,11 +55,11 @@ def carried(forces, place, speed, until, steps):
     scene, work = at_start(forces)
     # No sum stands in the way.
     work.errors[0].place = work.errors[0].speed = 1.0
-    work.place[at.CARRIED, 0, 0], work.velocity[at.CARRIED, 0, 0] = place, speed
+    work.place[CARRIED, 0, 0], work.velocity[CARRIED, 0, 0] = place, speed
     clock = stepped(scene, work, until / steps)
     for _ in range(steps):
         carry_error(scene, work, clock, until / steps)
-    return np.array([work.place[at.CARRIED, 0, 0], work.velocity[at.CARRIED, 0, 0]])
+    return np.array([work.place[CARRIED, 0, 0], work.velocity[CARRIED, 0, 0]])
 
 
 @pytest.mark.parametrize(("steps", "precision"), [(5, 0.1), (50, 2e-3)])
@@ -74,7 +74,7 @@ def test_an_error_goes_on_as_the_motion_does(steps, precision):
 
 def test_drag_uses_up_an_error_of_velocity():
     scene, work = at_start([StokesDrag()])
-    tau = scene.bodies[0].mass / work.jacobian[at.DAMPING, 0, 0, 0]
+    tau = scene.bodies[0].mass / work.jacobian[DAMPING, 0, 0, 0]
     place, speed = carried([StokesDrag()], 0.0, 1e-6, 30.0 * tau, 300)
     assert place == pytest.approx(1e-6 * tau, rel=1e-3)
     assert abs(speed) < 1e-12
@@ -138,5 +138,5 @@ def test_what_a_contact_takes_up_is_no_longer_stated():
     sums = system.integrator.estimate_share * errors["place"]
     sums += stated_error.OF_SWITCHES * errors["switch_place"]
     true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
-    assert abs(run.work.place[at.CARRIED, 1, at.Y]) < 0.05 * sums.max()
+    assert abs(run.work.place[CARRIED, 1, Y]) < 0.05 * sums.max()
     assert true <= run.error <= sums.max()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-import flocsim.arrays as at
 from benchmarks.speed.swarms import lone_pair
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.constants import LARGEST_BIAS
@@ -18,6 +17,7 @@ from flocsim.integrators.rhs.surface_gap import (
     soften,
 )
 from flocsim.integrators.rhs.views import pair_view
+from flocsim.state.work import NOW
 from tests.helpers.fast_scene import FastScene
 from tests.helpers.trial_scenes import hook, star
 
@@ -46,7 +46,7 @@ class Pair:
         self.scene, self.work = self.fast.scene, self.fast.work
 
     def place(self, x, y, angle):
-        self.work.place[at.NOW, 1] = x, y, angle
+        self.work.place[NOW, 1] = x, y, angle
 
     def loads(self, x, y, angle):
         """Forces and torques (2, 3) with the second body there."""
@@ -69,14 +69,14 @@ class Pair:
         """(g̃, gaps of all pairs that have a share) where the forces were last asked for."""
         end = int(self.work.tally.candidates)
         near = self.work.candidates[:end]["near"] == 1
-        return soften(self.scene, self.work, at.NOW, 0, end)[0], self.work.geometry[at.NOW, :end][
-            "gap"
-        ][near]
+        return soften(self.scene, self.work, NOW, 0, end)[0], self.work.geometry[NOW, :end]["gap"][
+            near
+        ]
 
     def closest(self):
         """Vertex and edge that have the largest share in g̃."""
         end = int(self.work.tally.candidates)
-        row = np.argmax(self.work.geometry[at.NOW, :end]["share"])
+        row = np.argmax(self.work.geometry[NOW, :end]["share"])
         return self.work.candidates[row].tolist()[:4]
 
     def strength(self, gap):

@@ -4,12 +4,12 @@ import math
 
 import pytest
 
-import flocsim.arrays as at
 from flocsim import Body, System
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.forces import VanDerWaals
 from flocsim.integrators.rhs import views
 from flocsim.io.results.schema import OUTCOMES
+from flocsim.state.work import NOW
 from tests.helpers.fast_scene import FastScene
 from tests.helpers.small_study import small_study
 from tests.helpers.trial_scenes import hook, star
@@ -29,7 +29,7 @@ def softening(scene):
 
 def attraction(fast, x, y):
     """Force (2,) on the second body with its centroid there."""
-    fast.work.place[at.NOW, 1, :2] = x, y
+    fast.work.place[NOW, 1, :2] = x, y
     return fast.loads()[1, :2]
 
 
