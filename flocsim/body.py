@@ -33,7 +33,7 @@ from flocsim.geometry.shapes.pieces import pieces_of_bodies
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import LAWS
 from flocsim.state.bodies import RESISTANCE_COLUMNS, UNSHIELDED, BodyConstants
-from flocsim.state.scene import NEAR_CUT, NO_LAYER, NO_OUTLINES, Scene
+from flocsim.state.scene import NO_LAYER, NO_OUTLINES, Scene
 
 NO_LAWS = (None,) * len(LAWS)
 """``Scene.laws`` of a scene without forces, uncompiled."""
@@ -308,5 +308,5 @@ def scene_of(
         layer=layer,
         **others,
     )
-    reach = max(scene.surface_reach, scene.water[NEAR_CUT] or -1.0)
+    reach = max(scene.surface_reach, scene.water.near_cut or -1.0)
     return scene._replace(listed_reach=reach)

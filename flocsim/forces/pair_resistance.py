@@ -18,17 +18,7 @@ from flocsim.forces.body_forces import Thermal
 from flocsim.forces.drag import StokesDrag, drag_radius, facts_of, is_permeable
 from flocsim.hydrodynamics import pair, two_spheres
 from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
-from flocsim.state.scene import (
-    CUT,
-    FIRST_RADIUS,
-    FLOOR,
-    FLOW,
-    MEAN_RADIUS,
-    NEAR_CUT,
-    NO_WATER,
-    VISCOSITY,
-    WATER_SIZE,
-)
+from flocsim.state.scene import NO_WATER, Water
 
 NEAR = 2.0
 """Gap of the outlines over the mean radius from which relative motion is that at the distance of
@@ -169,7 +159,7 @@ def refuse_pair_resistance(forces: Iterable[Force], what: str) -> None:
 
 def water_between(
     forces: Iterable[Force], bodies: Sequence[Body], fluid: Fluid
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, Water]:
     """(``Scene.pair_table``, ``Scene.water``) of two bodies; those of none without a
     PairResistance, or for a lone body. UsageError where tables do not reach."""
     forces = list(forces)
@@ -190,12 +180,13 @@ def water_between(
             f"h_min of PairResistance must be {pair.NEAREST:g} to .1 of the mean radius of "
             f"two bodies, {mean:.3g} m, found {force.h_min:g} m"
         )
-    water = np.zeros(WATER_SIZE)
-    water[[VISCOSITY, MEAN_RADIUS, FLOOR]] = fluid.viscosity, mean, force.h_min
     spheres = all(len(body.shape.vertices) == 1 for body in bodies)
-    water[CUT], water[NEAR_CUT] = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
-    water[FLOW : FLOW + 6] = fluid.flow
-    water[FIRST_RADIUS : FIRST_RADIUS + 2] = radii
+    water = Water.one()
+    water.viscosity, water.mean_radius, water.floor = fluid.viscosity, mean, force.h_min
+    water.cut, water.near_cut = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
+    water.flow_x, water.flow_y = fluid.velocity
+    water.flow_x_by_x, water.flow_x_by_y, water.flow_y_by_x, water.flow_y_by_y = fluid.gradient
+    water.first_radius, water.second_radius = radii
     table = unit_table(second / first) * pair.scales(fluid.viscosity, mean)[:, None]
     return table, water
 

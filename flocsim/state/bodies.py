@@ -91,6 +91,19 @@ class Pose(Record):
     way: float  # how far its points move at most in a step that is a series [m]
 
 
+class Disc(Record):
+    """A body in the sweep for pairs that come near each other: its circle, and its way."""
+
+    x: float  # where it begins [m]
+    y: float
+    way_x: float  # the way that it goes [m]
+    way_y: float
+    reach: float  # its radius [m]
+    moves: float  # 1 where it moves, 0 where it is fixed: no two fixed ones are near
+    left: float  # its left end, inside the box [m]
+    right: float  # and its right end [m]
+
+
 class BodyErrors(Record):
     """What the errors of steps, and of the times of switches, have led to, at a body's outline."""
 

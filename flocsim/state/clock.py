@@ -14,6 +14,7 @@ class Tally(Record):
     kept: int  # one more than displacements set aside for a list that found no room; 0: none are
     full: int  # what has found no room, see NOTHING_FULL
     series_terms: int  # terms of the last step's series in ``Work.series``; 0: it was none
+    soft_gap: float  # smooth gap of the last two bodies that were asked for one [m]
 
 
 # What Tally.full says.

@@ -1,125 +1,140 @@
 """How outlines are laid out for forces along them: pieces, nodes, charges and their fields."""
 
 from functools import cache
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-# Columns of ``Scene.pieces``: segments and arcs of an outline, in the frame of its body.
-(
-    PLACE_X,  # of a segment its middle, of an arc the centre of its circle [m]
-    PLACE_Y,
-    WAY_X,  # of a segment its unit tangent, the body on its left; of an arc the outward …
-    WAY_Y,  # … direction of its middle
-    SIZE,  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
-    BEND,  # the radius of an arc [m], 0 of a segment
-    MIDDLE_X,  # the centre of a circle that holds the piece [m]
-    MIDDLE_Y,
-    EXTENT,  # and its radius [m]
-    INWARD,  # how far behind the piece the core lies that it is the offset of [m]
-    PIECE_COLUMNS,
-) = range(11)
+from flocsim.state.records import Record
 
 
-# Rows of ``Work.near``, each with its number of pieces in front (rhs.outline_sum).
-(
-    NEAR_A,  # of the body that is gone along, those that may be near the other one
-    NEAR_B,  # of that one
-    AROUND,  # of these, those that may be near the piece that is gone along
-    SEEN,  # those that may be near any piece that has been
-) = range(4)
+class Piece(Record):
+    """A segment or an arc of an outline, in the frame of its body."""
+
+    x: float  # of a segment its middle, of an arc the centre of its circle [m]
+    y: float
+    way_x: float  # of a segment its unit tangent, the body on its left; of an arc the outward …
+    way_y: float  # … direction of its middle
+    size: float  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
+    bend: float  # the radius of an arc [m], 0 of a segment
+    middle_x: float  # the centre of a circle that holds the piece [m]
+    middle_y: float
+    extent: float  # and its radius [m]
+    inward: float  # how far behind the piece the core lies that it is the offset of [m]
 
 
-# Places in ``Work.listed``: for what the first two hold.
-(
-    LISTED_A,  # the bodies
-    LISTED_B,
-    LISTED_X,  # where the first one was, in the frame of the second [m]
-    LISTED_Y,
-    LISTED_COSINE,  # and how it was turned
-    LISTED_SINE,
-    LISTED_REACH,  # how near to each other pieces that are listed may have been [m]
-    LISTED_SIZE,
-) = range(8)
+class NearPieces(NamedTuple):
+    """Rows of the pieces of two bodies that count, each list with their number in front."""
+
+    first: np.ndarray  # of the body that is gone along, those that may be near the other one
+    second: np.ndarray  # of that one
+    around: np.ndarray  # of these, those that may be near the piece that is gone along
+    seen: np.ndarray  # those that may be near any piece that has been
 
 
-# Rows of ``Work.nodes``: places along an outline at which the other one is looked at.
-(
-    NODE_X,  # [m]
-    NODE_Y,
-    NODE_NORMAL_X,  # the outward normal
-    NODE_NORMAL_Y,
-    NODE_WEIGHT,  # how much of the outline it stands for [m]
-    NODE_GAP,  # how far the other outline is [m]
-    NODE_SUM,  # what attraction comes to there: geometry.contact.attraction [1/m³]
-    NODE_PLATES,  # at which gap plates attract each other as strongly [m]
-    NODE_LOG_SHARE,  # scratch of that: what a logarithm counts for
-    NODE_LOG_OF,  # and of what it is; below 0 where there is none
-    CELL_X,  # of a charge, where it lies in a cell of a field: from its corner, of a step
-    CELL_Y,
-    FIRST_CORNER,  # from here on the columns of ``Scene.field`` at all four corners
-) = range(13)
+class Listed(Record):
+    """For which bodies, and for which place of the first in the frame of the second, pieces are
+    listed."""
+
+    first_body: int  # −1: none are
+    second_body: int
+    x: float  # [m]
+    y: float
+    cosine: float
+    sine: float
+    reach: float  # how near to each other pieces that are listed may have been [m]
 
 
 MOST_NODES = 144
 """Nodes at a time."""
 
-
 MOST_ORDER = 16
 """Nodes of a rule at most."""
 
+MOST_FEET = 16
+"""Feet on one piece at most (rhs.outline_sum); more are left out, with nodes further apart."""
 
-# Columns of ``Scene.charges``: up to GROUP neighbours, in the frame of their body.
-(
-    GROUP_X,  # the centre of a circle that holds them [m]
-    GROUP_Y,
-    GROUP_EXTENT,  # and its radius [m]
-    GROUP_COUNT,  # how many there are
-    FIRST_CHARGE,  # from here on, of each x, y [m], and its charge: geometry.contact.charges
-) = range(5)
+
+class Nodes(NamedTuple):
+    """Places along an outline at which the other one is looked at, or charges behind it.
+
+    Arrays of MOST_NODES numbers each: several nodes are worked on at once.
+    """
+
+    x: np.ndarray  # [m]
+    y: np.ndarray
+    normal_x: np.ndarray  # the outward normal; of a charge, the force on it
+    normal_y: np.ndarray
+    weight: np.ndarray  # how much of the outline a node stands for [m]; the charge
+    gap: np.ndarray  # how far the other outline is [m]
+    attraction: np.ndarray  # S of geometry.contact.attraction [1/m³]
+    plate_gap: np.ndarray  # at which gap plates attract each other as strongly [m]
+    log_share: np.ndarray  # scratch of S: what a logarithm counts for
+    log_of: np.ndarray  # and of what it is; below 0 where there is none
+    cell_x: (
+        np.ndarray
+    )  # of a charge, where it lies in a cell of a field: from its corner, of a step
+    cell_y: np.ndarray
+    # What is known at all four corners of that cell (4, MOST_NODES), see FieldNode.
+    potential: Annotated[np.ndarray, (4, MOST_NODES)]
+    by_x: Annotated[np.ndarray, (4, MOST_NODES)]
+    by_y: Annotated[np.ndarray, (4, MOST_NODES)]
+    by_xy: Annotated[np.ndarray, (4, MOST_NODES)]
+
+
+def nodes_of() -> Nodes:
+    """Return Nodes of zeros."""
+    corners = ("potential", "by_x", "by_y", "by_xy")
+    return Nodes(
+        *(np.zeros((4, MOST_NODES) if name in corners else MOST_NODES) for name in Nodes._fields)
+    )
 
 
 GROUP = 8
-"""Charges in a row at most."""
+"""Neighbouring charges in a group at most."""
 
 
-CHARGE_COLUMNS = FIRST_CHARGE + 3 * GROUP
+class ChargeGroup(Record):
+    """Neighbouring charges of a body, which are left out together, and a circle that holds them."""
+
+    x: float  # its centre, in the frame of the body [m]
+    y: float
+    extent: float  # and its radius [m]
+    first: int  # where their charges begin in ``Scene.charges``
+    count: int  # how many there are
 
 
-# Columns of ``Scene.grids``: where the field of a body's charges is known, in its own frame.
-(
-    GRID_X,  # the lower left corner [m]
-    GRID_Y,
-    GRID_STEP,  # from node to node [m]
-    GRID_ACROSS,  # how many tiles there are along x
-    GRID_UP,  # and along y
-    GRID_TILE,  # where they begin in ``tiles``
-    GRID_FINENESS,  # one over the step [1/m]
-    GRID_COLUMNS,
-) = range(8)
+class Charge(Record):
+    """A charge behind an outline, in the frame of its body (geometry.contact.charges)."""
+
+    x: float  # [m]
+    y: float
+    size: float  # of charges that make a potential of 1 on the outline [-]
 
 
 TILE_BITS = 3
-
-
 TILE = 1 << TILE_BITS
 """Steps along a tile; its nodes are (TILE + 1)², those along its edges being its own."""
 
 
-# Columns of ``Scene.field``: of charges that make a potential of 1 on their outline.
-(
-    POTENTIAL,  # [-]
-    BY_X,  # its derivatives, of a step
-    BY_Y,
-    BY_XY,
-    FIELD_COLUMNS,
-) = range(5)
+class Grid(Record):
+    """Where the field of a body's charges is known, in its own frame."""
+
+    x: float  # the lower left corner [m]
+    y: float
+    fineness: float  # one over the step from node to node [1/m]
+    across: int  # how many tiles there are along x
+    up: int  # and along y
+    tile: int  # where they begin in ``Scene.tiles``
 
 
-NODE_ROWS = FIRST_CORNER + 4 * FIELD_COLUMNS
+class FieldNode(Record):
+    """The field of charges that make a potential of 1 on their outline, at a node."""
 
-
-MOST_FEET = 16
-"""Feet on one piece at most (rhs.outline_sum); more are left out, with nodes further apart."""
+    potential: float  # [-]
+    by_x: float  # its derivatives, of a step
+    by_y: float
+    by_xy: float
 
 
 @cache

@@ -35,11 +35,30 @@ class Record:
         """Return an array of records of zeros."""
         return np.zeros(shape, dtype=cls.dtype)
 
+    @classmethod
+    def of(cls, *columns: np.ndarray) -> Any:
+        """Return an array of records whose fields, in their order, are columns, (n,) or (n, k)."""
+        values = np.column_stack(columns)
+        found = cls.rows(len(values))
+        for name, column in zip(found.dtype.names, values.T, strict=True):
+            found[name] = column
+        return found
+
 
 def clear(value: Any) -> None:
-    """Set an array of numbers or of records, or a record, to zero."""
-    if isinstance(value, np.record):
+    """Set an array of numbers or of records, a record, or a tuple of such, to zero."""
+    if isinstance(value, tuple):
+        for each in value:
+            clear(each)
+    elif isinstance(value, np.record):
         for name in value.dtype.names or ():
             value[name] = 0
     else:
         value[...] = np.zeros((), dtype=value.dtype)
+
+
+def copied(value: Any) -> Any:
+    """Return the same as `clear` takes in arrays of their own."""
+    if isinstance(value, tuple):
+        return type(value)(*map(copied, value))
+    return value.copy()

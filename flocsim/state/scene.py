@@ -5,24 +5,25 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from flocsim.state.outlines import CHARGE_COLUMNS, FIELD_COLUMNS, GRID_COLUMNS, PIECE_COLUMNS
-
-# Places in ``Scene.water``: what two bodies' resistance follows from beside ``Scene.pair_table``.
-(
-    VISCOSITY,  # [Pa s]
-    MEAN_RADIUS,  # of the two [m]
-    FLOOR,  # the gap below which it stays what it is [m]
-    CUT,  # the gap at which it ends [m]; 0: there is none
-    NEAR_CUT,  # the gap of outlines up to which they count [m]; 0: of two spheres
-    FLOW,  # from here on: Fluid.flow
-) = range(6)
+from flocsim.state.records import Record
 
 
-FIRST_RADIUS = FLOW + 6
-"""And behind it, of either body, the radius of the sphere that has its drag [m]."""
+class Water(Record):
+    """What the resistance of two bodies follows from, beside ``Scene.pair_table``."""
 
-
-WATER_SIZE = FIRST_RADIUS + 2
+    viscosity: float  # [Pa s]
+    mean_radius: float  # of the two [m]
+    floor: float  # the gap below which it stays what it is [m]
+    cut: float  # the gap at which it ends [m]; 0: there is none
+    near_cut: float  # the gap of outlines up to which they count [m]; 0: of two spheres
+    flow_x: float  # the velocity of the flow at the origin [m/s]
+    flow_y: float
+    flow_x_by_x: float  # and its gradient: ∂u_x/∂x … [1/s]
+    flow_x_by_y: float
+    flow_y_by_x: float
+    flow_y_by_y: float
+    first_radius: float  # of the sphere that has the drag of the earlier body [m]
+    second_radius: float  # and of the later one [m]
 
 
 TABLE_COLUMNS = 20
@@ -36,7 +37,7 @@ NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
 NO_LAYER = (0.0, 0.0, -1.0)
 
 
-NO_WATER = (np.zeros((0, TABLE_COLUMNS, 4)), np.zeros(WATER_SIZE))
+NO_WATER = (np.zeros((0, TABLE_COLUMNS, 4)), Water.one())
 
 
 NO_BOX = (math.inf, math.inf)
@@ -49,15 +50,14 @@ class Scene(NamedTuple):
     first: np.ndarray  # (n + 1,): where a body's core points begin
     vertices: np.ndarray  # (points, 2 or more): geometry.contact.compounds.Outlines
     tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
-    pieces: Annotated[
-        np.ndarray, ("pieces", PIECE_COLUMNS)
-    ]  # see PLACE_X; none if nothing reads it
+    pieces: np.ndarray  # (pieces,) of outlines.Piece; none where nothing reads them
     first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
-    charges: Annotated[np.ndarray, ("groups", CHARGE_COLUMNS)]  # see GROUP_X; none likewise
-    first_charge: np.ndarray  # (n + 1,): where a body's charges begin
-    grids: Annotated[np.ndarray, ("n", GRID_COLUMNS)]  # see GRID_X; zeros likewise
+    groups: np.ndarray  # (groups,) of outlines.ChargeGroup; none likewise
+    first_group: np.ndarray  # (n + 1,): where a body's groups begin
+    charges: np.ndarray  # (charges,) of outlines.Charge
+    grids: np.ndarray  # (n,) of outlines.Grid; zeros likewise
     tiles: np.ndarray  # (tiles,): where the nodes of each begin in ``field``; −1: it has none
-    field: Annotated[np.ndarray, ("nodes", FIELD_COLUMNS)]  # see POTENTIAL
+    field: np.ndarray  # (nodes,) of outlines.FieldNode
     parameters: np.ndarray  # what the laws read of the forces
     laws: Any  # see flocsim.hooks
     surface_reach: float = -1.0  # the gap up to which surface forces act [m]; −1: there are none
@@ -71,5 +71,5 @@ class Scene(NamedTuple):
     kicks: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     key: tuple[int, int] = (0, 0)
     pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)] = NO_WATER[0]
-    water: Annotated[np.ndarray, (WATER_SIZE,)] = NO_WATER[1]  # see VISCOSITY
+    water: Water = NO_WATER[1]
     listed_reach: float = -1.0  # the gap up to which outlines are listed for what acts between them

@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from flocsim.state.bodies import MOST_FRAMES, BodyErrors, Cluster, Frame, Kick, KickTime, Pose
+from flocsim.state.bodies import MOST_FRAMES, BodyErrors, Cluster, Disc, Frame, Kick, KickTime, Pose
 from flocsim.state.clock import BLOCKS_FULL, NOTHING_FULL, PAIRS_FULL, Tally
 from flocsim.state.contacts import (
     BodyPair,
@@ -15,14 +15,15 @@ from flocsim.state.contacts import (
     VertexAtEdge,
 )
 from flocsim.state.outlines import (
-    LISTED_SIZE,
     MOST_FEET,
-    MOST_NODES,
     MOST_ORDER,
-    NODE_ROWS,
+    Listed,
+    NearPieces,
+    Nodes,
     gauss_rules,
+    nodes_of,
 )
-from flocsim.state.records import clear
+from flocsim.state.records import clear, copied
 from flocsim.state.scene import Scene
 
 # States: rows of ``place``, ``velocity``, ``force``, ``geometry`` and ``slip`` in Work.
@@ -77,11 +78,7 @@ TERMS = 44
 
 SQUARES = 6
 """Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a
-strain pulls at them with, and the smooth gap of the last two bodies that were asked for one."""
-
-
-SOFT_GAP = 6
-"""Column of that gap [m]."""
+strain pulls at them with."""
 
 
 # Matrices in ``Work.jacobian``: minus the derivatives of the forces …
@@ -136,10 +133,10 @@ class Work(NamedTuple):
     candidates: np.ndarray  # (capacity,) of Candidate
     geometry: np.ndarray  # (states, capacity) of VertexAtEdge
     kept: np.ndarray  # (capacity,) of KeptContact
-    near: np.ndarray  # (4, pieces + 1): pieces of two bodies, see NEAR_A
-    listed: np.ndarray  # see LISTED_A
+    near: NearPieces
+    listed: Listed
     feet: np.ndarray  # scratch of rhs.outline_sum
-    nodes: Annotated[np.ndarray, (NODE_ROWS, MOST_NODES)]  # see NODE_X
+    nodes: Nodes
     rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss's: nodes, weights
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
     pairs: np.ndarray  # (pairs,) of BodyPair
@@ -147,9 +144,9 @@ class Work(NamedTuple):
     budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
     along: Annotated[np.ndarray, ("pairs", 4)]  # what acts along outlines now, and by how both are
     # turned: F_x, F_y on the later body [N], the torques on it and on the earlier one [N m]
-    discs: Annotated[np.ndarray, ("n", 8)]  # what the sweep for pairs works on
-    order: np.ndarray  # (n,): the same
-    starts: np.ndarray  # (n + 1,): the same
+    discs: np.ndarray  # (n,) of Disc
+    order: np.ndarray  # (n,): discs by their left ends
+    starts: np.ndarray  # (n + 1,): where the near ones of a disc begin in ``pairs``
     tally: Tally
 
 
@@ -246,17 +243,17 @@ def work_of(
         candidates=Candidate.rows(capacity),
         geometry=VertexAtEdge.rows(STATES, capacity),
         kept=KeptContact.rows(capacity),
-        near=np.zeros((4, len(scene.pieces) + 1), dtype=np.int64),
-        listed=np.zeros(LISTED_SIZE),
+        near=NearPieces(*np.zeros((4, len(scene.pieces) + 1), dtype=np.int64)),
+        listed=Listed.one(),
         feet=np.zeros(MOST_FEET),
-        nodes=np.zeros((NODE_ROWS, MOST_NODES)),
+        nodes=nodes_of(),
         rules=gauss_rules(),
         squares=np.zeros((SQUARES + 1, 7)),
         pairs=BodyPair.rows(pairs),
         coordinates=np.zeros(12),
         budget=np.zeros(pairs),
         along=np.zeros((pairs, 4)),
-        discs=np.zeros((n, 8)),
+        discs=Disc.rows(n),
         order=np.zeros(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
         tally=Tally.one(),
@@ -269,7 +266,7 @@ def begin(
     work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray, all_pairs: bool = True
 ) -> None:
     """Write into work arrays that are 0 where a run of a scene begins."""
-    work.listed.fill(-1.0)
+    work.listed.first_body = -1
     work.budget.fill(-1.0)
     work.order[:] = range(len(work.order))
     work.place[NOW], work.velocity[NOW] = position, velocity
@@ -298,9 +295,8 @@ def put_motion(work: Work, state: int, motion: np.ndarray) -> None:
 
 def copy_of(work: Work) -> Work:
     """The same work in arrays of its own."""
-    elimination = Elimination(*(array.copy() for array in work.elimination))
-    copies = {name: array.copy() for name, array in work._asdict().items() if name != "elimination"}
-    return Work(elimination=elimination, **copies)
+    copies: Work = copied(work)
+    return copies
 
 
 def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:

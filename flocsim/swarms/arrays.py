@@ -4,8 +4,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.geometry.contact.body_pairs import DISC_COLUMNS
-from flocsim.state.bodies import MOTION_COLUMNS
+from flocsim.state.bodies import MOTION_COLUMNS, Disc
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
@@ -95,7 +94,7 @@ class Swarm(NamedTuple):
     stated: np.ndarray  # (n,): the stated error of every body [m]
     strayed: np.ndarray  # (n,): how far it strayed [m]
     ways: Annotated[np.ndarray, ("n", STRETCHES, BOX_COLUMNS)]  # where it has been
-    discs: Annotated[np.ndarray, ("n", DISC_COLUMNS)]  # what the sweep for neighbours works on
+    discs: np.ndarray  # (n,) of Disc: what the sweep for neighbours works on
     order: np.ndarray  # (n,): the same
     starts: np.ndarray  # (n + 1,): the same
     times: np.ndarray  # see BEGIN
@@ -128,7 +127,7 @@ def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np
         stated=np.zeros(n),
         strayed=np.zeros(n),
         ways=np.zeros((n, STRETCHES, BOX_COLUMNS)),
-        discs=np.zeros((n, DISC_COLUMNS)),
+        discs=Disc.rows(n),
         order=np.arange(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
         times=np.zeros(TIME_COUNT),

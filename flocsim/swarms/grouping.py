@@ -15,15 +15,7 @@ Fixed bodies do not pass on what acts on them: each is a part of all islands tha
 import math
 
 import flocsim.swarms.arrays as sw
-from flocsim.geometry.contact.body_pairs import (
-    MOVES,
-    PLACE_X,
-    PLACE_Y,
-    REACH,
-    WAY_X,
-    WAY_Y,
-    near_pairs,
-)
+from flocsim.geometry.contact.body_pairs import near_pairs
 from flocsim.geometry.contact.compounds import ONWARD, SWELL
 from flocsim.geometry.contact.points import nearest_way
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
@@ -37,9 +29,9 @@ def set_disc(swarm, body, x, y, way_x, way_y, wide):
     if free == 0.0:
         # Found by its outline: its circle may be as wide as the box.
         x = y = way_x = way_y = wide = 0.0
-    disc[PLACE_X], disc[PLACE_Y] = x, y
-    disc[WAY_X], disc[WAY_Y] = way_x, way_y
-    disc[REACH], disc[MOVES] = wide, free
+    disc.x, disc.y = x, y
+    disc.way_x, disc.way_y = way_x, way_y
+    disc.reach, disc.moves = wide, free
 
 
 def disc_reach(swarm, body, reach, stray):
@@ -143,8 +135,8 @@ def widen_landing(swarm, span, width, height, pairs, total, reach):
             faster = b if b_goes > math.hypot(m[a, VX], m[a, VY]) else a
             way = span * math.hypot(m[a, VX] - m[b, VX], m[a, VY] - m[b, VY])
             wide = disc_reach(swarm, faster, reach, (1.0 - share) * way)
-            if wide > swarm.discs[faster, REACH]:
-                swarm.discs[faster, REACH], found = wide, True
+            if wide > swarm.discs[faster].reach:
+                swarm.discs[faster].reach, found = wide, True
     return found
 
 

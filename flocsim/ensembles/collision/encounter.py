@@ -296,7 +296,7 @@ class Encounter(abc.ABC):
         """Return work arrays of a replicate with these angles [rad] and ``share``: see Draw."""
         place, velocity = map(np.array, self.places(angles, share))
         with contextlib.suppress(IndexError):  # none is left, or another thread has taken it
-            while (work := self.spare.pop()).near.shape[1] != len(self.scene.pieces) + 1:
+            while (work := self.spare.pop()).near.first.shape[0] != len(self.scene.pieces) + 1:
                 pass  # of another number of parts
             begin_anew(work, self.scene, place, velocity)
             return work

@@ -44,15 +44,6 @@ from flocsim.geometry.shapes.pieces import (
     piece_at,
     placed,
 )
-from flocsim.state.outlines import (
-    NODE_GAP,
-    NODE_LOG_OF,
-    NODE_LOG_SHARE,
-    NODE_PLATES,
-    NODE_SUM,
-    NODE_X,
-    NODE_Y,
-)
 
 # Gauss's rule of eight nodes on [−1, 1].
 EIGHT = (
@@ -96,15 +87,15 @@ def add_segment(nodes, count, piece, inset, lens):
     further in, and take its gap to them."""
     # Without a branch, so that several nodes are taken at once.
     for k in range(count):
-        dx, dy = nodes[NODE_X, k] - piece.x, nodes[NODE_Y, k] - piece.y
+        dx, dy = nodes.x[k] - piece.x, nodes.y[k] - piece.y
         height = dx * piece.way_y - dy * piece.way_x
         along = dx * piece.way_x + dy * piece.way_y
         past = abs(along) - piece.size
         past = past if past > 0.0 else 0.0
         deep = height + piece.inward
         gap = math.sqrt(deep * deep + past * past) - piece.inward
-        known = nodes[NODE_GAP, k]
-        nodes[NODE_GAP, k] = gap if gap < known else known
+        known = nodes.gap[k]
+        nodes.gap[k] = gap if gap < known else known
         p = height + inset
         reach = lens * lens - p * p
         reach = math.sqrt(reach if reach > 0.0 else 0.0)
@@ -116,7 +107,7 @@ def add_segment(nodes, count, piece, inset, lens):
         # Where the foot lies between them, all of the line less what is beyond both ends.
         whole = 4.0 / (3.0 * p * p * p) if (low < 0.0) & (high > 0.0) else 0.0
         found = whole + first - last
-        nodes[NODE_SUM, k] -= found if (low < high) & (p != 0.0) else 0.0
+        nodes.attraction[k] -= found if (low < high) & (p != 0.0) else 0.0
 
 
 def averted_arc(x, y, piece, radius, lens):
@@ -196,10 +187,10 @@ def add_arc(nodes, count, piece, inset, lens):
     start, end = arc_ends(piece)
     radius = max(piece.bend - inset, 0.5 * piece.bend)
     for k in range(count):
-        x, y = nodes[NODE_X, k] - piece.x, nodes[NODE_Y, k] - piece.y
+        x, y = nodes.x[k] - piece.x, nodes.y[k] - piece.y
         distance = math.sqrt(x * x + y * y)
-        gap, known = distance - piece.inward, nodes[NODE_GAP, k]
-        nodes[NODE_GAP, k] = gap if gap < known else known
+        gap, known = distance - piece.inward, nodes.gap[k]
+        nodes.gap[k] = gap if gap < known else known
         p = distance - radius
         reach = lens * lens - p * p
         reach = math.sqrt(reach if reach > 0.0 else 0.0)
@@ -211,17 +202,17 @@ def add_arc(nodes, count, piece, inset, lens):
         found, logarithm, ratio = facing_arc(p, radius, distance, low, high)
         faces = faces & faces_too & (p <= radius)
         seen = seen & faces
-        nodes[NODE_SUM, k] += found if seen else 0.0
-        nodes[NODE_LOG_SHARE, k] = logarithm if seen else 0.0
-        nodes[NODE_LOG_OF, k] = ratio if faces else -1.0
+        nodes.attraction[k] += found if seen else 0.0
+        nodes.log_share[k] = logarithm if seen else 0.0
+        nodes.log_of[k] = ratio if faces else -1.0
     # A logarithm is taken of one number at a time.
     for k in range(count):
-        if nodes[NODE_LOG_OF, k] < 0.0:
-            x, y = nodes[NODE_X, k] - piece.x, nodes[NODE_Y, k] - piece.y
-            nodes[NODE_SUM, k] += averted_arc(x, y, piece, radius, lens)
-        elif nodes[NODE_LOG_SHARE, k] != 0.0:
-            log = math.log(nodes[NODE_LOG_OF, k])
-            nodes[NODE_SUM, k] += nodes[NODE_LOG_SHARE, k] * log
+        if nodes.log_of[k] < 0.0:
+            x, y = nodes.x[k] - piece.x, nodes.y[k] - piece.y
+            nodes.attraction[k] += averted_arc(x, y, piece, radius, lens)
+        elif nodes.log_share[k] != 0.0:
+            log = math.log(nodes.log_of[k])
+            nodes.attraction[k] += nodes.log_share[k] * log
 
 
 MADE_UP = 12.88
@@ -235,14 +226,14 @@ def find_plates(nodes, count, inset, lens):
     """From S at so many nodes the gaps (−3S/4)^{−1/3} [m] of plates that attract each other as
     strongly; what is as far as ``lens`` [m] no longer counts."""
     for k in range(count):
-        share = nodes[NODE_GAP, k] / lens
+        share = nodes.gap[k] / lens
         share *= share
         left = 1.0 - share
         left *= left * left * (1.0 + share * (3.0 + share * MADE_UP))
-        cube = -0.75 * nodes[NODE_SUM, k] * left
-        nodes[NODE_SUM, k] = cube
+        cube = -0.75 * nodes.attraction[k] * left
+        nodes.attraction[k] = cube
         # Nearly that of a plane as near: two steps from there leave 1e-16 of it.
-        parted = nodes[NODE_GAP, k] + inset
+        parted = nodes.gap[k] + inset
         ratio = cube * parted * parted * parted
         known = (ratio > 0.1) & (ratio < 1.25)
         root = CUBE_ROOT[2] + ratio * CUBE_ROOT[3]
@@ -250,12 +241,12 @@ def find_plates(nodes, count, inset, lens):
         for _ in range(2):
             off = 1.0 - ratio * root * root * root
             root *= 1.0 + off * (1.0 / 3.0 + off * (2.0 / 9.0 + off * (14.0 / 81.0)))
-        nodes[NODE_PLATES, k] = parted * root if known else -1.0
+        nodes.plate_gap[k] = parted * root if known else -1.0
     for k in range(count):
-        if nodes[NODE_PLATES, k] < 0.0:
-            cube = nodes[NODE_SUM, k]
+        if nodes.plate_gap[k] < 0.0:
+            cube = nodes.attraction[k]
             far = cube ** (-1.0 / 3.0) if cube > 0.0 else NO_ATTRACTION
-            nodes[NODE_PLATES, k] = min(far, NO_ATTRACTION)
+            nodes.plate_gap[k] = min(far, NO_ATTRACTION)
 
 
 def share_of_depth(distance, depth):

@@ -24,12 +24,6 @@ WANDER = 0.25
 anew."""
 
 
-PLACE_X, PLACE_Y, WAY_X, WAY_Y, REACH, MOVES, LEFT, RIGHT, DISC_COLUMNS = range(9)
-"""Columns of ``discs``: where a disc begins, the way that it goes [m], its radius [m]; 1 where it
-moves, 0 where it is fixed: no two fixed ones are near; its left end, inside the box, and its right
-end."""
-
-
 def watches_all(work):
     """Whether all pairs that count are watched."""
     return work.poses.shape[0] <= ALL_PAIRS
@@ -100,11 +94,11 @@ def list_near(scene, work, cut):
     """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
     discs, (width, height) = work.discs, scene.box
     for body in range(work.poses.shape[0]):
-        discs[body, PLACE_X] = work.place[NOW, body, X]
-        discs[body, PLACE_Y] = work.place[NOW, body, Y]
-        discs[body, WAY_X] = discs[body, WAY_Y] = 0.0
-        discs[body, REACH] = scene.bodies[body].bounding_radius + 0.5 * cut
-        discs[body, MOVES] = scene.bodies[body].free
+        discs[body].x = work.place[NOW, body, X]
+        discs[body].y = work.place[NOW, body, Y]
+        discs[body].way_x = discs[body].way_y = 0.0
+        discs[body].reach = scene.bodies[body].bounding_radius + 0.5 * cut
+        discs[body].moves = scene.bodies[body].free
     total = near_pairs(discs, work.order, width, height, work.starts, work.pairs)
     if total > work.pairs.shape[0]:
         work.tally.full, work.tally.pairs = PAIRS_FULL, 0
@@ -125,12 +119,12 @@ def list_pairs(scene, work, cut):
 def place_ends(discs, width):
     """Fill in where every disc begins and ends along x, all of its way."""
     for disc in range(discs.shape[0]):
-        way, reach = discs[disc, WAY_X], discs[disc, REACH]
-        left = discs[disc, PLACE_X] + min(way, 0.0) - reach
+        way, reach = discs[disc].way_x, discs[disc].reach
+        left = discs[disc].x + min(way, 0.0) - reach
         length = abs(way) + 2.0 * reach
         if width < math.inf:
             left -= width * math.floor(left / width)
-        discs[disc, LEFT], discs[disc, RIGHT] = left, left + length
+        discs[disc].left, discs[disc].right = left, left + length
 
 
 def sort_discs(discs, order):
@@ -138,10 +132,10 @@ def sort_discs(discs, order):
     has hardly changed."""
     for place in range(1, order.shape[0]):
         disc, free = order[place], place
-        left = discs[disc, LEFT]
+        left = discs[disc].left
         while free > 0:
             other = order[free - 1]
-            if discs[other, LEFT] < left or (discs[other, LEFT] == left and other < disc):
+            if discs[other].left < left or (discs[other].left == left and other < disc):
                 break
             order[free] = other
             free -= 1
@@ -150,17 +144,17 @@ def sort_discs(discs, order):
 
 def come_near(discs, a, b, width, height):
     """Whether two discs touch at any time of their ways."""
-    if discs[a, MOVES] + discs[b, MOVES] == 0.0:
+    if discs[a].moves + discs[b].moves == 0.0:
         return False
-    way_x, way_y = discs[a, WAY_X] - discs[b, WAY_X], discs[a, WAY_Y] - discs[b, WAY_Y]
+    way_x, way_y = discs[a].way_x - discs[b].way_x, discs[a].way_y - discs[b].way_y
     # By the image that is nearest half way.
-    x = nearest_way(discs[a, PLACE_X] - discs[b, PLACE_X] + 0.5 * way_x, width) - 0.5 * way_x
-    y = nearest_way(discs[a, PLACE_Y] - discs[b, PLACE_Y] + 0.5 * way_y, height) - 0.5 * way_y
+    x = nearest_way(discs[a].x - discs[b].x + 0.5 * way_x, width) - 0.5 * way_x
+    y = nearest_way(discs[a].y - discs[b].y + 0.5 * way_y, height) - 0.5 * way_y
     length2, share = way_x * way_x + way_y * way_y, 0.0
     if length2 > 0.0:
         share = min(max(-(x * way_x + y * way_y) / length2, 0.0), 1.0)
     x, y = x + share * way_x, y + share * way_y
-    reach = discs[a, REACH] + discs[b, REACH]
+    reach = discs[a].reach + discs[b].reach
     return x * x + y * y < reach * reach
 
 
@@ -177,11 +171,11 @@ def sweep(discs, order, width, height, starts, pairs, fill):
                     break
                 there, shift = there - n, width
             b = order[there]
-            if discs[b, LEFT] + shift > discs[a, RIGHT]:
+            if discs[b].left + shift > discs[a].right:
                 break
             # Round the box, two long discs find each other twice: the shorter way counts.
             longer = width < math.inf and (2 * step > n or (2 * step == n and a > b))
-            if longer and discs[a, LEFT] + width - shift <= discs[b, RIGHT]:
+            if longer and discs[a].left + width - shift <= discs[b].right:
                 continue
             if come_near(discs, a, b, width, height):
                 later = max(a, b)

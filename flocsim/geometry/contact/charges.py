@@ -31,26 +31,7 @@ from flocsim.compiler.composer import compiled
 from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.pieces import at_parameter, piece_at, pieces_of_shape
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.state.outlines import (
-    BEND,
-    BY_X,
-    BY_XY,
-    BY_Y,
-    CHARGE_COLUMNS,
-    FIELD_COLUMNS,
-    FIRST_CHARGE,
-    GRID_COLUMNS,
-    GRID_TILE,
-    GROUP,
-    GROUP_COUNT,
-    GROUP_EXTENT,
-    GROUP_X,
-    GROUP_Y,
-    INWARD,
-    POTENTIAL,
-    SIZE,
-    TILE,
-)
+from flocsim.state.outlines import GROUP, TILE, Charge, ChargeGroup, FieldNode, Grid
 
 DEEP = 0.6
 """Depth of charges, and their distance from each other."""
@@ -124,8 +105,8 @@ def unit_of(shape: Shape, kappa: float) -> float:
 
 def spacings(pieces, kappa):
     """How far charges behind each piece lie from each other [m], and their numbers."""
-    spacing = DEEP * np.minimum(pieces[:, INWARD], 1.0 / kappa)
-    bend, size = pieces[:, BEND], pieces[:, SIZE]
+    spacing = DEEP * np.minimum(pieces["inward"], 1.0 / kappa)
+    bend, size = pieces["bend"], pieces["size"]
     lengths = np.where(bend > 0.0, 4.0 * np.arctan(size) * bend, 2.0 * size)
     # A corner that is not rounded would need infinitely many.
     with np.errstate(divide="ignore"):
@@ -218,32 +199,38 @@ def clusters(charges):
     return [*clusters(order[: len(order) // 2]), *clusters(order[len(order) // 2 :])]
 
 
-@lru_cache(maxsize=256)
-def rows_of_shape(shape: Shape, kappa: float) -> np.ndarray:
-    """The same as rows (groups, CHARGE_COLUMNS), of neighbours and a circle that holds them."""
-    found = clusters(charges_of_shape(shape, kappa))
-    rows = np.zeros((len(found), CHARGE_COLUMNS))
-    for row, group in zip(rows, found, strict=True):
-        middle = 0.5 * (group[:, :2].min(axis=0) + group[:, :2].max(axis=0))
-        extent = np.hypot(*(group[:, :2] - middle).T).max()
-        row[:FIRST_CHARGE] = *middle, extent, len(group)
-        row[FIRST_CHARGE : FIRST_CHARGE + group.size] = group.ravel()
-    return rows
-
-
 class Charges(NamedTuple):
-    """The charges of some bodies; a Scene has the same fields."""
+    """The charges of some bodies in groups of neighbours; a Scene has the same fields."""
 
+    groups: np.ndarray
+    first_group: np.ndarray
     charges: np.ndarray
-    first_charge: np.ndarray
+
+
+@lru_cache(maxsize=256)
+def grouped_charges(shape: Shape, kappa: float) -> Charges:
+    """The Charges of a shape around its centroid, at κ [1/m]."""
+    found = clusters(charges_of_shape(shape, kappa))
+    groups, first = ChargeGroup.rows(len(found)), 0
+    for group, members in zip(groups, found, strict=True):
+        middle = 0.5 * (members[:, :2].min(axis=0) + members[:, :2].max(axis=0))
+        group.x, group.y = middle
+        group.extent = np.hypot(*(members[:, :2] - middle).T).max()
+        group.first, group.count = first, len(members)
+        first += len(members)
+    return Charges(groups, np.array([0, len(groups)]), Charge.of(np.concatenate(found)))
 
 
 def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
     """The Charges of bodies of these shapes at κ [1/m]; 0: of so many bodies with none."""
-    none = np.zeros((0, CHARGE_COLUMNS))
-    rows = [rows_of_shape(shape, kappa) if kappa > 0.0 else none for shape in shapes]
-    first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
-    return Charges(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))
+    none = Charges(ChargeGroup.rows(0), np.zeros(2, np.int64), Charge.rows(0))
+    found = [grouped_charges(shape, kappa) if kappa > 0.0 else none for shape in shapes]
+    groups = np.concatenate([each.groups for each in found])
+    sizes = [len(each.groups) for each in found]
+    before = np.cumsum([0, *[len(each.charges) for each in found[:-1]]])
+    groups["first"] += np.repeat(before, sizes)
+    first = np.cumsum([0, *sizes]).astype(np.int64)
+    return Charges(groups, first, np.concatenate([each.charges for each in found]))
 
 
 def layer_energy(
@@ -290,33 +277,34 @@ class Field(NamedTuple):
     field: np.ndarray
 
 
-def list_groups(charges, x, y, reach, near):
-    """List the rows of charges that may be within a reach [m] of a point; how many they are."""
+def list_groups(groups, x, y, reach, near):
+    """List the groups of charges that may be within a reach [m] of a point; how many they are."""
     count = 0
-    for row in range(charges.shape[0]):
-        dx, dy = x - charges[row, GROUP_X], y - charges[row, GROUP_Y]
-        most = reach + charges[row, GROUP_EXTENT]
+    for row in range(groups.shape[0]):
+        group = groups[row]
+        dx, dy = x - group.x, y - group.y
+        most = reach + group.extent
         if dx * dx + dy * dy < most * most:
             near[count] = row
             count += 1
     return count
 
 
-def at_node(charges, near, count, kappa, x, y):
-    """(φ, and its derivatives by x, by y [1/m], by both [1/m²]) of the charges listed, at a point;
+def at_node(groups, charges, near, count, kappa, x, y):
+    """(φ, and its derivatives by x, by y [1/m], by both [1/m²]) of the groups listed, at a point;
     what is FADED is left out."""
     value, by_x, by_y, by_both = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
-        row = near[k]
-        for each in range(int(charges[row, GROUP_COUNT])):
-            place = FIRST_CHARGE + 3 * each
-            dx, dy = x - charges[row, place], y - charges[row, place + 1]
+        group = groups[near[k]]
+        for row in range(group.first, group.first + group.count):
+            charge = charges[row]
+            dx, dy = x - charge.x, y - charge.y
             squared = kappa * kappa * (dx * dx + dy * dy)
             if squared > (FADED + 1.0) * (FADED + 1.0):
                 continue
             squared = max(squared, LEAST)
             zero, first = bessel_pair(squared)
-            size = charges[row, place + 2]
+            size = charge.size
             slope = -size * kappa * kappa * first
             value += size * zero
             by_x += slope * dx
@@ -325,22 +313,22 @@ def at_node(charges, near, count, kappa, x, y):
     return value, by_x, by_y, by_both
 
 
-def fill(charges, kappa, step, corners, near, field):
+def fill(groups, charges, kappa, step, corners, near, field):
     """Write the nodes of tiles with these lower left corners (m, 2); ``near`` is scratch."""
     side, half = TILE + 1, 0.5 * TILE * step
     for tile in range(corners.shape[0]):
         x, y = corners[tile, 0] + half, corners[tile, 1] + half
         reach = (FADED + 1.0) / kappa + 1.5 * half
-        count = list_groups(charges, x, y, reach, near)
+        count = list_groups(groups, x, y, reach, near)
         for node in range(side * side):
             x = corners[tile, 0] + step * (node % side)
             y = corners[tile, 1] + step * (node // side)
-            value, by_x, by_y, by_both = at_node(charges, near, count, kappa, x, y)
-            row = tile * side * side + node
-            field[row, POTENTIAL] = value
-            field[row, BY_X] = step * by_x
-            field[row, BY_Y] = step * by_y
-            field[row, BY_XY] = step * step * by_both
+            value, by_x, by_y, by_both = at_node(groups, charges, near, count, kappa, x, y)
+            known = field[tile * side * side + node]
+            known.potential = value
+            known.by_x = step * by_x
+            known.by_y = step * by_y
+            known.by_xy = step * step * by_both
 
 
 def tiles_around(shape, kappa, step):
@@ -378,11 +366,15 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     tiles = np.where(used, (np.cumsum(used) - 1) * side * side, -1)
     places = np.flatnonzero(used)
     corners = low + TILE * step * np.column_stack([places % counts[0], places // counts[0]])
-    field = np.empty((nodes, FIELD_COLUMNS))
-    charges = rows_of_shape(shape, kappa)
-    near = np.zeros(len(charges), np.int64)
-    compiled(fill)(charges, kappa, step, corners, near, field)
-    return Field(np.array([[*low, step, *counts, 0.0, 1.0 / step]]), tiles, field)
+    field = FieldNode.rows(nodes)
+    groups, _, charges = grouped_charges(shape, kappa)
+    near = np.zeros(len(groups), np.int64)
+    compiled(fill)(groups, charges, kappa, step, corners, near, field)
+    grid = Grid.rows(1)
+    grid["x"], grid["y"] = low
+    grid["across"], grid["up"] = counts
+    grid["fineness"] = 1.0 / step
+    return Field(grid, tiles, field)
 
 
 def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
@@ -391,7 +383,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     bounds = [shape.bounding_radius for shape in shapes]
     # The earlier one of two that are as large: outline_sum.between_outlines.
     asked = {bounds.index(max(bounds))} if len(shapes) == 2 else set(range(len(shapes)))
-    none = Field(np.zeros((1, GRID_COLUMNS)), np.zeros(0, np.int64), np.zeros((0, FIELD_COLUMNS)))
+    none = Field(Grid.rows(1), np.zeros(0, np.int64), FieldNode.rows(0))
     found = [
         field_of_shape(shape, kappa) if kappa > 0.0 and body in asked else none
         for body, shape in enumerate(shapes)
@@ -400,7 +392,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     known = [each for each in found if len(each.field)]
     if len(known) == 1:  # tables are large, and not copied where they need not be
         return Field(grids, known[0].tiles, known[0].field)
-    grids[:, GRID_TILE] = np.cumsum([0, *[len(each.tiles) for each in found[:-1]]])
+    grids["tile"] = np.cumsum([0, *[len(each.tiles) for each in found[:-1]]])
     before = np.cumsum([0, *[len(each.field) for each in found[:-1]]])
     tiles = [np.where(each.tiles < 0, -1, each.tiles + first)
              for each, first in zip(found, before, strict=True)]  # fmt: skip

@@ -21,19 +21,7 @@ from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import Part, signed_area
 from flocsim.geometry.shapes.moments import exposed_arcs, exposed_chords, is_disc, pieces_of
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.state.outlines import (
-    BEND,
-    EXTENT,
-    INWARD,
-    MIDDLE_X,
-    MIDDLE_Y,
-    PIECE_COLUMNS,
-    PLACE_X,
-    PLACE_Y,
-    SIZE,
-    WAY_X,
-    WAY_Y,
-)
+from flocsim.state.outlines import Piece
 
 WIDEST = 0.5 * math.pi
 """No arc is longer than this angle [rad]."""
@@ -48,7 +36,7 @@ def segment_rows(starts, units, low, high, radius):
     middle = starts + 0.5 * (low + high)[:, None] * units
     half = 0.5 * (high - low)
     radii = np.broadcast_to(radius, half.shape)
-    rows = np.column_stack([middle, units, half, np.zeros_like(half), middle, half, radii])
+    rows = Piece.of(middle, units, half, np.zeros_like(half), middle, half, radii)
     return rows[half > 0.0]
 
 
@@ -62,12 +50,12 @@ def arc_rows(centres, radii, low, high):
     way = np.column_stack([np.cos(angle), np.sin(angle)])
     radius, centre = radii[owner], centres[owner]
     middle = centre + (radius * np.cos(half))[:, None] * way
-    rows = [centre, way, np.tan(0.5 * half), radius, middle, radius * np.sin(half), radius]
-    return np.column_stack(rows)
+    size, extent = np.tan(0.5 * half), radius * np.sin(half)
+    return Piece.of(centre, way, size, radius, middle, extent, radius)
 
 
 def outline_pieces(parts: Sequence[Part]) -> np.ndarray:
-    """The pieces (k, PIECE_COLUMNS) of the outline of parts, each core ⊕ disk, exact: offset edges
+    """The pieces (k,) of the outline of parts, each core ⊕ disk, exact: offset edges
     and arcs as far as no other part of the shape covers them, holes included."""
     if is_disc(parts):
         [centre] = parts[0].rings[0]
@@ -113,12 +101,12 @@ def pieces_that_count(shape: Shape) -> np.ndarray:
     """The pieces of a shape's outline without those that are nothing but rounding: they would be
     looked at as often as any other."""
     rows = pieces_of_shape(shape)
-    return rows[(rows[:, BEND] > 0.0) | (rows[:, EXTENT] > ROUNDED * rows[:, EXTENT].max())]
+    return rows[(rows["bend"] > 0.0) | (rows["extent"] > ROUNDED * rows["extent"].max())]
 
 
 def pieces_of_bodies(shapes: Sequence[Shape], count: int) -> Pieces:
     """The Pieces of bodies of these shapes; of so many bodies with none where there are none."""
-    rows = [pieces_that_count(shape) for shape in shapes] or [np.zeros((0, PIECE_COLUMNS))] * count
+    rows = [pieces_that_count(shape) for shape in shapes] or [Piece.rows(0)] * count
     first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
     return Pieces(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))
 
@@ -133,7 +121,7 @@ class Pose(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """A piece in some frame: the columns of ``pieces``."""
+    """A Piece in some frame."""
 
     x: float
     y: float
@@ -149,12 +137,10 @@ class Placed(NamedTuple):
 
 def piece_at(pieces, row):
     """A piece in the frame of its own body."""
+    own = pieces[row]
     return Placed(
-        pieces[row, PLACE_X], pieces[row, PLACE_Y],
-        pieces[row, WAY_X], pieces[row, WAY_Y],
-        pieces[row, SIZE], pieces[row, BEND],
-        pieces[row, MIDDLE_X], pieces[row, MIDDLE_Y],
-        pieces[row, EXTENT], pieces[row, INWARD],
+        own.x, own.y, own.way_x, own.way_y, own.size, own.bend,
+        own.middle_x, own.middle_y, own.extent, own.inward,
     )  # fmt: skip
 
 

@@ -19,15 +19,7 @@ from flocsim.geometry.shapes.pieces import (
     piece_at,
 )
 from flocsim.state.outlines import (
-    AROUND,
     MOST_FEET,
-    NODE_GAP,
-    NODE_NORMAL_X,
-    NODE_NORMAL_Y,
-    NODE_SUM,
-    NODE_WEIGHT,
-    NODE_X,
-    NODE_Y,
 )
 
 SAME = 1e-3
@@ -53,8 +45,8 @@ LEAST_GROWTH = 1e-6
 def gap_from(scene, work, x, y):
     """How far the other outline, as far as it is around, is from a point [m]."""
     near, gap = work.near, math.inf
-    for j in range(near[AROUND, 0]):
-        gap = min(gap, distance_to(x, y, piece_at(scene.pieces, near[AROUND, 1 + j])))
+    for j in range(near.around[0]):
+        gap = min(gap, distance_to(x, y, piece_at(scene.pieces, near.around[1 + j])))
     return gap
 
 
@@ -63,8 +55,8 @@ def find_feet(scene, work, piece, inset, lens):
     places, ends among them, from where the gap within the lens grows either way."""
     near, count = work.near, 0
     first, last = ends_of(piece)
-    for j in range(near[AROUND, 0]):
-        other = piece_at(scene.pieces, near[AROUND, 1 + j])
+    for j in range(near.around[0]):
+        other = piece_at(scene.pieces, near.around[1 + j])
         parameter = min(max(foot_of(piece, other), first), last)
         x, y, _, _, metres = at_parameter(piece, parameter)
         gap = distance_to(x, y, other)
@@ -118,29 +110,29 @@ def write_nodes(nodes, rules, count, piece, foot, scale, low, high, order):
         t = middle + half * rules[order, 0, k]
         shrunk = 1.0 / (1.0 - t * t)
         part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * shrunk * shrunk
-        nodes[NODE_WEIGHT, count + k] = part
-        nodes[NODE_SUM, count + k] = foot + 2.0 * scale * t * shrunk
+        nodes.weight[count + k] = part
+        nodes.attraction[count + k] = foot + 2.0 * scale * t * shrunk
     if piece.bend == 0.0:
         for k in range(order):
-            parameter = nodes[NODE_SUM, count + k]
-            nodes[NODE_X, count + k] = piece.x + parameter * piece.way_x
-            nodes[NODE_Y, count + k] = piece.y + parameter * piece.way_y
+            parameter = nodes.attraction[count + k]
+            nodes.x[count + k] = piece.x + parameter * piece.way_x
+            nodes.y[count + k] = piece.y + parameter * piece.way_y
         for k in range(order):
-            nodes[NODE_NORMAL_X, count + k] = piece.way_y
-            nodes[NODE_NORMAL_Y, count + k] = -piece.way_x
+            nodes.normal_x[count + k] = piece.way_y
+            nodes.normal_y[count + k] = -piece.way_x
     else:
         for k in range(order):
-            parameter = nodes[NODE_SUM, count + k]
+            parameter = nodes.attraction[count + k]
             shrunk = 1.0 / (1.0 + parameter * parameter)
             c, s = (1.0 - parameter * parameter) * shrunk, 2.0 * parameter * shrunk
-            nodes[NODE_NORMAL_X, count + k] = c * piece.way_x - s * piece.way_y
-            nodes[NODE_NORMAL_Y, count + k] = c * piece.way_y + s * piece.way_x
-            nodes[NODE_WEIGHT, count + k] *= 2.0 * piece.bend * shrunk
+            nodes.normal_x[count + k] = c * piece.way_x - s * piece.way_y
+            nodes.normal_y[count + k] = c * piece.way_y + s * piece.way_x
+            nodes.weight[count + k] *= 2.0 * piece.bend * shrunk
         for k in range(order):
-            nodes[NODE_X, count + k] = piece.x + piece.bend * nodes[NODE_NORMAL_X, count + k]
-            nodes[NODE_Y, count + k] = piece.y + piece.bend * nodes[NODE_NORMAL_Y, count + k]
+            nodes.x[count + k] = piece.x + piece.bend * nodes.normal_x[count + k]
+            nodes.y[count + k] = piece.y + piece.bend * nodes.normal_y[count + k]
     for k in range(order):
-        nodes[NODE_GAP, count + k], nodes[NODE_SUM, count + k] = math.inf, 0.0
+        nodes.gap[count + k], nodes.attraction[count + k] = math.inf, 0.0
 
 
 def order_of(width, nearness):
@@ -166,8 +158,8 @@ def growth_at(scene, work, piece, foot):
     parameter) at a foot."""
     x, y, nx, ny, metres = at_parameter(piece, foot)
     near, gap, slope, rise = work.near, math.inf, 0.0, 0.0
-    for j in range(near[AROUND, 0]):
-        other = piece_at(scene.pieces, near[AROUND, 1 + j])
+    for j in range(near.around[0]):
+        other = piece_at(scene.pieces, near.around[1 + j])
         dx, dy, end = from_core(x, y, other)
         distance = math.sqrt(dx * dx + dy * dy)
         if distance - other.inward < gap:
@@ -211,16 +203,16 @@ def next_bend(scene, work, piece, foot, scale, low, last, gap):
     """The first t behind ``low`` at which what of the other outline is nearest, up to a gap [m],
     goes over from one of its pieces into the next: the gap bends there; ``last`` where it does not
     before."""
-    near, bend, count = work.near, last, work.near[AROUND, 0]
+    near, bend, count = work.near, last, work.near.around[0]
     for j in range(count):
-        other = piece_at(scene.pieces, near[AROUND, 1 + j])
+        other = piece_at(scene.pieces, near.around[1 + j])
         if other.bend > 0.0:
             for end in arc_ends(other):
                 met = parameter_before(piece, other.x, other.y, end, other.bend + gap)
                 bend = earlier(met, foot, scale, low, bend)
         else:
             # Where two faces meet in a reflex corner, on the bisector of their normals.
-            behind = piece_at(scene.pieces, near[AROUND, 1 + (j + 1) % count])
+            behind = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
             x, y = other.x + other.size * other.way_x, other.y + other.size * other.way_y
             dx = behind.x - behind.size * behind.way_x - x
             dy = behind.y - behind.size * behind.way_y - y

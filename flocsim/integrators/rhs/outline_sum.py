@@ -26,27 +26,8 @@ from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, growth
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import ANGLE
 from flocsim.state.outlines import (
-    AROUND,
-    CELL_X,
-    LISTED_A,
-    LISTED_B,
-    LISTED_COSINE,
-    LISTED_REACH,
-    LISTED_SINE,
-    LISTED_X,
-    LISTED_Y,
     MOST_NODES,
     MOST_ORDER,
-    NEAR_A,
-    NEAR_B,
-    NODE_GAP,
-    NODE_NORMAL_X,
-    NODE_NORMAL_Y,
-    NODE_PLATES,
-    NODE_WEIGHT,
-    NODE_X,
-    NODE_Y,
-    SEEN,
 )
 from flocsim.state.views import OutlineView
 from flocsim.state.work import NOW
@@ -70,15 +51,15 @@ AT_ONCE = 8
 def list_near(scene, work, a, b, pose, reach):
     """List the pieces of two bodies that are nearer to each other than ``reach``."""
     near, listed = work.near, work.listed
-    list_within(scene.pieces, near[NEAR_A], scene.first_piece[a], scene.first_piece[a + 1],
+    list_within(scene.pieces, near.first, scene.first_piece[a], scene.first_piece[a + 1],
                 pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
-    list_within(scene.pieces, near[NEAR_B], scene.first_piece[b], scene.first_piece[b + 1],
+    list_within(scene.pieces, near.second, scene.first_piece[b], scene.first_piece[b + 1],
                 UNMOVED, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
-    keep_paired(scene.pieces, near[NEAR_A], pose, near[NEAR_B], UNMOVED, reach)
-    keep_paired(scene.pieces, near[NEAR_B], UNMOVED, near[NEAR_A], pose, reach)
-    listed[LISTED_A], listed[LISTED_B], listed[LISTED_REACH] = a, b, reach
-    listed[LISTED_X], listed[LISTED_Y] = pose.x, pose.y
-    listed[LISTED_COSINE], listed[LISTED_SINE] = pose.cosine, pose.sine
+    keep_paired(scene.pieces, near.first, pose, near.second, UNMOVED, reach)
+    keep_paired(scene.pieces, near.second, UNMOVED, near.first, pose, reach)
+    listed.first_body, listed.second_body, listed.reach = a, b, reach
+    listed.x, listed.y = pose.x, pose.y
+    listed.cosine, listed.sine = pose.cosine, pose.sine
 
 
 def list_within(pieces, rows, first, last, pose, x, y, reach):
@@ -111,20 +92,20 @@ def slack_of(scene, work, a, b, pose):
     """How near to each other pieces have to be so that they are listed, as bodies lie by now [m];
     below 0 where none are."""
     listed = work.listed
-    if listed[LISTED_A] != a or listed[LISTED_B] != b:
+    if listed.first_body != a or listed.second_body != b:
         return -1.0
-    way = length_of(pose.x - listed[LISTED_X], pose.y - listed[LISTED_Y])
-    c, s = pose.cosine - listed[LISTED_COSINE], pose.sine - listed[LISTED_SINE]
-    return listed[LISTED_REACH] - way - scene.bodies[a].bounding_radius * length_of(c, s)
+    way = length_of(pose.x - listed.x, pose.y - listed.y)
+    c, s = pose.cosine - listed.cosine, pose.sine - listed.sine
+    return listed.reach - way - scene.bodies[a].bounding_radius * length_of(c, s)
 
 
 def gap_listed(scene, work, pose):
     """The least gap of the pieces that are listed [m]; inf where none are."""
     near, least = work.near, math.inf
-    for i in range(near[NEAR_A, 0]):
-        one = placed(scene.pieces, near[NEAR_A, 1 + i], pose)
-        for j in range(near[NEAR_B, 0]):
-            other = piece_at(scene.pieces, near[NEAR_B, 1 + j])
+    for i in range(near.first[0]):
+        one = placed(scene.pieces, near.first[1 + i], pose)
+        for j in range(near.second[0]):
+            other = piece_at(scene.pieces, near.second[1 + j])
             if may_be_within(one, other, least):
                 squared, _, _, _, _ = between_cores(one, other)
                 least = min(least, math.sqrt(squared) - one.inward - other.inward)
@@ -135,13 +116,13 @@ def look_around_piece(scene, work, piece, lens):
     """List the pieces of the other body that may be within ``lens`` of one, and add them to those
     that have been so far; how many they are."""
     near, count = work.near, 0
-    for j in range(near[NEAR_B, 0]):
-        row = near[NEAR_B, 1 + j]
+    for j in range(near.second[0]):
+        row = near.second[1 + j]
         if may_be_within(piece, piece_at(scene.pieces, row), lens):
             count += 1
-            near[AROUND, count] = row
-            add_row(near[SEEN], row)
-    near[AROUND, 0] = count
+            near.around[count] = row
+            add_row(near.seen, row)
+    near.around[0] = count
     return count
 
 
@@ -158,8 +139,8 @@ def look_from(scene, work, count, inset, lens):
     """Look from so many nodes at the pieces that are around any: how far they are, and at which gap
     plates attract each other as they do."""
     near = work.near
-    for j in range(near[SEEN, 0]):
-        piece = piece_at(scene.pieces, near[SEEN, 1 + j])
+    for j in range(near.seen[0]):
+        piece = piece_at(scene.pieces, near.seen[1 + j])
         if piece.bend > 0.0:
             add_arc(work.nodes, count, piece, inset, lens)
         else:
@@ -174,23 +155,23 @@ def add_nodes(scene, work, total, count, numbers):
     nodes = work.nodes
     # Several are looked from at once: as if there were some more, of no weight.
     whole = -(-count // AT_ONCE) * AT_ONCE
-    for row in range(CELL_X):
-        for k in range(count, whole):
-            nodes[row, k] = nodes[row, count - 1]
+    for k in range(count, whole):
+        nodes.x[k], nodes.y[k] = nodes.x[count - 1], nodes.y[count - 1]
+        nodes.gap[k], nodes.attraction[k] = nodes.gap[count - 1], nodes.attraction[count - 1]
     look_from(scene, work, whole, inset, lens)
     for k in range(count):
-        gap = nodes[NODE_GAP, k]
+        gap = nodes.gap[k]
         if gap < lens:
-            parted, plates = gap + inset, nodes[NODE_PLATES, k]
+            parted, plates = gap + inset, nodes.plate_gap[k]
             # The more an outline bends away, the more of what attracts is near: of circles the
             # share of a depth is that of plates within 1 % up to a gap of a third of it.
             point = OutlineView(
                 view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
                 view.radius_j, view.reduced_radius, view.effective_mass,
             )  # fmt: skip
-            size = -outline_pressure(scene, point) * nodes[NODE_WEIGHT, k]
-            x, y = nodes[NODE_X, k], nodes[NODE_Y, k]
-            across, up = size * nodes[NODE_NORMAL_X, k], size * nodes[NODE_NORMAL_Y, k]
+            size = -outline_pressure(scene, point) * nodes.weight[k]
+            x, y = nodes.x[k], nodes.y[k]
+            across, up = size * nodes.normal_x[k], size * nodes.normal_y[k]
             fx, fy, torque = fx + across, fy + up, torque + x * up - y * across
     return fx, fy, torque
 
@@ -266,9 +247,9 @@ def sum_along(scene, work, time, a, b, x, y, cosine, sine):
     inset, lens, view = numbers
     if lens == 0.0:
         return total
-    count, least, work.near[SEEN, 0] = 0, view.gap + inset, 0
-    for i in range(work.near[NEAR_A, 0]):
-        piece = placed(scene.pieces, work.near[NEAR_A, 1 + i], pose)
+    count, least, work.near.seen[0] = 0, view.gap + inset, 0
+    for i in range(work.near.first[0]):
+        piece = placed(scene.pieces, work.near.first[1 + i], pose)
         if look_around_piece(scene, work, piece, lens) == 0:
             continue
         feet = find_feet(scene, work, piece, inset, lens)

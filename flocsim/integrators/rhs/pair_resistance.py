@@ -19,8 +19,7 @@ from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.surface_gap import soften
 from flocsim.integrators.rhs.views import add_force, centre_line
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.scene import CUT, FIRST_RADIUS, FLOOR, FLOW, MEAN_RADIUS, NEAR_CUT, VISCOSITY
-from flocsim.state.work import DAMPING, NOW, SOFT_GAP, SQUARES, STIFFNESS
+from flocsim.state.work import DAMPING, NOW, SQUARES, STIFFNESS
 
 (
     N_1, N_2, A_V1, A_V2, A_W1, A_W2, B_V1, B_V2, B_W1, B_W2, K_N, K_A, K_B,
@@ -46,7 +45,7 @@ SPHERE_DRAG, SPHERE_TURN = 6.0 * math.pi, 8.0 * math.pi
 
 def interval_of(scene, gap):
     """(interval, share of it) of the tables at a gap [m]; at an end where they do not reach."""
-    place = math.log(gap / (scene.water[MEAN_RADIUS] * NEAREST)) * NODES_A_UNIT
+    place = math.log(gap / (scene.water.mean_radius * NEAREST)) * NODES_A_UNIT
     last = scene.pair_table.shape[0] - 1
     interval = int(min(max(place, 0.0), last))
     return interval, min(max(place - interval, 0.0), 1.0)
@@ -107,16 +106,16 @@ def flow_in(scene, work, state, body):
     """(u_x, u_y, spin) of the flow at a body."""
     f = scene.water
     x, y = work.place[state, body, X], work.place[state, body, Y]
-    u = f[FLOW] + f[FLOW + 2] * x + f[FLOW + 3] * y
-    v = f[FLOW + 1] + f[FLOW + 4] * x + f[FLOW + 5] * y
-    return u, v, 0.5 * (f[FLOW + 4] - f[FLOW + 3])
+    u = f.flow_x + f.flow_x_by_x * x + f.flow_x_by_y * y
+    v = f.flow_y + f.flow_y_by_x * x + f.flow_y_by_y * y
+    return u, v, 0.5 * (f.flow_y_by_x - f.flow_x_by_y)
 
 
 def strain_along(scene, nx, ny):
     """(E_nn, E_nt) of the flow [1/s], t being n turned counter-clockwise."""
     f = scene.water
-    e_xx = 0.5 * (f[FLOW + 2] - f[FLOW + 5])
-    e_xy = 0.5 * (f[FLOW + 3] + f[FLOW + 4])
+    e_xx = 0.5 * (f.flow_x_by_x - f.flow_y_by_y)
+    e_xy = 0.5 * (f.flow_x_by_y + f.flow_y_by_x)
     cosine, sine = nx * nx - ny * ny, 2.0 * nx * ny
     return e_xx * cosine + e_xy * sine, e_xy * cosine - e_xx * sine
 
@@ -152,7 +151,7 @@ def write_relative(scene, work, place, arm, arm_2):
 
 def water_radius(scene, body):
     """Of the sphere that has the body's drag [m]."""
-    return scene.water[FIRST_RADIUS + body]
+    return scene.water.first_radius if body == 0 else scene.water.second_radius
 
 
 def relative_gap(scene, work, state, between):
@@ -162,17 +161,17 @@ def relative_gap(scene, work, state, between):
     Far outlines are of no account, and at touch theirs is the gap.
     """
     spheres = max(between, 0.0)
-    if scene.water[NEAR_CUT] == 0.0:
+    if scene.water.near_cut == 0.0:
         return spheres, 1.0
     if work.tally.candidates == 0:
         return spheres, 0.0
     if scene.surface_reach > 0.0:
         # Forces between the two outlines have asked for it just now.
-        found = work.squares[PULL, SOFT_GAP]
+        found = work.tally.soft_gap
     else:
         found, _ = soften(scene, work, state, 0, work.tally.candidates)
-    near, _ = fading(found, scene.water[NEAR_CUT])
-    outlines, mean = max(found, 0.0), scene.water[MEAN_RADIUS]
+    near, _ = fading(found, scene.water.near_cut)
+    outlines, mean = max(found, 0.0), scene.water.mean_radius
     lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
     factor = math.exp(LEAN * mean / (mean + LEAN_FALLS * outlines) * lean)
     return near * outlines * factor + (1.0 - near) * spheres, near * factor
@@ -186,10 +185,10 @@ def write_squares(scene, work, state, one, two):
     nx, ny, distance = centre_line(scene, work, state, two, one)
     radius = water_radius(scene, one)
     sizes = radius + water_radius(scene, two)
-    far, _ = fading(distance - sizes, scene.water[CUT])
+    far, _ = fading(distance - sizes, scene.water.cut)
     if far == 0.0:
         return 0.0, 0.0, nx, ny
-    floor, slope = scene.water[FLOOR], 0.0
+    floor, slope = scene.water.floor, 0.0
     gap = max(distance - sizes, floor)
     e_nn, e_nt = strain_along(scene, nx, ny)
     write_common(scene, work, interval_of(scene, gap), e_nn, e_nt)
@@ -205,7 +204,7 @@ def write_squares(scene, work, state, one, two):
     t_n, t_t, t_s = pull_at(scene, place, distance / (sizes + found))
     t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
     one_pull, two_pull = (-t_n, -t_t, -arm * t_t - t_s), (t_n, t_t, (arm - distance) * t_t + t_s)
-    write_row(work, PULL, one_pull, two_pull, work.squares[PULL, SOFT_GAP])
+    write_row(work, PULL, one_pull, two_pull, 0.0)
     return far, slope, nx, ny
 
 
@@ -221,7 +220,7 @@ def pull_at(scene, place, size):
 
 def own_drag(scene, body):
     """(of velocities, of the spin) Stokes drag of the sphere of its drag [N s/m, N m s]."""
-    radius, viscosity = water_radius(scene, body), scene.water[VISCOSITY]
+    radius, viscosity = water_radius(scene, body), scene.water.viscosity
     return SPHERE_DRAG * viscosity * radius, SPHERE_TURN * viscosity * radius**3
 
 
@@ -229,7 +228,7 @@ def own_drag(scene, body):
 def add_pair_resistance(scene, work, state):
     """Add what the water between two bodies puts on them in a state, which is located, beside their
     Stokes drag."""
-    if scene.water[CUT] == 0.0:
+    if scene.water.cut == 0.0:
         return
     s = work.squares
     for pair in range(work.tally.pairs):
@@ -260,7 +259,7 @@ def add_pair_resistance(scene, work, state):
 def add_pair_damping(scene, work):
     """Its derivatives now: by the velocities all of them, by the places that of the resistance
     along the gap of the outlines, which grows without bounds."""
-    if scene.water[CUT] == 0.0:
+    if scene.water.cut == 0.0:
         return
     s, jacobian = work.squares, work.jacobian
     for pair in range(work.tally.pairs):

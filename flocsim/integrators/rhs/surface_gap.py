@@ -19,7 +19,7 @@ from flocsim.geometry.contact.points import length_of, locate_polygons, separati
 from flocsim.integrators.rhs.views import centre_line, normal_rate, pair_view
 from flocsim.state.bodies import ANGLE
 from flocsim.state.contacts import OPEN
-from flocsim.state.work import NEW, NOW, SOFT_GAP, SQUARES
+from flocsim.state.work import NEW, NOW
 
 RANGE = 40.0
 """Pairs whose u is so much above the least have no share: exp(−40) is below rounding."""
@@ -175,7 +175,7 @@ def soften(scene, work, state, row, end):
             own = length_at(scene, geometry[state, each].gap)
             geometry[state, each].share *= length / (own * total)
             rate += geometry[state, each].share * normal_rate(work, state, each)
-    work.squares[SQUARES, SOFT_GAP] = gap
+    work.tally.soft_gap = gap
     return gap, rate
 
 

@@ -106,7 +106,7 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     assert list_candidates(scene, work)
     locate_contacts(scene, work, NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
-    assert work.geometry[NOW, : work.tally.candidates, 2].min() < 0.0
+    assert work.geometry["gap"][NOW, : work.tally.candidates].min() < 0.0
 
 
 REACHES = [1e-8, 4e-7, 2e-5]
@@ -131,7 +131,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
             if {pair[0], pair[2]} == two
         )
         known = [
-            work.geometry[NOW, row, 2] for row, key in enumerate(listed) if {key[0], key[2]} == two
+            work.geometry[NOW, row].gap for row, key in enumerate(listed) if {key[0], key[2]} == two
         ]
         if least < reach:
             assert min(known, default=np.inf) == pytest.approx(least, rel=1e-9, abs=1e-17)

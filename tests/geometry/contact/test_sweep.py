@@ -5,17 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.geometry.contact.body_pairs import (
-    DISC_COLUMNS,
-    MOVES,
-    PLACE_X,
-    PLACE_Y,
-    REACH,
-    WAY_X,
-    WAY_Y,
-    come_near,
-    near_pairs,
-)
+from flocsim.geometry.contact.body_pairs import come_near, near_pairs
+from flocsim.state.bodies import Disc
 from flocsim.state.contacts import BodyPair
 
 BOXES = [(math.inf, math.inf), (10.0, math.inf), (math.inf, 8.0), (10.0, 8.0)]
@@ -23,13 +14,14 @@ BOXES = [(math.inf, math.inf), (10.0, math.inf), (math.inf, 8.0), (10.0, 8.0)]
 
 def random_discs(rng, count, box):
     """Discs of any size, some of them fixed, that go some way."""
-    discs = np.zeros((count, DISC_COLUMNS))
-    for axis, side in zip((PLACE_X, PLACE_Y), box, strict=True):
+    discs = Disc.rows(count)
+    for axis, side in zip("xy", box, strict=True):
         wide = 12.0 if side == math.inf else 3.0 * side
-        discs[:, axis] = rng.uniform(-wide, wide, count)
-    discs[:, [WAY_X, WAY_Y]] = 0.4 * rng.normal(size=(count, 2))
-    discs[:, REACH] = rng.uniform(0.1, 0.9, count)
-    discs[:, MOVES] = rng.random(count) < 0.8
+        discs[axis] = rng.uniform(-wide, wide, count)
+    for axis in ("way_x", "way_y"):
+        discs[axis] = 0.4 * rng.normal(size=count)
+    discs["reach"] = rng.uniform(0.1, 0.9, count)
+    discs["moves"] = rng.random(count) < 0.8
     return discs
 
 
@@ -55,12 +47,12 @@ def test_the_sweep_finds_what_a_look_at_all_pairs_finds(seed, box):
 def test_ways_are_met_in_between(seed):
     rng = np.random.default_rng(seed)
     discs = random_discs(rng, 2, BOXES[0])
-    discs[:, MOVES] = 1.0
+    discs["moves"] = 1.0
     shares = np.linspace(0.0, 1.0, 2001)[:, None]
-    places = [discs[k, :2] + shares * discs[k, 2:4] for k in range(2)]
+    places = [(d.x, d.y) + shares * (d.way_x, d.way_y) for d in discs]
     least = np.hypot(*(places[0] - places[1]).T).min()
     for reach in (0.9 * least, 1.1 * least):
-        discs[:, REACH] = 0.5 * reach
+        discs["reach"] = 0.5 * reach
         assert come_near(discs, 0, 1, *BOXES[0]) == (reach > least)
 
 
@@ -68,5 +60,6 @@ def test_a_box_shifted_by_any_vector_has_the_same_pairs():
     rng = np.random.default_rng(3)
     discs = random_discs(rng, 60, (10.0, 8.0))
     moved = discs.copy()
-    moved[:, [PLACE_X, PLACE_Y]] += rng.uniform(-30.0, 30.0, 2)
+    moved["x"] += rng.uniform(-30.0, 30.0)
+    moved["y"] += rng.uniform(-30.0, 30.0)
     assert found(moved, (10.0, 8.0)) == found(discs, (10.0, 8.0))

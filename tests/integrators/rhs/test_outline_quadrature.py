@@ -15,16 +15,6 @@ from flocsim.integrators.rhs.outline_sum import (
     look_around_piece,
     sum_along,
 )
-from flocsim.state.outlines import (
-    NEAR_A,
-    NODE_GAP,
-    NODE_NORMAL_X,
-    NODE_NORMAL_Y,
-    NODE_SUM,
-    NODE_WEIGHT,
-    NODE_X,
-    NODE_Y,
-)
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import SIZE, Pair, at_gap, rough
 
@@ -47,10 +37,10 @@ def between(scene, work, piece, low, high, numbers):
     for k in range(8):
         parameter = 0.5 * (low + high) + half * work.rules[8, 0, k]
         x, y, nx, ny, metres = at_parameter(piece, parameter)
-        nodes[NODE_X, k], nodes[NODE_Y, k] = x, y
-        nodes[NODE_NORMAL_X, k], nodes[NODE_NORMAL_Y, k] = nx, ny
-        nodes[NODE_WEIGHT, k] = half * work.rules[8, 1, k] * metres
-        nodes[NODE_GAP, k], nodes[NODE_SUM, k] = math.inf, 0.0
+        nodes.x[k], nodes.y[k] = x, y
+        nodes.normal_x[k], nodes.normal_y[k] = nx, ny
+        nodes.weight[k] = half * work.rules[8, 1, k] * metres
+        nodes.gap[k], nodes.attraction[k] = math.inf, 0.0
     return add_nodes(scene, work, (0.0, 0.0, 0.0), 8, numbers)
 
 
@@ -60,8 +50,8 @@ def halved(scene, work, a, b, x, y, cosine, sine, parts, error):
     numbers = look_around(scene, work, 0.0, a, b, pose)
     depth = numbers[2].depth
     fx, fy = 0.0, 0.0
-    for i in range(work.near[NEAR_A, 0]):
-        piece = placed(scene.pieces, work.near[NEAR_A, 1 + i], pose)
+    for i in range(work.near.first[0]):
+        piece = placed(scene.pieces, work.near.first[1 + i], pose)
         if look_around_piece(scene, work, piece, numbers[1]) == 0:
             continue
         first, last = ends_of(piece)
