@@ -70,8 +70,9 @@ def test_contact_pairs(seed):
     for row, key in enumerate(keys):
         side = 1.0 if key == wanted.pair_keys()[row] else -1.0
         geometry = found[key]
-        assert -geometry[2] == pytest.approx(wanted.overlap[row], rel=1e-9, abs=1e-18)
-        assert geometry[:2] == pytest.approx(side * wanted.normal[row], abs=1e-9)
+        assert -geometry.gap == pytest.approx(wanted.overlap[row], rel=1e-9, abs=1e-18)
+        normal = geometry.normal_x, geometry.normal_y
+        assert normal == pytest.approx(side * wanted.normal[row], abs=1e-9)
         assert fast.contact_point(key, geometry) == pytest.approx(wanted.point[row], abs=1e-15)
 
 

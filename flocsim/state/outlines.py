@@ -15,7 +15,7 @@ class Piece(Record):
     y: float
     way_x: float  # of a segment its unit tangent, the body on its left; of an arc the outward …
     way_y: float  # … direction of its middle
-    size: float  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
+    half: float  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
     bend: float  # the radius of an arc [m], 0 of a segment
     middle_x: float  # the centre of a circle that holds the piece [m]
     middle_y: float
@@ -109,7 +109,7 @@ class Charge(Record):
 
     x: float  # [m]
     y: float
-    size: float  # of charges that make a potential of 1 on the outline [-]
+    strength: float  # of charges that make a potential of 1 on the outline [-]
 
 
 TILE_BITS = 3

@@ -23,6 +23,8 @@ class Record:
         fields = [
             (name, KINDS[kind]) for name, kind in get_type_hints(cls).items() if kind in KINDS
         ]
+        if taken := [name for name, _ in fields if hasattr(np.record, name)]:
+            raise TypeError(f"{cls.__name__}.{taken[0]}: numpy's records have that name themselves")
         cls.dtype = np.dtype((np.record, np.dtype(fields, align=True)))
 
     @classmethod

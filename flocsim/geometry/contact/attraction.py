@@ -90,7 +90,7 @@ def add_segment(nodes, count, piece, inset, lens):
         dx, dy = nodes.x[k] - piece.x, nodes.y[k] - piece.y
         height = dx * piece.way_y - dy * piece.way_x
         along = dx * piece.way_x + dy * piece.way_y
-        past = abs(along) - piece.size
+        past = abs(along) - piece.half
         past = past if past > 0.0 else 0.0
         deep = height + piece.inward
         gap = math.sqrt(deep * deep + past * past) - piece.inward
@@ -99,7 +99,7 @@ def add_segment(nodes, count, piece, inset, lens):
         p = height + inset
         reach = lens * lens - p * p
         reach = math.sqrt(reach if reach > 0.0 else 0.0)
-        low, high = -piece.size - along, piece.size - along
+        low, high = -piece.half - along, piece.half - along
         low, high = low if low > -reach else -reach, high if high < reach else reach
         first, last = beyond(p, abs(low)), beyond(p, abs(high))
         first = first if low >= 0.0 else -first
@@ -114,7 +114,7 @@ def averted_arc(x, y, piece, radius, lens):
     """S of an arc from its middle, x as seen from its centre."""
     total = 0.0
     for node, weight in EIGHT:
-        t = piece.size * node
+        t = piece.half * node
         grown = 1.0 + t * t
         c, s = (1.0 - t * t) / grown, 2.0 * t / grown
         nx, ny = c * piece.way_x - s * piece.way_y, c * piece.way_y + s * piece.way_x
@@ -123,7 +123,7 @@ def averted_arc(x, y, piece, radius, lens):
         if squared < lens * lens:
             ahead = nx * dx + ny * dy
             total += weight * ahead / (grown * squared * squared * math.sqrt(squared))
-    return 2.0 * radius * piece.size * total
+    return 2.0 * radius * piece.half * total
 
 
 def facing_arc(p, radius, distance, low, high):
@@ -167,8 +167,8 @@ def facing_arc(p, radius, distance, low, high):
 
 def arc_ends(piece):
     """The directions of the two ends of an arc from its centre, (x, y), (x, y)."""
-    squared = piece.size * piece.size
-    c, s = (1.0 - squared) / (1.0 + squared), 2.0 * piece.size / (1.0 + squared)
+    squared = piece.half * piece.half
+    c, s = (1.0 - squared) / (1.0 + squared), 2.0 * piece.half / (1.0 + squared)
     x, y = piece.way_x, piece.way_y
     return (c * x + s * y, c * y - s * x), (c * x - s * y, c * y + s * x)
 
@@ -280,7 +280,7 @@ def from_segment(x, y, piece, depth, rule):
     """∫ q ρ⁻³ ds over a segment, seen from a point [1/m²]."""
     dx, dy = x - piece.x, y - piece.y
     p, along = dx * piece.way_y - dy * piece.way_x, dx * piece.way_x + dy * piece.way_y
-    low, high = -piece.size - along, piece.size - along
+    low, high = -piece.half - along, piece.half - along
     if low < 0.0 < high or abs(p) > 1e-3 * min(abs(low), abs(high)):
         if depth == math.inf:
             first, last = low / math.sqrt(p * p + low * low), high / math.sqrt(p * p + high * high)
@@ -304,14 +304,14 @@ def from_segment(x, y, piece, depth, rule):
 def from_arc(x, y, nx, ny, piece, depth, rule):
     """∫ (n·n(s)) q ρ⁻³ ds over an arc, seen from a point with a normal [1/m²]: by panels that grow
     with the distance from where the point faces its circle."""
-    foot = min(max(parameter_beside(piece, x, y), -piece.size), piece.size)
+    foot = min(max(parameter_beside(piece, x, y), -piece.half), piece.half)
     fx, fy, _, _, metres = at_parameter(piece, foot)
     near = math.sqrt((x - fx) * (x - fx) + (y - fy) * (y - fy)) / metres
     total = 0.0
     for side in range(2):
-        end = piece.size if side == 0 else -piece.size
+        end = piece.half if side == 0 else -piece.half
         way = 1.0 if end > foot else -1.0
-        begin, step = foot, max(near, 1e-9 * piece.size)
+        begin, step = foot, max(near, 1e-9 * piece.half)
         while (end - begin) * way > 0.0:
             stop = begin + way * step
             if (end - stop) * way < 0.5 * step:

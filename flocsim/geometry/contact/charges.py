@@ -106,7 +106,7 @@ def unit_of(shape: Shape, kappa: float) -> float:
 def spacings(pieces, kappa):
     """How far charges behind each piece lie from each other [m], and their numbers."""
     spacing = DEEP * np.minimum(pieces["inward"], 1.0 / kappa)
-    bend, size = pieces["bend"], pieces["size"]
+    bend, size = pieces["bend"], pieces["half"]
     lengths = np.where(bend > 0.0, 4.0 * np.arctan(size) * bend, 2.0 * size)
     # A corner that is not rounded would need infinitely many.
     with np.errstate(divide="ignore"):
@@ -139,9 +139,9 @@ def points_of(pieces, kappa, times=1):
     for row, (depth, count) in enumerate(zip(spacing, times * counts.astype(int), strict=True)):
         piece = piece_at(pieces, row)
         share = (2.0 * np.arange(count) + 1.0) / count - 1.0
-        parameter = share * piece.size
+        parameter = share * piece.half
         if piece.bend > 0.0:
-            parameter = np.tan(share * math.atan(piece.size))
+            parameter = np.tan(share * math.atan(piece.half))
         x, y, nx, ny, _ = at_parameter(piece, parameter)
         points.append(np.column_stack([x, y]))
         places.append(np.column_stack([x - depth * nx, y - depth * ny]))
@@ -304,7 +304,7 @@ def at_node(groups, charges, near, count, kappa, x, y):
                 continue
             squared = max(squared, LEAST)
             zero, first = bessel_pair(squared)
-            size = charge.size
+            size = charge.strength
             slope = -size * kappa * kappa * first
             value += size * zero
             by_x += slope * dx

@@ -127,7 +127,7 @@ class Placed(NamedTuple):
     y: float
     way_x: float
     way_y: float
-    size: float
+    half: float
     bend: float
     middle_x: float
     middle_y: float
@@ -139,7 +139,7 @@ def piece_at(pieces, row):
     """A piece in the frame of its own body."""
     own = pieces[row]
     return Placed(
-        own.x, own.y, own.way_x, own.way_y, own.size, own.bend,
+        own.x, own.y, own.way_x, own.way_y, own.half, own.bend,
         own.middle_x, own.middle_y, own.extent, own.inward,
     )  # fmt: skip
 
@@ -151,7 +151,7 @@ def placed(pieces, row, pose):
     return Placed(
         x + c * own.x - s * own.y, y + s * own.x + c * own.y,
         c * own.way_x - s * own.way_y, s * own.way_x + c * own.way_y,
-        own.size, own.bend,
+        own.half, own.bend,
         x + c * own.middle_x - s * own.middle_y, y + s * own.middle_x + c * own.middle_y,
         own.extent, own.inward,
     )  # fmt: skip
@@ -164,7 +164,7 @@ def core_of(piece):
     # The outward normal is the tangent turned clockwise.
     x = piece.x - piece.inward * piece.way_y
     y = piece.y + piece.inward * piece.way_x
-    return (x, y), (piece.size * piece.way_x, piece.size * piece.way_y)
+    return (x, y), (piece.half * piece.way_x, piece.half * piece.way_y)
 
 
 def place_beside(x, y, middle, half):
@@ -237,7 +237,7 @@ def are_within(one, other, reach):
 
 def ends_of(piece):
     """The parameters at both ends of a piece: metres along a segment, tan(φ/2) along an arc."""
-    return -piece.size, piece.size
+    return -piece.half, piece.half
 
 
 def at_parameter(piece, parameter):

@@ -116,7 +116,7 @@ def sum_charges(scene, work, a, b, x, y, cosine, sine):
             charge = scene.charges[row]
             ax = x + cosine * charge.x - sine * charge.y
             ay = y + sine * charge.x + cosine * charge.y
-            count = put_charge(scene, work.nodes, count, grid, ax, ay, charge.size)
+            count = put_charge(scene, work.nodes, count, grid, ax, ay, charge.strength)
         if count > MOST_NODES - GROUP:
             total = add_forces(work.nodes, total, count)
             count = 0

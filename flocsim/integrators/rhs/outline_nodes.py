@@ -213,10 +213,10 @@ def next_bend(scene, work, piece, foot, scale, low, last, gap):
         else:
             # Where two faces meet in a reflex corner, on the bisector of their normals.
             behind = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
-            x, y = other.x + other.size * other.way_x, other.y + other.size * other.way_y
-            dx = behind.x - behind.size * behind.way_x - x
-            dy = behind.y - behind.size * behind.way_y - y
-            if behind.bend == 0.0 and dx * dx + dy * dy < 1e-12 * other.size * other.size:
+            x, y = other.x + other.half * other.way_x, other.y + other.half * other.way_y
+            dx = behind.x - behind.half * behind.way_x - x
+            dy = behind.y - behind.half * behind.way_y - y
+            if behind.bend == 0.0 and dx * dx + dy * dy < 1e-12 * other.half * other.half:
                 nx, ny = other.way_y + behind.way_y, -other.way_x - behind.way_x
                 length = math.sqrt(nx * nx + ny * ny)
                 met = parameter_before(piece, x, y, (nx / length, ny / length), gap)

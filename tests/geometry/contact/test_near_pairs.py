@@ -94,13 +94,18 @@ def least_of(distances):
 def listed(scene, work, cutoff, a=1, b=0):
     """The pairs listed up to a gap, in order, as (vertex's body, edge's body, vertex, edge)."""
     work.tally.candidates = 0
-    work.pairs[0, :2] = a, b
+    work.pairs[0].later, work.pairs[0].earlier = a, b
     assert compose(list_polygons, {})(scene, work, 0, cutoff)
     rows = work.candidates[: work.tally.candidates]
     first = scene.first
     return [
-        (int(a), int(b), int(point - first[a]), int(start - first[b]))
-        for a, point, b, start in rows[:, :4]
+        (
+            int(row.vertex_body),
+            int(row.edge_body),
+            int(row.vertex - first[row.vertex_body]),
+            int(row.edge_start - first[row.edge_body]),
+        )
+        for row in rows
     ]
 
 

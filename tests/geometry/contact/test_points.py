@@ -28,5 +28,5 @@ def test_a_vertex_right_on_an_edge_gets_a_unit_normal_and_no_nan():
     scene, work = arrays(Body(square, surface_density=2.0), sphere(1e-6, 2e-6, 0.0))
     assert locate_contacts(scene, work, NOW) == pytest.approx(-2e-6)
     listed = work.geometry[NOW, : work.tally.candidates]
-    assert np.isfinite(listed).all()
-    assert np.hypot(listed[:, 0], listed[:, 1]) == pytest.approx(np.ones(len(listed)))
+    assert all(np.isfinite(listed[name]).all() for name in listed.dtype.names)
+    assert np.hypot(listed["normal_x"], listed["normal_y"]) == pytest.approx(np.ones(len(listed)))
