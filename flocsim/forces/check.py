@@ -128,9 +128,10 @@ def computed(force, owner, name):
 
 
 def as_numbers(value):
-    """A number, or a tuple of numbers, as the compiled kernel will see it."""
+    """A number, or a tuple of numbers, named or not, as the compiled kernel will see it."""
     if isinstance(value, tuple):
-        return tuple(as_numbers(each) for each in value)
+        numbers = tuple(map(as_numbers, value))
+        return type(value)(*numbers) if hasattr(value, "_fields") else numbers
     return float(value)
 
 

@@ -111,6 +111,9 @@ class Source:
 
     def value(self, value):
         """Keep a number or a tuple of numbers; the text that reads it back."""
+        if hasattr(value, "_fields"):
+            self.kernels[type(value).__name__] = type(value)
+            return f"{type(value).__name__}({', '.join(map(self.value, value))})"
         if isinstance(value, tuple):
             return "(" + "".join(self.value(each) + ", " for each in value) + ")"
         self.numbers.append(value)

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 
@@ -11,19 +11,33 @@ from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import ContactForce
 
 
-def stiffnesses(contact, springs):
+class ContactLaw(NamedTuple):
+    """The numbers of a Contact's law, as its kernels read them."""
+
+    normal_stiffness: float  # k_n [N/m]; 0 where the next one is given
+    normal_modulus: float  # k_n over the equivalent radius of the smaller body [Pa]
+    tangential_stiffness: float  # k_t [N/m]; 0 where the next one is given
+    tangential_ratio: float  # k_t over k_n
+    damping_ratio: float  # z = λ_n/(2 √(k_n/M)); 0 where the next one is given
+    normal_damping: float  # λ_n [1/s]
+    proportional: float  # 1 where λ_t = λ_n k_t/k_n, 0 where it is the next one
+    tangential_damping: float  # λ_t [1/s]
+    friction: float  # µ; inf where nothing slides
+    tension: float  # 1 where the normal force may pull, 0 where it may not
+
+
+def stiffnesses(contact, law):
     """(k_n, k_t) [N/m] of a contact: as given, or from the modulus and the smaller body's size."""
-    k_n, modulus, k_t, ratio = springs
-    k_n = k_n + modulus * contact.smaller_radius
-    return k_n, k_t + ratio * k_n
+    k_n = law.normal_stiffness + law.normal_modulus * contact.smaller_radius
+    return k_n, law.tangential_stiffness + law.tangential_ratio * k_n
 
 
-def unclipped(contact, springs, dashpots):
-    """(normal, tangential) force of springs and dashpots alone [N]."""
-    k_n, k_t = stiffnesses(contact, springs)
-    damping_ratio, lambda_n, proportional, lambda_t = dashpots
-    damping = lambda_n + damping_ratio * 2.0 * math.sqrt(k_n / contact.effective_mass)
-    shear_damping = lambda_t + proportional * (k_t / k_n) * damping
+def unclipped(contact, law):
+    """(normal, tangential) force of springs and dashpots alone [N]: eqs 7 and 8."""
+    k_n, k_t = stiffnesses(contact, law)
+    critical = 2.0 * math.sqrt(k_n / contact.effective_mass)
+    damping = law.normal_damping + law.damping_ratio * critical
+    shear_damping = law.tangential_damping + law.proportional * (k_t / k_n) * damping
     normal = k_n * contact.overlap + contact.effective_mass * damping * contact.overlap_rate
     drag = contact.effective_mass * shear_damping * contact.slip_rate
     return normal, -k_t * contact.slip - drag
@@ -129,39 +143,27 @@ class Contact(ContactForce):
         return ("k_n", "N/m") if self.young is None else ("young", "Pa")
 
     @property
-    def frictionless(self) -> bool:
-        """Whether µ = 0: there is no tangential force then, and nothing of it exists."""
-        return self.friction == 0.0
-
-    @property
-    def springs(self) -> tuple[float, float, float, float]:
-        """(k_n [N/m], ∂k_n/∂r_eq [Pa], k_t [N/m], ∂k_t/∂k_n), each 0 unless it is what is given."""
+    def law(self) -> ContactLaw:
+        """Return the numbers that the kernels read; friction = 0 leaves nothing tangential."""
+        sheared = self.friction != 0.0
         ratio = 0.0 if self.poisson is None else (1.0 - 3.0 * self.poisson) / (1.0 + self.poisson)
-        shear = (0.0, 0.0) if self.frictionless else (self.k_t or 0.0, ratio)
-        return self.k_n or 0.0, 0.5 * math.pi * (self.young or 0.0), *shear
-
-    @property
-    def dashpots(self) -> tuple[float, float, float, float]:
-        """(z of critical damping, λ_n [1/s], 1.0 where λ_t follows λ_n, λ_t [1/s])."""
-        normal: tuple[float, Any] = (0.0, self.damping_n)
+        k_t, ratio = (self.k_t or 0.0, ratio) if sheared else (0.0, 0.0)
+        damping_ratio, normal_damping = 0.0, 0.0
         if self.restitution is not None:
-            normal = (damping_ratio_for(self.restitution, self.tension), 0.0)
+            damping_ratio = damping_ratio_for(self.restitution, self.tension)
         elif self.damping_n == "critical":
-            normal = (1.0, 0.0)
-        if self.frictionless or self.damping_t == "proportional":
-            return *normal, float(not self.frictionless), 0.0
-        return *normal, 0.0, float(self.damping_t)
-
-    @property
-    def sheared(self) -> bool:
-        """Whether there is a tangential spring."""
-        return max(self.springs[2:]) > 0.0
-
-    @property
-    def friction_limit(self) -> float:
-        """µ as a number: inf where nothing can slide."""
-        dragged = self.sheared or self.dashpots[3] > 0.0
-        return float(self.friction) if self.friction != "none" and dragged else math.inf
+            damping_ratio = 1.0
+        else:
+            normal_damping = self.damping_n
+        proportional = sheared and self.damping_t == "proportional"
+        tangential_damping = 0.0 if proportional or not sheared else float(self.damping_t)
+        # Friction limits springs and dashpots; without either there is nothing to limit.
+        limited = self.friction != "none" and max(k_t, ratio, tangential_damping) > 0.0
+        return ContactLaw(
+            self.k_n or 0.0, 0.5 * math.pi * (self.young or 0.0), k_t, ratio, damping_ratio,
+            normal_damping, float(proportional), tangential_damping,
+            float(self.friction) if limited else math.inf, float(self.tension),
+        )  # fmt: skip
 
     @property
     def goes_on_apart(self) -> bool:
@@ -171,38 +173,39 @@ class Contact(ContactForce):
     @property
     def slides(self) -> bool:
         """Whether friction limits ξ, or a subclass with a limit of its own."""
-        own = type(self).slip_limit is not Contact.slip_limit
-        return own or (self.friction_limit < math.inf and self.sheared)
+        own, law = type(self).slip_limit is not Contact.slip_limit, self.law
+        springs = max(law.tangential_stiffness, law.tangential_ratio) > 0.0
+        return own or (law.friction < math.inf and springs)
 
     @property
     def has_events(self) -> bool:
         """Whether anything is clipped."""
-        return not self.tension or self.friction_limit < math.inf
+        return not self.tension or self.law.friction < math.inf
 
     @staticmethod
-    def kernel(contact, springs, dashpots, friction_limit, tension):
+    def kernel(contact, law):
         """(normal, tangential) force [N]."""
-        normal, tangential = unclipped(contact, springs, dashpots)
-        if tension == 0.0:
+        normal, tangential = unclipped(contact, law)
+        if law.tension == 0.0:
             normal = max(normal, 0.0)
-        if friction_limit < math.inf:
-            hold = friction_limit * max(normal, 0.0)
+        if law.friction < math.inf:
+            hold = law.friction * max(normal, 0.0)
             tangential = min(max(tangential, -hold), hold)
         return normal, tangential
 
     @staticmethod
-    def events(contact, springs, dashpots, friction_limit):
+    def events(contact, law):
         """(the normal force, which begins to pull where it is 0; how much more friction could hold,
         which begins to slide) [N]."""
-        normal, tangential = unclipped(contact, springs, dashpots)
-        if friction_limit == math.inf:
+        normal, tangential = unclipped(contact, law)
+        if law.friction == math.inf:
             return normal, 1.0
-        return normal, friction_limit * max(normal, 0.0) - abs(tangential)
+        return normal, law.friction * max(normal, 0.0) - abs(tangential)
 
     @staticmethod
-    def slip_limit(contact, springs, friction_limit):
+    def slip_limit(contact, law):
         """The elastic displacement µ k_n Δ/k_t that friction can hold [m]."""
-        k_n, k_t = stiffnesses(contact, springs)
-        if friction_limit == math.inf or k_t == 0.0:
+        k_n, k_t = stiffnesses(contact, law)
+        if law.friction == math.inf or k_t == 0.0:
             return math.inf
-        return friction_limit * k_n * max(contact.overlap, 0.0) / k_t
+        return law.friction * k_n * max(contact.overlap, 0.0) / k_t

@@ -180,7 +180,7 @@ def test_events_of_several_forces_stand_in_a_row():
     assert pieces.events == 4
     contact = SAMPLE_CONTACTS[0]
     found = [call(pieces, "contact_event", contact, which) for which in range(4)]
-    normal, _ = Contact.events(contact, law.springs, law.dashpots, law.friction_limit)
+    normal, _ = Contact.events(contact, law.law)
     assert found[0] == pytest.approx(5e-9) and found[3] == pytest.approx(-1e-8)
     assert found[1] == pytest.approx(normal) and found[2] == 1.0
 

@@ -177,7 +177,7 @@ def energy_of(stage, bodies, contact):
     rows = np.arange(work.tally.candidates)
     overlap = np.maximum(-work.geometry[NOW, rows]["gap"], 0.0)
     slip = np.where(overlap > 0.0, work.slip[NOW, rows], 0.0)
-    shear = 0.0 if contact.frictionless else contact.k_t
+    shear = contact.law.tangential_stiffness
     springs = contact.k_n * np.sum(overlap**2) + shear * np.sum(slip**2)
     return 0.5 * (np.sum(mass[free] * stage.velocity[free] ** 2) + springs)
 
