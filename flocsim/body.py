@@ -1,4 +1,4 @@
-"""Body and Fluid: what a user builds a scene of."""
+"""Body and Fluid: the objects that a user composes a scene of."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -36,12 +36,14 @@ from flocsim.state.bodies import RESISTANCE_COLUMNS, UNSHIELDED, BodyConstants
 from flocsim.state.scene import NO_LAYER, NO_OUTLINES, Scene
 
 NO_LAWS = (None,) * len(LAWS)
-"""``Scene.laws`` of a scene without forces, uncompiled."""
+"""``Scene.laws`` of an uncompiled scene without forces."""
 
 
 def read_vector(name: str, length: int, unit: str, values: Iterable[float]) -> Any:
-    """``length`` finite numbers, or texts such as "5 um", as a tuple of floats; UsageError for
-    anything else."""
+    """Return ``length`` finite numbers, or texts such as "5 um", as a tuple of floats.
+
+    Raises UsageError for anything else.
+    """
     try:
         listed = [] if isinstance(values, str) else list(values)
         numbers = tuple(float(in_unit(value, unit, name)) for value in listed)
@@ -64,15 +66,40 @@ def read_velocity(values: Iterable[float]) -> tuple[float, float]:
 
 @attrs.frozen(eq=False)
 class Fluid:
-    """The water around the bodies, with an optional linear background flow.
+    """Water around the bodies, with an optional linear background flow.
 
-    u(x) = velocity + gradient · x, Ω = ½ (∂u_y/∂x − ∂u_x/∂y); still by default.
-    ``gradient`` = (∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y) [1/s].
+    Parameters
+    ----------
+    temperature : float, optional
+        Temperature [K], or a text such as "15 degC".
+    salinity : float, optional
+        Salinity of sea water [g/kg].
+    ionic_strength : float, optional
+        Ionic strength of another salt [mol/m³], instead of ``salinity``.
+    viscosity : float
+        γ [Pa s]; by default that of the water described, else of water at 25 °C.
+    density : float
+        ρ_f [kg/m³]; default as for the viscosity.
+    buoyancy : bool
+        Whether the weight of the displaced fluid is subtracted from a body's weight.
+    velocity : (float, float)
+        Velocity of the background flow at the origin [m/s].
+    gradient : (float, float, float, float)
+        (∂u_x/∂x, ∂u_x/∂y, ∂u_y/∂x, ∂u_y/∂y) [1/s].
 
-    With a ``temperature``, a ``salinity`` or an ``ionic_strength``, viscosity and density follow
-    from it unless they are given (flocsim.water), and so do ``permittivity`` and
-    ``debye_length``. With a salt given by its ionic strength, viscosity and density are those
-    of fresh water: 0.1 mol/l of NaCl would add 0.9 and 0.4 % to them.
+    Raises
+    ------
+    UsageError
+        If both ``salinity`` and ``ionic_strength`` are given.
+
+    Notes
+    -----
+    The flow is u(x) = velocity + gradient · x, with Ω = ½ (∂u_y/∂x − ∂u_x/∂y); still by default.
+
+    With a temperature, a salinity or an ionic strength, viscosity and density follow from it unless
+    they are given (flocsim.water), and so do ``permittivity`` and ``debye_length``. With a salt
+    given by its ionic strength, viscosity and density are those of fresh water: 0.1 mol/l of NaCl
+    would add 0.9 and 0.4 % to them.
     """
 
     temperature: float | None = quantity(
@@ -115,8 +142,11 @@ class Fluid:
             )
 
     def of_water(self, law: Callable[[float, float], float], otherwise: float) -> float:
-        """A law of flocsim.water of the temperature and the salinity; ``otherwise`` where the
-        water is not described, or not by numbers, which validators then say."""
+        """Return a property from flocsim.water at the temperature and salinity of this fluid.
+
+        ``otherwise`` where the water is not described, or not by numbers (validators then report
+        that).
+        """
         given = [
             each for each in (self.temperature, self.salinity, self.ionic_strength)
             if each is not None
@@ -127,32 +157,33 @@ class Fluid:
 
     @property
     def warmth(self) -> float:
-        """The temperature [K] that its laws are taken at."""
+        """Temperature [K] at which properties of water are evaluated."""
         return self.temperature or ROOM_TEMPERATURE
 
     @property
     def ions(self) -> float | None:
-        """The ionic strength [mol/m³]; None where no salt is given."""
+        """Ionic strength [mol/m³]; None if no salt is given."""
         if self.salinity is None:
             return self.ionic_strength
         return self.of_water(water.ionic_strength, 0.0)
 
     @property
     def permittivity(self) -> float:
-        """ε_r [-]."""
+        """Relative permittivity ε_r [-]."""
+        # Of sea water the equivalent concentration of its ions.
         salt = self.ionic_strength or water.sea_normality(self.salinity or 0.0)
         return self.of_water(lambda warmth, _: water.permittivity(warmth, salt), WATER_PERMITTIVITY)
 
     @property
     def debye_length(self) -> float | None:
-        """1/κ [m]; None where no salt is given, or none is in it."""
+        """Debye length 1/κ [m]; None without salt."""
         if not self.ions:
             return None
         return water.debye_length(self.warmth, self.ions, self.permittivity)
 
     @property
     def words(self) -> str:
-        """What water it is, and what follows from that; "" where nothing is said of it."""
+        """Description of the water and of its derived properties; "" if it is not described."""
         said = [f"{self.warmth - water.ZERO_CELSIUS:.4g} degC"]
         if self.salinity is not None:
             said.append(f"{self.salinity:g} g/kg of salt")
@@ -169,17 +200,26 @@ class Fluid:
 
     @property
     def flow(self) -> tuple[float, ...]:
-        """Velocity and gradient as the parameters (u_x, u_y, g_xx, g_xy, g_yx, g_yy)."""
+        """Velocity and gradient as (u_x, u_y, g_xx, g_xy, g_yx, g_yy)."""
         return (*self.velocity, *self.gradient)
 
 
 @attrs.frozen
 class FractalDensity:
-    """ρ(D) = ρ_w + (ρ_p − ρ_w)(D_p/D)^(3 − n_f) of a floc of the diameter D = 2 r_eq.
+    """Density of a fractal floc, ρ(D) = ρ_w + (ρ_p − ρ_w)(D_p/D)^(3 − n_f), with D = 2 r_eq.
 
-    Parameters: ``primary``, the diameter D_p of the primary particles [m]; ``dimension`` n_f;
-    ``solid``, their density ρ_p [kg/m³]. A floc below D_p is solid. Source: Kranenburg (1994),
-    Estuarine, Coastal and Shelf Science 39, 451.
+    Parameters
+    ----------
+    primary : float
+        Diameter D_p of the primary particles [m]; a smaller floc is solid.
+    dimension : float
+        Fractal dimension n_f.
+    solid : float
+        Density ρ_p of the primary particles [kg/m³].
+
+    Notes
+    -----
+    Source: Kranenburg (1994), Estuarine, Coastal and Shelf Science 39, 451.
     """
 
     law: str = choice("fractal")
@@ -188,19 +228,47 @@ class FractalDensity:
     solid: float = quantity("kg/m^3", above=0.0)
 
     def at(self, radius: float, water: float) -> float:
-        """ρ [kg/m³] of a floc of an equivalent radius [m] in water of a density [kg/m³]."""
+        """Return ρ [kg/m³] of a floc with equivalent radius ``radius`` [m] in water of density
+        ``water``."""
         thinned = min(0.5 * self.primary / radius, 1.0) ** (3.0 - self.dimension)
         return water + (self.solid - water) * thinned
 
 
 @attrs.frozen(eq=False)
 class Body:
-    """A rigid shape with a mass, a place and a motion.
+    """A rigid shape with a mass, a position and a velocity.
 
-    Mass m = ρ_s A and inertia I = ρ_s J, with ρ_s [kg/m²] either ``surface_density`` or
-    ``density`` · ``depth``; depth is a length [m] or "sphere" = 4/3 r_eq (then m is the mass of the
-    equivalent solid sphere). A ``fixed`` body is held: no force changes its velocity, which is
-    zero unless given.
+    Parameters
+    ----------
+    shape : Shape
+        Outline of the body.
+    position : (float, float)
+        Centroid [m].
+    angle : float
+        Angle of the shape's frame, counter-clockwise [rad].
+    velocity : (float, float)
+        [m/s].
+    spin : float
+        Angular velocity, counter-clockwise [rad/s].
+    surface_density : float, optional
+        ρ_s [kg/m²].
+    density : float, optional
+        ρ [kg/m³], instead of ``surface_density``.
+    depth : float or "sphere"
+        Extent in the third direction [m]; "sphere" = 4/3 r_eq, with which the mass is that of the
+        equivalent solid sphere.
+    fixed : bool
+        Whether no force changes its velocity, which is zero unless given.
+
+    Raises
+    ------
+    UsageError
+        Unless exactly one of ``surface_density`` and ``density`` is given.
+
+    Notes
+    -----
+    Mass m = ρ_s A and moment of inertia I = ρ_s J, with ρ_s = ``surface_density`` or ``density`` ·
+    ``depth``.
     """
 
     shape: Shape = attrs.field(
@@ -228,6 +296,7 @@ class Body:
         if self.surface_density is not None:
             return self.surface_density
         assert self.density is not None
+        # The volume of the equivalent sphere over the area of its great circle: 4/3 r_eq.
         if isinstance(self.depth, str):
             return self.density * 4.0 / 3.0 * self.shape.equivalent_radius
         return self.density * self.depth
@@ -243,8 +312,10 @@ class Body:
         return self.areal_density * self.shape.second_moment
 
     def buoyant_mass(self, fluid: Fluid) -> float:
-        """m (1 − ρ_f/ρ) [kg] with buoyancy on, else m; UsageError where ρ is not known, but for a
-        fixed body, which no weight moves."""
+        """Return m (1 − ρ_f/ρ) [kg] with buoyancy on, else m.
+
+        Raises UsageError if ρ is unknown, except for a fixed body, which no weight moves.
+        """
         if not fluid.buoyancy or (self.fixed and self.density is None):
             return self.mass
         if self.density is None:
@@ -256,7 +327,7 @@ class Body:
 
 
 def of_forces(pieces: Any) -> dict[str, Any]:
-    """{field of a Scene: its value} of what forces add up to, flocsim.forces.codegen.Pieces."""
+    """Return {field of a Scene: value} for the forces' Pieces (flocsim.forces.codegen)."""
     return {
         "parameters": np.array(pieces.parameters, dtype=float),
         "surface_reach": float(pieces.surface_reach), "centre_reach": float(pieces.centre_reach),
@@ -275,10 +346,13 @@ def scene_of(
     resistances: Sequence[Sequence[float]] | None = None,
     **others: Any,
 ) -> Scene:
-    """The bodies as one Scene of fresh arrays, with what their forces make of it; without, a scene
-    that has no laws. ``resistances``: of every body, where a drag follows their shapes
-    (flocsim.forces.drag); ``others``: further fields of the Scene."""
+    """Return the bodies as one Scene of new arrays, with the contributions of their forces.
+
+    Without these the scene has no laws. ``resistances``: of every body, if a drag follows shapes
+    (flocsim.forces.drag); ``others``: further fields of the Scene.
+    """
     shapes = [body.shape for body in bodies]
+    # Fields of BodyConstants in their order, up to the resistances.
     columns: tuple[Iterable[float], ...] = (
         [body.mass for body in bodies],
         [body.buoyant_mass(fluid) for body in bodies],
@@ -299,6 +373,7 @@ def scene_of(
     scene = Scene(
         bodies=known,
         **outlines_of(shapes)._asdict(),
+        # Outlines, charges and fields are empty unless a force between outlines needs them.
         **pieces_of_bodies(shapes if outlines[0] > 0.0 else (), len(bodies))._asdict(),
         **charges_of_bodies(shapes, layer[0])._asdict(),
         **field_of_bodies(shapes, layer[0])._asdict(),
@@ -308,5 +383,6 @@ def scene_of(
         layer=layer,
         **others,
     )
+    # Features are listed for surface forces, and for a pair resistance between outlines.
     reach = max(scene.surface_reach, scene.water.near_cut or -1.0)
     return scene._replace(listed_reach=reach)

@@ -24,9 +24,9 @@ from flocsim.constants import BOLTZMANN
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, is_number
 from flocsim.forces.base import Force, PairForce
-from flocsim.forces.body_forces import key_of, thermal_in
+from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.codegen import laws_of
-from flocsim.forces.outline import asks_for_both, refuse_outlines
+from flocsim.forces.outline import needs_both_shapes, refuse_outlines
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.integrators.base import Integrator, Status
@@ -66,7 +66,7 @@ def repulsion(
     Forces along outlines are those of their circles, as deep as bodies are that have no depth of
     their own.  UsageError for forces that ask how bodies are turned.
     """
-    along = [f for f in forces if isinstance(f, PairForce) and asks_for_both(f)]
+    along = [f for f in forces if isinstance(f, PairForce) and needs_both_shapes(f)]
     refuse_outlines(
         [force for force in along if force.acts_on != "outlines"], "a meeting of two spheres"
     )
@@ -258,7 +258,7 @@ def brownian_meetings(
     """
     if len(bodies) != 2:
         raise UsageError(f"a meeting is one of two bodies, found {len(bodies)}")
-    if not thermal_in(forces):
+    if not thermal_forces(forces):
         raise UsageError("a brownian meeting needs a Thermal force of a temperature above 0 K")
     check_whole(replicates, 1, "replicates")
     near, far = above_zero(release, "m", "release"), above_zero(escape, "m", "escape")
@@ -291,7 +291,7 @@ def placed(first: Run, near: float, seed: int, replicate: int) -> Run:
     run = first.copy()
     stream = np.random.SeedSequence(seed, spawn_key=(replicate,))
     numbers = 2.0 * np.pi * np.random.Generator(np.random.Philox(stream)).random(3)
-    run.scene = first.scene._replace(key=key_of(seed, replicate))
+    run.scene = first.scene._replace(key=random_key(seed, replicate))
     run.work.place[NOW] = run.work.velocity[NOW] = 0.0
     run.work.place[NOW, :, ANGLE] = numbers[:2]
     run.work.place[NOW, 1, :2] = near * np.cos(numbers[2]), near * np.sin(numbers[2])

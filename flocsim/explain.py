@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from flocsim.forces import check
-from flocsim.forces.base import BodyForce, ContactForce, names_of
-from flocsim.forces.outline import layer_along
+from flocsim.forces.base import BodyForce, ContactForce, force_names
+from flocsim.forces.outline import charge_layer
 from flocsim.forces.pair_resistance import PairResistance
 from flocsim.forces.settling import lone_view
 from flocsim.plausibility import all_settled, plausibility_warnings, settled
@@ -63,7 +63,7 @@ def heading(system):
 
 def force_lines(system):
     """Return "in: …" or "out: …" for every force object, two of one class each by itself."""
-    named = [*zip(names_of(system.forces), system.forces, strict=True)]
+    named = [*zip(force_names(system.forces), system.forces, strict=True)]
     lines = [
         f"in:  {force}: {'; '.join(about(system, force))}" for _, force in named if not force.absent
     ]
@@ -89,7 +89,7 @@ def about(system, force):
         elif force.acts_on == "outlines":
             place = "all along the outlines"
             shapes = [body.shape for body in system.bodies]
-            if layer_along([force], shapes) is not None:
+            if charge_layer([force], shapes) is not None:
                 place += ", between charges behind them, for it is thick beside their corners"
                 if force.boundary == "superposition":
                     reach = system.pieces.layer[2]

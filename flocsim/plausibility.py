@@ -13,8 +13,8 @@ import attrs
 
 from flocsim.body import Body, Fluid
 from flocsim.errors import UsageError
-from flocsim.forces.base import ContactForce, told_apart
-from flocsim.forces.body_forces import Gravity, Thermal, thermal_in
+from flocsim.forces.base import ContactForce, unique_names
+from flocsim.forces.body_forces import Gravity, Thermal, thermal_forces
 from flocsim.forces.contact import Contact
 from flocsim.forces.dlvo import DoubleLayer, VanDerWaals
 from flocsim.forces.drag import SCHILLER_NAUMANN_UP_TO, StokesDrag, follows_shape, reynolds_number
@@ -60,7 +60,7 @@ class Asked:
     def forces(self) -> dict[str, Any]:
         """{name: force} of the forces that act."""
         forces = self.systems[0].forces
-        names = told_apart(self.names.forces or [type(force).__name__ for force in forces])
+        names = unique_names(self.names.forces or [type(force).__name__ for force in forces])
         return {
             name: each for name, each in zip(names, forces, strict=True) if not each.absent
         }  # fmt: skip
@@ -83,7 +83,7 @@ def about_values(asked: Asked) -> Iterator[str]:
     for name, force in asked.forces.items():
         yield from unusual(force, name)
     yield from unusual(asked.fluid, asked.names.fluid)
-    warm = bool(thermal_in(asked.forces.values()))  # then bodies may be as small as they like
+    warm = bool(thermal_forces(asked.forces.values()))  # then bodies may be as small as they like
     for body in asked.bodies:
         yield from unusual(body, asked.names.body)
         size = body.shape.equivalent_radius
@@ -119,9 +119,9 @@ def about_drag(asked: Asked) -> Iterator[str]:
     drags = {name: each for name, each in asked.forces.items() if isinstance(each, StokesDrag)}
     if not drags or not settled:
         return
-    name, drag = min(drags.items(), key=lambda item: item[1].serves_up_to)
+    name, drag = min(drags.items(), key=lambda item: item[1].valid_up_to)
     worst = max(settled, key=lambda each: each.reynolds)
-    if worst.reynolds <= drag.serves_up_to:
+    if worst.reynolds <= drag.valid_up_to:
         return
     advice = "use smaller or lighter bodies, or a drag of your own"
     if drag.law == "stokes":
@@ -129,7 +129,7 @@ def about_drag(asked: Asked) -> Iterator[str]:
             f'give {name} law = "schiller_naumann", valid up to Re = {SCHILLER_NAUMANN_UP_TO:g}'
         )
     yield (
-        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.serves_up_to:g} "
+        f"a body of {worst.words}, but {HOLDS[drag.law]} only up to Re = {drag.valid_up_to:g} "
         f"(Clift, Grace and Weber 1978, Bubbles, Drops and Particles, ch. 5): {advice}"
     )
 

@@ -1,4 +1,4 @@
-"""System: bodies, forces, an integrator and a fluid → Trajectory."""
+"""System: bodies, forces, an integrator and a fluid; running one returns a Trajectory."""
 
 import functools
 import math
@@ -17,12 +17,12 @@ from flocsim.errors import KernelError, KernelWarning, PlausibilityWarning, Usag
 from flocsim.explain import explain
 from flocsim.fields import above_zero, check_whole, is_whole, only
 from flocsim.forces.base import Force
-from flocsim.forces.body_forces import key_of, kicks_of
+from flocsim.forces.body_forces import kick_parameters, random_key
 from flocsim.forces.codegen import Pieces, laws_of
-from flocsim.forces.dlvo import refuse_unlike
+from flocsim.forces.dlvo import refuse_unlike_potentials
 from flocsim.forces.drag import resistance_numbers, shields_clusters
 from flocsim.forces.outline import smoothing_of
-from flocsim.forces.pair_resistance import resistance_of_pairs, water_between
+from flocsim.forces.pair_resistance import pair_resistance_tables, resistance_of_pairs
 from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.points import overlap_fault
@@ -40,18 +40,18 @@ from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 
 Fillings = dict[Callable, Callable]
-"""{hook of flocsim.hooks.HOOKS: the function in its place}."""
+"""{hook of flocsim.hooks.HOOKS: its replacement}."""
 
 FAMILIES: dict[str, Fillings] = {
     "spheres": SPHERES_ONLY,
     "polygons": {},
     "compounds": compounds.FILLINGS,
 }
-"""What each family of shapes replaces."""
+"""{family of shapes: its replacements of hooks}."""
 
 
 def as_tuple(values: Any, what: str) -> tuple:
-    """A sequence as a tuple; UsageError for one lone object."""
+    """Return a sequence as a tuple; raise UsageError for a single object."""
     try:
         return tuple(values)
     except TypeError:
@@ -59,7 +59,7 @@ def as_tuple(values: Any, what: str) -> tuple:
 
 
 def check_bodies(bodies: Iterable[Body]) -> tuple[Body, ...]:
-    """The bodies as a tuple; UsageError for none, or for what is no Body."""
+    """Return the bodies as a tuple; raise UsageError for none, or for another object."""
     bodies = as_tuple(bodies, "bodies")
     if not bodies:
         raise UsageError("a System needs at least one Body")
@@ -70,7 +70,7 @@ def check_bodies(bodies: Iterable[Body]) -> tuple[Body, ...]:
 
 
 def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
-    """The forces as a tuple; UsageError for what is no Force object."""
+    """Return the forces as a tuple; raise UsageError for a class in the place of an object."""
     forces = as_tuple(forces, "forces")
     for force in forces:
         if isinstance(force, type) and issubclass(force, Force):
@@ -82,7 +82,7 @@ def check_forces(forces: Iterable[Force]) -> tuple[Force, ...]:
 
 
 def read_seed(value: Any) -> tuple[int, ...]:
-    """A whole number from 0, or some of them, as a tuple; UsageError for anything else."""
+    """Return a non-negative integer, or several, as a tuple; raise UsageError for anything else."""
     numbers = (value,) if is_whole(value) else as_tuple(value, "seed")
     if not numbers or not all(is_whole(each) and each >= 0 for each in numbers):
         raise UsageError(f"seed must be a whole number from 0, or some of them, found {value!r}")
@@ -91,11 +91,27 @@ def read_seed(value: Any) -> tuple[int, ...]:
 
 @attrs.frozen(eq=False, repr=False)
 class System:
-    """Bodies in a fluid, the forces on them, and the method that moves them.
+    """Bodies in a fluid, the forces on them, and the integrator of their motion.
 
-    Parameters: ``bodies``, Body objects; ``forces``, Force objects; ``integrator``; ``fluid``;
-    ``seed``, a whole number from 0 or some of them (seed, replicate), by which random forces go.
+    Parameters
+    ----------
+    bodies : iterable of Body
+    forces : iterable of Force, optional
+    integrator : Integrator, optional
+        Implicit by default.
+    fluid : Fluid, optional
+    seed : int or sequence of int, optional
+        Seed of random forces, e.g. (seed, replicate).
 
+    Raises
+    ------
+    UsageError
+        If an argument has the wrong type, or bodies and forces cannot be combined.
+    KernelError
+        If a kernel of a force cannot be used.
+
+    Examples
+    --------
     >>> from flocsim.forces import Gravity, StokesDrag
     >>> body = Body(Sphere(5e-6), density=2650.0)
     >>> System([body], [Gravity(), StokesDrag()]).run(until=1e-3).status.name
@@ -114,10 +130,10 @@ class System:
     pieces: Pieces = attrs.field(init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        refuse_unlike(self.forces, len(self.bodies))
+        refuse_unlike_potentials(self.forces, len(self.bodies))
         shapes = [body.shape for body in self.bodies]
         object.__setattr__(self, "pieces", laws_of(self.forces, self.fluid, shapes))
-        water_between(self.forces, self.bodies, self.fluid)
+        pair_resistance_tables(self.forces, self.bodies, self.fluid)
 
     def __repr__(self) -> str:
         n = len(self.bodies)
@@ -126,15 +142,18 @@ class System:
         return f"System({', '.join([*words, type(self.integrator).__name__])})"
 
     def changed(self, **fields: Any) -> "System":
-        """The same with as many other ``bodies``, or another ``seed``, taken as they are.
+        """Return a copy with as many other ``bodies``, or another ``seed``; they are not checked
+        again.
 
-        What its forces add up to is found out and checked once, but where it hangs on the bodies.
-        UsageError where bodies are none for the water between them.
+        The laws are reused, except for forces between outlines, which depend on the shapes. Raises
+        UsageError if a pair resistance does not support the bodies.
         """
+        # Parameters of forces between outlines depend on the shapes: construct anew.
         if "bodies" in fields:
             if self.pieces.outlines != NO_OUTLINES:
                 return attrs.evolve(self, **fields)
-            water_between(self.forces, fields["bodies"], self.fluid)
+            pair_resistance_tables(self.forces, fields["bodies"], self.fluid)
+        # Bypass the constructor, which would generate and check the laws again.
         other = object.__new__(type(self))
         for each in attrs.fields(type(self)):
             value = fields.get(each.name, getattr(self, each.name))
@@ -148,21 +167,23 @@ class System:
 
     @property
     def spheres_only(self) -> bool:
-        """Whether no body has an edge."""
+        """True if no body has an edge."""
         return all(len(body.shape.vertices) == 1 for body in self.bodies)
 
     @property
     def family(self) -> str:
-        """What its shapes take to compile: "spheres", "polygons", or "compounds" where one has
-        holes, or parts."""
+        """Family of shapes to compile for: "spheres", "polygons", or "compounds" (holes or
+        parts)."""
         if any(body.shape.is_compound for body in self.bodies):
             return "compounds"
         return "spheres" if self.spheres_only else "polygons"
 
     @property
     def reached(self) -> dict[str, bool]:
-        """What its forces reach of an engine (flocsim.integrators.left_out): two systems of one
-        family that reach the same share their compiled code."""
+        """Optional parts of an engine that its forces use (flocsim.integrators.left_out).
+
+        Two systems of one family with the same parts share their compiled code.
+        """
         return {
             "outlines": bool({"outline_pressure", "oriented_energy"} & self.pieces.laws.keys())
             or self.pieces.layer[2] > 0.0,
@@ -172,30 +193,30 @@ class System:
         }
 
     def scene(self, *, jit: bool = True, laws: Any = None) -> Scene:
-        """The bodies as arrays for the drivers, with the laws that their forces add up to, or with
-        those that are given.
+        """Return the bodies as a Scene, with the laws of their forces or with given ``laws``.
 
-        KernelError for a law that cannot be compiled.
+        Raises KernelError for a law that cannot be compiled.
         """
         shapes = [body.shape for body in self.bodies]
-        pair_table, water = water_between(self.forces, self.bodies, self.fluid)
+        pair_table, water = pair_resistance_tables(self.forces, self.bodies, self.fluid)
         return scene_of(
             self.bodies, self.fluid, **of_forces(self.pieces),
             laws=self.laws(jit=jit) if laws is None else laws,
             smoothing=smoothing_of(self.pieces.smoothness, shapes),
-            kicks=kicks_of(self.forces, self.bodies, self.fluid), key=key_of(*self.seed),
+            kicks=kick_parameters(self.forces, self.bodies, self.fluid), key=random_key(*self.seed),
             resistances=[resistance_numbers(self.forces, body) for body in self.bodies],
             pair_table=pair_table, water=water,
         )  # fmt: skip
 
     def laws(self, *, jit: bool = True) -> Any:
-        """The laws of the scene as the drivers call them.
+        """Return the laws of the scene, compiled unless ``jit=False``.
 
-        KernelError for one that cannot be compiled: it names the force.
+        Raises KernelError, with the name of the force, for a law that cannot be compiled.
         """
         try:
             return law_table(self.pieces.laws, jit=jit, plain=self.pieces.plain_bodies)
         except KernelError as error:
+            # Find the force at fault: compile the laws of each force alone.
             for name, force in self.pieces.used.items():
                 try:
                     its = laws_of([force], self.fluid)
@@ -205,17 +226,20 @@ class System:
             raise error from None
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Position and velocity (n, 3) at the start."""
+        """Return initial positions and velocities, (n, 3) each."""
         position = [(*body.position, body.angle) for body in self.bodies]
         velocity = [(*body.velocity, body.spin) for body in self.bodies]
         return np.array(position, dtype=float), np.array(velocity, dtype=float)
 
     def fillings(self, observer: Fillings | None = None, *, grows: bool = False) -> Fillings:
-        """{hook: function} of integrator, shapes and an observer; ``grows``: whether the driver is
-        to serve any number of bodies, not these alone."""
+        """Return {hook: replacement} of integrator, shapes and observer.
+
+        ``grows``: whether the driver must serve any number of bodies.
+        """
         shapes = FAMILIES[self.family]
         needless = left_out(math.inf if grows else len(self.bodies), **self.reached)
         filled = {**self.integrator.fillings, **needless, **shapes, **(observer or {})}
+        # Only registered hooks can be replaced.
         for replaced in filled.keys() - set(HOOKS.values()):
             raise UsageError(
                 f"{replaced.__module__}.{replaced.__qualname__} cannot be replaced: "
@@ -225,20 +249,24 @@ class System:
 
     @property
     def compiled_calls(self) -> Fillings:
-        """{hook: function} that let a compiled driver call the laws of the scene."""
+        """{hook: replacement} by which a compiled driver calls the laws of the scene."""
         return compiled_calls(self.pieces.plain_bodies)
 
     def compose(
         self, entry: Callable = advance, observer: Fillings | None = None, *, jit: bool = True
     ) -> Callable:
-        """The driver of this family of scenes as one function, compiled unless ``jit=False``."""
+        """Return the driver of this family of scenes as one function, compiled unless
+        ``jit=False``."""
         calls = self.compiled_calls if jit else {}
         what = f"the engine for {self.family}"
         return compose(entry, {**calls, **self.fillings(observer)}, jit=jit, what=what)
 
     def check_overlaps(self) -> None:
-        """UsageError where two bodies start with crossing cores or too deep an overlap, of forces
-        along outlines one beyond d_min; fixed ones may: they do not act on each other."""
+        """Raise UsageError if two bodies start with crossing cores or too deep an overlap.
+
+        With forces along outlines the limit is d_min. Fixed bodies may overlap: they do not
+        interact.
+        """
         reach, d_min, *_ = self.pieces.outlines
         most = d_min if reach > 0.0 else math.inf
         for (i, a), (j, b) in combinations(enumerate(self.bodies), 2):
@@ -257,16 +285,43 @@ class System:
         amplification: bool = False, jit: bool = True, start: Trajectory | None = None,
         watch: Watch | None = None,
     ) -> Trajectory:  # fmt: skip
-        """Move the bodies until a time, in s or as "20 ms", and return the Trajectory.
+        """Move the bodies until a time and return the Trajectory.
 
-        A run that ends early says why in ``Trajectory.status``; it raises no exception. Where a
-        force is to blame that gives no number, a KernelWarning names it, with file and line.
-        ``amplification``: whether to run a nudged companion, too, for Trajectory.amplification.
-        ``start``: begin where another run of the same shapes has ended, at its time, in its motion
-        and with the tangential displacements of its contacts; forces, masses and the method may be
-        others. ``watch(state)`` is called between two steps (some 0.1 ms each) and stops the run,
-        as STOPPED, where it returns what counts as true. A PlausibilityWarning says, once for each,
-        what of the scene is implausible.
+        Parameters
+        ----------
+        until : float or str
+            End time, in s or as a text such as "20 ms".
+        max_steps : int
+            Budget of steps.
+        record : bool
+            Whether every accepted step is stored.
+        amplification : bool
+            Whether to run a perturbed companion as well, for Trajectory.amplification.
+        jit : bool
+            False runs uncompiled.
+        start : Trajectory, optional
+            Continue at the end of another run of the same shapes: its time, motion and tangential
+            displacements. Forces, masses and the method may differ.
+        watch : callable, optional
+            ``watch(state)`` is called between steps (every 0.1 ms or so) and stops the run, as
+            STOPPED, by returning a true value.
+
+        Returns
+        -------
+        Trajectory
+            A run that ends early says why in ``status``; it raises no exception.
+
+        Raises
+        ------
+        UsageError
+            For bodies that overlap too deeply, or arguments that cannot be combined.
+
+        Warns
+        -----
+        KernelWarning
+            If a force returned no number and ended the run: its name, file and line.
+        PlausibilityWarning
+            Once for each implausible property of the scene.
         """
         end = above_zero(until, "s", "until")
         check_whole(max_steps, 0, "max_steps")
@@ -286,6 +341,7 @@ class System:
 
         fresh = functools.partial(self.begin_at, start, end, max_steps=max_steps, jit=jit)
         run = fresh(record=record)
+        # The run itself; a force that returned no number is identified afterwards.
         status = watched(run, watch)
         if status in UNABLE and (why := force_to_blame(self, run)):
             warnings.warn(f"the run has ended at t = {run.time:.6g} s ({status.name}): {why}",
@@ -298,14 +354,14 @@ class System:
         return Trajectory.of(run, status, time.perf_counter() - began, growth, origin=origin)
 
     def begin_at(self, start: Trajectory | None, until: float, **more: Any) -> Run:
-        """A Run as of `begin`, at the end of another where there is one to ``start`` from."""
+        """Return a Run as `begin` does, at the end of another run if there is a ``start``."""
         run = self.begin(until, **more)
         return run if start is None else self.placed_at_end(run, start)
 
     def placed_at_end(self, run: Run, start: Trajectory) -> Run:
-        """A fresh Run put where another has ended, with the history of its contacts.
+        """Place a fresh Run at the end of another one, with the history of its contacts.
 
-        UsageError where that has other shapes, or has come as far as this one is to go.
+        Raises UsageError if that has other shapes, or has already reached this run's end time.
         """
         if not isinstance(start, Trajectory):
             raise UsageError(
@@ -319,6 +375,8 @@ class System:
                 f"{run.clock.until:g}"
             )
         scene = origin.ended.scene
+        # Contacts are stored by the numbers of bodies and features: shapes and order must be the
+        # same.
         if not all(
             np.array_equal(own, other)
             for own, other in (
@@ -327,10 +385,12 @@ class System:
             )
         ):  # fmt: skip
             raise UsageError("start must be a run of the same shapes in the same order")
+        # The end of the other run stays as it is: several runs may start there.
         run.work = copy_of(origin.ended.work)
-        run.work.budget[:] = -1.0  # pairs are listed anew: other forces may reach further
+        run.work.budget[:] = -1.0  # rebuild the lists: other forces may reach further
         if (run.scene.kicks, run.scene.key) != (scene.kicks, scene.key):
-            run.work.kick.span = 0.0  # no kick has begun
+            run.work.kick.duration = 0.0  # no kick has begun
+        # Count from zero, and go on with time and stated error of the other run.
         run.work.tally.rebuilds = 0
         run.work.tally.evaluations = 0
         run.clock.time = start.t[-1]
@@ -343,11 +403,12 @@ class System:
         self, until: float, end: np.ndarray, max_steps: int = 1_000_000, *,
         nudge: float | None = None, jit: bool = True,
     ) -> float:  # fmt: skip
-        """By how much the motion up to a time [s] amplifies a nudge of its start [m].
+        """Return by which factor the motion up to a time [s] amplifies a perturbation of its start.
 
-        The distance of any outline point at ``end`` (n, 3), where the bodies come to, from where it
-        is in a companion whose moving bodies start ``nudge`` further in fixed directions, over the
-        nudge (default: amplification.NUDGE of a radius); inf where the companion ends early.
+        It is the distance of any outline point at ``end`` (n, 3), the final positions, from that
+        point in a companion run whose moving bodies start ``nudge`` [m] further in fixed
+        directions, over the nudge (default: amplification.NUDGE of a radius). inf if the companion
+        ends early.
         """
 
         def companion(bodies: list[Body]) -> np.ndarray | None:
@@ -367,10 +428,10 @@ class System:
         observed: np.ndarray | None = None,
         jit: bool = True,
     ) -> Run:
-        """A Run to a time [s] that has yet to take its first step.
+        """Return a Run to a time [s] that has not taken a step yet.
 
-        ``observer`` {hook: function} may stand in for hooks.observe and hooks.awaits_touch, and
-        ``observed`` is the array that they see.
+        ``observer`` {hook: replacement} may replace hooks.observe and hooks.awaits_touch;
+        ``observed`` is the array that they receive.
         """
         scene = self.scene(jit=jit)
         return Run(
@@ -379,9 +440,9 @@ class System:
         )  # fmt: skip
 
     def explain(self) -> str:
-        """What is compiled into this scene and what is left out, each with its reason, as text.
+        """Return a text on what this scene contains and leaves out, with reasons.
 
-        Ends with Reynolds numbers, the scene's time scales, the step that an explicit method would
-        need, and a line on everything that is implausible.
+        It ends with Reynolds numbers, time scales, the step that an explicit method would need, and
+        a line on everything implausible.
         """
         return explain(self)

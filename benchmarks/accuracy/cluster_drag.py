@@ -73,7 +73,7 @@ def exact(rings, middle):
         rigid_bodies.surface([ring - middle], 4.0 / 3.0, spacing)
         for ring, spacing in zip(rings, spacings, strict=True)
     ])  # fmt: skip
-    loads = rigid_bodies.loads(places, rigid_bodies.RADIUS * float(np.mean(spacings)))
+    loads = rigid_bodies.rigid_loads(places, rigid_bodies.SPHERE_RADIUS * float(np.mean(spacings)))
     return np.linalg.inv(loads[:, :3])[:2, :2] / ALONE
 
 

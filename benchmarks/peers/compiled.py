@@ -6,12 +6,17 @@ listed pair.
 
 import math
 
-from flocsim.geometry.contact.candidates import hand_over, list_ahead, outline_speed, spent
+from flocsim.geometry.contact.candidates import (
+    outline_speed,
+    rebuild_list_ahead,
+    spent_budget,
+    transfer_slips,
+)
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import observe
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.loop.driver import too_deep
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.loop.driver import any_too_deep
+from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import NOW
 
@@ -30,7 +35,7 @@ def read_state(work, vector):
 def rate_state(scene, work, time, vector, rates):
     """Derivative of a state vector by time, every listed pair flagged as it is there."""
     read_state(work, vector)
-    locate_and_rate(scene, work, NOW)
+    locate_with_slip_rates(scene, work, NOW)
     sum_forces(scene, work, time, NOW)
     bodies = work.place.shape[1]
     for body in range(bodies):
@@ -39,7 +44,7 @@ def rate_state(scene, work, time, vector, rates):
             rates[6 * body + axis] = vector[6 * body + 3 + axis]
             rates[6 * body + 3 + axis] = gain * work.force[NOW, body, axis]
     for row in range(work.tally.candidates):
-        closed = work.candidates[row].closed == 1
+        closed = work.candidates[row].contact_mode == 1
         rates[6 * bodies + row] = work.slip_rate[NOW, row] if closed else 0.0
 
 
@@ -66,8 +71,8 @@ def longest_step(scene, work):
 def list_anew(scene, work):
     """Hand displacements on, list the pairs; the longest step for this list, −1 without room."""
     locate_now(scene, work)
-    hand_over(scene, work)
-    if not list_ahead(scene, work, LISTED_FOR):
+    transfer_slips(scene, work)
+    if not rebuild_list_ahead(scene, work, LISTED_FOR):
         return -1.0
     locate_now(scene, work)
     return longest_step(scene, work)
@@ -82,6 +87,6 @@ def inspect(scene, work, observed, time, vector, watch):
     least = locate_now(scene, work) if work.tally.candidates > 0 else math.inf
     opened = False
     for row in range(work.tally.candidates):
-        opened = opened or (work.candidates[row].closed == 0 and work.slip[NOW, row] != 0.0)
+        opened = opened or (work.candidates[row].contact_mode == 0 and work.slip[NOW, row] != 0.0)
     code = observe(scene, work, observed, time) if watch else 0
-    return spent(scene, work, NOW), opened, least, too_deep(scene, work), code
+    return spent_budget(scene, work, NOW), opened, least, any_too_deep(scene, work), code

@@ -10,9 +10,9 @@ import attrs
 import numpy as np
 
 from benchmarks.speed.scenes import rolling_pair
-from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
+from flocsim.geometry.contact.candidates import rebuild_list, spent_budget, transfer_slips
 from flocsim.integrators import Implicit, VelocityVerlet
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import NOW, work_of
 
@@ -34,7 +34,7 @@ def push(scene, work, step):
             work.velocity[NOW, body, axis] += gain * work.force[NOW, body, axis]
             work.place[NOW, body, axis] += step * work.velocity[NOW, body, axis]
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == 1:
+        if work.candidates[row].contact_mode == 1:
             work.slip[NOW, row] += step * work.slip_rate[NOW, row]
 
 
@@ -45,13 +45,13 @@ def evaluate_and_push(scene, work, step, count, turn):
     """
     touching = 0
     for k in range(count):
-        if spent(scene, work, NOW) > 0.5 and not list_candidates(scene, work):
+        if spent_budget(scene, work, NOW) > 0.5 and not rebuild_list(scene, work):
             return -1
-        locate_and_rate(scene, work, NOW)
+        locate_with_slip_rates(scene, work, NOW)
         sum_forces(scene, work, 0.0, NOW)
-        hand_over(scene, work)
+        transfer_slips(scene, work)
         for row in range(work.tally.candidates):
-            if work.candidates[row].closed == 1:
+            if work.candidates[row].contact_mode == 1:
                 touching += 1
                 break
         push(scene, work, -step if k // turn % 2 == 1 else step)

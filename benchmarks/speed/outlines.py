@@ -23,7 +23,7 @@ from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.geometry.contact import charges
-from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.outline_sum import outline_forces_at
 from flocsim.state.work import work_of
 from tests.integrators.rhs.test_outline_sum import at_gap, rough
 
@@ -43,7 +43,7 @@ def many(scene, work, x, y, angle, count):
     """The sum of so many forces, so that none is left out."""
     total = 0.0
     for k in range(count):
-        fx, _, _, _ = between_outlines(scene, work, 0.0, 1, 0, x, y, angle + 1e-15 * k, 0.0)
+        fx, _, _, _ = outline_forces_at(scene, work, 0.0, 1, 0, x, y, angle + 1e-15 * k, 0.0)
         total += fx
     return total
 

@@ -1,24 +1,24 @@
-"""Two bodies that may be bound, the load on their bond, and certificates.
+"""Certificates: proofs that attraction alone keeps two bodies together under every later load.
 
-The bodies are i and j, j being the later one; the work lists pairs of features of these two alone,
-located where they are now. A certificate says that no later load can open the bond, by attraction
-alone:
+The bodies are i and j, j being the later one. The work arrays list and locate pairs of features of
+these two bodies only. There are three certificates.
 
-- Held: the bodies lie calm, and attraction outweighs, by a safety factor, the largest load, in any
-  orientation. What an attraction can bear is the most that it comes to on the way out of where the
-  bodies are, contacts or not: in a well between attraction and repulsion the net force of now is
-  the load, whatever the well could bear. It bears the load in pulling straight, and in prying the
-  doublet open about each of the two outermost contact points, which lie on either side of the line
-  of centres. Two spheres, and a surface force, which follows the contact, need the straight pull
-  only.
-- Trapped: to climb out of the attraction between their centres, against that load, takes more than
-  all the energy that they have.
-- In kicks: to climb out of their attraction, against that load, and times its leverage where it
-  pries, takes the energy that they have and BARRIER k_B T besides: by Kramers' rate e^20 = 5e8
-  times as long as bodies take to relax. Whatever way shapes roll, what they climb is their
-  potential (integrators/rhs/climb.py).
+- Held: the bodies move slowly, and attraction exceeds the largest load, in any orientation, by the
+  factor SAFETY. The capacity of the attraction is its maximum along the way out from the present
+  position, whether or not there is a contact. (In a well between attraction and repulsion the
+  present net force equals the load and says nothing about the capacity.) It must carry the load in
+  a straight pull, and in prying the doublet open about each of the two outermost contact points, on
+  either side of the line of centres. For two spheres, and for a surface force, which follows the
+  contact, the straight pull suffices.
+- Trapped: the energy needed to climb out of the attraction between the centres, against the load,
+  exceeds SAFETY times the present energy.
+- In kicks (thermal motion): the energy needed to climb out, against the load times its leverage
+  where it pries, exceeds the present energy plus BARRIER k_B T. By Kramers' rate escape then takes
+  e^20 = 5e8 relaxation times. However shapes roll, they have to climb their potential
+  (integrators/rhs/climb.py).
 
-All forces are those at rest: what resists an opening, as lubrication, holds nothing.
+Only forces at rest count: resistance to opening, such as lubrication, carries no load in the long
+run.
 """
 
 import math
@@ -35,8 +35,8 @@ from flocsim.hooks import (
     has,
     surface_force,
 )
-from flocsim.integrators.rhs.climb import BARRIER, LEAST_RUNG, RUNG, can_climb
-from flocsim.integrators.rhs.outline_sum import acts_along, outline_reach, outlines_apart
+from flocsim.integrators.rhs.climb import BARRIER, CLIMB_STEP, LEAST_CLIMB_STEP, can_escape
+from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_reach, outline_repulsion
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
 from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass, pair_view
 from flocsim.state.bodies import ANGLE, X, Y
@@ -44,12 +44,16 @@ from flocsim.state.views import moved_contact
 from flocsim.state.work import NOW
 
 NO_BOND, CERTIFICATE, HOOK, REST = range(4)
-"""Kinds of bond."""
+"""Kinds of bond: none, certified, by shape, or by a pose that was stable under the largest load."""
 
 
 class Bond(NamedTuple):
-    """Bodies ``i`` and ``j``; the unit vector from i's centroid to j's, and their distance [m]; the
-    least gap of their features [m], and ``surface_gap``, that by which surface forces go [m]."""
+    """Two bodies and their relative position.
+
+    Bodies ``i`` and ``j``; the unit vector from i's centroid to j's and their distance [m];
+    ``gap``, the smallest gap of their features [m]; ``surface_gap``, the gap that surface forces
+    depend on [m].
+    """
 
     i: int
     j: int
@@ -61,10 +65,13 @@ class Bond(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What pulls at a bond: its largest ``force`` [N]; the ``drift`` of the two against each other
-    [m/s], or of the bodies of their cluster; its direction (``x``, ``y``) on j, (0, 0) where it may
-    have any; ``lever``, how long an arm the cluster gives it at least [m]; ``alone``, 1.0 where the
-    two are all of their cluster; ``kicks``, k_B T [J], 0.0 without."""
+    """Load on a bond.
+
+    ``force``: largest force on it [N]; ``drift``: relative drift velocity of the two bodies [m/s],
+    or of the bodies of their cluster; ``x``, ``y``: direction of the load on j, (0, 0) for any
+    direction; ``lever``: smallest lever arm that the cluster provides [m]; ``alone``: 1.0 if the
+    two form a cluster of their own; ``kicks``: k_B T [J], 0.0 without thermal motion.
+    """
 
     force: float
     drift: float
@@ -76,7 +83,7 @@ class Load(NamedTuple):
 
 
 def bond_between(scene, work, time, i, j):
-    """The Bond of two bodies whose features are listed and located."""
+    """Return the Bond of two bodies whose features are listed and located."""
     nx, ny, distance = centre_line(scene, work, NOW, j, i)
     gap = least_listed_gap(work)
     surface = gap
@@ -87,63 +94,72 @@ def bond_between(scene, work, time, i, j):
 
 
 def is_closed(work, row):
-    """Whether a listed pair of features touches now."""
+    """Return True if a listed pair of features touches in the present state."""
     return work.geometry[NOW, row].gap < 0.0
 
 
-def size_of(scene, i, j):
-    """The smaller bounding radius [m]: by so much outlines move as the bodies turn by one."""
+def smaller_bounding_radius(scene, i, j):
+    """Return the smaller bounding radius [m]: displacement of the outline per radian of
+    rotation."""
     return min(scene.bodies[i].bounding_radius, scene.bodies[j].bounding_radius)
 
 
 def radii_of(scene, bond):
-    """r_i + r_j, equivalent radii [m]."""
+    """Return r_i + r_j of the equivalent radii [m]."""
     return scene.bodies[bond.i].equivalent_radius + scene.bodies[bond.j].equivalent_radius
 
 
 def are_spheres(scene, bond):
-    """Whether both bodies are spheres."""
+    """Return True if both bodies are spheres."""
     count_i = scene.first[bond.i + 1] - scene.first[bond.i]
     return count_i == 1 and scene.first[bond.j + 1] - scene.first[bond.j] == 1
 
 
 def speeds_of(scene, work, bond):
-    """(along the line of centres, of any kind) speeds of j against i as a rigid doublet [m/s]."""
+    """Return the speeds of j relative to i, as a rigid doublet [m/s]: (along the line of centres,
+    any)."""
     i, j = bond.i, bond.j
     ux, uy = (
         work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
         work.velocity[NOW, j, Y] - work.velocity[NOW, i, Y],
     )
+    # Subtract the rigid rotation with i's spin; the difference of the spins counts at the outline.
     rx, ry = bond.nx * bond.distance, bond.ny * bond.distance
     spin = work.velocity[NOW, i, ANGLE]
     shear = math.hypot(ux + spin * ry, uy - spin * rx)
-    turning = abs(work.velocity[NOW, j, ANGLE] - spin) * size_of(scene, i, j)
+    turning = abs(work.velocity[NOW, j, ANGLE] - spin) * smaller_bounding_radius(scene, i, j)
     return abs(ux * bond.nx + uy * bond.ny), shear + turning
 
 
 def doublet_pose(scene, work, state, i, j):
-    """Place [m] and angle of body j in the frame of i, which turns with it, in a state."""
+    """Return the position [m] and angle of body j in the frame of i, which rotates with it."""
     x, y = separation(scene, work, state, j, i)
     turn = work.place[state, i, ANGLE]
     c, s = math.cos(turn), math.sin(turn)
     return c * x + s * y, c * y - s * x, work.place[state, j, ANGLE] - turn
 
 
-def way_between(scene, i, j, pose, before):
-    """By how much the outlines of two bodies have moved from one such pose to another [m]."""
+def pose_change(scene, i, j, pose, before):
+    """Return an upper bound of the displacement of the outlines between two such poses [m]."""
     x, y, angle = pose
     was_x, was_y, was_angle = before
-    return math.hypot(x - was_x, y - was_y) + abs(angle - was_angle) * size_of(scene, i, j)
+    return math.hypot(x - was_x, y - was_y) + abs(angle - was_angle) * smaller_bounding_radius(
+        scene, i, j
+    )
 
 
 def resting_contact(view, slip):
-    """The ContactView of the same contact at rest, its tangential displacement given [m]."""
+    """Return the ContactView of the same contact at rest, with a given tangential
+    displacement [m]."""
     return moved_contact(view, view.overlap, 0.0, slip, 0.0)
 
 
 def energy_of(scene, work, bond):
-    """What the bodies have to climb out with [J]: the energy of their motion against each other, of
-    their spins, and twice that of their contacts' springs."""
+    """Return the energy available for an escape [J].
+
+    It is the energy of relative motion and of both spins, plus twice the elastic energy of the
+    contacts.
+    """
     i, j = bond.i, bond.j
     ux, uy = (
         work.velocity[NOW, j, X] - work.velocity[NOW, i, X],
@@ -162,108 +178,125 @@ def energy_of(scene, work, bond):
         if is_closed(work, row):
             view = contact_view(scene, work, NOW, row)
             normal, tangential = contact_force(scene, resting_contact(view, view.slip))
+            # Force times displacement is twice the elastic energy of a linear spring.
             total += abs(normal * view.overlap) + abs(tangential * view.slip)
     return total
 
 
 SAFETY = 3.0
-"""Factor by which attraction must outweigh the load."""
+"""Factor by which attraction must exceed the load."""
 
-CALM = 0.02
-"""A pair whose parts move at less than this share of the drift is calm enough."""
+CALM_SPEED = 0.02
+"""A pair is calm if its relative speed is below this share of the drift velocity."""
 
-LEANING = 0.05
-"""Over this share of the distance, and over the square of the leverage, levers stay what they are
-as a doublet is pried open: so far on the way out attraction between centres counts there."""
+PRYING_RANGE = 0.05
+"""Displacement over distance and squared leverage within which levers stay nearly constant as a
+doublet is pried open: attraction between centres counts only within it."""
 
-FINER = 0.125
-"""A step about the highest place of the way out, over one of the whole way."""
+REFINEMENT = 0.125
+"""Step of the refined search near the maximum over that of the first search."""
 
 
-def attraction_at(scene, work, time, bond, way):
-    """(between centres, between outlines) [N] at rest, both gaps wider by a way [m]."""
+def attraction_at(scene, work, time, bond, displacement):
+    """Return the attraction (between centres, between outlines) [N] at rest, both gaps wider by
+    ``displacement`` [m]."""
     centres, surfaces = 0.0, 0.0
-    distance, gap = bond.distance + way, bond.surface_gap + way
+    distance, gap = bond.distance + displacement, bond.surface_gap + displacement
     if has(scene, CENTRE_FORCE):
         between = distance - radii_of(scene, bond)
         view = pair_view(scene, time, bond.j, bond.i, between, 0.0, distance)
         centres = -centre_force(scene, view)
     if scene.surface_reach > gap:
         surfaces = -surface_force(scene, pair_view(scene, time, bond.j, bond.i, gap, 0.0, distance))
-    if acts_along(scene):
-        surfaces -= outlines_apart(scene, work, time, bond.j, bond.i, way)
+    if has_outline_forces(scene):
+        surfaces -= outline_repulsion(scene, work, time, bond.j, bond.i, displacement)
     return centres, surfaces
 
 
-def is_enough(all_of_it, follows, pries, enough):
-    """Whether a capacity is above what is asked for: all of it, and one of its two parts."""
-    return all_of_it > enough[0] and (follows > enough[1] or pries > enough[2])
+def is_enough(total, outline_part, centre_part, enough):
+    """Return True if a capacity suffices: its total, and one of its two parts."""
+    return total > enough[0] and (outline_part > enough[1] or centre_part > enough[2])
 
 
 @apart
-def most_between(scene, work, time, bond, start, end, near, share, enough):
-    """What the attraction comes to at most over the ways from ``start`` to ``end`` [N], as capacity
-    has it, and the way at which all of it is most [m]; ``share``: steps over the gap there."""
-    sizes, best = radii_of(scene, bond), start
-    all_of_it, follows, pries = 0.0, 0.0, 0.0
-    way = start
-    while way < end:
-        centres, surfaces = attraction_at(scene, work, time, bond, way)
-        if centres + surfaces > all_of_it:
-            all_of_it, best = centres + surfaces, way
-        follows = max(follows, surfaces + min(centres, 0.0))
-        if way <= near:
-            pries = max(pries, centres)
-        if is_enough(all_of_it, follows, pries, enough):
+def largest_attraction(scene, work, time, bond, start, end, near, share, enough):
+    """Return the largest attraction [N] along the way out, as in `capacity`, and its position [m].
+
+    ``start``, ``end``: range of displacements [m]; ``share``: step over the distance on which
+    forces vary.
+    """
+    radii, best = radii_of(scene, bond), start
+    total, outline_part, centre_part = 0.0, 0.0, 0.0
+    displacement = start
+    while displacement < end:
+        centres, surfaces = attraction_at(scene, work, time, bond, displacement)
+        if centres + surfaces > total:
+            total, best = centres + surfaces, displacement
+        outline_part = max(outline_part, surfaces + min(centres, 0.0))
+        if displacement <= near:
+            # Levers stay nearly constant only within ``near`` of the start (PRYING_RANGE).
+            centre_part = max(centre_part, centres)
+        if is_enough(total, outline_part, centre_part, enough):
             break
-        # Forces change over as much as is left of the gap that they go by.
-        left = end
+        # Step in proportion to the smallest of the gaps that forces depend on: forces vary over
+        # such lengths.
+        length_scale = end
         if has(scene, CENTRE_FORCE):
-            left = min(left, abs(bond.distance + way - sizes))
+            length_scale = min(length_scale, abs(bond.distance + displacement - radii))
         if scene.surface_reach > 0.0:
-            left = min(left, abs(bond.surface_gap + way))
-        if bond.gap + way < outline_reach(scene):
-            left = min(left, max(bond.gap + way, scene.outlines[1]))
-        way += max(share * left, LEAST_RUNG)
-    return all_of_it, follows, pries, best
+            length_scale = min(length_scale, abs(bond.surface_gap + displacement))
+        if bond.gap + displacement < outline_reach(scene):
+            length_scale = min(length_scale, max(bond.gap + displacement, scene.outlines[1]))
+        displacement += max(share * length_scale, LEAST_CLIMB_STEP)
+    return total, outline_part, centre_part, best
 
 
 @apart
-def lets_out(scene, work, time, bond, pull, needed):
-    """Whether less than an energy [J] leads out of the attraction, a pull [N] helping."""
+def can_leave(scene, work, time, bond, pull, needed):
+    """Return True if less than an energy [J] leads out of the attraction, with the help of a pull
+    [N]."""
     known = scene, work, time, bond.j, bond.i
-    return can_climb(*known, bond.distance, bond.surface_gap, pull, needed)
+    return can_escape(*known, bond.distance, bond.surface_gap, pull, needed)
 
 
 def capacity(scene, work, time, bond, near, enough):
-    """What the attraction can bear from here outwards [N]: (all of it; that of outlines alone, less
-    a repulsion of centres; that of centres alone, over a way ``near`` [m]). It is not looked for
-    any further than to where it is ``enough`` (is_enough)."""
+    """Return the load that the attraction can carry [N], as three numbers.
+
+    The total; that of outlines alone, minus any repulsion between centres; that of centres alone,
+    within ``near`` [m] of the start. The search ends as soon as these are ``enough`` (is_enough).
+    """
     between = scene.surface_reach > bond.surface_gap or outline_reach(scene) > bond.gap
     if not has(scene, CENTRE_FORCE) and not between:
         return 0.0, 0.0, 0.0
-    sizes = radii_of(scene, bond)
-    end = 2.0 * sizes + max(-bond.surface_gap, sizes - bond.distance, 0.0)
-    known = scene, work, time, bond, 0.0, end, near, RUNG, enough
-    most, follows, pries, best = most_between(*known)
-    if is_enough(most, follows, pries, enough):
-        return most, follows, pries
-    # Once more about the highest place, which may be a cusp.
-    around = RUNG * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else sizes)
+    radii = radii_of(scene, bond)
+    # Search up to two mean diameters beyond contact.
+    end = 2.0 * radii + max(-bond.surface_gap, radii - bond.distance, 0.0)
+    known = scene, work, time, bond, 0.0, end, near, CLIMB_STEP, enough
+    total, outline_part, centre_part, best = largest_attraction(*known)
+    if is_enough(total, outline_part, centre_part, enough):
+        return total, outline_part, centre_part
+    # Refine around the maximum, which may be a cusp.
+    around = CLIMB_STEP * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else radii)
     if outline_reach(scene) > 0.0:
-        around = min(around, RUNG * max(bond.gap + best, scene.outlines[1]))
+        around = min(around, CLIMB_STEP * max(bond.gap + best, scene.outlines[1]))
     if has(scene, CENTRE_FORCE):
-        around = min(around, RUNG * abs(bond.distance + best - sizes))
+        around = min(around, CLIMB_STEP * abs(bond.distance + best - radii))
     start, end = max(best - around, 0.0), best + around
-    known = scene, work, time, bond, start, end, near, FINER * RUNG, enough
-    finer, follows_finer, pries_finer, _ = most_between(*known)
-    return max(most, finer), max(follows, follows_finer), max(pries, pries_finer)
+    known = scene, work, time, bond, start, end, near, REFINEMENT * CLIMB_STEP, enough
+    finer_total, finer_outline_part, finer_centre_part, _ = largest_attraction(*known)
+    return (
+        max(total, finer_total),
+        max(outline_part, finer_outline_part),
+        max(centre_part, finer_centre_part),
+    )
 
 
 def leverage(work, bond, least):
-    """By how much a load that pries about either outer contact outdoes one that pulls straight at
-    the attraction along the centres, with an arm of at least ``least`` [m]; inf where no contact
-    lies on one side of it."""
+    """Return the factor by which a load that pries exceeds one that pulls straight.
+
+    It pries about the outer contact on either side of the line of centres, with a lever arm of at
+    least ``least`` [m]. inf if one side has no contact.
+    """
     left, right = math.inf, math.inf
     nx, ny, distance = bond.nx, bond.ny, bond.distance
     for row in range(work.tally.candidates):
@@ -271,6 +304,8 @@ def leverage(work, bond, least):
             continue
         x, y = contact_point(work, row, bond.i)
         side = nx * y - ny * x
+        # Moment balance about the contact: attraction acts with the arm ``side``, the load with
+        # ``lever``.
         lever = max(math.hypot(x, y), math.hypot(x - distance * nx, y - distance * ny), least)
         if side > 0.0:
             left = min(left, lever / side)
@@ -280,28 +315,35 @@ def leverage(work, bond, least):
 
 
 def is_held(scene, work, time, bond, load):
-    """Whether the bodies lie calm and attraction outweighs every later load on the bond."""
+    """Return True if the bodies are calm and attraction exceeds every later load on the bond."""
     along, shear = speeds_of(scene, work, bond)
-    if not along < CALM * load.drift:
+    if not along < CALM_SPEED * load.drift:
         return False
     mass, spin = effective_mass(scene, bond.i, bond.j), work.velocity[NOW, bond.i, ANGLE]
+    # The load, plus the centrifugal force of the rotating doublet.
     needed = SAFETY * (load.force + mass * spin * spin * bond.distance)
     spheres = are_spheres(scene, bond)
     ratio = 1.0 if spheres else leverage(work, bond, load.lever)
-    near = LEANING * bond.distance / (ratio * ratio)
-    pried = needed * ratio if shear < CALM * load.drift else math.inf
-    enough = needed, -1.0 if spheres else needed, pried
-    all_of_it, follows, pries = capacity(scene, work, time, bond, near, enough)
-    if not is_enough(all_of_it, follows, pries, enough):
+    # How far out the attraction between centres counts while prying, see PRYING_RANGE.
+    near = PRYING_RANGE * bond.distance / (ratio * ratio)
+    prying_load = needed * ratio if shear < CALM_SPEED * load.drift else math.inf
+    enough = needed, -1.0 if spheres else needed, prying_load
+    total, outline_part, centre_part = capacity(scene, work, time, bond, near, enough)
+    if not is_enough(total, outline_part, centre_part, enough):
         return False
-    # In a well, which they might still be leaving.
-    moving = 0.5 * mass * along * along
-    return bond.gap < 0.0 or not lets_out(scene, work, time, bond, load.force, moving)
+    # Without contact, in a well between attraction and repulsion: they must not have the energy to
+    # leave.
+    kinetic_energy = 0.5 * mass * along * along
+    return bond.gap < 0.0 or not can_leave(scene, work, time, bond, load.force, kinetic_energy)
 
 
 def is_trapped(scene, work, time, bond, load):
-    """Whether the two have too little energy to leave each other's attraction between centres, in
-    which they lie, against the load: its work out of it is more than SAFETY times their energy."""
+    """Return True if the bodies lack the energy to leave the attraction between their centres.
+
+    They lie within it, and climbing out, helped by SAFETY times the load, costs more than SAFETY
+    times their energy. False if the bodies belong to a larger cluster, or if forces between
+    outlines act.
+    """
     inside = has(scene, CENTRE_FORCE) and bond.distance < radii_of(scene, bond)
     if not inside or max(scene.surface_reach, outline_reach(scene)) > 0.0 or load.alone == 0.0:
         return False
@@ -310,23 +352,26 @@ def is_trapped(scene, work, time, bond, load):
     if not centres > pull:
         return False
     needed = SAFETY * energy_of(scene, work, bond)
-    return not lets_out(scene, work, time, bond, pull, needed)
+    return not can_leave(scene, work, time, bond, pull, needed)
 
 
 def is_certain(scene, work, time, bond, load):
-    """Whether no later load can open the bond, where nothing kicks; not known where forces ask how
-    bodies are turned."""
+    """Return True if no later load can open the bond, without thermal motion.
+
+    Unknown, hence False, for forces that depend on orientation.
+    """
     if has(scene, ORIENTED_ENERGY):
         return False
     return is_trapped(scene, work, time, bond, load) or is_held(scene, work, time, bond, load)
 
 
 def is_certain_in_kicks(scene, work, time, bond, load):
-    """Whether neither a later load nor kicks can open the bond."""
+    """Return True if neither a later load nor thermal kicks can open the bond."""
     pull = SAFETY * load.force
     if pull > 0.0 and not are_spheres(scene, bond):
-        _, follows, _ = capacity(scene, work, time, bond, 0.0, (-1.0, pull, math.inf))
-        if not follows > pull:
+        _, outline_part, _ = capacity(scene, work, time, bond, 0.0, (-1.0, pull, math.inf))
+        if not outline_part > pull:
+            # If outlines do not carry the load by themselves, it may pry.
             pull *= leverage(work, bond, load.lever)
     needed = BARRIER * load.kicks + energy_of(scene, work, bond)
-    return not lets_out(scene, work, time, bond, pull, needed)
+    return not can_leave(scene, work, time, bond, pull, needed)

@@ -1,44 +1,45 @@
-"""Rests and hooks: bonds that have shown to hold, as they kept their pose under the worst load.
+"""Rests and hooks: contacts classified as bonded because their pose was stable under the largest
+load.
 
-Where attraction could not carry the load, and the contacts do by themselves, such a bond is a hook;
-what merely has kept its pose is a rest. A rest shows that the doublet holds, not that no kick could
-open it. Where thermal motion kicks, spheres rest where BARRIER k_B T keep them in their attraction
-against the load, and shapes, whose contacts no potential tells of, where it takes as much to lift
-one by the smaller spheroradius against it.
+Where attraction could not carry that load but the contacts do, by their shape, the bond is a hook;
+otherwise a rest. A rest shows that the doublet holds, not that no disturbance could open it. Under
+thermal motion spheres rest if BARRIER k_B T keep them in their attraction against the load. Shapes,
+whose contacts have no such potential, rest if lifting one by the smaller spheroradius against the
+load costs as much.
 
-Of a hook the contacts carry the load, whatever attraction there is: statics without tension. Every
-closed contact gives body j a force N n + T t, N ≥ 0, |T| ≤ µ N, along its normal n and tangent t,
-and its moment. The load hangs from them where such forces balance it. That is so for all loads that
-the doublet meets, or there is a motion of j against i that no contact forbids and along which a
-load does work (Farkas' lemma); a motion is forbidden where a contact's force could only ever do
-negative work along it. In the plane a motion (v_x, v_y, ω) has three numbers, and those to look at
-are the edges of what is allowed: each is across two of the contacts' forces, so that two loops over
-these find them.
+**Hooks.** The contacts of a hook carry the load without tension, whatever the attraction: statics
+with friction. Every closed contact exerts on body j a force N n + T t, N ≥ 0, |T| ≤ µ N, along its
+normal n and tangent t, and its moment. The load is carried if such forces balance it. By Farkas'
+lemma, either all loads that the doublet may meet are balanced, or there is a motion of j relative
+to i along which a load does positive work and no possible contact force does negative work. A
+motion in the plane (v_x, v_y, ω) has three components. It suffices to test the extreme rays of the
+cone of motions along which no contact force does negative work. Each is orthogonal to two extreme
+contact forces, so two nested loops find them all.
 
-A load is a force f on j and its reverse on i. Of a free doublet that settles askew, and turns, it
-acts along f somewhere between the two centroids, and less of it across their line, as drag takes up
-the rest: all of these are balanced where f at either centroid and a pull along the line of centres
-are. A free doublet turns until its faster body hangs below: its loads go from that of now to one
-along the line of centres. That of a fixed receiver does not turn, and one in a flow, or in a
-cluster, meets loads from everywhere.
+**Loads.** A load is a force f on j and its reverse on i. In a free doublet that settles askew and
+turns, f acts somewhere between the two centroids, reduced across their line, as drag takes up the
+rest. All of these are balanced if f at either centroid and a pull along the line of centres are. A
+free doublet turns until its faster body hangs below: its loads range from the present one to one
+along the line of centres. The load on a fixed receiver does not turn. A doublet in a flow or in a
+cluster meets loads from all directions.
 
-Two spheres touch at one point, and no load along their line of centres is carried there: no hook.
+Two spheres touch in one point, which carries no pull along the line of centres: no hook.
 """
 
 import math
 
 from flocsim.bonds.certificate import (
-    CALM,
+    CALM_SPEED,
     HOOK,
     NO_BOND,
     REST,
     are_spheres,
+    can_leave,
     capacity,
     is_closed,
-    lets_out,
     radii_of,
     resting_contact,
-    size_of,
+    smaller_bounding_radius,
 )
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
@@ -48,131 +49,151 @@ from flocsim.integrators.rhs.views import contact_view
 from flocsim.state.bodies import ANGLE
 from flocsim.state.work import NOW
 
-STILL = 1e-3
-"""A pair that has moved by less than this share of the drift's way keeps its pose."""
+STABLE_POSE = 1e-3
+"""A pose is stable if it has changed by less than this share of the path at drift velocity."""
 
-HANGING = 0.99
-"""Cosine between line of centres and drift above which the load is at its worst."""
+HANGING_COSINE = 0.99
+"""Cosine between line of centres and drift above which the load is at its largest."""
 
-NEST = 0.1
-"""Centres nearer than this share of r_i + r_j lie nested: the load has no lever to turn them, …"""
+NESTED_DISTANCE = 0.1
+"""Centres closer than this share of r_i + r_j are nested: the load has no lever to turn the
+doublet."""
 
-FAR_LONGER = 10.0
-"""… and they are bound when they have rested for so many rest times."""
+NESTED_REST_TIMES = 10.0
+"""Nested pairs count as bonded after this number of rest times."""
 
 REST_TURNS = 3.0
-"""Automatic rest time, in turn times (r_i + r_j)/|relative drift|."""
+"""Automatic rest time, in units of the time (r_i + r_j)/|relative drift|."""
 
 
-def swings(scene, work, i, j, load):
-    """Whether a doublet that turns to hang still swings: it passes the worst direction of its load,
-    but may yet be thrown open. One that any load may meet turns with the flow, or its cluster."""
+def is_swinging(scene, work, i, j, load):
+    """Return True if a doublet that turns to hang is still swinging.
+
+    It passes the direction of its largest load, but may yet be thrown open. A doublet that meets
+    loads from all directions turns with the flow or its cluster and does not swing.
+    """
     outer = scene.bodies[i].bounding_radius + scene.bodies[j].bounding_radius
     turns = load.x != 0.0 or load.y != 0.0
-    return turns and abs(work.velocity[NOW, i, ANGLE]) * outer > CALM * load.drift
+    return turns and abs(work.velocity[NOW, i, ANGLE]) * outer > CALM_SPEED * load.drift
 
 
-def has_shown(scene, bond, load, rested):
-    """Whether a pose kept for so many rest times shows that the bond holds.
+def has_kept_pose(scene, bond, load, rested):
+    """Return True if a pose kept for ``rested`` rest times shows that the bond holds.
 
-    The load is at its worst where the faster body hangs straight below; a fixed receiver cannot
-    turn, so it need not, nor one whose load comes from everywhere; a nest, or a pair across a
-    barrier, has to keep its pose for far longer.
+    The load is largest where the faster body hangs straight below. A fixed receiver cannot turn, so
+    this is not required of it, nor of loads from all directions. A nest, or a pair across a
+    barrier, must keep its pose for NESTED_REST_TIMES.
     """
-    near = bond.gap >= 0.0 or bond.distance < NEST * radii_of(scene, bond)
-    if near and rested >= FAR_LONGER:
+    near = bond.gap >= 0.0 or bond.distance < NESTED_DISTANCE * radii_of(scene, bond)
+    if near and rested >= NESTED_REST_TIMES:
         return True
-    hangs = bond.nx * load.x + bond.ny * load.y >= HANGING or (load.x == 0.0 and load.y == 0.0)
+    hangs = bond.nx * load.x + bond.ny * load.y >= HANGING_COSINE or (
+        load.x == 0.0 and load.y == 0.0
+    )
     hangs = hangs or scene.bodies[bond.i].free == 0.0 or scene.bodies[bond.j].free == 0.0
     return bond.gap < 0.0 and hangs and rested >= 1.0
 
 
 def outlasts_kicks(scene, work, time, bond, load):
-    """Whether kicks let the bond rest."""
+    """Return True if thermal kicks leave the bond at rest."""
     barrier = BARRIER * load.kicks
     if not are_spheres(scene, bond):
         radii = scene.bodies[bond.i].radius, scene.bodies[bond.j].radius
+        # The energy to lift a shape by the smaller spheroradius against the load.
         return load.force > 0.0 and load.force * min(radii[0], radii[1]) >= barrier
-    return load.force > 0.0 and not lets_out(scene, work, time, bond, load.force, barrier)
+    return load.force > 0.0 and not can_leave(scene, work, time, bond, load.force, barrier)
 
 
 def kind_at_rest(scene, work, time, bond, load, rested):
-    """HOOK or REST of a bond whose pose has been kept for so many rest times, or NO_BOND."""
-    if not has_shown(scene, bond, load, rested):
+    """Return HOOK, REST or NO_BOND for a bond whose pose was kept for ``rested`` rest times."""
+    if not has_kept_pose(scene, bond, load, rested):
         return NO_BOND
     if load.kicks > 0.0 and not outlasts_kicks(scene, work, time, bond, load):
         return NO_BOND
-    borne, _, _ = capacity(scene, work, time, bond, 0.0, (load.force, -1.0, math.inf))
-    return HOOK if borne <= load.force and is_hooked(scene, work, bond, load) else REST
+    # A hook carries what attraction cannot.
+    attraction, _, _ = capacity(scene, work, time, bond, 0.0, (load.force, -1.0, math.inf))
+    return HOOK if attraction <= load.force and is_hooked(scene, work, bond, load) else REST
 
 
-GRIP = 10.0
-"""Friction µ of contacts without a Coulomb limit: what holds by less than a tenth of the tangential
-force being normal is not taken to hold by its shape."""
+UNLIMITED_FRICTION = 10.0
+"""Friction coefficient of contacts without a Coulomb limit: a bond that needs |T| > 10 N at a
+contact does not count as held by its shape."""
 
-SLACK = 0.05
-"""A pair at rest is as near to its balance as this: so much friction, and so broad a contact, over
-the smaller bounding radius, is granted to every one."""
+BALANCE_TOLERANCE = 0.05
+"""Smallest friction coefficient, and half-width of a contact over the smaller bounding radius: a
+pair at rest is within this of its balance."""
 
-EDGES = 4
-"""Extreme forces of a contact: both sides of its friction cone, at both ends of its breadth."""
+EXTREME_FORCES = 4
+"""Extreme forces of a contact: both sides of its friction cone, at both ends of its width."""
 
 ROUNDING = 1e-9
-"""What counts as nothing of a unit motion."""
+"""Components of a unit motion below this count as zero."""
 
 
-def grip_of(scene, work):
-    """µ: the least share of their normal forces that the closed contacts hold along the tangent, at
-    least SLACK; 0 without contacts or forces at them."""
+def least_friction(scene, work):
+    """Return µ, the smallest ratio |T|/N that the closed contacts can hold.
+
+    At least BALANCE_TOLERANCE; 0 without contacts or contact forces.
+    """
     least = 0.0
     if not has(scene, CONTACT_FORCE):
         return least
     for row in range(work.tally.candidates):
         if is_closed(work, row):
             view = contact_view(scene, work, NOW, row)
+            # Without a limit: tangential force at a displacement equal to the overlap.
             slip, limit = view.overlap, math.inf
             if has(scene, SLIP_LIMIT):
                 limit = slip_limit(scene, resting_contact(view, 0.0))
             if limit < math.inf:
                 slip = limit
             normal, tangential = contact_force(scene, resting_contact(view, slip))
-            grip = abs(tangential) / normal if normal > 0.0 else 0.0
-            if grip > 0.0 and not limit < math.inf:
-                grip = GRIP
-            grip = min(max(grip, SLACK), GRIP)
-            least = grip if least == 0.0 else min(least, grip)
+            friction = abs(tangential) / normal if normal > 0.0 else 0.0
+            # A law with a tangential force but no Coulomb limit.
+            if friction > 0.0 and not limit < math.inf:
+                friction = UNLIMITED_FRICTION
+            friction = min(max(friction, BALANCE_TOLERANCE), UNLIMITED_FRICTION)
+            least = friction if least == 0.0 else min(least, friction)
     return least
 
 
 def normal_on(work, bond, row):
-    """The unit vector along which a contact pushes body j."""
+    """Return the unit vector along which a contact pushes body j."""
     geometry = work.geometry[NOW, row]
     x, y = geometry.normal_x, geometry.normal_y
     return (x, y) if work.candidates[row].vertex_body == bond.j else (-x, -y)
 
 
-def push_of(work, bond, size, grip, edge):
-    """(x, y, moment about j's centroid over ``size``) of an extreme force on j."""
-    row = edge // EDGES
+def extreme_force(work, bond, size, friction, edge):
+    """Return (f_x, f_y, moment about j's centroid over ``size``) of an extreme force on j.
+
+    ``edge`` numbers them: contact row times EXTREME_FORCES plus 0 to 3.
+    """
+    row = edge // EXTREME_FORCES
     nx, ny = normal_on(work, bond, row)
     x, y = contact_point(work, row, bond.j)
-    aside = SLACK * size if edge % 2 == 0 else -SLACK * size
+    # The two ends of the contact's width, along the tangent.
+    aside = BALANCE_TOLERANCE * size if edge % 2 == 0 else -BALANCE_TOLERANCE * size
     x, y = (x - aside * ny) / size, (y + aside * nx) / size
-    along = grip if edge % EDGES < 2 else -grip
+    # The two sides of the friction cone.
+    along = friction if edge % EXTREME_FORCES < 2 else -friction
     px, py = nx - along * ny, ny + along * nx
     return px, py, x * py - y * px
 
 
-def across(one, other):
-    """The vector product: the motion along which neither of two forces does work."""
+def orthogonal_motion(one, other):
+    """Return the vector product: the motion along which neither of two generalised forces does
+    work."""
     a, b, c = one
     d, e, f = other
     return b * f - c * e, c * d - a * f, a * e - b * d
 
 
-def is_allowed(work, bond, size, grip, motion):
-    """Whether no force of any contact does negative work along a motion (of j's centroid; ``size``
-    times its turn)."""
+def is_allowed(work, bond, size, friction, motion):
+    """Return True if no possible force of any contact does negative work along a motion.
+
+    ``motion``: velocity of j's centroid and ``size`` times its rotation.
+    """
     vx, vy, turn = motion
     for row in range(work.tally.candidates):
         if not is_closed(work, row):
@@ -181,21 +202,25 @@ def is_allowed(work, bond, size, grip, motion):
         x, y = contact_point(work, row, bond.j)
         ux, uy = vx - turn * y / size, vy + turn * x / size
         normal, along = nx * ux + ny * uy, nx * uy - ny * ux
-        # Turning moves the ends of its breadth along the normal.
-        if normal - SLACK * abs(turn) - grip * abs(along) < -ROUNDING:
+        # The least work per normal force, over both sides of the friction cone and both ends of the
+        # width.
+        if normal - BALANCE_TOLERANCE * abs(turn) - friction * abs(along) < -ROUNDING:
             return False
     return True
 
 
 def load_works(scene, bond, load, size, motion):
-    """Whether one of the loads that the doublet meets does work along a motion."""
+    """Return True if one of the loads that the doublet may meet does positive work along a
+    motion."""
     vx, vy, turn = motion
     reach = turn * bond.distance / size
-    # There, the motion of j's body where i's centroid is.
+    # The velocity of j's rigid extension at i's centroid.
     tx, ty = vx + reach * bond.ny, vy - reach * bond.nx
     at_j, at_i = load.x * vx + load.y * vy, load.x * tx + load.y * ty
+    # Loads from all directions: any motion of either point.
     if load.x == 0.0 and load.y == 0.0:
         return vx * vx + vy * vy + tx * tx + ty * ty > ROUNDING * ROUNDING
+    # A fixed body: the load acts at the free one and does not turn.
     if scene.bodies[bond.i].free == 0.0:
         return at_j > ROUNDING
     if scene.bodies[bond.j].free == 0.0:
@@ -203,33 +228,37 @@ def load_works(scene, bond, load, size, motion):
     pulling = bond.nx * vx + bond.ny * vy
     askew = load.x * bond.nx + load.y * bond.ny
     if askew < 0.0:
-        # It turns by more than a quarter: all loads across the line to that side, and along it.
+        # The doublet turns by more than 90°: all loads across the line on that side, and along it.
         at_j, at_i, pulling = at_j - askew * pulling, at_i - askew * pulling, abs(pulling)
     return max(at_j, at_i, pulling) > ROUNDING
 
 
 @apart
 def is_hooked(scene, work, bond, load):
-    """Whether the contacts of the two carry every load that the doublet meets."""
-    grip, size = grip_of(scene, work), size_of(scene, bond.i, bond.j)
-    if grip == 0.0 or are_spheres(scene, bond):
+    """Return True if the contacts of the two bodies carry every load that the doublet may meet."""
+    friction, size = least_friction(scene, work), smaller_bounding_radius(scene, bond.i, bond.j)
+    if friction == 0.0 or are_spheres(scene, bond):
         return False
-    count = EDGES * work.tally.candidates
+    count = EXTREME_FORCES * work.tally.candidates
     for first in range(count):
-        if not is_closed(work, first // EDGES):
+        if not is_closed(work, first // EXTREME_FORCES):
             continue
-        one = push_of(work, bond, size, grip, first)
+        first_force = extreme_force(work, bond, size, friction, first)
         for second in range(first):
-            if not is_closed(work, second // EDGES):
+            if not is_closed(work, second // EXTREME_FORCES):
                 continue
-            x, y, turn = across(one, push_of(work, bond, size, grip, second))
+            # A candidate extreme ray: orthogonal to two extreme contact forces.
+            x, y, turn = orthogonal_motion(
+                first_force, extreme_force(work, bond, size, friction, second)
+            )
             length = math.sqrt(x * x + y * y + turn * turn)
             if length <= ROUNDING:
                 continue
-            for way in (1.0 / length, -1.0 / length):
-                motion = x * way, y * way, turn * way
+            # Both senses; an allowed motion along which a load does work opens the bond.
+            for scale in (1.0 / length, -1.0 / length):
+                motion = x * scale, y * scale, turn * scale
                 if load_works(scene, bond, load, size, motion) and is_allowed(
-                    work, bond, size, grip, motion
+                    work, bond, size, friction, motion
                 ):
                     return False
     return True

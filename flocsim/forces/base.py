@@ -1,10 +1,11 @@
-"""The kinds of force. A force is a frozen attrs class around one plain kernel.
+"""The kinds of force that a scene may contain, as abstract classes.
 
-The kernel is a static method on scalars: its first argument is the view of a body, a pair or a
-contact (flocsim.state.views), the others are the names of its own fields and properties, or of the
-fluid's (``viscosity``, ``density``, ``flow``). It captures nothing and allocates nothing, so that
-it runs uncompiled for debugging and compiled at the speed of hand-written code. New parameter
-values never recompile.
+A force is a frozen attrs class around one plain kernel. The kernel is a static method on scalars.
+Its first argument is a view of a body, a pair of bodies or a contact (flocsim.state.views). Its
+other arguments are named after fields or properties of the force, or of the fluid (``viscosity``,
+``density``, ``flow``), and receive their values. A kernel captures no variables and allocates no
+memory, so that it runs uncompiled for debugging and compiled at the speed of hand-written code. New
+parameter values never recompile it.
 """
 
 from abc import ABC, abstractmethod
@@ -20,39 +21,53 @@ from flocsim.fields import word_or_quantity
 
 @attrs.frozen
 class Force(ABC):
-    """What all forces share; subclass one of its kinds, BodyForce, CentreForce, SurfaceForce,
-    OutlineForce, OrientedForce or ContactForce, and give it a static method ``kernel``, its law."""
+    """Base class of all forces.
+
+    Subclass one of its kinds (BodyForce, CentreForce, SurfaceForce, OutlineForce, OrientedForce or
+    ContactForce), and give it a static method ``kernel``.
+    """
 
     @staticmethod
     @abstractmethod
     def kernel(view):
-        """The law itself; each kind says what it returns."""
+        """Return the force, pressure or energy; each kind states units and shape."""
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """The kernel to use in this fluid; a subclass may have a cheaper one for some fluids."""
+        """Return the kernel to use in this fluid; a subclass may choose a cheaper one for some
+        fluids."""
         return self.kernel
 
     def remarks(self, fluid: Fluid) -> list[str]:
-        """What System.explain() says of it in this fluid besides, in a few words each."""
+        """Return short remarks on this force in this fluid, for System.explain()."""
         return []
 
     @property
     def absent(self) -> str:
-        """Why a scene can leave this force out ("" where it cannot), e.g. a zero strength."""
+        """Reason why a scene can leave this force out, e.g. "hamaker is zero"; "" where it
+        cannot."""
         return ""
 
 
 @attrs.frozen
 class BodyForce(Force):
-    """A force on each body by itself: ``kernel(body, …) → (fx, fy, torque)`` [N, N, N m]."""
+    """A force on each body independently of all others.
+
+    Notes
+    -----
+    ``kernel(body, …) → (fx, fy, torque)`` [N, N, N m], torque about the centroid; ``body`` is a
+    BodyView.
+    """
 
 
 @attrs.frozen
 class PairForce(Force):
-    """A force between two bodies: ``kernel(pair, …) → repulsion`` [N], positive pushes apart.
+    """A force between two bodies.
 
-    A class may supply ``slope(pair, …)``, the derivative of the repulsion by the gap [N/m], for
-    the implicit integrators; without it they take differences of the kernel.
+    Notes
+    -----
+    ``kernel(pair, …) → repulsion`` [N], positive where it pushes the bodies apart. A class may
+    supply a static method ``slope(pair, …)``, the derivative of the repulsion with respect to the
+    gap [N/m], for the implicit integrators; otherwise they use central differences of the kernel.
     """
 
     slope: ClassVar[Any] = None
@@ -60,37 +75,51 @@ class PairForce(Force):
     @property
     @abstractmethod
     def acts_on(self) -> str:
-        """ "centres" (along the line of centres), "surfaces" (at the nearest points of the
-        outlines), "outlines" (all along them) or "orientations" (as both are turned)."""
+        """Where the force acts.
+
+        "centres" (along the line of centres), "surfaces" (at the nearest points of the outlines),
+        "outlines" (along both outlines) or "orientations" (depends on both angles).
+        """
 
     @property
     def reach(self) -> float:
-        """The gap [m] beyond which the force is left out, and not even called."""
+        """Gap [m] beyond which the force is taken as zero and its kernel is not called."""
         return np.inf
 
 
 @attrs.frozen
 class CentreForce(PairForce):
-    """A PairForce along the line of centres, of the gap between the equivalent spheres: without
-    torque."""
+    """A PairForce along the line of centres, as a function of the gap between equivalent spheres.
+
+    It exerts no torque. ``pair`` is a PairView.
+    """
 
     acts_on = "centres"
 
 
 @attrs.frozen
 class SurfaceForce(PairForce):
-    """A PairForce between the two outlines, of the smooth gap between them (surface_gap.py)."""
+    """A PairForce at the nearest points of two outlines, as a function of their smooth gap.
+
+    The smooth gap is a soft minimum over all vertex–edge pairs (integrators/rhs/surface_gap.py).
+    ``pair`` is a PairView.
+    """
 
     acts_on = "surfaces"
 
 
 @attrs.frozen
 class OutlineForce(PairForce):
-    """A PairForce all along the two outlines: ``kernel(point, …) → pressure`` [Pa].
+    """A PairForce distributed along two outlines: ``kernel(point, …) → pressure`` [Pa].
 
-    ``point`` is an OutlineView, and the pressure that of two plates which are ``point.gap`` apart,
-    above 0 where it pushes them apart. It is summed over the outline of the smaller body, times the
-    ``depth`` of the bodies along the third direction [m] ("sphere": 4/3 r_eq of the smaller).
+    ``point`` is an OutlineView. The kernel returns the pressure between two parallel plates
+    ``point.gap`` apart, positive in repulsion. It is integrated over the outline of the smaller
+    body.
+
+    Parameters
+    ----------
+    depth : float or "sphere"
+        Extent of the bodies in the third direction [m]; "sphere" is 4/3 r_eq of the smaller body.
     """
 
     depth: float | str = word_or_quantity("sphere", "m", above=0.0, default="sphere", kw_only=True)
@@ -100,13 +129,17 @@ class OutlineForce(PairForce):
 
 @attrs.frozen
 class OrientedForce(PairForce):
-    """A PairForce of the distance of two bodies and of how both are turned:
-    ``kernel(pair, …) → energy`` [J].
+    """A PairForce derived from an energy of distance and orientations: ``kernel(pair, …) → energy``
+    [J].
 
-    ``pair`` is an OrientedView. Force and torques are minus the derivatives of the energy U, by
-    differences: F = −∂U/∂d along the line of centres, (∂U/∂α_i + ∂U/∂α_j)/d across it, and torques
-    −∂U/∂α, so that momentum, angular momentum and energy are kept. U must be smooth, of period 2π
-    in both angles, and have faded at ``reach``.
+    ``pair`` is an OrientedView.
+
+    Notes
+    -----
+    Forces and torques are minus the derivatives of the energy U, by finite differences: −∂U/∂d
+    along the line of centres, (∂U/∂α_i + ∂U/∂α_j)/d across it, and torques −∂U/∂α_i and −∂U/∂α_j.
+    Momentum, angular momentum and energy are therefore conserved. U must be smooth, have period 2π
+    in both angles, and have decayed to zero at ``reach``.
     """
 
     acts_on = "orientations"
@@ -116,14 +149,19 @@ class OrientedForce(PairForce):
 class ContactForce(Force):
     """A force at each contact point: ``kernel(contact, …) → (normal, tangential)`` [N].
 
-    The normal force is positive in repulsion; the tangential force acts along the direction in
-    which ``slip`` grows, so that a spring returns −k·slip. A class may supply
-    ``slip_limit(contact, …)`` [m]: the largest elastic displacement that the contact can hold; and
-    ``events(contact, …) → (number, …)``, of any unit: each changes its sign at a kink of the law
-    (a clip, a threshold), and steps of controlled error end there.
+    ``contact`` is a ContactView. The normal force is positive in repulsion. The tangential force
+    acts along the direction in which ``slip`` grows, so a spring returns −k·slip.
 
-    ``contact.overlap`` is never below 0: where a step is tried beyond the end of a contact, it is
-    0. ``goes_on_apart = True`` hands negative overlaps over, to a law that goes on smoothly there.
+    Notes
+    -----
+    A class may supply two more static methods. ``slip_limit(contact, …)`` [m] returns the largest
+    elastic displacement that friction allows. ``events(contact, …) → (number, …)``, in any unit,
+    returns functions that change sign at kinks of the law (a clipped force, a threshold); steps
+    with error control end at these sign changes.
+
+    ``contact.overlap`` is never negative: where a trial step leads beyond the end of a contact, it
+    is 0. With ``goes_on_apart = True`` the kernel receives negative overlaps as well, for a law
+    that continues smoothly there.
     """
 
     slip_limit: ClassVar[Any] = None
@@ -131,30 +169,32 @@ class ContactForce(Force):
 
     @property
     def goes_on_apart(self) -> bool:
-        """Whether the law is one for negative overlaps, too, without a kink at 0."""
+        """True if the law extends to negative overlaps without a kink at 0."""
         return False
 
     @property
     def slides(self) -> bool:
-        """Whether its displacements have a limit with these parameters."""
+        """True if the tangential displacement is limited with these parameters."""
         return self.slip_limit is not None
 
     @property
     def has_events(self) -> bool:
-        """Whether the law has kinks with these parameters."""
+        """True if the law has kinks with these parameters."""
         return self.events is not None
 
 
-def told_apart(names: Iterable[str]) -> list[str]:
-    """The names in their order, each once: "Pull", "Pull (2)", "Pull (3)"."""
-    found: list[str] = []
+def unique_names(names: Iterable[str]) -> list[str]:
+    """Return the names in the same order, repeated ones numbered: "Pull", "Pull (2)", "Pull
+    (3)"."""
+    unique: list[str] = []
     counts: dict[str, int] = {}
     for name in names:
         counts[name] = counts.get(name, 0) + 1
-        found.append(name if counts[name] == 1 else f"{name} ({counts[name]})")
-    return found
+        # The first of a name is not numbered.
+        unique.append(name if counts[name] == 1 else f"{name} ({counts[name]})")
+    return unique
 
 
-def names_of(forces: Sequence[Any]) -> list[str]:
-    """What the forces of a scene are called, by their classes and their places: no two alike."""
-    return told_apart(type(force).__name__ for force in forces)
+def force_names(forces: Sequence[Any]) -> list[str]:
+    """Return a unique name for each force of a scene: its class, numbered where it repeats."""
+    return unique_names(type(force).__name__ for force in forces)

@@ -1,6 +1,4 @@
-"""Forces on every body by itself, besides drag: weight, and the kicks of thermal motion, which
-Stokes's drag balances.
-"""
+"""Forces on single bodies other than drag: gravity, and the random kicks of thermal motion."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,22 +14,28 @@ from flocsim.fields import flag, quantity, word_or_quantity
 from flocsim.forces.base import BodyForce, Force
 from flocsim.forces.drag import follows_shape, is_permeable, shields_clusters
 
-FAR_SHARE = 0.1
-"""Share of the smallest radius by which a kick of automatic length moves two bodies against each
-other while they are far apart."""
+KICK_DISPLACEMENT = 0.1
+"""Relative displacement of two distant bodies in an automatic kick, over the smallest radius."""
 
 MOST_HALVINGS = 40
-"""More would take a kick below what a double can tell of the time."""
+"""Largest number of halvings: a shorter kick would be below the rounding of time."""
 
-KICKS = 0x7E4D
-"""Keeps kicks apart from what else is drawn with a seed and a replicate."""
+KICK_STREAM = 0x7E4D
+"""Stream number that separates kicks from other random numbers of a seed and replicate."""
 
 
 @attrs.frozen
 class Gravity(BodyForce):
-    """Weight F = m g towards −y, times (1 − ρ_f/ρ) with the fluid's buoyancy on.
+    """Weight F = m g towards −y, times (1 − ρ_f/ρ) if the fluid's buoyancy is on.
 
-    Parameters: ``g`` [m/s²].  Source: Tang et al. (2014), eq. 3; the paper has no buoyancy.
+    Parameters
+    ----------
+    g : float
+        Gravitational acceleration [m/s²].
+
+    Notes
+    -----
+    Source: Tang et al. (2014), eq. 3; the paper has no buoyancy.
     """
 
     g: float = quantity("m/s^2", at_least=0.0, default=STANDARD_GRAVITY)
@@ -42,7 +46,8 @@ class Gravity(BodyForce):
 
     @staticmethod
     def kernel(body, g):
-        """(0, −m_b g, 0), m_b the mass less the displaced fluid's where buoyancy is on."""
+        """Return (0, −m_b g, 0), where m_b is the mass minus that of the displaced fluid, if
+        buoyancy is on."""
         return 0.0, -body.buoyant_mass * g, 0.0
 
 
@@ -50,18 +55,28 @@ class Gravity(BodyForce):
 class Thermal(BodyForce):
     """Random force √(2 k_B T ζ/τ) ξ_k, constant over each kick [kτ, (k + 1)τ), and such a torque.
 
-    ζ = 6πγ r_eq, 8πγ r_eq³ for the torque, as in Stokes's drag, which is needed as well; ξ is a
-    standard normal number for each body, kick and coordinate. A free body diffuses
-    with D = k_B T/ζ at any τ; its velocity at the end of kicks has
-    ⟨v²⟩ = (k_B T/m) tanh(x/2)/(x/2), x = ζτ/m.
+    ζ is the Stokes resistance 6πγ r_eq (8πγ r_eq³ for the torque), so StokesDrag is needed as well;
+    ξ is a standard normal number for each body, kick and coordinate.
 
-    Parameters: ``temperature`` T [K]; ``kick`` τ [s], "auto": the time in which two bodies
-    diffuse a tenth of the smaller radius relative to each other; ``finest`` [m]: where bodies are
-    near each other kicks are halved (a Brownian bridge) until one moves them by no more than a
-    quarter of the gap, or by ``finest``; "auto": 1 nm where the kick is automatic, and no halving
-    where it is given. ``rotational``: the torque; switch it off together with that of the drag.
+    Parameters
+    ----------
+    temperature : float
+        T [K].
+    kick : float or "auto"
+        Duration τ [s]; "auto": the time in which two bodies diffuse a tenth of the smallest radius
+        relative to each other.
+    finest : float or "auto"
+        Near other bodies kicks are halved (Brownian bridge) until one displaces them by at most a
+        quarter of the gap, or by this length [m]. "auto": 1 nm if ``kick`` is automatic, and no
+        halving otherwise.
+    rotational : bool
+        Whether there is a random torque; switch it off together with that of the drag.
 
-    The random numbers depend only on the seed, the replicate, the body and the kick.
+    Notes
+    -----
+    A free body diffuses with D = k_B T/ζ at any τ. Its velocity at the ends of kicks has ⟨v²⟩ =
+    (k_B T/m) tanh(x/2)/(x/2), x = ζτ/m. The random numbers depend only on the seed, the replicate,
+    the body and the kick.
 
     Source: Ermak and McCammon (1978), J. Chem. Phys. 69, 1352, without hydrodynamic interaction.
     """
@@ -86,53 +101,56 @@ class Thermal(BodyForce):
         return BOLTZMANN * self.temperature
 
     def diffusion(self, fluid: Fluid, radius: float) -> float:
-        """D = k_B T/(6πγ r) of a sphere [m²/s]."""
+        """Return D = k_B T/(6πγ r) of a sphere [m²/s]."""
         return self.energy / (6.0 * math.pi * fluid.viscosity * radius)
 
     def rotational_diffusion(self, fluid: Fluid, radius: float) -> float:
-        """D_r = k_B T/(8πγ r³) of a sphere [1/s]."""
+        """Return D_r = k_B T/(8πγ r³) of a sphere [1/s]."""
         return self.energy / (8.0 * math.pi * fluid.viscosity * radius**3)
 
     @property
-    def least_way(self) -> float:
-        """The way in a kick below which none is halved [m]; inf where none is at all."""
+    def least_displacement(self) -> float:
+        """Displacement per kick below which kicks are not halved [m]; inf without halving."""
         if isinstance(self.finest, str):
             return MINIMUM_GAP if isinstance(self.kick, str) else math.inf
         return self.finest
 
     def remarks(self, fluid: Fluid) -> list[str]:
-        """How long kicks are."""
+        """Return the duration of kicks in words."""
         length = (
-            f"as long as diffusion by {FAR_SHARE:g} of the smallest radius takes"
+            f"as long as diffusion by {KICK_DISPLACEMENT:g} of the smallest radius takes"
             if isinstance(self.kick, str)
             else f"of {self.kick:.3g} s"
         )
-        least = self.least_way
+        least = self.least_displacement
         near = "" if least == math.inf else f", halved near contact down to ways of {least:.3g} m"
         return [f"steps end at kicks {length}{near}"]
 
     @staticmethod
     def kernel(body, viscosity, energy, rotational):
-        """√(2 k_B T ζ) times the mean of white noise over the present kick."""
+        """Return √(2 k_B T ζ) times the mean of white noise over the present kick."""
         radius = body.radius
+        # √(2 k_B T ζ) with ζ = 6πγ r, and ζ = 8πγ r³ for the torque.
         force = math.sqrt(12.0 * math.pi * viscosity * radius * energy)
         torque = math.sqrt(16.0 * math.pi * viscosity * radius**3 * energy) * rotational
         return force * body.kick_x, force * body.kick_y, torque * body.kick_turn
 
 
-def thermal_in(forces: Iterable[Force]) -> list[Thermal]:
-    """The random forces among some that are of a temperature above 0 K."""
+def thermal_forces(forces: Iterable[Force]) -> list[Thermal]:
+    """Return the random forces with a temperature above 0 K."""
     return [force for force in forces if isinstance(force, Thermal) and not force.absent]
 
 
-def kicks_of(
+def kick_parameters(
     forces: Sequence[Force], bodies: Sequence[Body], fluid: Fluid
 ) -> tuple[float, float, float, float]:
-    """Scene.kicks of these forces on these bodies; zeros without random forces.
+    """Return Scene.kicks: duration [s], halvings, relative diffusion [m²/s], least displacement
+    [m].
 
-    UsageError for more than one of them.
+    Zeros without random forces. Raises UsageError for several of them, or for a drag whose
+    fluctuations they do not match.
     """
-    found = thermal_in(forces)
+    found = thermal_forces(forces)
     radii = sorted(body.shape.equivalent_radius for body in bodies if not body.fixed)
     if not found or not radii:
         return 0.0, 0.0, 0.0, 0.0
@@ -150,22 +168,27 @@ def kicks_of(
             "the drag's clusters and permeability out"
         )
     thermal = found[0]
-    spread = 2.0 * sum(thermal.diffusion(fluid, radius) for radius in radii[:2])
+    # Mean squared relative displacement per time of the two most mobile bodies: ⟨x²⟩ = 2 (D_i +
+    # D_j) t.
+    relative_diffusion = 2.0 * sum(thermal.diffusion(fluid, radius) for radius in radii[:2])
     kick: Any = thermal.kick
+    # ⟨x²⟩ = spread · τ is the square of KICK_DISPLACEMENT times the smallest radius.
     if kick == "auto":
-        kick = (FAR_SHARE * radii[0]) ** 2 / spread
-    least, halvings = thermal.least_way, 0
+        kick = (KICK_DISPLACEMENT * radii[0]) ** 2 / relative_diffusion
+    least, halvings = thermal.least_displacement, 0
     pairs = any(not isinstance(force, BodyForce) and not force.absent for force in forces)
-    if pairs and len(bodies) > 1 and spread * kick > least**2:
-        halvings = min(math.ceil(math.log2(spread * kick / least**2)), MOST_HALVINGS)
-    return float(kick), float(halvings), float(spread), least if halvings else 0.0
+    # Halvings after which a kick displaces bodies by no more than ``least``; none without
+    # interactions.
+    if pairs and len(bodies) > 1 and relative_diffusion * kick > least**2:
+        halvings = min(math.ceil(math.log2(relative_diffusion * kick / least**2)), MOST_HALVINGS)
+    return float(kick), float(halvings), float(relative_diffusion), least if halvings else 0.0
 
 
-def key_of(*numbers: int) -> tuple[int, int]:
-    """Scene.key of a seed and of what it is spawned by, whole numbers from 0: two words of 32 bits.
+def random_key(*numbers: int) -> tuple[int, int]:
+    """Return Scene.key, two 32-bit words of a random stream, from a seed and its spawn numbers.
 
-    As the start of a replicate's own numbers, and apart from it.
+    The stream is independent of the replicate's other random numbers.
     """
-    stream = np.random.SeedSequence(numbers[0], spawn_key=(*numbers[1:], KICKS))
+    stream = np.random.SeedSequence(numbers[0], spawn_key=(*numbers[1:], KICK_STREAM))
     first, second = stream.generate_state(2).tolist()
     return first, second

@@ -1,4 +1,7 @@
-"""A force's kernels tried once, uncompiled, so that a wrong one is named before it is compiled."""
+"""Trial calls of a force's kernels, uncompiled, to report errors before compilation.
+
+A KernelError names the force, the kernel, and its file and line.
+"""
 
 import functools
 import inspect
@@ -36,12 +39,13 @@ SAMPLE_CONTACTS = tuple(
 
 
 def sample_gaps(reach):
-    """Gaps [m] in contact, nearly so, and apart, within a reach."""
+    """Return gaps [m] in overlap, near contact, and apart, within a reach."""
+    # Half of the reach is well inside: no sample is beyond the end of a force.
     return [min(gap, 0.5 * reach) for gap in (-1e-9, 1e-10, 1e-7)]
 
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:
-    """PairViews with gaps of either sign, within the reach of a force [m]."""
+    """Return PairViews with gaps and gap rates of both signs, within the reach of a force [m]."""
     return tuple(
         PairView(1e-3, gap, rate, gap + 3e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
         for gap in sample_gaps(reach) for rate in (-1e-4, 1e-4)
@@ -49,7 +53,7 @@ def sample_pairs(reach: float) -> tuple[PairView, ...]:
 
 
 def samples_of(force: Force) -> tuple:
-    """Views such as a force's kernels will get."""
+    """Return sample views of the kind that a force's kernels receive."""
     if isinstance(force, BodyForce):
         return SAMPLE_BODIES
     if isinstance(force, ContactForce):
@@ -59,6 +63,7 @@ def samples_of(force: Force) -> tuple:
         return tuple(
             OutlineView(1e-3, gap, gap, apart, apart, 2e-6, 1e-6, 2e-6, 2e-6 / 3.0, 1e-10)
             for gap in sample_gaps(reach_of(force))
+            # Outlines count as d_min or more apart; 1e-10 m stands for it.
             for apart in [max(gap, 1e-10)]
         )
     if force.acts_on == "orientations":
@@ -71,34 +76,35 @@ def samples_of(force: Force) -> tuple:
     return sample_pairs(reach_of(force))
 
 
-def refusal(force, function, finding):
-    """A KernelError that names the force, the kernel, and its file and line."""
+def kernel_error(force, function, finding):
+    """Return a KernelError that names the force, the kernel, and its file and line."""
     return KernelError(f"{type(force).__name__}: kernel {where(function)} {finding}")
 
 
 def require_plain(force, kernel):
-    """KernelError where a kernel is not a plain function that captures nothing."""
+    """Raise KernelError unless a kernel is a plain function that captures nothing."""
     name = type(force).__name__
+    # Each mistake has its own message, which says what to write instead.
     if inspect.ismethod(kernel):
-        raise refusal(force, kernel, "is a method; put @staticmethod above it and drop `self`")
+        raise kernel_error(force, kernel, "is a method; put @staticmethod above it and drop `self`")
     if hasattr(kernel, "py_func"):
-        raise refusal(force, kernel.py_func, "is compiled already; leave its @njit out")
+        raise kernel_error(force, kernel.py_func, "is compiled already; leave its @njit out")
     if not isinstance(kernel, types.FunctionType):
         raise KernelError(f"{name}: its kernel is {kernel!r}; write a function with `def`")
     if kernel.__name__ == "<lambda>":
-        raise refusal(force, kernel, "is a lambda; write it with `def`")
+        raise kernel_error(force, kernel, "is a lambda; write it with `def`")
     refuse_closure(kernel)
     if words := made_by(kernel):
-        raise refusal(
+        raise kernel_error(
             force, kernel, f"{words}: compiled kernels allocate nothing; write its numbers out"
         )
-    if words := why_untold(kernel):
+    if words := unhashable_reason(kernel):
         raise KernelError(f"{name}: {words}")
 
 
 @functools.lru_cache(maxsize=256)
-def why_untold(kernel):
-    """Why no hash could follow what a kernel reads, in words; "" where one can."""
+def unhashable_reason(kernel):
+    """Return why the inputs of a kernel cannot be hashed (stale caches); "" if they can."""
     try:
         tell(kernel, {})
     except KernelError as error:
@@ -107,17 +113,19 @@ def why_untold(kernel):
 
 
 def parameter_value(force, fluid, name, kernel):
-    """The force's own value of a parameter, else the fluid's; KernelError where neither has it."""
+    """Return the force's value of a parameter, else the fluid's; raise KernelError without
+    either."""
+    # The class is asked first: a property that fails raises its own error in `read_attribute`.
     for owner in (force, fluid):
         if hasattr(type(owner), name) or name in getattr(owner, "__dict__", ()):
-            return computed(force, owner, name)
+            return read_attribute(force, owner, name)
     known = ", ".join(f.name for f in attrs.fields(type(force))) or "it has none"
     lacking = f"no field or property of the force ({known}) or of the fluid"
-    raise refusal(force, kernel, f"asks for {name!r}, which is {lacking}")
+    raise kernel_error(force, kernel, f"asks for {name!r}, which is {lacking}")
 
 
-def computed(force, owner, name):
-    """The value of an attribute; KernelError where its property fails."""
+def read_attribute(force, owner, name):
+    """Return an attribute; raise KernelError if its property fails."""
     try:
         return getattr(owner, name)
     except Exception as error:
@@ -128,36 +136,39 @@ def computed(force, owner, name):
 
 
 def as_numbers(value):
-    """A number, or a tuple of numbers, named or not, as the compiled kernel will see it."""
+    """Return a number, or a (named) tuple of numbers, as floats: the compiled kernel's view of
+    it."""
     if isinstance(value, tuple):
         numbers = tuple(map(as_numbers, value))
         return type(value)(*numbers) if hasattr(value, "_fields") else numbers
+    # Integers and bools, too: compiled laws read floats from one array.
     return float(value)
 
 
 def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
-    """What a kernel is called with after its view; KernelError for what is no number."""
+    """Return a kernel's arguments after the view; raise KernelError for any that is no number."""
     arguments = []
     for name in list(inspect.signature(kernel).parameters)[1:]:
         value = parameter_value(force, fluid, name, kernel)
         try:
             arguments.append(as_numbers(value))
         except (TypeError, ValueError):
-            raise refusal(
+            raise kernel_error(
                 force, kernel, f"asks for {name!r}, which is {value!r}; a kernel takes numbers only"
             ) from None
-        # Rows could not be repeated: every pair of bodies asks anew.
-        if repr(again := parameter_value(force, fluid, name, kernel)) != repr(value):
-            raise refusal(
+        # Parameters are evaluated anew for every pair of bodies: one that changes from call to call
+        # would make rows irreproducible.
+        if repr(repeated := parameter_value(force, fluid, name, kernel)) != repr(value):
+            raise kernel_error(
                 force, kernel,
-                f"asks for {name!r}, which is {value!r} once and {again!r} then; compute it from "
-                "the force's fields alone",
+                f"asks for {name!r}, which is {value!r} once and {repeated!r} then; compute it "
+                "from the force's fields alone",
             )  # fmt: skip
     return arguments
 
 
 def failing_line(error):
-    """ "file:line" of the innermost Python line that raised."""
+    """Return "file:line" of the innermost Python line that raised."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
     return f"{frame.filename}:{frame.lineno}"
 
@@ -165,41 +176,47 @@ def failing_line(error):
 def results(
     force: Force, kernel: Callable, samples: Iterable, arguments: Sequence
 ) -> Iterator[Any]:
-    """What a kernel returns for the samples, those beyond its arithmetic left out, which the
-    compiled code answers with inf or nan."""
+    """Yield the results of a kernel for the samples.
+
+    Samples with an ArithmeticError are skipped: compiled code returns inf or nan there.
+    """
     for view in samples:
         try:
             result = kernel(view, *arguments)
         except ArithmeticError:
             continue
         except Exception as error:
+            # math.sqrt(−1) and the like: compiled code returns nan. A failed unpacking is a
+            # mistake, though.
             if isinstance(error, ValueError) and "unpack" not in str(error):
                 continue
-            raise refusal(force, kernel, failure(view, error)) from None
+            raise kernel_error(force, kernel, describe_failure(view, error)) from None
         parts = result if isinstance(result, tuple) else (result,)
+        # Python turns a negative base with a fractional exponent into a complex number; numba does
+        # not.
         if any(isinstance(part, complex) for part in parts):
-            raise refusal(
+            raise kernel_error(
                 force, kernel,
-                f"gives no real number at {asked_at(view)}: what is below zero has no power with a "
-                "fractional exponent; bound its base, as in max(x, 0.0)",
+                f"gives no real number at {describe_sample(view)}: what is below zero has no power "
+                "with a fractional exponent; bound its base, as in max(x, 0.0)",
             )  # fmt: skip
         yield result
 
 
-def failure(view, error):
-    """What a kernel did wrong, in words, from the exception that it raised for a sample."""
+def describe_failure(view, error):
+    """Describe the exception that a kernel raised for a sample."""
     if isinstance(error, AttributeError) and error.obj is view:
         fields = type(view)._fields
         near = closest(error.name, fields)
         advice = f"did you mean {near!r}?" if near else f"it has {', '.join(fields)}"
         lacks = f"{type(view).__name__} has no attribute {error.name!r}"
         return f"fails in {failing_line(error)}: {lacks}; {advice}"
-    what = " ".join(f"{type(error).__name__}: {error}".split())
-    return f"fails in {failing_line(error)}: {what}"
+    description = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"fails in {failing_line(error)}: {description}"
 
 
-def asked_at(view: Any) -> str:
-    """Where a force was asked, in words."""
+def describe_sample(view: Any) -> str:
+    """Describe the sample at which a kernel was called."""
     if hasattr(view, "gap"):
         return f"a gap of {view.gap:.3g} m"
     if hasattr(view, "overlap"):
@@ -208,8 +225,10 @@ def asked_at(view: Any) -> str:
 
 
 def check_results(force, fluid, kernel, *parts):
-    """KernelError unless a kernel can be called and returns the named parts, each a number; without
-    any, a tuple of numbers, always as many."""
+    """Raise KernelError unless a kernel returns the named parts, each a number.
+
+    Without names it must return a tuple of numbers, always of the same length.
+    """
     require_plain(force, kernel)
     arguments, count = kernel_arguments(force, fluid, kernel), len(parts) or None
     wanted = f"({', '.join(parts)})" if parts else "a tuple of numbers, always as many"
@@ -218,16 +237,17 @@ def check_results(force, fluid, kernel, *parts):
     for result in results(force, kernel, samples_of(force), arguments):
         found = (result,) if len(parts) == 1 else result
         numbers = isinstance(found, tuple) and all(isinstance(part, Real) for part in found)
+        # Without given names the first sample sets the number of results.
         count = count or (len(found) if numbers else None)
         if not numbers or not found or len(found) != count:
-            raise refusal(force, kernel, f"returns {result!r}; it must return {wanted}")
-    # Returns of other numbers in branches where no sample may come.
+            raise kernel_error(force, kernel, f"returns {result!r}; it must return {wanted}")
+    # Also inspect return statements in branches that no sample reaches.
     if words := wrong_return(kernel, count):
-        raise refusal(force, kernel, f"{words}; it must return {wanted}")
+        raise kernel_error(force, kernel, f"{words}; it must return {wanted}")
 
 
-class Watched:
-    """A view that notes which of its fields are read, by name, by index, or by unpacking."""
+class RecordingView:
+    """A view that records the fields read from it, by name, by index, or by unpacking."""
 
     def __init__(self, view):
         self.view, self.read = view, set()
@@ -237,29 +257,34 @@ class Watched:
         return getattr(self.view, name)
 
     def __getitem__(self, index):
+        # Fields may be read by position, or by a slice.
         self.read.update(np.atleast_1d(self.view._fields[index]).tolist())
         return self.view[index]
 
 
 def fields_read(force: Force, fluid: Fluid, kernel: Callable) -> set[str]:
-    """Names that a kernel reads of its view: those in its code and its helpers', and those that
-    it is seen to read without a name."""
+    """Return the names of the fields that a kernel reads.
+
+    They are the names in its code and in its helpers' code, and those observed in trial calls
+    (fields read by index or by unpacking have no name in the code).
+    """
     names, pending, known = set(), [kernel], set()
+    # Walk the helpers reachable through globals; ``known`` guards against recursion.
     while pending:
         function = pending.pop()
         known.add(function)
         names |= names_in(function.__code__)
         called = [value for _, value in globals_read(function) if inspect.isfunction(value)]
         pending += [each for each in called if each not in known]
-    watched = [Watched(view) for view in samples_of(force)]
+    watched = [RecordingView(view) for view in samples_of(force)]
     for _ in results(force, kernel, watched, kernel_arguments(force, fluid, kernel)):
         pass
     return names.union(*(each.read for each in watched))
 
 
 def reach_of(force: PairForce) -> float:
-    """The force's reach; KernelError unless it is a number."""
-    reach = computed(force, force, "reach")
+    """Return the reach of a force; raise KernelError unless it is a number."""
+    reach = read_attribute(force, force, "reach")
     if not isinstance(reach, Real) or math.isnan(reach):
         raise KernelError(f"{type(force).__name__}: its reach is {reach!r}; it must be a gap [m]")
     return float(reach)
@@ -271,10 +296,10 @@ def event_count(force: ContactForce, fluid: Fluid) -> int:
 
 
 def check_kernel(force: Force, fluid: Fluid) -> None:
-    """KernelError, with force, file and line, unless all kernels of a force can be used.
+    """Raise KernelError unless all kernels of a force are usable.
 
-    Each is called uncompiled on samples of the view that it will get, which finds misspelt
-    attributes, unknown parameters, and results of the wrong kind.
+    Each is called uncompiled on sample views, which finds misspelt attributes, unknown parameters,
+    and results of the wrong kind.
     """
     kernel = force.kernel_in(fluid)
     if isinstance(force, BodyForce):
@@ -288,8 +313,9 @@ def check_kernel(force: Force, fluid: Fluid) -> None:
         check_results(force, fluid, kernel, "normal", "tangential")
         if force.slides:
             check_results(force, fluid, force.slip_limit, "largest slip [m]")
+        # The former name of ``events``: without this check such a method would be ignored.
         if inspect.isfunction(kink := getattr(force, "kink", None)):
-            raise refusal(
+            raise kernel_error(
                 force, kink, "is called kink: name it events and return a tuple, one a kink"
             )
         if force.has_events:

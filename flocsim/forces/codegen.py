@@ -1,11 +1,13 @@
-"""From force objects to the scene's laws: generated source that adds up their kernels.
+"""Generate the laws of a scene: functions that add up the kernels of its force objects.
 
-The text is short and has no numbers in it: a force's values travel in one flat array, so that new
-values never recompile. What a scene does not need (absent forces, forces out of reach,
-derivatives of what no kernel reads) is not written, and is no law of the scene.
+The generated source is short and contains no numbers. Parameter values are stored in one flat
+array, so new values never recompile a law. Only functions that the scene needs are generated:
+absent forces, forces out of reach, and derivatives with respect to fields that no kernel reads are
+left out.
 
-Derivatives of kernels are differences, of views that are shifted. The laws take the differences
-themselves: one call of a law costs less than one for every shift.
+Derivatives of kernels are finite differences with respect to the fields of a view. The laws compute
+these differences themselves, because one call of a law (through its address) costs less than one
+call per shifted view.
 """
 
 import functools
@@ -15,7 +17,7 @@ import attrs
 
 from flocsim.body import NO_LAYER, NO_OUTLINES, Fluid
 from flocsim.errors import KernelError, UsageError
-from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, names_of
+from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce, force_names
 from flocsim.forces.check import (
     check_kernel,
     event_count,
@@ -24,13 +26,13 @@ from flocsim.forces.check import (
     reach_of,
 )
 from flocsim.forces.outline import (
-    layer_along,
-    layer_numbers,
-    outlines_of_forces,
+    charge_layer,
+    layer_parameters,
+    outline_parameters,
     pressures_of,
     smoothness,
 )
-from flocsim.forces.pair_resistance import PairResistance, stand_in
+from flocsim.forces.pair_resistance import PairResistance, lubrication_stand_in
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import LAWS
 from flocsim.state.views import (
@@ -44,24 +46,27 @@ from flocsim.state.views import (
 
 
 def body_change(view, axis):
-    """How much to change x, y, angle (axis 0–2) or vx, vy, spin (3–5) by [m, rad, m/s, rad/s]."""
+    """Return the increment [m, rad, m/s, rad/s] for axis 0–2 (x, y, angle) or 3–5 (vx, vy,
+    spin)."""
     if axis < 3:
         return 1e-6 if axis == 2 else 1e-6 * view.radius
     floor = 1e-9 / view.radius if axis == 5 else 1e-9
+    # 1e-3 of the velocity, with a floor for a body at rest.
     return 1e-3 * abs((view.vx, view.vy, view.spin)[axis - 3]) + floor
 
 
 def contact_change(view, axis):
-    """How much to change an overlap, its rate, a slip or its rate (axis 0–3) by [m or m/s]."""
+    """Return the increment [m or m/s] for axis 0–3: overlap, its rate, slip, its rate."""
     value = (view.overlap, view.overlap_rate, view.slip, view.slip_rate)[axis]
+    # 1e-3 of the value, with a floor of 1e-13 m or 1e-9 m/s for a value of zero.
     floor = 1e-13 if axis % 2 == 0 else 1e-9
     return 1e-3 * abs(value) + floor
 
 
 def pressed_contact(view):
-    """A ContactView without what is no overlap, as an own law of contact sees it.
+    """Return a ContactView with its overlap clipped at 0, for laws that do not extend to a gap.
 
-    Steps are tried beyond the end of a contact, where the two surfaces are apart.
+    Trial steps lead beyond the end of a contact, where the two surfaces are apart.
     """
     return moved_contact(view, max(view.overlap, 0.0), view.overlap_rate, view.slip, view.slip_rate)
 
@@ -72,19 +77,34 @@ PLACES = {"x", "y", "angle", "time"}
 PLACES_OF_PAIRS = {
     "centres": "centre", "surfaces": "surface", "outlines": "outline", "orientations": "oriented",
 }  # fmt: skip
-ROOM = 64
-"""Numbers of one kind of force stand at a multiple of so many places, so that more numbers of
-another kind leave the text of a law as it is."""
+BLOCK_LENGTH = 64
+"""Parameters of each kind of force start at a multiple of this index, so that more parameters of
+one kind do not change the source of another kind's laws."""
 
 
 @attrs.define
 class Pieces:
-    """What forces make of a scene: its laws {name of flocsim.hooks.LAWS: plain function}, their
-    numbers, the gaps up to which surface and centre forces reach (−1: there are none) and how the
-    gap of outlines is smoothed, how far those all along them look and what acts
-    between their charges (outline.py), how many events its contact forces have, whether its body
-    forces are given PlainBodyViews, and which forces are used and left out, {name: force} and
-    {name: why}, each by a name of its own (base.names_of)."""
+    """Contributions of the forces to a scene.
+
+    Attributes
+    ----------
+    laws : dict
+        {name in flocsim.hooks.LAWS: plain function}.
+    parameters : list of float
+        Parameters of all kernels, read by the laws.
+    surface_reach, centre_reach : float
+        Largest gaps of surface and centre forces [m]; −1 without any.
+    smoothness : (float, float, float)
+        See forces/outline.smoothness.
+    outlines, layer : tuple
+        Scene.outlines and Scene.layer (forces/outline.py).
+    events : int
+        Number of event functions of contact forces.
+    plain_bodies : bool
+        Whether body forces receive PlainBodyViews.
+    used, left_out : dict
+        {unique name: force} and {unique name: reason}.
+    """
 
     laws: dict[str, Callable] = attrs.Factory(dict)
     parameters: list[float] = attrs.Factory(list)
@@ -101,8 +121,10 @@ class Pieces:
 
 @attrs.define
 class Source:
-    """The source of the laws of one kind of force, the kernels that it names, and the numbers that
-    it reads from ``parameters``, from place ``BASE`` on."""
+    """Source text of the laws of one kind of force, its kernels and its parameters.
+
+    The text reads the parameters from the array ``parameters``, from index ``BASE`` on.
+    """
 
     fluid: Fluid
     functions: list[str] = attrs.Factory(list)
@@ -110,7 +132,7 @@ class Source:
     numbers: list[float] = attrs.Factory(list)
 
     def value(self, value):
-        """Keep a number or a tuple of numbers; the text that reads it back."""
+        """Store a number or a (named) tuple of numbers; return the text that reads it back."""
         if hasattr(value, "_fields"):
             self.kernels[type(value).__name__] = type(value)
             return f"{type(value).__name__}({', '.join(map(self.value, value))})"
@@ -120,23 +142,30 @@ class Source:
         return f"parameters[BASE + {len(self.numbers) - 1}]"
 
     def call(self, force, kernel, view):
-        """Text of a call of a kernel with its parameters read from the array."""
+        """Return the text of a call of a kernel with its parameters read from the array."""
+        # Numbered: two forces of one class have different parameters and may have different
+        # kernels.
         name = f"{type(force).__name__}_{kernel.__name__}_{len(self.kernels)}"
         self.kernels[name] = kernel
         arguments = kernel_arguments(force, self.fluid, kernel)
         return f"{name}({', '.join([view, *map(self.value, arguments)])})"
 
     def laws(self, parameters):
-        """{law: function}; its numbers are appended to ``parameters``."""
+        """Append the parameters of this kind to ``parameters`` and return {law: function}."""
         base = len(parameters)
         parameters += self.numbers
-        parameters += [0.0] * (-len(parameters) % ROOM or (ROOM if not self.numbers else 0))
+        # Pad to the next multiple of BLOCK_LENGTH; a kind without parameters still occupies one
+        # block.
+        parameters += [0.0] * (
+            -len(parameters) % BLOCK_LENGTH or (BLOCK_LENGTH if not self.numbers else 0)
+        )
         return made_laws("\n\n".join(self.functions), base, tuple(self.kernels.items()))
 
 
 @functools.lru_cache(maxsize=256)
 def made_laws(text, base, kernels):
-    """{law: function} of a source text; the same functions for the same text and kernels."""
+    """Compile a source text to {law: function}, cached so that equal text yields the same
+    functions."""
     known = (*VIEWS, body_change, contact_change, pressed_contact)
     namespace = {"BASE": base, "max": max, "min": min, "abs": abs, **dict(kernels)}
     namespace |= {each.__name__: each for each in known}
@@ -145,7 +174,11 @@ def made_laws(text, base, kernels):
 
 
 def sum_function(name, view, terms, zeros):
-    """Source of a function that adds up the given terms (tuples of as many parts as zeros)."""
+    """Return the source of a function that adds up terms, each a tuple of as many parts as
+    ``zeros``.
+
+    ``terms`` are (condition, call); the condition is "" or an expression such as a reach test.
+    """
     lines = [f"def {name}({view}, parameters):"]
     totals = [f"total_{k}" for k in range(zeros)]
     parts = [f"part_{k}" for k in range(zeros)]
@@ -162,7 +195,7 @@ def sum_function(name, view, terms, zeros):
 
 
 def difference_text(call, field, size):
-    """Source of a central difference of a pair kernel by one field of its view."""
+    """Return the source of a central difference of a pair kernel with respect to one field."""
     index = PairView._fields.index(field)
     shifted = []
     for sign in "+-":
@@ -173,8 +206,11 @@ def difference_text(call, field, size):
 
 
 def change_text(kind, changed):
-    """Source of a function that gives a view of a kind with one of its fields ``changed``, that of
-    an axis, by so much."""
+    """Return the source of ``changed(view, axis, by)``, a copy with one field incremented.
+
+    ``changed``: the names of the fields, in the order of the axes.
+    """
+    # Branch-free: (axis == k) is 0 or 1.
     fields = [
         f"view.{name} + by * (axis == {changed.index(name)})" if name in changed else f"view.{name}"
         for name in kind._fields
@@ -183,13 +219,14 @@ def change_text(kind, changed):
 
 
 def differences_text(name, force, view, parts, axes, keep):
-    """Source of a function with the one-sided differences of a sum of forces by some axes.
+    """Return the source of a function with one-sided differences of a sum of forces.
 
-    It returns the ``parts`` of the force first where ``keep``, then their changes by each axis.
+    It returns the ``parts`` of the force first if ``keep``, then their derivatives along each axis.
     """
     lines = [f"def {name}({view}, parameters):", f"    now = {force}({view}, parameters)"]
     found = [f"now[{part}]" for part in range(parts)] if keep else []
     for axis in axes:
+        # size: increment; new: force of the changed view.
         lines += [
             f"    size_{axis} = {view}_change({view}, {axis})",
             f"    new_{axis} = {force}(changed({view}, {axis}, size_{axis}), parameters)",
@@ -199,8 +236,7 @@ def differences_text(name, force, view, parts, axes, keep):
 
 
 def write_body_laws(source, forces):
-    """Body forces, and derivatives of those parts of them that depend on velocity or place; whether
-    they are given PlainBodyViews."""
+    """Write the body forces and their derivatives; return True if PlainBodyViews suffice."""
     plain = True
     terms = {"body_force": [], "velocity_force": [], "position_force": []}
     for force in forces:
@@ -209,6 +245,7 @@ def write_body_laws(source, forces):
         reads = fields_read(force, source.fluid, kernel)
         plain = plain and not reads & NUMBERS_OF_SHAPES
         terms["body_force"].append(("", call))
+        # Only forces that read a velocity (a position) enter the damping (stiffness) differences.
         if reads & VELOCITIES:
             terms["velocity_force"].append(("", call))
         if reads & PLACES:
@@ -226,18 +263,21 @@ def write_body_laws(source, forces):
 
 
 def write_pair_laws(source, forces, kind):
-    """The sum of pair forces, and its derivatives by the gap and, negative, by the gap's rate."""
+    """Write the sum of pair forces and its derivatives: ∂F/∂gap and −∂F/∂(gap rate)."""
     sums, derivatives = [], []
     for force in forces:
         kernel = force.kernel_in(source.fluid)
+        # Beyond its reach a force is not called at all.
         condition = f"pair.gap < {source.value(reach_of(force))}"
         call = source.call(force, kernel, "pair")
         sums.append((condition, call))
         if force.slope is None:
+            # 1e-4 of the gap: power laws of the gap are resolved to 1e-8.
             slope = difference_text(call, "gap", "(1e-4 * abs(pair.gap) + 1e-13)")
         else:
             slope = source.call(force, force.slope, "pair")
         damping = "0.0"
+        # Only a force that reads the rate of the gap has a damping.
         if "gap_rate" in fields_read(force, source.fluid, kernel):
             change = difference_text(call, "gap_rate", "(1e-3 * abs(pair.gap_rate) + 1e-9)")
             damping = f"-({change})"
@@ -250,8 +290,7 @@ def write_pair_laws(source, forces, kind):
 
 
 def write_sum(source, forces, law, view):
-    """The pressure between two outlines at a point of one, or the energy of two bodies as they are
-    turned."""
+    """Write the sum of outline pressures, or of the energies of oriented pairs."""
     terms = []
     for force in forces:
         call = source.call(force, force.kernel_in(source.fluid), view)
@@ -261,9 +300,10 @@ def write_sum(source, forces, law, view):
 
 
 def write_contact_laws(source, forces):
-    """Contact forces, the limit of their tangential displacement, and their events; how many."""
+    """Write contact forces, slip limit and events; return the number of event functions."""
     terms, limits, events = [], [], []
     for force in forces:
+        # Laws that do not extend to a gap see an overlap of 0 there.
         view = "contact" if force.goes_on_apart else "pressed_contact(contact)"
         terms.append(("", source.call(force, force.kernel_in(source.fluid), view)))
         if force.slides:
@@ -278,35 +318,40 @@ def write_contact_laws(source, forces):
         law = "contact_derivatives", "contact_force"
         source.functions.append(differences_text(*law, "contact", 2, range(4), keep=True))
     if limits:
+        # Several contact forces share one displacement ξ: the smallest limit holds.
         least = f"min({', '.join(limits)})" if len(limits) > 1 else limits[0]
         source.functions.append(f"def slip_limit(contact, parameters):\n    return {least}\n")
     if events:
         lines = ["def contact_event(contact, parameters, which):"]
         for number, event in enumerate(events):
             lines += [f"    if which == {number}:", f"        return {event}"]
+        # An index beyond the last event: never zero.
         source.functions.append("\n".join([*lines, "    return 1.0"]) + "\n")
     return len(events)
 
 
 def sort_forces(pieces, forces, fluid):
-    """Forces by kind, absent ones noted as left out.
+    """Return the forces by kind; note absent ones in ``pieces.left_out``.
 
-    UsageError for what is no force, KernelError for a force whose kernel cannot be used.
+    Raises UsageError for an object that is no force, KernelError for an unusable kernel.
     """
     kinds = {"body": [], "centre": [], "surface": [], "contact": [], "outline": [], "oriented": []}
     forces = list(forces)
-    for name, force in zip(names_of(forces), forces, strict=True):
+    for name, force in zip(force_names(forces), forces, strict=True):
         if not isinstance(force, Force):
             raise UsageError(f"a force must be a flocsim Force object, found {force!r}")
+        # A force of zero strength: no code is generated for it.
         if force.absent:
             pieces.left_out[name] = force.absent
             continue
         pieces.used[name] = force
+        # It has no kernel: the engine evaluates it from tables
+        # (integrators/rhs/pair_resistance.py).
         if isinstance(force, PairResistance):
             continue
         try:
             check_kernel(force, fluid)
-        except KernelError as error:  # which knows it by its class alone
+        except KernelError as error:  # the error names the class; put the unique name instead
             raise KernelError(str(error).replace(type(force).__name__, name, 1)) from None
         if isinstance(force, BodyForce):
             kinds["body"].append(force)
@@ -323,8 +368,10 @@ def sort_forces(pieces, forces, fluid):
 
 
 def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ()) -> Pieces:
-    """The Pieces of a scene with these forces in this fluid, between bodies of these shapes:
-    without any, double layers along outlines are as thin as between plates."""
+    """Return the Pieces of these forces in this fluid, for bodies of these shapes.
+
+    Without ``shapes`` double layers along outlines are taken as thin, as between plates.
+    """
     pieces = Pieces()
     kinds = sort_forces(pieces, forces, fluid)
     sources = {kind: Source(fluid) for kind in kinds}
@@ -337,14 +384,20 @@ def laws_of(forces: Iterable[Force], fluid: Fluid, shapes: Sequence[Shape] = ())
         pieces.centre_reach = max(map(reach_of, of_centres))
     if kinds["surface"]:
         pieces.surface_reach = max(map(reach_of, kinds["surface"]))
-    water = [stand_in(each) for each in pieces.used.values() if isinstance(each, PairResistance)]
-    if kinds["surface"] or water:
-        pieces.smoothness = smoothness([*kinds["surface"], *water], fluid)
-    layer = layer_along(kinds["outline"], shapes)
+    # A pair resistance follows the smooth gap, too: lubrication stands in for it there.
+    lubrication = [
+        lubrication_stand_in(each)
+        for each in pieces.used.values()
+        if isinstance(each, PairResistance)
+    ]
+    if kinds["surface"] or lubrication:
+        pieces.smoothness = smoothness([*kinds["surface"], *lubrication], fluid)
+    # A double layer thicker than corners are round acts between charges, not as a pressure.
+    layer = charge_layer(kinds["outline"], shapes)
     pressures = pressures_of(kinds["outline"], layer)
     write_sum(sources["outline"], pressures, "outline_pressure", "point")
-    pieces.outlines = outlines_of_forces(kinds["outline"], pressures, fluid)
-    pieces.layer = layer_numbers(layer)
+    pieces.outlines = outline_parameters(kinds["outline"], pressures, fluid)
+    pieces.layer = layer_parameters(layer)
     for source in sources.values():
         pieces.laws |= source.laws(pieces.parameters)
     return pieces

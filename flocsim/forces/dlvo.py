@@ -1,4 +1,9 @@
-"""What acts between bodies in water with a salt (DLVO): van der Waals attraction, double layers."""
+"""DLVO forces between bodies in salt water: van der Waals attraction and double-layer repulsion.
+
+Two formulations of each: between equivalent spheres or at nearest surface points (Derjaguin's
+approximation, Tang et al. 2014, eqs 5 and 6), and integrated along both outlines (``law =
+"outline"``), where the kernel is the pressure between parallel plates.
+"""
 
 import math
 from collections.abc import Callable, Iterable
@@ -17,7 +22,8 @@ from flocsim.fields import choice, quantity, quantity_of_each, word_or_quantity
 from flocsim.forces.base import Force, PairForce
 
 GAPS = {"equivalent_spheres": "centres", "surface": "surfaces"}
-"""What the gap d is: between equivalent spheres (the paper), or between the outlines."""
+"""{key ``gap``: where the force acts}: between equivalent spheres (the paper), or between outlines.
+"""
 
 CUT_HELP = (
     "gap beyond which the force is left out, where that is to be nearer than it is negligible"
@@ -25,19 +31,25 @@ CUT_HELP = (
 
 
 RETARDATION = 5.32
-"""Of 1 + 5.32 d/λ, by which Gregory (1981, J. Colloid Interface Sci. 83, 138) divides."""
+"""Coefficient of d/λ in the retardation factor 1/(1 + 5.32 d/λ), Gregory (1981), J. Colloid
+Interface Sci. 83, 138."""
 
 
-def depth_share(x):
-    """What a depth W leaves of the pressure between plates a gap d apart, x = d/W: within 1e-4 up
-    to x = .1, 2 % at 1. Exactly it is the mean of (2/π) atan(W/ρ) over ρ⁻⁵ on a plate."""
+def depth_factor(x):
+    """Return the fraction of the plate pressure at gap d that bodies of finite depth W retain, x =
+    d/W.
+
+    The exact fraction is the mean of (2/π) atan(W/ρ) weighted by ρ⁻⁵ over a plate. This closed form
+    is within 1e-4 up to x = 0.1 and within 2 % at x = 1.
+    """
+    # Taylor series: its first omitted term, cubic in x, is below 4e-6 here.
     if x < 0.02:
         return 1.0 - 0.75 * x  # the cubic term is below 4e-6
     return 2.0 / math.pi * math.atan(8.0 / (3.0 * math.pi * x))
 
 
-def cut_at(cut: float | None, reach: float) -> float:
-    """A reach [m], or a cut that is nearer."""
+def smaller_reach(cut: float | None, reach: float) -> float:
+    """Return the smaller of a reach and an optional cut-off gap [m]."""
     return reach if cut is None else min(cut, reach)
 
 
@@ -51,17 +63,30 @@ DEPTH_HELP = 'thickness of the bodies of law = "outline"; "sphere" = 4/3 r_eq of
 
 @attrs.frozen
 class VanDerWaals(PairForce):
-    """Attraction F = H_A r*/(6 d²), r* = r_i r_j/(r_i + r_j), constant below d = d_min.
+    """Van der Waals attraction F = H_A r*/(6 d²), r* = r_i r_j/(r_i + r_j), constant below d =
+    d_min.
 
-    Parameters: ``hamaker`` H_A [J]; ``d_min`` [m], below which the diverging law is cut off;
-    ``gap``: d = d_c − r_i − r_j ("equivalent_spheres", along the line of centres) or the distance
-    of the outlines ("surface", at all nearly closest points); ``cut`` [m], the gap beyond which the
-    force is left out even if it is not negligible there.  Source: Tang et al. (2014), eq. 5.
+    Parameters
+    ----------
+    hamaker : float
+        Hamaker constant H_A [J].
+    d_min : float
+        Gap [m] below which the diverging law is held constant.
+    gap : "equivalent_spheres" or "surface"
+        Meaning of d: d_c − r_i − r_j, along the line of centres; or the smooth gap of the outlines.
+    cut : float, optional
+        Gap [m] beyond which the force is left out even if it is not yet negligible.
+    law : "spheres" or "outline"
+        "outline" integrates −C/r⁶, H_A = π² C, over both bodies; outlines nearer than d_min count
+        as d_min apart.
+    depth : float or "sphere"
+        Extent of the bodies in the third direction [m]; "sphere": 4/3 r_eq of the smaller body.
+    wavelength : float, optional
+        λ [m] of the retardation, which divides the plate energy by 1 + 5.32 d/λ; none by default.
 
-    ``law = "outline"``: the sum of −C/r⁶ over both bodies, H_A = π² C, along their ``depth`` [m]
-    ("sphere": 4/3 r_eq of the smaller); outlines nearer than d_min count as d_min apart.
-    ``wavelength`` λ [m] of the retardation, which divides the energy of plates by 1 + 5.32 d/λ;
-    no retardation unless given.  Source: Hamaker (1937); Gregory (1981).
+    Notes
+    -----
+    Sources: Tang et al. (2014), eq. 5; Hamaker (1937); Gregory (1981).
     """
 
     hamaker: float = quantity("J", at_least=0.0, default=1e-18)
@@ -82,10 +107,13 @@ class VanDerWaals(PairForce):
 
     @property
     def reach(self) -> float:
-        """The gap at which the attraction has become negligible, or ``cut`` [m]: of outlines that
-        of plates, of spheres that of spheres."""
+        """Gap [m] at which the attraction becomes negligible, or ``cut`` if that is smaller.
+
+        Plates (law "outline") decay as d⁻³, spheres as d⁻².
+        """
+        # (d/d_min)^−n equals NEGLIGIBLE_FORCE, n = 3 for plates and 2 for spheres.
         power = 1.0 / 3.0 if self.law == "outline" else 0.5
-        return cut_at(self.cut, self.d_min / NEGLIGIBLE_FORCE**power)
+        return smaller_reach(self.cut, self.d_min / NEGLIGIBLE_FORCE**power)
 
     @property
     def absent(self) -> str:
@@ -101,27 +129,31 @@ class VanDerWaals(PairForce):
 
     @staticmethod
     def pressure(point, hamaker, retarded):
-        """−H_A/(6π d³) (1 + 3x/2)/(1 + x)² q [Pa], d = ``point.plate_gap``, x = 5.32 d/λ, and q
-        what a depth W leaves of plates ``point.depth_gap`` apart."""
+        """Return the pressure −H_A/(6π d³) (1 + 3x/2)/(1 + x)² q [Pa] between plates.
+
+        d = ``point.plate_gap``, x = 5.32 d/λ; q is the fraction left by the finite depth
+        (depth_factor).
+        """
         d = point.plate_gap
         x = retarded * d
+        # Minus the derivative of the retarded energy −H_A/(12π d²)/(1 + x).
         share = (1.0 + 1.5 * x) / ((1.0 + x) * (1.0 + x))
         return (
             -hamaker
             / (6.0 * math.pi * d * d * d)
             * share
-            * depth_share(point.depth_gap / point.depth)
+            * depth_factor(point.depth_gap / point.depth)
         )
 
     @staticmethod
     def kernel(pair, hamaker, d_min):
-        """−H_A r*/(6 d²) [N]."""
+        """Return the force −H_A r*/(6 d²) [N]."""
         d = max(pair.gap, d_min)
         return -hamaker * pair.reduced_radius / (6.0 * d * d)
 
     @staticmethod
     def slope(pair, hamaker, d_min):
-        """H_A r*/(3 d³) [N/m], none below the cut-off."""
+        """Return its derivative H_A r*/(3 d³) [N/m], 0 below d_min."""
         if pair.gap <= d_min:
             return 0.0
         return hamaker * pair.reduced_radius / (3.0 * pair.gap**3)
@@ -135,20 +167,39 @@ BOUNDARY_HELP = (
 
 @attrs.frozen
 class DoubleLayer(PairForce):
-    """Repulsion F = 4π ε0 ε_r κ φ_i φ_j r* exp(−κ d), r* = r_i r_j/(r_i + r_j).
+    """Double-layer repulsion F = 4π ε0 ε_r κ φ_i φ_j r* exp(−κ d), r* = r_i r_j/(r_i + r_j).
 
-    Parameters: ``potential`` φ [V], of both bodies, or of each where they are unlike (of opposite
-    signs they attract each other); ``debye_length`` 1/κ [m]; ``permittivity`` ε_r [-]; ``gap`` and
-    ``cut`` as for VanDerWaals. Bodies in contact count as d = 0.  Source: Tang et al. (2014), eq.
-    6, whose minus sign means "against attraction".
+    Parameters
+    ----------
+    potential : float or (float, float)
+        Surface potential φ [V] of both bodies, or of each; opposite signs attract.
+    debye_length : float
+        1/κ [m].
+    permittivity : float
+        ε_r [-].
+    gap, cut, depth
+        As for VanDerWaals; bodies in contact count as d = 0.
+    law : "spheres" or "outline"
+        "outline" superposes the double layers of both outlines; plates then repel with the pressure
+        2ε κ² φ_i φ_j exp(−κ d).
+    boundary : "superposition", "potential" or "charge"
+        Quantity that surfaces keep constant as they approach (law "outline").
+    d_min : float, optional
+        Least gap [m] for a boundary condition whose pressure diverges at d = 0.
 
-    ``law = "outline"``: by linear superposition of what each outline has alone at its potential,
-    plates having 2ε κ φ_i φ_j exp(−κ d), along the ``depth`` of the bodies as of VanDerWaals.
-    ``boundary``: "superposition", or "potential" and "charge", which bodies keep as they come near;
-    plates then have ε κ φ² (1 − tanh(κ d/2)) and ε κ φ² (coth(κ d/2) − 1), and other outlines, to
-    what superposition has, the pressure by which these differ, gap by gap. Where that has no bound,
-    d is ``d_min`` [m] at least.  Source: Hogg, Healy and Fuerstenau (1966), Trans. Faraday Soc. 62,
-    1638; Wiese and Healy (1970), ibid. 66, 490.
+    Raises
+    ------
+    RangeError
+        If ``boundary`` is given with another law than "outline", or lacks a needed ``d_min``.
+
+    Notes
+    -----
+    At constant equal potentials plates have the energy ε κ φ² (1 − tanh(κ d/2)), at constant
+    charges ε κ φ² (coth(κ d/2) − 1). For other outlines the difference between these pressures and
+    that of superposition is added, gap by gap.
+
+    Sources: Tang et al. (2014), eq. 6, whose minus sign means "against attraction"; Hogg, Healy and
+    Fuerstenau (1966), Trans. Faraday Soc. 62, 1638; Wiese and Healy (1970), ibid. 66, 490.
     """
 
     potential: float | tuple[float, float] = quantity_of_each(
@@ -175,6 +226,7 @@ class DoubleLayer(PairForce):
                 f'boundary = "{self.boundary}" is of law = "outline", found law = "{self.law}": '
                 "give that, or leave boundary out"
             )
+        # 1/sinh² diverges at d = 0: a least gap must be chosen by the user.
         if self.unbounded != 0.0 and self.d_min is None:
             like = "" if self.boundary == "charge" else " between unlike potentials"
             raise RangeError(
@@ -188,55 +240,59 @@ class DoubleLayer(PairForce):
 
     @property
     def kappa(self) -> float:
-        """κ [1/m], the reciprocal Debye length."""
+        """Inverse Debye length κ [1/m]."""
         return 1.0 / self.debye_length
 
     @property
     def potentials(self) -> tuple[float, float]:
-        """Of either body [V]."""
+        """Surface potential of each body [V]."""
         given = self.potential
         return given if isinstance(given, tuple) else (given, given)
 
     @property
     def strength(self) -> float:
-        """4π ε0 ε_r κ φ_i φ_j [N/m]: the repulsion at contact for unit reduced radius."""
+        """4π ε0 ε_r κ φ_i φ_j [N/m]: the repulsion at contact per unit of reduced radius."""
         return 2.0 * self.between_charges / self.debye_length
 
     @property
     def between_charges(self) -> float:
-        """2π ε0 ε_r φ_i φ_j [N]."""
+        """2π ε0 ε_r φ_i φ_j [N], the factor of the energy between outline charges."""
         one, other = self.potentials
         return 2.0 * math.pi * VACUUM_PERMITTIVITY * self.permittivity * one * other
 
     @property
     def first(self) -> float:
-        """2ε κ² φ_i φ_j [Pa], the pressure of plates at touch by superposition."""
+        """2ε κ² φ_i φ_j [Pa], the pressure of plates at d = 0 by superposition."""
         return self.between_charges * self.kappa**2 / math.pi
 
     @property
     def parts(self) -> tuple[float, float, float]:
-        """Factors [Pa] of exp(−κd), 1/(2 cosh²(κd/2)) and 1/(2 sinh²(κd/2)) in the pressure."""
+        """Coefficients [Pa] of exp(−κd), 1/(2 cosh²(κd/2)) and 1/(2 sinh²(κd/2)) in the plate
+        pressure."""
         if self.boundary == "superposition":
             return self.first, 0.0, 0.0
         one, other = self.potentials
         unit = VACUUM_PERMITTIVITY * self.permittivity * self.kappa**2
+        # Unlike surfaces are the sum of a symmetric and an antisymmetric pair, with the strengths
+        # ¼(φ_i + φ_j)² and ¼(φ_i − φ_j)² (Hogg et al. 1966; Wiese and Healy 1970). The boundary
+        # condition decides which of the two diverges at d = 0.
         mean, rest = unit * (0.5 * (one + other)) ** 2, unit * (0.5 * (one - other)) ** 2
         return (0.0, mean, -rest) if self.boundary == "potential" else (0.0, -rest, mean)
 
     @property
     def unbounded(self) -> float:
-        """That of 1/(2 sinh²(κd/2)), which grows without bound towards d = 0 [Pa]."""
+        """Coefficient [Pa] of 1/(2 sinh²(κd/2)), the term that diverges at d = 0."""
         return self.parts[2]
 
     @property
     def closest(self) -> float:
-        """The least gap that counts [m]."""
+        """Least gap used in the pressure [m]."""
         return self.d_min or 0.0
 
     @property
     def reach(self) -> float:
-        """The gap at which the repulsion has become negligible, or ``cut`` [m]."""
-        return cut_at(self.cut, -math.log(NEGLIGIBLE_FORCE) * self.debye_length)
+        """Gap [m] at which the repulsion becomes negligible, or ``cut`` if that is smaller."""
+        return smaller_reach(self.cut, -math.log(NEGLIGIBLE_FORCE) * self.debye_length)
 
     @property
     def absent(self) -> str:
@@ -247,8 +303,9 @@ class DoubleLayer(PairForce):
 
     @staticmethod
     def pressure(point, parts, kappa, closest):
-        """Of plates [Pa], in powers of exp(−κd), which do not overflow."""
+        """Return the pressure of plates [Pa]."""
         first, even, odd = parts
+        # cosh and sinh are written in powers of exp(−κd), which cannot overflow at large gaps.
         x = kappa * max(point.parted_gap, closest)
         fall = math.exp(-x)
         total = first * fall + 2.0 * even * fall / (1.0 + fall) ** 2
@@ -258,20 +315,23 @@ class DoubleLayer(PairForce):
 
     @staticmethod
     def kernel(pair, strength, kappa):
-        """F = strength r* exp(−κ d) [N]."""
+        """Return the force strength · r* · exp(−κ d) [N]."""
         return strength * pair.reduced_radius * math.exp(-kappa * max(pair.gap, 0.0))
 
     @staticmethod
     def slope(pair, strength, kappa):
-        """−κ F [N/m], none in contact."""
+        """Return its derivative −κ F [N/m], 0 in contact."""
         if pair.gap <= 0.0:
             return 0.0
         return -kappa * strength * pair.reduced_radius * math.exp(-kappa * pair.gap)
 
 
 @attrs.frozen
-class BesideCharges(DoubleLayer):
-    """A double layer less what superposition makes of it, which is between charges."""
+class BoundaryCorrection(DoubleLayer):
+    """The pressure that a boundary condition adds to superposition.
+
+    Superposition itself is then computed from outline charges (geometry/contact/charges.py).
+    """
 
     @property
     def parts(self) -> tuple[float, float, float]:
@@ -279,14 +339,14 @@ class BesideCharges(DoubleLayer):
         return -self.first, even, odd
 
 
-def unlike(force: Force) -> bool:
-    """Whether a force is one of two bodies of different potentials."""
+def has_unlike_potentials(force: Force) -> bool:
+    """Return True if a force has different potentials on its two bodies."""
     return isinstance(force, DoubleLayer) and isinstance(force.potential, tuple)
 
 
-def refuse_unlike(forces: Iterable[Force], bodies: int) -> None:
-    """UsageError for potentials of two bodies among more of them."""
-    if bodies > 2 and any(map(unlike, forces)):
+def refuse_unlike_potentials(forces: Iterable[Force], bodies: int) -> None:
+    """Raise UsageError for two different potentials in a scene of more than two bodies."""
+    if bodies > 2 and any(map(has_unlike_potentials, forces)):
         raise UsageError(
             f"potential = [a, b] is of two unlike bodies, found {bodies} bodies: give one number"
         )

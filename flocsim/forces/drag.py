@@ -1,5 +1,8 @@
-"""Drag: of Stokes, of Schiller and Naumann where the flow around a body is not slow, and of a
-body's own shape, whose resistance is computed once and kept on the disk."""
+"""Drag on each body: Stokes, Schiller and Naumann (finite Reynolds number), or that of its shape.
+
+The resistance of a shape is computed once by a rigid multiblob (flocsim.hydrodynamics.prism_drag)
+and stored on disk. Equations and sources stand in StokesDrag.
+"""
 
 import functools
 import hashlib
@@ -24,40 +27,47 @@ from flocsim.hydrodynamics.rigid_bodies import drag_factor, turning_factor
 from flocsim.state.bodies import RESISTANCE_COLUMNS
 
 STOKES_UP_TO = 1.0
-"""Reynolds number up to which Stokes's drag is taken to hold: there it lacks 15 %."""
+"""Reynolds number up to which Stokes's law is used without a warning: it is 15 % too low there."""
 
 SCHILLER_NAUMANN_UP_TO = 800.0
-"""Reynolds number up to which the law of Schiller and Naumann holds, within about 5 %."""
+"""Reynolds number up to which the law of Schiller and Naumann is valid, within about 5 %."""
 
 
 def flow_at(flow, x, y):
-    """(u_x, u_y, Ω) of the flow (u_x, u_y, g_xx, g_xy, g_yx, g_yy) at a place."""
+    """Return (u_x, u_y, Ω) of the flow (u_x, u_y, g_xx, g_xy, g_yx, g_yy) at a position."""
     u_x, u_y, g_xx, g_xy, g_yx, g_yy = flow
     return u_x + g_xx * x + g_xy * y, u_y + g_yx * x + g_yy * y, 0.5 * (g_yx - g_xy)
 
 
 def strain_of(flow):
-    """(E_xx, E_xy) [1/s] of the flow: its rate of strain, without what makes it swell."""
+    """Return (E_xx, E_xy) [1/s] of the flow: its rate of strain without the dilatational part."""
     _, _, g_xx, g_xy, g_yx, g_yy = flow
     return 0.5 * (g_xx - g_yy), 0.5 * (g_xy + g_yx)
 
 
-def strained_spin(body, flow):
-    """B (−E_xx sin 2ψ + E_xy cos 2ψ) [rad/s]: how much faster than Ω a body with its long axis at
-    the angle ψ turns freely in the flow."""
+def strain_spin(body, flow):
+    """Return B (−E_xx sin 2ψ + E_xy cos 2ψ) [rad/s], the spin beyond Ω that a strain causes.
+
+    ψ is the angle of the long axis; Jeffery (1922).
+    """
     e_xx, e_xy = strain_of(flow)
     twice = 2.0 * (body.angle + body.long_axis)
     return body.elongation * (e_xy * math.cos(twice) - e_xx * math.sin(twice))
 
 
 def reynolds_number(speed: float, radius: float, viscosity: float, density: float) -> float:
-    """Re = 2 r ρ_f |v − u|/γ of a speed against the fluid [m/s]; r [m], γ [Pa s], ρ_f [kg/m³]."""
+    """Return Re = 2 r ρ_f |v − u|/γ for a speed relative to the fluid [m/s].
+
+    r in m, γ in Pa s, ρ_f in kg/m³.
+    """
     return 2.0 * radius * density * speed / viscosity
 
 
-def resisted(body, c, s, vx, vy, spin):
-    """R (v − u, ω − Ω) in the frame of a shape that has turned by an angle of this cosine and sine,
-    over the viscosity."""
+def resistance_load(body, c, s, vx, vy, spin):
+    """Return R (v − u, ω − Ω) over the viscosity, in the frame of the shape.
+
+    ``c`` and ``s`` are the cosine and sine of the angle of the body.
+    """
     ahead, aside = c * vx + s * vy, c * vy - s * vx
     return (
         body.resistance_xx * ahead + body.resistance_xy * aside + body.resistance_xs * spin,
@@ -66,15 +76,17 @@ def resisted(body, c, s, vx, vy, spin):
     )
 
 
-def shielded_by(body, x, y):
-    """Q (x, y): what is left in a cluster of a motion, or of the force against it."""
+def apply_shielding(body, x, y):
+    """Return Q (x, y): the velocity, or the force, left by the shielding in a cluster."""
     xy = body.shielding_xy
     return body.shielding_xx * x + xy * y, xy * x + body.shielding_yy * y
 
 
 def sphere_load(body, x, y, spin, viscosity, density, options):
-    """Force and torque on the equivalent sphere that moves and turns so against the flow;
-    ``options``: rotational, with_inertia, permeability."""
+    """Return (fx, fy, torque) on the equivalent sphere at a velocity and spin relative to the flow.
+
+    ``options``: (rotational, with_inertia, permeability).
+    """
     rotational, with_inertia, permeability = options
     translation = 6.0 * math.pi * viscosity * body.radius
     rotation = 8.0 * math.pi * viscosity * body.radius**3 * rotational
@@ -83,22 +95,25 @@ def sphere_load(body, x, y, spin, viscosity, density, options):
         rotation *= turning_factor(body.radius, permeability)
     if with_inertia:
         reynolds = reynolds_number(math.hypot(x, y), body.radius, viscosity, density)
+        # Schiller and Naumann (1933); the torque stays that of slow flow.
         translation *= 1.0 + 0.15 * reynolds**0.687
     return -translation * x, -translation * y, -rotation * spin
 
 
-def resisted_in(body, flow):
-    """(cosine and sine of its angle, the same of its motion in a flow)."""
+def load_in_flow(body, flow):
+    """Return (cosine, sine) of the body's angle and `resistance_load` for its motion in a flow."""
     u, v, turning = flow_at(flow, body.x, body.y)
     c, s = math.cos(body.angle), math.sin(body.angle)
-    x, y, turn = resisted(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
+    x, y, turn = resistance_load(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
     return c, s, x, y, turn
 
 
-def strained_load(body, c, s, flow):
-    """Γ (E_xx, E_xy) in that frame: what a flow's strain puts on the shape, over the viscosity."""
+def strain_load(body, c, s, flow):
+    """Return Γ (E_xx, E_xy) over the viscosity, the load of the strain, in the frame of the
+    shape."""
     e_xx, e_xy = strain_of(flow)
     c_2, s_2 = c * c - s * s, 2.0 * c * s
+    # A strain rotates with twice the angle.
     e_xx, e_xy = c_2 * e_xx + s_2 * e_xy, c_2 * e_xy - s_2 * e_xx
     return (
         body.strain_xx_x * e_xx + body.strain_xy_x * e_xy,
@@ -109,38 +124,54 @@ def strained_load(body, c, s, flow):
 
 @attrs.frozen
 class StokesDrag(BodyForce):
-    """Drag −6πγ r_eq (v − u) f, and torque −8πγ r_eq³ (ω − Ω) where ``rotational``.
+    """Drag −6πγ r_eq (v − u) f and, if ``rotational``, torque −8πγ r_eq³ (ω − Ω).
 
-    ``law`` "stokes": f = 1, for Reynolds numbers up to about 1. "schiller_naumann":
-    f = 1 + 0.15 Re^0.687 for Re up to 800, with Re = 2 r_eq ρ_f |v − u|/γ of the equivalent sphere
-    (its diameter and its speed relative to the flow); the torque remains Stokes's. Viscosity γ,
-    density ρ_f and the background flow u, Ω are the fluid's.
+    Viscosity γ, density ρ_f and the background flow u, Ω are the fluid's.
 
-    "shape": −γ R (v − u, ω − Ω) + γ Γ (E_xx, E_xy), force and torque, for slow flow around the
-    body's own outline. The symmetric R (3 × 3) and Γ (3 × 2), in the frame of the shape, are those
-    of a prism of the outline and the body's depth, a rigid multiblob
-    (flocsim.hydrodynamics.prism_drag), computed once for a shape; a body of one core point is a
-    sphere unless its depth is given. Such a body drifts sideways and turns as it falls.
+    Parameters
+    ----------
+    rotational : bool
+        Whether there is a drag torque.
+    law : "stokes", "schiller_naumann" or "shape"
+        "stokes": f = 1, for Reynolds numbers up to about 1. "schiller_naumann": f = 1 + 0.15
+        Re^0.687 for Re = 2 r_eq ρ_f |v − u|/γ up to 800; the torque remains Stokes's. "shape": slow
+        flow around the body's own outline.
+    strain : bool
+        Whether the strain E of the flow turns elongated bodies (law "shape" includes it).
+    clusters : bool
+        Whether touching bodies of a swarm shield each other from the flow.
+    permeability : float
+        k [m²] of Brinkman's equation inside the equivalent sphere; 0 is impermeable.
 
-    ``strain``: the strain E of the flow also turns an elongated body ("shape" includes that), with
-    the torque
-    −8πγ r_eq³ [ω − Ω − B(−E_xx sin 2ψ + E_xy cos 2ψ)], ψ being the angle of the long axis and
-    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area. An ellipse with the half axes
-    a and b has B = (a² − b²)/(a² + b²), and turns as Jeffery found, once in 2π(a/b + b/a)/G in a
-    simple shear G; any other shape is treated as the ellipse of its moments.
+    Raises
+    ------
+    RangeError
+        If ``strain`` or the law "shape" is combined with ``rotational`` false, or "shape" with a
+        permeability.
 
-    ``clusters``: bodies of a swarm that touch shield each other from the flow. Their drag R becomes
-    Q R Q, the same Q for all of a cluster, with which all of them together resist as much as the
-    cluster does (flocsim.swarms.together.clusters); torques stay those of each. Re is then that of
-    Q (v − u).
+    Notes
+    -----
+    Shape: the load (force, torque) is −γ R (v − u, ω − Ω) + γ Γ (E_xx, E_xy). The symmetric R (3 ×
+    3) and Γ (3 × 2), in the frame of the shape, are those of a prism with the outline and the depth
+    of the body (flocsim.hydrodynamics.prism_drag), computed once per shape. A body of one core
+    point is a sphere unless its depth is given. Such a body drifts sideways and turns as it falls.
 
-    ``permeability`` k [m²]: what water passes through resists less, by Brinkman's factor of the
-    equivalent sphere, 2β²(1 − tanh β/β)/(2β² + 3(1 − tanh β/β)) with β = r_eq/√k, its torque by
-    1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.rigid_bodies); 0 is impermeable.
+    Strain: the torque is −8πγ r_eq³ [ω − Ω − B(−E_xx sin 2ψ + E_xy cos 2ψ)], where ψ is the angle
+    of the long axis and B = (M₁ − M₂)/(M₁ + M₂) follows from the principal second moments of area.
+    An ellipse with half axes a and b has B = (a² − b²)/(a² + b²) and follows Jeffery's orbit, with
+    period 2π(a/b + b/a)/G in simple shear G. Any other shape is treated as the ellipse with its
+    moments.
+
+    Clusters: the drag R of a body becomes Q R Q, with the same Q for all bodies of a cluster,
+    chosen so that their sum is the resistance of the cluster (flocsim.swarms.together.clusters).
+    Torques stay those of single bodies. Re is then that of Q (v − u).
+
+    Permeability: with β = r_eq/√k the drag is reduced by Brinkman's factor 2β²(1 − tanh β/β)/(2β² +
+    3(1 − tanh β/β)) and the torque by 1 + 3/β² − 3 coth β/β (flocsim.hydrodynamics.rigid_bodies).
 
     Sources: Tang et al. (2014), eq. 4; Schiller and Naumann (1933), as in Clift, Grace and Weber
     (1978), Table 5.2; Jeffery (1922), Proc. R. Soc. A 102, 161. The rotational drag of a sphere is
-    an addition; without it nothing would stop a spin.
+    an addition to the paper; without it nothing would stop a spin.
     """
 
     rotational: bool = flag(default=True, help="drag torque on spinning bodies")
@@ -184,14 +215,18 @@ class StokesDrag(BodyForce):
             )
 
     @property
-    def serves_up_to(self) -> float:
-        """The Reynolds number up to which the law holds."""
+    def valid_up_to(self) -> float:
+        """Reynolds number up to which the law is valid."""
         return SCHILLER_NAUMANN_UP_TO if self.law == "schiller_naumann" else STOKES_UP_TO
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """Still water needs no flow, and no derivative by the place; a flow without strain, none by
-        the angle."""
+        """Return the cheapest kernel that is exact in this fluid.
+
+        Still water needs no flow and no derivatives with respect to position; a flow without strain
+        needs none with respect to the angle.
+        """
         moves, strains = any(fluid.flow), any(strain_of(fluid.flow))
+        # Every kernel is exact for the cases in which it is chosen; they differ in cost.
         if self.law == "shape":
             if self.clusters:
                 return self.shielded_shape
@@ -204,12 +239,12 @@ class StokesDrag(BodyForce):
 
     @property
     def options(self) -> tuple[bool, bool, float]:
-        """What its kernels on spheres are given: ``rotational``, whether the force is more than
-        Stokes's, ``permeability``."""
+        """Parameters of `sphere_load`: rotational, with inertia (Schiller–Naumann),
+        permeability."""
         return self.rotational, self.law == "schiller_naumann", self.permeability
 
     def remarks(self, fluid: Fluid) -> list[str]:
-        """Whether it follows shapes, the flow's strain and clusters."""
+        """Return whether the drag depends on shape, strain, clusters and permeability."""
         others = ["less in clusters of a swarm"] * self.clusters
         others += ["less as water passes through"] * (self.permeability > 0.0)
         if self.law == "shape":
@@ -222,7 +257,7 @@ class StokesDrag(BodyForce):
 
     @staticmethod
     def kernel(body, viscosity, density, flow, options):
-        """Force and torque on the equivalent sphere in the flow."""
+        """Return the load on the equivalent sphere in the flow."""
         u, v, turning = flow_at(flow, body.x, body.y)
         return sphere_load(
             body, body.vx - u, body.vy - v, body.spin - turning, viscosity, density, options
@@ -230,69 +265,73 @@ class StokesDrag(BodyForce):
 
     @staticmethod
     def strained(body, viscosity, density, flow, options):
-        """The same, with the torque of the flow's strain on the shape."""
+        """Return the same load with the torque of the flow's strain on the elongated shape."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        spin = body.spin - turning - strained_spin(body, flow)
+        # Jeffery: the strain shifts the spin at which there is no torque.
+        spin = body.spin - turning - strain_spin(body, flow)
         return sphere_load(body, body.vx - u, body.vy - v, spin, viscosity, density, options)
 
     @staticmethod
     def still(body, viscosity, density, options):
-        """Force and torque on the equivalent sphere in still water."""
+        """Return the load on the equivalent sphere in still water."""
         return sphere_load(body, body.vx, body.vy, body.spin, viscosity, density, options)
 
     @staticmethod
     def shielded(body, viscosity, density, flow, strain, options):
-        """Force and torque on the equivalent sphere in a cluster, which strain may turn."""
+        """Return the load on the equivalent sphere in a cluster, in a flow with or without strain
+        torque."""
         u, v, turning = flow_at(flow, body.x, body.y)
-        spin = body.spin - turning - strain * strained_spin(body, flow)
-        x, y = shielded_by(body, body.vx - u, body.vy - v)
+        spin = body.spin - turning - strain * strain_spin(body, flow)
+        # The drag matrix is Q R Q: the velocity is shielded first, then the force.
+        x, y = apply_shielding(body, body.vx - u, body.vy - v)
         fx, fy, torque = sphere_load(body, x, y, spin, viscosity, density, options)
-        fx, fy = shielded_by(body, fx, fy)
+        fx, fy = apply_shielding(body, fx, fy)
         return fx, fy, torque
 
     @staticmethod
     def shielded_still(body, viscosity, density, options):
-        """The same in still water."""
-        x, y = shielded_by(body, body.vx, body.vy)
+        """Return the load on the equivalent sphere in a cluster in still water."""
+        x, y = apply_shielding(body, body.vx, body.vy)
         fx, fy, torque = sphere_load(body, x, y, body.spin, viscosity, density, options)
-        fx, fy = shielded_by(body, fx, fy)
+        fx, fy = apply_shielding(body, fx, fy)
         return fx, fy, torque
 
     @staticmethod
     def shape(body, viscosity, flow):
-        """Force and torque on the shape in a flow without strain."""
-        c, s, x, y, turn = resisted_in(body, flow)
+        """Return the load on the shape in a flow without strain."""
+        c, s, x, y, turn = load_in_flow(body, flow)
+        # Back from the frame of the shape to that of the scene.
         return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
 
     @staticmethod
     def shape_strained(body, viscosity, flow):
-        """Force and torque on the shape in the flow."""
-        c, s, x, y, turn = resisted_in(body, flow)
-        more_x, more_y, more = strained_load(body, c, s, flow)
+        """Return the load on the shape in any linear flow."""
+        c, s, x, y, turn = load_in_flow(body, flow)
+        more_x, more_y, more = strain_load(body, c, s, flow)
+        # Load of the strain minus resistance, then back to the frame of the scene.
         x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
         return c * x - s * y, s * x + c * y, turn
 
     @staticmethod
     def shielded_shape(body, viscosity, flow):
-        """Force and torque on the shape in a cluster."""
+        """Return the load on the shape in a cluster."""
         u, v, turning = flow_at(flow, body.x, body.y)
         c, s = math.cos(body.angle), math.sin(body.angle)
-        x, y = shielded_by(body, body.vx - u, body.vy - v)
-        x, y, turn = resisted(body, c, s, x, y, body.spin - turning)
-        more_x, more_y, more = strained_load(body, c, s, flow)
+        x, y = apply_shielding(body, body.vx - u, body.vy - v)
+        x, y, turn = resistance_load(body, c, s, x, y, body.spin - turning)
+        more_x, more_y, more = strain_load(body, c, s, flow)
         x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
-        x, y = shielded_by(body, c * x - s * y, s * x + c * y)
+        x, y = apply_shielding(body, c * x - s * y, s * x + c * y)
         return x, y, turn
 
 
 def shields_clusters(forces: Iterable[Force]) -> bool:
-    """Whether a drag among the forces is less in clusters."""
+    """Return True if one of the forces is a drag with shielding in clusters."""
     return any(isinstance(force, StokesDrag) and force.clusters for force in forces)
 
 
 def solid_radius(radius: float, forces: Iterable[Force]) -> float:
-    """Radius [m] of the solid sphere that resists as one of ``radius`` under the drag among
-    ``forces``: smaller where water passes through it."""
+    """Return the radius [m] of the solid sphere with the drag of a permeable one of ``radius``."""
     for force in forces:
         if isinstance(force, StokesDrag) and force.permeability > 0.0:
             radius *= drag_factor(radius, force.permeability)
@@ -300,94 +339,107 @@ def solid_radius(radius: float, forces: Iterable[Force]) -> float:
 
 
 def is_permeable(forces: Iterable[Force]) -> bool:
-    """Whether a drag among the forces is that of bodies which water passes through."""
+    """Return True if one of the forces is a drag of permeable bodies."""
     return any(isinstance(force, StokesDrag) and force.permeability > 0.0 for force in forces)
 
 
-DIGITS = 7
-"""Of an outline over r_eq, and of the depth: shapes that differ by less are one."""
+KEY_DECIMALS = 7
+"""Decimals of outline coordinates and depth over r_eq in the key of a stored resistance.
 
-SPHERE = (6.0 * math.pi, 0.0, 6.0 * math.pi, 0.0, 0.0, 8.0 * math.pi) + (0.0,) * 6
-"""The numbers of a sphere of radius 1: R, and no load by a strain."""
+Shapes that agree to these decimals share one result.
+"""
 
-POWERS = (1, 1, 1, 2, 2, 3, 2, 2, 3, 2, 2, 3)
-"""By which power of the size each number grows."""
+UNIT_SPHERE = (6.0 * math.pi, 0.0, 6.0 * math.pi, 0.0, 0.0, 8.0 * math.pi) + (0.0,) * 6
+"""R and Γ of a sphere of radius 1, in the order of BodyView: a strain exerts no load on it."""
+
+LENGTH_POWERS = (1, 1, 1, 2, 2, 3, 2, 2, 3, 2, 2, 3)
+"""Power of the length scale by which each number grows (R: m, m², m³; Γ: m², m³)."""
 
 
 def follows_shape(forces: Iterable[Force]) -> bool:
-    """Whether a drag among the forces is that of shapes."""
+    """Return True if one of the forces is a drag with the law "shape"."""
     return any(isinstance(force, StokesDrag) and force.law == "shape" for force in forces)
 
 
 def resistance_numbers(forces: Iterable[Force], body: Body) -> tuple[float, ...]:
-    """Those of BodyView, from ``resistance_xx`` on: zeros unless a drag follows shapes."""
+    """Return the fields of BodyView from ``resistance_xx`` on; zeros unless a drag follows
+    shapes."""
     return body_resistance(body) if follows_shape(forces) else (0.0,) * RESISTANCE_COLUMNS
 
 
 def body_resistance(body: Body) -> tuple[float, ...]:
-    """The six numbers of R and six of Γ of a body over the viscosity, in the order of BodyView.
+    """Return the six numbers of R and six of Γ of a body over the viscosity, in BodyView's order.
 
-    Of the prism of its outline with the body's depth [m]; where that is "sphere" a shape of one
-    core point is a sphere, and another 4/3 r_eq deep.
+    They are those of a prism with the body's outline and depth [m]. With depth "sphere" a shape of
+    one core point is a sphere, any other shape is 4/3 r_eq deep.
     """
     shape, radius = body.shape, body.shape.equivalent_radius
     if isinstance(body.depth, str) and len(shape.vertices) == 1:
-        unit: Any = SPHERE
+        unit: Any = UNIT_SPHERE
     else:
+        # Everything in units of r_eq, so that equal shapes share a stored result.
         height = 4.0 / 3.0 if isinstance(body.depth, str) else body.depth / radius
-        unit = unit_resistance(outline_text(shape), round(height, DIGITS))
-    return tuple(number * radius**power for number, power in zip(unit, POWERS, strict=True))
+        unit = unit_resistance(outline_bytes(shape), round(height, KEY_DECIMALS))
+    return tuple(number * radius**power for number, power in zip(unit, LENGTH_POWERS, strict=True))
 
 
 def drag_radius(forces: Iterable[Force], body: Body) -> float:
-    """Of the sphere that is as hard to move as a body in the mean of all directions of its plane,
-    free to turn [m]: r_eq unless a drag follows shapes, or is of bodies that water passes
-    through."""
+    """Return the radius [m] of the sphere with the same mobility, averaged over in-plane
+    directions.
+
+    The body is free to turn. It is r_eq unless a drag follows shapes or bodies are permeable.
+    """
     radius = body.shape.equivalent_radius
     if not follows_shape(forces):
         return solid_radius(radius, forces)
-    free = np.linalg.inv(resistance_matrices(body_resistance(body))[0])
-    return float(1.0 / (3.0 * math.pi * (free[0, 0] + free[1, 1])))
+    # Mobility of the free body: torque zero, so the full R is inverted.
+    mobility = np.linalg.inv(resistance_matrices(body_resistance(body))[0])
+    # Mean mobility ½ (µ_xx + µ_yy) = 1/(6πγ r), solved for r.
+    return float(1.0 / (3.0 * math.pi * (mobility[0, 0] + mobility[1, 1])))
 
 
 def resistance_matrices(numbers: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
-    """(R (3, 3), Γ (3, 2)) of such numbers."""
+    """Return (R (3, 3), Γ (3, 2)) from the twelve numbers."""
     xx, xy, yy, xs, ys, ss, *strain = numbers
     resistance = np.array([[xx, xy, xs], [xy, yy, ys], [xs, ys, ss]])
     return resistance, np.reshape(strain, (2, 3)).T
 
 
-def outline_text(shape: Shape) -> tuple[bytes, ...]:
-    """The rings of an outline over r_eq, so that shapes alike at any size have the same."""
+def outline_bytes(shape: Shape) -> tuple[bytes, ...]:
+    """Return the outline over r_eq as bytes, equal for equal shapes of any size."""
     radius = shape.equivalent_radius
-    # Adding zero leaves no −0, which has other bytes.
-    return tuple((np.round(ring / radius, DIGITS) + 0.0).tobytes() for ring in shape.outline())
+    # Adding zero turns −0 into 0, which has other bytes.
+    return tuple(
+        (np.round(ring / radius, KEY_DECIMALS) + 0.0).tobytes() for ring in shape.outline()
+    )
 
 
 @functools.lru_cache(maxsize=4096)
 def unit_resistance(outline: tuple[bytes, ...], height: float) -> tuple[float, ...]:
-    """The numbers of an outline of r_eq = 1, kept on the disk."""
+    """Return the twelve numbers for an outline with r_eq = 1, from disk if they are stored
+    there."""
 
-    def made() -> bytes:
+    def make() -> bytes:
         rings = [np.frombuffer(ring).reshape(-1, 2) for ring in outline]
-        found = rigid_bodies.prism_drag(rings, height)
-        r = found.resistance
+        drag = rigid_bodies.prism_drag(rings, height)
+        r = drag.resistance
         if not np.linalg.eigvalsh(r)[0] > 0.0:
             raise UsageError(
                 f"the drag of an outline {height:.3g} r_eq deep cannot be computed: its resistance "
                 'is not positive; give the drag the law "stokes", or the shape fewer thin parts'
             )
-        numbers = [r[0, 0], r[0, 1], r[1, 1], r[0, 2], r[1, 2], r[2, 2], *found.strain.T.ravel()]
+        # R: xx, xy, yy, xs, ys, ss; then Γ by columns.
+        numbers = [r[0, 0], r[0, 1], r[1, 1], r[0, 2], r[1, 2], r[2, 2], *drag.strain.T.ravel()]
         return np.array(numbers, dtype=float).tobytes()
 
-    told = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
-    data = kept("flocsim_drag", f"{told} {height} {facts_of(rigid_bodies, cores)}", made)
+    digest = hashlib.blake2b(b"|".join(outline), digest_size=32).hexdigest()
+    data = kept("flocsim_drag", f"{digest} {height} {computation_key(rigid_bodies, cores)}", make)
     return tuple(np.frombuffer(data).tolist())
 
 
 @functools.cache
-def facts_of(*modules: Any) -> str:
-    """What is computed once follows from beside its input: code of modules, versions, processor."""
+def computation_key(*modules: Any) -> str:
+    """Return a key for stored results besides their input: code of modules, versions, processor."""
     code = hashlib.blake2b(digest_size=16)
     for module in modules:
         code.update(inspect.getsource(module).encode())

@@ -1,4 +1,5 @@
-"""The water between two bodies: lubrication alone, or the resistance to all of their motion."""
+"""Hydrodynamic interaction of two bodies: lubrication alone, or the full resistance of two
+spheres."""
 
 import functools
 import math
@@ -15,28 +16,41 @@ from flocsim.errors import RangeError, UsageError
 from flocsim.fields import quantity
 from flocsim.forces.base import Force, SurfaceForce
 from flocsim.forces.body_forces import Thermal
-from flocsim.forces.drag import StokesDrag, drag_radius, facts_of, is_permeable
+from flocsim.forces.drag import StokesDrag, computation_key, drag_radius, is_permeable
 from flocsim.hydrodynamics import pair, two_spheres
 from flocsim.hydrodynamics.two_spheres import FADES_FROM, fading
 from flocsim.state.scene import NO_WATER, Water
 
-NEAR = 2.0
-"""Gap of the outlines over the mean radius from which relative motion is that at the distance of
-the centres alone; from FADES_FROM of it on outlines count less and less."""
+OUTLINE_RANGE = 2.0
+"""Gap of the outlines over the mean radius from which relative motion depends on the distance of
+the centres alone; outlines fade out from FADES_FROM times this gap."""
 
 
 @attrs.frozen
 class Lubrication(SurfaceForce):
-    """Resistance F = −6πγ r*² ḣ/h against a change of the gap h, r* = r_i r_j/(r_i + r_j).
+    """Lubrication resistance F = −6πγ r*² ḣ/h against a change of the gap h, r* = r_i r_j/(r_i +
+    r_j).
 
-    For two spheres that are close, h ≪ r*, and for other outlines at the smooth gap between them.
-    Below ``h_min`` [m], where surfaces are rough and the fluid is no longer a continuum, the
-    resistance keeps its value at h_min, so that bodies touch; ``cut`` [m]: the force ends there,
-    and fades from half of it on. Viscosity γ is the fluid's. A constant push F on the pair gives
-    h = h₀ exp(−F t/(6πγ r*²)), and van der Waals attraction at the surface gap gives
-    h² = h₀² − H_A t/(18πγ r*).
+    Parameters
+    ----------
+    h_min : float
+        Gap [m] below which the resistance stays constant, because surfaces are rough and the fluid
+        is no continuum; bodies can touch.
+    cut : float
+        Gap [m] at which the force ends; it fades out from half of it.
 
-    Source: Kim and Karrila (1991), Microhydrodynamics, ch. 9; the leading term of two spheres.
+    Raises
+    ------
+    RangeError
+        If ``h_min`` is above half of ``cut``.
+
+    Notes
+    -----
+    Leading term for two spheres with h ≪ r*; for other outlines the smooth gap is used. Viscosity γ
+    is the fluid's. Under a constant force F on the pair h = h₀ exp(−F t/(6πγ r*²)); under van der
+    Waals attraction at the surface gap h² = h₀² − H_A t/(18πγ r*).
+
+    Source: Kim and Karrila (1991), Microhydrodynamics, ch. 9.
     """
 
     h_min: float = quantity(
@@ -63,16 +77,17 @@ class Lubrication(SurfaceForce):
 
     @staticmethod
     def kernel(pair, viscosity, h_min, cut):
-        """−6πγ r*² ḣ/h [N]."""
+        """Return the force −6πγ r*² ḣ/h [N]."""
         share, _ = fading(pair.gap, cut)
         resistance = 6.0 * math.pi * viscosity * pair.reduced_radius**2 / max(pair.gap, h_min)
         return -share * resistance * pair.gap_rate
 
     @staticmethod
     def slope(pair, viscosity, h_min, cut):
-        """Its derivative by the gap [N/m], none below h_min."""
+        """Return its derivative with respect to the gap [N/m], 0 below h_min."""
         if pair.gap <= h_min:
             return 0.0
+        # Product rule: 1/h and the fade both depend on the gap.
         share, fall = fading(pair.gap, cut)
         squeezed = 6.0 * math.pi * viscosity * pair.reduced_radius**2 * pair.gap_rate
         return squeezed / pair.gap * (share / pair.gap - fall)
@@ -82,22 +97,31 @@ class Lubrication(SurfaceForce):
 class PairResistance(Force):
     """Forces and torques that two bodies exert on each other through the water between them.
 
-    They follow from the motion of both and from the strain of a flow: the exact resistance of two
-    spheres in slow flow, less the Stokes drag of each alone, which StokesDrag gives. The spheres
-    have the drag of the bodies: their equivalent radii, or, where drag has the law "shape", radii
-    larger by about 8 %. With that drag the resistance is symmetric and positive: no work is gained.
-    The common motion of the two uses the distance of their centres; their relative motion, along
-    and across their line, uses a gap that changes from that of the outlines at contact to that of
-    the spheres where outlines are a mean radius apart. For real flocs at least 0.25 r_eq apart
-    with the drag of their shape, the common motion is right to 3 % (rms), along and across, and
-    that of settling pairs to 6 % (rms, 12 % at most); the relative motion to 4 and 2 % (rms) at a
-    gap of r_eq, 8 and 3 % at half of it, 22 and 5 % at a quarter (docs/kernels.md). Below the gap
-    ``h_min`` [m], where surfaces are rough, the resistance keeps its value at h_min, so that bodies
-    touch. ``cut``: gap over r_i + r_j at which all of it ends; it fades from half of that on, where
-    it changes the speed of two settling bodies by less than a tenth, in proportion to 1/gap.
+    Parameters
+    ----------
+    h_min : float
+        Gap [m] below which the resistance stays constant, because surfaces are rough; bodies can
+        touch.
+    cut : float
+        Gap over r_i + r_j at which the interaction ends. It fades out from half of that, where it
+        changes the speed of two settling bodies by less than a tenth, in proportion to 1/gap.
 
-    For two free bodies, ratios of radii up to 50, gaps from 1e-7 mean radii. Sources: Jeffrey and
-    Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
+    Notes
+    -----
+    The load follows from the motion of both bodies and the strain of the flow: the exact resistance
+    of two spheres in slow flow, minus the Stokes drag of each alone, which StokesDrag provides. The
+    spheres have the drag of the bodies: their equivalent radii or, with the drag law "shape", radii
+    larger by about 8 %. Together with that drag the resistance is symmetric and positive definite.
+
+    Common motion uses the distance of the centres. Relative motion, along and across their line,
+    uses a gap that changes from that of the outlines at contact to that of the spheres, which takes
+    over between one and two mean radii. For real flocs at least 0.25 r_eq apart, with the drag of
+    their shape, common motion is right to 3 % (rms), and that of settling pairs to 6 % (rms, 12 %
+    at most). Relative motion is right to 4 and 2 % (rms, along and across) at a gap of r_eq, 8 and
+    3 % at half of it, 22 and 5 % at a quarter (docs/kernels.md).
+
+    For two free bodies with ratios of radii up to 50, and gaps from 1e-7 mean radii. Sources:
+    Jeffrey and Onishi (1984), J. Fluid Mech. 139, 261; Jeffrey (1992), Phys. Fluids A 4, 16.
     """
 
     h_min: float = quantity(
@@ -113,13 +137,16 @@ class PairResistance(Force):
 
     @staticmethod
     def kernel(view):
-        """Nothing: what is computed follows from tables (integrators/rhs/pair_resistance.py)."""
+        """Raise NotImplementedError: loads follow from tables
+        (integrators/rhs/pair_resistance.py)."""
         raise NotImplementedError("a pair resistance is no kernel")
 
 
 def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
-    """The pair resistance among some forces; None without. UsageError for several, or beside a
-    force that it does not go with."""
+    """Return the pair resistance among some forces, None without one.
+
+    Raises UsageError for several, or for a combination with an incompatible force.
+    """
     forces = list(forces)
     found = [force for force in forces if isinstance(force, PairResistance)]
     if not found:
@@ -137,6 +164,7 @@ def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
                 "thermal kicks do not go with PairResistance, for they would have to be correlated "
                 "between bodies as it is: leave Thermal or PairResistance out"
             )
+    # The tables contain the drag of single spheres in slow flow: it must be there to be subtracted.
     drags = [force for force in forces if isinstance(force, StokesDrag)]
     usual = len(drags) == 1 and drags[0].rotational and not is_permeable(drags)
     if not usual or drags[0].law == "schiller_naumann":
@@ -148,20 +176,22 @@ def resistance_of_pairs(forces: Iterable[Force]) -> PairResistance | None:
     return found[0]
 
 
-def refuse_pair_resistance(forces: Iterable[Force], what: str) -> None:
-    """UsageError where there is a pair resistance, which ``what`` cannot have."""
+def refuse_pair_resistance(forces: Iterable[Force], subject: str) -> None:
+    """Raise UsageError if there is a pair resistance, which ``subject`` does not support."""
     if any(isinstance(force, PairResistance) for force in forces):
         raise UsageError(
-            f"PairResistance is of two bodies, and {what} cannot have it: of many its sum over "
+            f"PairResistance is of two bodies, and {subject} cannot have it: of many its sum over "
             "pairs would not be positive; leave it out"
         )
 
 
-def water_between(
+def pair_resistance_tables(
     forces: Iterable[Force], bodies: Sequence[Body], fluid: Fluid
 ) -> tuple[np.ndarray, Water]:
-    """(``Scene.pair_table``, ``Scene.water``) of two bodies; those of none without a
-    PairResistance, or for a lone body. UsageError where tables do not reach."""
+    """Return (``Scene.pair_table``, ``Scene.water``) of two bodies; NO_WATER without interaction.
+
+    Raises UsageError if the tables do not cover these bodies.
+    """
     forces = list(forces)
     force = resistance_of_pairs(forces)
     if force is None or len(bodies) < 2:
@@ -174,6 +204,7 @@ def water_between(
             "PairResistance out"
         )
     first, second = radii = [drag_radius(forces, body) for body in bodies]
+    # Tables start at gaps of NEAREST mean radii.
     mean = 0.5 * (first + second)
     if not pair.NEAREST * mean <= force.h_min <= 0.1 * mean:
         raise UsageError(
@@ -183,36 +214,39 @@ def water_between(
     spheres = all(len(body.shape.vertices) == 1 for body in bodies)
     water = Water.one()
     water.viscosity, water.mean_radius, water.floor = fluid.viscosity, mean, force.h_min
-    water.cut, water.near_cut = force.cut * 2.0 * mean, 0.0 if spheres else NEAR * mean
+    water.cut, water.near_cut = force.cut * 2.0 * mean, 0.0 if spheres else OUTLINE_RANGE * mean
     water.flow_x, water.flow_y = fluid.velocity
     water.flow_x_by_x, water.flow_x_by_y, water.flow_y_by_x, water.flow_y_by_y = fluid.gradient
     water.first_radius, water.second_radius = radii
+    # Tables are stored for a mean radius and a viscosity of 1 and scaled by powers of both.
     table = unit_table(second / first) * pair.scales(fluid.viscosity, mean)[:, None]
     return table, water
 
 
-def stand_in(force: PairResistance) -> Lubrication:
-    """A force between outlines that changes as fast as the resistance does."""
+def lubrication_stand_in(force: PairResistance) -> Lubrication:
+    """Return a Lubrication force that varies as fast as the pair resistance does."""
     return Lubrication(force.h_min, force.h_min / FADES_FROM * 1e3)
 
 
 @functools.lru_cache(maxsize=256)
 def unit_table(ratio: float) -> Any:
-    """``Scene.pair_table`` of a mean radius and a viscosity of 1, r₂/r₁ = ``ratio``."""
+    """Return ``Scene.pair_table`` for a mean radius and a viscosity of 1; ``ratio`` = r₂/r₁."""
     if not 1.0 / pair.LARGEST_RATIO <= ratio * (1.0 + 1e-9) <= 1.0001 * 50.0:
         raise UsageError(
             f"the radii of two bodies with PairResistance must be up to "
             f"{pair.LARGEST_RATIO:g} times each other, found {max(ratio, 1.0 / ratio):.4g}"
         )
-    values = sum(weight * kept_node(place) for place, weight in pair.slots(ratio))
+    # Lagrange interpolation between tabulated ratios of radii.
+    values = sum(weight * stored_node(place) for place, weight in pair.interpolation_weights(ratio))
     return pair.cubics(np.asarray(values))
 
 
 @functools.cache
-def kept_node(place: int) -> np.ndarray:
-    """The columns of a node of the ratio, kept on the disk: a second to compute."""
+def stored_node(place: int) -> np.ndarray:
+    """Return the table columns at a node of the ratio, from disk if stored: they take a second."""
+    # Ratios below 1 are those above 1 with the two bodies exchanged.
     if place < 0:
-        return pair.exchanged(kept_node(-place))
-    facts = facts_of(pair, two_spheres)
-    data = kept("flocsim_pair", f"{place} {facts}", lambda: pair.node(place).tobytes())
+        return pair.exchanged(stored_node(-place))
+    facts = computation_key(pair, two_spheres)
+    data = kept("flocsim_pair", f"{place} {facts}", lambda: pair.ratio_node(place).tobytes())
     return np.frombuffer(data).reshape(pair.NODES, -1)

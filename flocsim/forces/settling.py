@@ -1,4 +1,5 @@
-"""Terminal velocities: where a body's own forces balance, and how it yields to others there."""
+"""Terminal velocities: the balance of a lone body's forces by Newton's method, and its mobility
+there."""
 
 import math
 from typing import Any
@@ -13,22 +14,22 @@ from flocsim.forces.codegen import laws_of
 from flocsim.state.views import BodyView
 
 ITERATIONS = 50
-"""Newton steps for the terminal velocity; Stokes drag, being linear, needs one."""
+"""Newton iterations for the terminal velocity; Stokes drag is linear and needs one."""
 
-NEARLY_AT_REST = 1e-6
-"""Share of the terminal speed at which a body counts as at rest."""
+REST_SPEED = 1e-6
+"""Share of the terminal speed at which the resistance at rest is evaluated."""
 
-VANISHING = 0.01
-"""A resistance at rest below this share of that in settling is none: a drag such as v²."""
+NEGLIGIBLE_RESISTANCE = 0.01
+"""A resistance at rest below this share of that in settling counts as zero: a drag such as v²."""
 
 
 def no_force(view, parameters):
-    """Where a system has no body forces."""
+    """Stand in for the body forces of a system that has none."""
     return 0.0, 0.0, 0.0
 
 
 def lone_view(system, body):
-    """The BodyView of a body at rest at the origin."""
+    """Return the BodyView of a body at rest at the origin."""
     shape = body.shape
     return BodyView(
         0.0, 0.0, 0.0, body.angle, 0.0, 0.0, 0.0, body.mass, body.buoyant_mass(system.fluid),
@@ -38,8 +39,10 @@ def lone_view(system, body):
 
 
 def balance(force, view, parameters, velocity):
-    """(fx, fy) on a body that moves at a velocity (2,); where that is (vx, vy, r_eq spin) also
-    the torque over r_eq."""
+    """Return the forces (fx, fy) [N] on a body at a velocity (2,) [m/s].
+
+    For (vx, vy, r_eq spin) also the torque over r_eq.
+    """
     r = view.radius
     spin = velocity[2] / r if len(velocity) > 2 else 0.0
     fx, fy, torque = force(view._replace(vx=velocity[0], vy=velocity[1], spin=spin), parameters)
@@ -47,7 +50,9 @@ def balance(force, view, parameters, velocity):
 
 
 def derivative(force, view, parameters, velocity):
-    """∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN where a force gives no number."""
+    """Return ∂(fx, fy, …)/∂(vx, vy, …) by central differences; NaN if a force is undefined
+    there."""
+    # Increment: 1e-3 of the largest component, with a floor for a body at rest.
     size = 1e-3 * np.abs(velocity).max() + 1e-9
     columns = []
     try:
@@ -61,17 +66,17 @@ def derivative(force, view, parameters, velocity):
 
 
 def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> float:
-    """How much the body forces on a body grow with its speed along gravity [kg/s]; NaN where one of
-    them gives no number.
+    """Return the derivative of the body forces with respect to speed along gravity [kg/s].
 
-    At a ``speed`` [m/s] against the flow at the origin; ``size``: of the difference, by default a
-    thousandth of the speed.
+    ``speed`` [m/s] is relative to the flow at the origin; ``size``: increment of the difference, by
+    default a thousandth of the speed. NaN if a force is undefined there.
     """
     pieces: Any = system.pieces
     force = pieces.laws.get("body_force", no_force)
     u, v = system.fluid.velocity
     size = size or 1e-3 * speed + 1e-9
     view = lone_view(system, body)
+    # Force along y at two speeds around the given one, downwards relative to the flow.
     ends = (u, v - speed + size), (u, v - speed - size)
     try:
         ahead, behind = (balance(force, view, pieces.parameters, end)[1] for end in ends)
@@ -82,49 +87,53 @@ def resistance(system: Any, body: Body, speed: float, size: float = 0.0) -> floa
 
 @np.errstate(all="ignore")
 def largest_mobility(system: Any, body: Body, speed: float, mobility: float) -> float:
-    """The largest mobility [s/kg] of a body between rest and its terminal speed [m/s].
+    """Return the largest mobility [s/kg] of a body between rest and its terminal speed [m/s].
 
-    A drag that grows faster than the speed yields most at rest; a linear one alike everywhere.
-    ``mobility`` is that at the terminal speed, which stands where there is no drag at rest. So
-    1/it is the least resistance with which what is left of a velocity dies away. Of a shape that
-    has one in every direction: the largest.
+    Its reciprocal is the smallest resistance with which a velocity decays. A drag that grows faster
+    than the speed has its largest mobility at rest; a linear drag the same everywhere. ``mobility``
+    is that at the terminal speed; it is returned if there is no drag at rest. For a drag that
+    follows the shape it is the largest over all directions.
     """
     if not mobility > 0.0:
         return mobility
     if drag.follows_shape(system.forces):
         return free_mobilities(system, body)[1]
-    at_rest = resistance(system, body, 0.0, NEARLY_AT_REST * speed + 1e-9)
-    return max(mobility, 1.0 / at_rest) if at_rest * mobility > VANISHING else mobility
+    at_rest = resistance(system, body, 0.0, REST_SPEED * speed + 1e-9)
+    return max(mobility, 1.0 / at_rest) if at_rest * mobility > NEGLIGIBLE_RESISTANCE else mobility
 
 
 @np.errstate(all="ignore")
 def least_mobility(system: Any, body: Body, speed: float, mobility: float) -> float:
-    """The least mobility [s/kg] of a body up to a speed [m/s] that another may impose on it; of a
-    shape that of the direction in which it resists most, held at its angle."""
+    """Return the smallest mobility [s/kg] of a body up to a speed [m/s] that others may impose on
+    it.
+
+    For a drag that follows the shape it is that of the direction of largest resistance, without
+    rotation.
+    """
     if not mobility > 0.0:
         return mobility
     if drag.follows_shape(system.forces):
-        return held_mobility(system, body)
+        return nonrotating_mobility(system, body)
     there = resistance(system, body, speed)
     return min(mobility, 1.0 / there) if 0.0 < there < math.inf else mobility
 
 
-def held_mobility(system: Any, body: Body) -> float:
-    """The least mobility [s/kg] of a body whose drag follows its shape, held from turning."""
+def nonrotating_mobility(system: Any, body: Body) -> float:
+    """Return the smallest mobility [s/kg] of a body with a shape drag that cannot rotate."""
     resistance, _ = drag.resistance_matrices(drag.body_resistance(body))
     return float(1.0 / (system.fluid.viscosity * np.linalg.eigvalsh(resistance[:2, :2])[-1]))
 
 
 def free_mobilities(system: Any, body: Body) -> tuple[float, float]:
-    """(least, largest) [s/kg] by direction of a body free to turn, whose drag follows its shape."""
+    """Return the (smallest, largest) mobility [s/kg] over directions, of a freely rotating body."""
     resistance, _ = drag.resistance_matrices(drag.body_resistance(body))
     mobility = np.linalg.inv(resistance)[:2, :2] / system.fluid.viscosity
     least, largest = np.linalg.eigvalsh(mobility).tolist()
     return least, largest
 
 
-def no_number(system, body, velocity):
-    """Which body force gives no number at a velocity, or around it, in words."""
+def describe_undefined_force(system, body, velocity):
+    """Describe which body force is undefined at or around a velocity."""
     at = f"a velocity of ({velocity[0]:.3g}, {velocity[1]:.3g}) m/s"
     for force in system.pieces.used.values():
         own = laws_of([force], system.fluid)
@@ -137,11 +146,11 @@ def no_number(system, body, velocity):
 
 @np.errstate(all="ignore")
 def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
-    """(velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
+    """Return (velocity (2,) [m/s], mobility [s/kg]) of a body alone in the system's fluid.
 
-    The velocity at which the system's body forces balance; the mobility is that along gravity.
-    Where the drag is of shapes a body turns as well, so that its torques balance, too, and both are
-    those at its angle. Zero both for a fixed body. UsageError where there is no balance.
+    At this velocity the body forces balance; the mobility is that along gravity. With a shape drag
+    a body rotates as well: torques balance, too, and both results hold at its present angle. Both
+    are zero for a fixed body. Raises UsageError if there is no balance.
     """
     if body.fixed:
         return np.zeros(2), 0.0
@@ -149,14 +158,18 @@ def terminal_motion(system: Any, body: Body) -> tuple[np.ndarray, float]:
     force = pieces.laws.get("body_force", no_force)
     known = (force, lone_view(system, body), pieces.parameters)
     velocity = np.zeros(3 if drag.follows_shape(system.forces) else 2)
+    # Newton's method from rest.
     for _ in range(ITERATIONS):
         slope = derivative(*known, velocity)
         if not np.isfinite(slope).all():
-            raise UsageError(f"no terminal velocity: {no_number(system, body, velocity)}")
+            raise UsageError(
+                f"no terminal velocity: {describe_undefined_force(system, body, velocity)}"
+            )
         if not abs(np.linalg.det(slope)) > 0.0:
             break
         change = np.linalg.solve(slope, balance(*known, velocity))
         velocity = velocity - change
+        # Converged to rounding. The mobility is the velocity per force, −(∂f/∂v)⁻¹.
         if np.abs(change).max() <= 1e-12 * (np.abs(velocity).max() + 1e-15):
             if len(velocity) > 2:
                 return velocity[:2], float(-np.linalg.inv(slope)[1, 1])

@@ -1,7 +1,6 @@
-"""Shapes, where two of them touch, and how shapes are fitted to pixels.
+"""Shapes, contact geometry of placed shapes, and fits of shapes to pixels.
 
-``shapes``: points swept by a radius, their areas and moments, their outlines in pieces.
-``contact``: which vertices and edges of two placed shapes are near, the contact points between
-them, and what outlines do to each other.  ``fit``: from a mask to a shape.
-May import constants, errors, arrays and hooks; nothing above them.
+``shapes``: core points swept by a disk, areas and moments, outlines in pieces. ``contact``: near
+vertices and edges of two placed shapes, their contact points, and forces between outlines. ``fit``:
+from a mask to a shape. May import constants, errors, arrays and hooks.
 """

@@ -1,9 +1,9 @@
-"""How slow flow resists bodies.
+"""Hydrodynamic resistance in slow (Stokes) flow.
 
-two_spheres: the resistance functions of two unequal spheres, exactly; pair: what follows from them
-for motion in a plane; encounters: which of two spheres that meet touch; rigid_bodies: the drag of a
-floc's outline, of spheres that water passes through, and of clusters of bodies. May import
-geometry, compiler and errors.
+two_spheres: exact resistance functions of two unequal spheres. pair: resistance and mobility of two
+spheres for motion in a plane. encounters: collision efficiency of two spheres. rigid_bodies: drag
+of floc outlines, permeable spheres, and clusters of bodies. May import geometry, compiler and
+errors.
 """
 
 from flocsim.hydrodynamics.encounters import Meeting, bend

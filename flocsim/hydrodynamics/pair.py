@@ -1,26 +1,25 @@
-"""Two spheres in the plane of their centres: what their motion and a flow's strain do to them.
+"""Resistance and mobility of two spheres moving in the plane of their centres, and tables for runs.
 
-Directions are n, from 1 to 2, and t, n turned counter-clockwise; spins are counter-clockwise. The
-flow is linear, u = u₀ + ω × x + E x, and what the spheres feel follows from what they do against it
-at their centres: (force, torque) = −R (velocity − u, spin − ω) + Γ E.
+Directions: n from 1 to 2, and t, n turned counter-clockwise; spins are counter-clockwise. The flow
+is linear, u = u₀ + ω × x + E x. The load depends on the motion relative to the flow at the centres:
+(force, torque) = −R (velocity − u, spin − ω) + Γ E.
 
-For runs the resistance is a sum of squares, in tables: common motion, relative motion.
-
-Held together as one rigid body the two resist with A; against each other, while nothing is put on
-them together, with S. With W the rigid motions of the two, J their relative motion (the rate of the
-gap; sliding and the difference of spins, where the gap is) and R of `SpherePair`,
+For runs the resistance is tabulated as a sum of squares, split into common and relative motion.
+Held together as one rigid body the two resist with A. Relative to each other, without a total load,
+they resist with S. With W the rigid motions of the two, J their relative motion (rate of the gap,
+sliding and difference of spins at the gap) and R of `SpherePair`,
 
     A = Wᵀ R W,  S⁻¹ = J R⁻¹ Jᵀ,  R = R W A⁻¹ Wᵀ R + Jᵀ S J.
 
-A and what belongs to it stay finite at touch, S is what lubrication is in. Both are positive, and
-stay so where each is taken at a distance of its own. Tables hold factors K, A⁻¹ being made of them,
-and L, S = L Lᵀ, so that interpolating leaves them positive, too:
+A and its factors stay finite at contact; S contains lubrication. Both are positive definite, and
+remain so if each is evaluated at a distance of its own. The tables contain factors, K of the first
+term and L with S = L Lᵀ, so interpolated values stay positive as well:
 
     forces = −Kᵀ (K (v − u) − k E) − Jᵀ (L Lᵀ J v − t E),
 
-u being the flow at the centres and E its strain. t is what a strain pulls at the two with while
-they are held together, and finite: the flow against them and the resistance to it, each of which
-diverges, are in it together.
+where u is the flow at the centres and E its strain. t is the tension that a strain exerts on two
+spheres held together. It is finite: it combines the relative flow and the resistance to it, each of
+which diverges.
 """
 
 import functools
@@ -35,11 +34,11 @@ from flocsim.hydrodynamics.two_spheres import TwoSpheres
 
 SPHERES = (1, 2)
 TOWARDS = {1: 1.0, 2: -1.0}
-"""The sign of n along which a sphere sees the other."""
+"""Sign of n in the direction from a sphere to the other one."""
 
 
-def apart(gap: ArrayLike) -> np.ndarray:
-    """Gaps (k,) [m]; UsageError unless all are above 0."""
+def positive_gaps(gap: ArrayLike) -> np.ndarray:
+    """Return gaps as an array (k,) [m]; raise UsageError unless all are positive."""
     found = np.atleast_1d(np.asarray(gap, dtype=float))
     if not np.all(found > 0.0):
         raise UsageError("two spheres in water are known at gaps above 0 m")
@@ -48,10 +47,26 @@ def apart(gap: ArrayLike) -> np.ndarray:
 
 @attrs.frozen(slots=False)
 class SpherePair:
-    """Two spheres of the radii ``radii`` (a₁, a₂) [m] in a fluid of ``viscosity`` µ [Pa s].
+    """Two spheres in a viscous fluid.
 
-    All methods take gaps (k,) [m] above 0, r − a₁ − a₂. Source: Jeffrey and Onishi (1984), Jeffrey
-    (1992); signs as in Kim and Karrila (1991), Microhydrodynamics, ch. 7 and 11.
+    Parameters
+    ----------
+    radii : (float, float)
+        a₁, a₂ [m].
+    viscosity : float
+        µ [Pa s].
+
+    Raises
+    ------
+    UsageError
+        Unless radii and viscosity are positive.
+
+    Notes
+    -----
+    All methods take gaps (k,) [m] above 0, r − a₁ − a₂.
+
+    Sources: Jeffrey and Onishi (1984), Jeffrey (1992); signs as in Kim and Karrila (1991),
+    Microhydrodynamics, ch. 7 and 11.
     """
 
     radii: tuple[float, float]
@@ -67,31 +82,35 @@ class SpherePair:
 
     @functools.cached_property
     def functions(self) -> TwoSpheres:
-        """Those of the ratio of the radii."""
+        """Resistance functions for this ratio of radii."""
         first, second = self.radii
         return TwoSpheres(second / first)
 
     def scaled(self, family: str, power: int, on: int, of: int, gap: np.ndarray) -> np.ndarray:
-        """π µ (a_on + a_of)^power times a function; of A three times that."""
+        """Return a resistance function times its scale, π µ (a_on + a_of)^power (three times that
+        for A)."""
         sum_ = self.radii[on - 1] + self.radii[of - 1]
         scale = math.pi * self.viscosity * sum_**power * (3.0 if family.endswith("A") else 1.0)
         return scale * self.functions.function(family, on, of, 2.0 * gap / sum(self.radii))
 
     def along(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """(R (k, 2, 2) [N s/m], Γ (k, 2) [N s]) of velocities along n, and of E_nn."""
-        gap = apart(gap)
+        """Return (R (k, 2, 2) [N s/m], Γ (k, 2) [N s]) for velocities along n, and for E_nn."""
+        gap = positive_gaps(gap)
         resistance, strain = np.empty((len(gap), 2, 2)), np.zeros((len(gap), 2))
         for on in SPHERES:
             for of in SPHERES:
                 resistance[:, on - 1, of - 1] = self.scaled("XA", 1, on, of, gap)
-                # By reciprocity: what moving sphere `on` does to the stresslet of `of`.
+                # By reciprocity the force on sphere `on` in a strain follows from the stresslets
+                # that its motion causes.
                 strain[:, on - 1] += TOWARDS[of] * self.scaled("XG", 2, of, on, gap)
         return resistance, strain
 
     def across(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """(R (k, 4, 4), Γ (k, 4)) of the velocities along t of both and their spins, and of E_nt;
-        forces [N] first, then torques [N m]."""
-        gap = apart(gap)
+        """Return (R (k, 4, 4), Γ (k, 4)) for both velocities along t and both spins, and for E_nt.
+
+        Forces [N] first, then torques [N m].
+        """
+        gap = positive_gaps(gap)
         resistance, strain = np.empty((len(gap), 4, 4)), np.zeros((len(gap), 4))
         for on in SPHERES:
             for of in SPHERES:
@@ -105,8 +124,8 @@ class SpherePair:
         return resistance, strain
 
     def relative(self, gap: ArrayLike) -> "Relative":
-        """How the two move against each other where no torque acts on them."""
-        gap = apart(gap)
+        """Return the relative motion of two spheres free of torques."""
+        gap = positive_gaps(gap)
         distance = sum(self.radii) + gap
         along, stretch = self.along(gap)
         across, shear = self.across(gap)
@@ -117,20 +136,23 @@ class SpherePair:
         return Relative(n[:, :2], t[:, :2], -n[:, 2] / distance, -t[:, 2] / distance)
 
     def doublet(self, gap: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """(tension over E_nn (k,) [N s], B (k,)) of the two as one rigid body, free in a flow.
+        """Return (tension over E_nn (k,) [N s], B (k,)) of the two as one rigid body, free in a
+        flow.
 
-        The tension is what water pulls at either along n; the doublet turns by
-        ω_z + B E_nt, in a shear G once in 4π/(G √(1 − B²)). Both have limits as the gap closes:
-        of equal spheres 12.23 πµa² and .594.
+        The tension is the force of the water that pulls the two apart along n. The doublet rotates
+        with ω_z + B E_nt, in a shear G with period 4π/(G √(1 − B²)). Both have finite limits at
+        contact: 12.23 πµa² and 0.594 for equal spheres.
         """
-        gap = apart(gap)
+        gap = positive_gaps(gap)
         arm = 0.5 * (sum(self.radii) + gap)
         (along, stretch), (across, shear) = self.along(gap), self.across(gap)
         ones = np.ones_like(gap)
-        # What the spheres do against the flow at their centres, for E_nn = 1 and E_nt = 1.
+        # Loads on the spheres at rest in the strain: they move by (arm, −arm) relative to the flow.
         held = stretch - np.einsum("kij,kj->ki", along, np.stack([arm, -arm], axis=1))
+        # Free of force: the doublet drifts such that the total force vanishes.
         drift = held.sum(axis=1) / along.sum(axis=(1, 2))
         tension = held[:, 1] - drift * along[:, 1].sum(axis=1)
+        # Rigid motions of the pair across n: translation, and rotation about the middle.
         moves = np.stack([[ones, ones, 0 * ones, 0 * ones], [-arm, arm, ones, ones]]).T
         flow = np.stack([-arm, arm, 0 * ones, 0 * ones], axis=1)
         load = shear + np.einsum("kij,kj->ki", across, flow)
@@ -139,8 +161,8 @@ class SpherePair:
         return tension, turning[:, 1, 0]
 
     def alone(self, gap: ArrayLike) -> "Relative":
-        """The same of two spheres that do not move the water around each other."""
-        gap = apart(gap)
+        """Return the relative motion of two spheres without hydrodynamic interaction."""
+        gap = positive_gaps(gap)
         mobility = 1.0 / (6.0 * math.pi * self.viscosity * np.array(self.radii))
         driven = np.tile(mobility * [-1.0, 1.0], (len(gap), 1))
         return Relative(driven, driven, np.zeros(len(gap)), np.zeros(len(gap)))
@@ -148,9 +170,16 @@ class SpherePair:
 
 @attrs.frozen
 class Relative:
-    """Velocities of sphere 2 against 1, free of torques: along n (``along`` (k, 2) [m/(N s)]) and t
-    (``across``) by forces on 1 and 2; in a flow (E·r)_n (1 − ``stretch``) along n and
-    (E·r)_t (1 − ``shear``) + ω r along t, the A and B of Batchelor and Green (1972)."""
+    """Relative mobility of sphere 2 against sphere 1, free of torques.
+
+    Attributes
+    ----------
+    along, across : (k, 2) arrays
+        Relative velocities along n and along t by unit forces on 1 and 2 [m/(N s)].
+    stretch, shear : (k,) arrays
+        A and B of Batchelor and Green (1972): in a flow the relative velocity is (E·r)_n (1 − A)
+        along n and (E·r)_t (1 − B) + ω r along t.
+    """
 
     along: np.ndarray
     across: np.ndarray
@@ -184,27 +213,35 @@ POWERS = {
     **dict.fromkeys(("t_n", "t_t"), FORCE),
     "t_s": TORQUE,
 }
-"""{column: powers of the viscosity and of the mean radius that it grows by}."""
+"""{column: powers of the viscosity and of the mean radius with which it scales}."""
 
 NEAREST, FARTHEST, NODES_A_DECADE = 1e-7, 200.0, 12
-"""Gaps over the mean radius of the two from which to which tables reach; the cubics between their
+"""Smallest and largest tabulated gap over the mean radius, and nodes per decade: cubics between the
 nodes are right to 1e-5."""
 
 NODES_A_UNIT = NODES_A_DECADE / math.log(10.0)
-"""Nodes in a unit of ln(gap over the mean radius), from NEAREST on."""
+"""Nodes per unit of ln(gap over the mean radius), from NEAREST on."""
 
 NODES = 1 + math.ceil(math.log(FARTHEST / NEAREST) * NODES_A_UNIT)
 
 LARGEST_RATIO, HALF_NODES = 50.0, 48
-"""Of the radii, and nodes of its logarithm from 1 to there; between them cubics of four."""
+"""Largest ratio of radii, and number of nodes of its logarithm from 1 to there; interpolation is
+cubic."""
 
-REVERSED = ("n_1", "n_2"), ("a_v1", "a_v2"), ("a_w1", "a_w2"), ("b_v1", "b_v2"), ("b_w1", "b_w2")
-CHANGED = "a_w1", "a_w2", "b_v1", "b_v2", "k_n", "k_a", "mixed", "t_s"
-"""Columns that change places, and such as change sign, where 1 and 2 do and n and t turn round."""
+EXCHANGED_COLUMNS = (
+    ("n_1", "n_2"),
+    ("a_v1", "a_v2"),
+    ("a_w1", "a_w2"),
+    ("b_v1", "b_v2"),
+    ("b_w1", "b_w2"),
+)
+NEGATED_COLUMNS = "a_w1", "a_w2", "b_v1", "b_v2", "k_n", "k_a", "mixed", "t_s"
+"""Columns to exchange, and columns that change sign, if spheres 1 and 2 are exchanged and n and t
+reversed."""
 
 
 def columns_at(pair: SpherePair, gap: np.ndarray) -> np.ndarray:
-    """(k, columns) of two spheres at gaps (k,) [m]; SI units."""
+    """Return the columns (k, columns) for two spheres at gaps (k,) [m]; SI units."""
     (along, stretch), (across, shear) = pair.along(gap), pair.across(gap)
     ones, none = np.ones_like(gap), np.zeros_like(gap)
     arm_1, arm_2 = (radius + 0.5 * gap for radius in pair.radii)
@@ -213,7 +250,9 @@ def columns_at(pair: SpherePair, gap: np.ndarray) -> np.ndarray:
     def rows(*each: list) -> np.ndarray:
         return np.moveaxis(np.array(each), -1, 0)
 
+    # Motion along n: common translation; approach; the flow at the centres for E_nn = 1.
     n = split(along, stretch, rows([ones, ones]), rows([-ones, ones]), rows([-half, half])[:, 0])
+    # Motion across n: translation and rotation; sliding at the middle of the gap and relative spin.
     t = split(
         across, shear,
         rows([ones, ones, none, none], [-arm_1, arm_2, ones, ones]),
@@ -231,46 +270,57 @@ def split(
     resistance: np.ndarray, strain: np.ndarray, rigid: np.ndarray, relative: np.ndarray,
     flow: np.ndarray,
 ) -> tuple[np.ndarray, ...]:  # fmt: skip
-    """(K, k, L, t) of R (k, m, m) and Γ (k, m), of the rows of W and J (k, …, m), and of what a
-    strain of 1 does at the centres (k, m)."""
+    """Return (K, k, L, t) from R (k, m, m), Γ (k, m), W and J.
+
+    ``rigid`` and ``relative``: rows of W and J (k, …, m); ``flow``: velocity of the centres in a
+    unit strain (k, m).
+    """
+    # Load on spheres at rest in the strain.
     held = strain + np.einsum("kij,kj->ki", resistance, flow)
-    whole = rigid @ resistance
-    factor = np.linalg.cholesky(whole @ np.swapaxes(rigid, 1, 2))
+    weighted = rigid @ resistance
+    # A = F Fᵀ, K = F⁻¹ Wᵀ R, k = F⁻¹ Wᵀ Γ: then Kᵀ K = R W A⁻¹ Wᵀ R.
+    factor = np.linalg.cholesky(weighted @ np.swapaxes(rigid, 1, 2))
     loads = np.einsum("kij,kj->ki", rigid, strain)
-    common = np.linalg.solve(factor, np.dstack([whole, loads]))
-    freed = np.linalg.solve(resistance, np.dstack([np.swapaxes(relative, 1, 2), held]))
-    against = np.linalg.inv(relative @ freed[..., :-1])
-    pull = np.einsum("kij,kj->ki", against @ relative, freed[..., -1])
-    return common[..., :-1], common[..., -1], np.linalg.cholesky(against), pull
+    common = np.linalg.solve(factor, np.dstack([weighted, loads]))
+    responses = np.linalg.solve(resistance, np.dstack([np.swapaxes(relative, 1, 2), held]))
+    # S = (J R⁻¹ Jᵀ)⁻¹, and the tension t = S J R⁻¹ (load).
+    relative_resistance = np.linalg.inv(relative @ responses[..., :-1])
+    tension = np.einsum("kij,kj->ki", relative_resistance @ relative, responses[..., -1])
+    return common[..., :-1], common[..., -1], np.linalg.cholesky(relative_resistance), tension
 
 
-def node(place: int) -> np.ndarray:
-    """(NODES, columns) at a node of the ratio, r₂/r₁ = 50^(place/HALF_NODES), of a mean radius and
-    a viscosity of 1."""
+def ratio_node(place: int) -> np.ndarray:
+    """Return (NODES, columns) at a node of the ratio, r₂/r₁ = 50^(place/HALF_NODES).
+
+    For a mean radius and a viscosity of 1.
+    """
     return columns_at(
         SpherePair(node_radii(place)), NEAREST * np.exp(np.arange(NODES) / NODES_A_UNIT)
     )
 
 
 def node_radii(place: int) -> tuple[float, float]:
-    """The radii, of a mean of 1, at a node of the ratio."""
+    """Return the radii, with a mean of 1, at a node of the ratio."""
     ratio = LARGEST_RATIO ** (place / HALF_NODES)
     return 2.0 / (1.0 + ratio), 2.0 * ratio / (1.0 + ratio)
 
 
 def exchanged(values: np.ndarray) -> np.ndarray:
-    """Columns (…, columns) of the same two spheres, 1 being called 2."""
+    """Return the columns (…, columns) of the same two spheres with their numbers exchanged."""
     order, sign = list(range(len(COLUMNS))), np.ones(len(COLUMNS))
-    for pair in REVERSED:
+    for pair in EXCHANGED_COLUMNS:
         one, other = map(COLUMNS.index, pair)
         order[one], order[other] = other, one
-    sign[[COLUMNS.index(name) for name in CHANGED]] = -1.0
+    sign[[COLUMNS.index(name) for name in NEGATED_COLUMNS]] = -1.0
     return values[..., order] * sign
 
 
 @functools.lru_cache(maxsize=256)
-def slots(ratio: float) -> tuple[tuple[int, float], ...]:
-    """((node, weight), …) of a ratio of the radii, by Lagrange; its node alone at one."""
+def interpolation_weights(ratio: float) -> tuple[tuple[int, float], ...]:
+    """Return ((node, weight), …) of Lagrange interpolation for a ratio of radii.
+
+    A ratio at a node has this node alone.
+    """
     place = HALF_NODES * math.log(ratio) / math.log(LARGEST_RATIO)
     if abs(place - round(place)) < 1e-9:
         return ((round(place), 1.0),)
@@ -283,8 +333,8 @@ def slots(ratio: float) -> tuple[tuple[int, float], ...]:
 
 
 def cubics(values: np.ndarray) -> np.ndarray:
-    """(intervals, columns, 4): coefficients of the cubics between even nodes, constant first, in
-    shares of an interval."""
+    """Return cubic spline coefficients (intervals, columns, 4), constant first, in shares of an
+    interval."""
     from scipy.interpolate import CubicSpline
 
     found = CubicSpline(np.arange(len(values)), values)
@@ -292,6 +342,6 @@ def cubics(values: np.ndarray) -> np.ndarray:
 
 
 def scales(viscosity: float, mean_radius: float) -> np.ndarray:
-    """(columns,) by which the columns of a mean radius and a viscosity of 1 are multiplied."""
+    """Return the factors (columns,) from a mean radius and viscosity of 1 to the given ones."""
     powers = np.array([POWERS[name] for name in COLUMNS])
     return viscosity ** powers[:, 0] * mean_radius ** powers[:, 1]

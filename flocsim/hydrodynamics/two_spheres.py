@@ -1,10 +1,9 @@
-"""Resistance functions of two unequal rigid spheres in slow flow, as series with lubrication.
+"""Resistance functions of two unequal rigid spheres in slow flow: series with lubrication terms.
 
-Sphere 2 has the radius λ of sphere 1. The flow around either is a sum of multipoles (Lamb's
-solution), those of the one being the incident flow of the other; the coefficients of x^k,
-x = (a₁ + a₂)/r, follow from those of lower k. What of them does not fall faster than k⁻³ belongs to
-lubrication, is known in closed form and summed without end, so that the rest converges down to
-touching.
+Sphere 2 has λ times the radius of sphere 1. The flow around each is a sum of multipoles (Lamb's
+solution), and those of one sphere form the incident flow of the other. The coefficients of x^k, x =
+(a₁ + a₂)/r, follow from those of lower k. The part that decays no faster than k⁻³ belongs to
+lubrication. It is known in closed form and summed to infinity; the rest converges down to contact.
 
 Sources: D. J. Jeffrey and Y. Onishi (1984), J. Fluid Mech. 139, 261 (A, B, C); D. J. Jeffrey
 (1992), Phys. Fluids A 4, 16 (G, H); with the corrections of A. K. Townsend (2018),
@@ -20,21 +19,25 @@ from numpy.typing import ArrayLike
 from flocsim.errors import UsageError
 
 TERMS = 300
-"""Of each series. The relative velocity of two spheres, over their gap where it falls with that, is
-right to 1e-4 for ratios above .1 and 2e-3 at LEAST_RATIO (twice as many terms say so)."""
+"""Terms of each series. The relative velocity of two spheres, over the gap where it vanishes with
+the gap, is right to 1e-4 for ratios above 0.1 and to 2e-3 at LEAST_RATIO (compared with twice as
+many terms)."""
 
 LEAST_RATIO = 0.02
-"""Of the radii: below it lubrication reaches less far than the terms do."""
+"""Smallest ratio of the radii: below it lubrication has a shorter range than the terms resolve."""
 
 FAMILIES = ("XA", "YA", "YB", "YC", "XG", "YG", "YH")
 
 ODD_ITSELF = frozenset({"YB", "XG", "YG"})
-"""Families whose functions of a sphere's own motion are odd in 1/r; of the others they are even."""
+"""Families whose functions of a sphere's own motion are odd in 1/r; the others are even."""
 
 
 def lubrication(ratio: float) -> dict[str, tuple[float, float, float]]:
-    """{family and parity: (g₁, g₂, g₃)}, what multiplies 1/ξ, ln 1/ξ and ξ ln 1/ξ near touching;
-    ``ratio``: the other sphere's radius over that of the sphere that feels it."""
+    """Return {family and parity: (g₁, g₂, g₃)}, the coefficients of 1/ξ, ln 1/ξ and ξ ln 1/ξ near
+    contact.
+
+    ``ratio``: radius of the other sphere over that of the sphere that the function acts on.
+    """
     x, sum_ = ratio, 1.0 + ratio
     two, three = sum_**2, sum_**3
     a1, g1 = 2.0 * x**2 / three, 3.0 * x**2 / three
@@ -73,8 +76,11 @@ def lubrication(ratio: float) -> dict[str, tuple[float, float, float]]:
 
 
 def couplings(shares: tuple[float, float], order: int, terms: int) -> list[dict]:
-    """For each sphere the matrices (n, s) by which multipole s of the other makes its multipole n:
-    Jeffrey and Onishi's (3.6) to (3.9) for ``order`` 0, (4.6) to (4.11) for 1."""
+    """Return for each sphere the matrices (n, s) by which multipole s of the other causes its
+    multipole n.
+
+    Jeffrey and Onishi's (3.6) to (3.9) for ``order`` 0, (4.6) to (4.11) for 1.
+    """
     from scipy.special import gammaln
 
     numbers = np.arange(1.0, terms + 2.0)
@@ -86,6 +92,7 @@ def couplings(shares: tuple[float, float], order: int, terms: int) -> list[dict]
     else:
         straight = 3.0 * (n + s) - (n * s + 1) * (2 * n * s - s - n + 2)
         straight *= (2 * n + 1) / (2 * (n + 1) * s * (n + s) * (2 * s - 1))
+    # {name: (factor, powers of the other and of the own share of a₁ + a₂)}.
     factors = {
         "p_of_p": (straight, s, n - 1),
         "p_of_p_beyond": (sign * n * (2 * n - 1) / (2 * (n + 1)), s, n + 1),
@@ -107,18 +114,22 @@ def couplings(shares: tuple[float, float], order: int, terms: int) -> list[dict]
 
 
 def multipoles(ratio: float, order: int, spinning: bool, terms: int) -> list[np.ndarray]:
-    """For each sphere the coefficients (P and Q, n of 1 and 2, k) of x^k, for spheres that move
-    along (``order`` 0) or across (1) their line of centres, or spin about an axis across it."""
+    """Return for each sphere the coefficients (P and Q, n of 1 and 2, k) of x^k.
+
+    For spheres that move along (``order`` 0) or across (1) their line of centres, or spin about an
+    axis across it (``spinning``).
+    """
     shares = 1.0 / (1.0 + ratio), ratio / (1.0 + ratio)
     matrices = couplings(shares, order, terms)
-    # Of coefficient k of multipole s column s + k, so that what a k needs lies in rows.
+    # Coefficient k of multipole s is stored in column s + k: the values needed for one k then lie
+    # in rows.
     start = terms + 3
     p, v, q = (np.zeros((2, terms + 1, 2 * start + terms)) for _ in range(3))
     for each in [q] if spinning else [p, v]:
         each[:, 0, start + 1] = 1.0
     index = np.arange(1, terms + 2)
     for k in range(1, terms + 1):
-        # Multipoles that x^k has in it.
+        # Multipoles that contribute at order k.
         size = min(k + 1, terms + 1)
         rows = index[:size]
 
@@ -154,8 +165,11 @@ def multipoles(ratio: float, order: int, spinning: bool, terms: int) -> list[np.
 
 @attrs.frozen
 class Series:
-    """One function of ξ = s − 2, s = 2r/(a₁ + a₂): its parity in 1/s, (g₁, g₂, g₃), and what is
-    left of the coefficients of (2/s)^k, k even or odd."""
+    """One function of ξ = s − 2, s = 2r/(a₁ + a₂).
+
+    ``odd``: parity in 1/s; ``singular``: (g₁, g₂, g₃); ``rest``: coefficients of (2/s)^k, k even or
+    odd, without the singular terms.
+    """
 
     odd: bool
     singular: tuple[float, float, float]
@@ -163,9 +177,11 @@ class Series:
     scale: float
 
     def __call__(self, xi: ArrayLike) -> np.ndarray:
-        """Its value at ξ > 0."""
+        """Return its value at ξ > 0."""
         xi = np.asarray(xi, dtype=float)
         s = 2.0 + xi
+        # y = 1 − x²: the singular terms are 1/y, ln y and y ln y (odd functions: with (1 + x)/(1 −
+        # x)).
         x, y = 2.0 / s, xi * (s + 2.0) / s**2
         first, logarithm, third = self.singular
         rest = np.polynomial.polynomial.polyval(x * x, self.rest)
@@ -179,7 +195,7 @@ class Series:
 def series_of(
     coefficients: np.ndarray, singular: tuple[float, float, float], odd: bool, scale: float
 ) -> Series:
-    """The coefficients of x^k of one parity without those of the singular terms."""
+    """Return the Series of one parity: coefficients of x^k minus those of the singular terms."""
     first, second, third = singular
     k = np.arange(len(coefficients), dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -192,15 +208,27 @@ def series_of(
 
 @attrs.frozen
 class TwoSpheres:
-    """Resistance functions of two spheres whose radii are a₂/a₁ = ``ratio``, .02 to 50.
+    """Resistance functions of two spheres with radii a₂/a₁ = ``ratio``.
 
-    UsageError for other ratios. Building one takes half a second; the last 256 are kept.
+    Parameters
+    ----------
+    ratio : float
+        From 0.02 to 50.
+
+    Raises
+    ------
+    UsageError
+        For other ratios.
+
+    Notes
+    -----
+    Construction takes half a second; the last 256 are cached.
     """
 
     ratio: float = attrs.field(converter=float)
 
     def __attrs_post_init__(self) -> None:
-        # Of radii whose quotient is rounded, too.
+        # Tolerate a rounded quotient of two radii.
         less = min(self.ratio, 1.0 / (self.ratio or 1.0))
         if not less * (1.0 + 1e-12) >= LEAST_RATIO:
             raise UsageError(
@@ -209,19 +237,31 @@ class TwoSpheres:
             )
 
     def function(self, family: str, on: int, of: int, xi: ArrayLike) -> np.ndarray:
-        """The function X^A, Y^A, Y^B, Y^C, X^G, Y^G or Y^H ("XA", …) of ξ = 2r/(a₁ + a₂) − 2 > 0.
+        """Return the function X^A, Y^A, Y^B, Y^C, X^G, Y^G or Y^H at ξ = 2r/(a₁ + a₂) − 2.
 
-        Jeffrey and Onishi's hatted ones: force (A), torque (B, C) or stresslet (G, H) ``on`` sphere
-        1 or 2 by the velocity (A, B, G) or spin (C, H) ``of`` 1 or 2, over 3πµ(a_on + a_of) (A),
-        πµ(a_on + a_of)² (B, G), πµ(a_on + a_of)³ (C, H). B, G and H are those of a sphere that sees
-        the other one along d: of sphere 2, d points from 2 to 1.
+        Parameters
+        ----------
+        family : str
+            "XA", "YA", "YB", "YC", "XG", "YG" or "YH".
+        on, of : 1 or 2
+            The sphere on which force, torque or stresslet acts, and the sphere that moves.
+        xi : array
+            ξ > 0.
+
+        Returns
+        -------
+        array
+            Jeffrey and Onishi's dimensionless function: force (A), torque (B, C) or stresslet (G,
+            H) by the velocity (A, B, G) or spin (C, H), over 3πµ(a_on + a_of) (A), πµ(a_on + a_of)²
+            (B, G), πµ(a_on + a_of)³ (C, H). B, G and H are those of a sphere that sees the other
+            one along d; for sphere 2, d points from 2 to 1.
         """
         return functions_of(self.ratio)[family, on, of](xi)
 
 
 @lru_cache(maxsize=256)
 def functions_of(ratio: float, terms: int = TERMS) -> dict[tuple[str, int, int], Series]:
-    """{(family, on, of): Series} of a ratio of radii."""
+    """Return {(family, on, of): Series} for a ratio of radii."""
     along, across, spinning = (
         multipoles(ratio, order, spins, terms)
         for order, spins in ((0, False), (1, False), (1, True))
@@ -249,11 +289,12 @@ def functions_of(ratio: float, terms: int = TERMS) -> dict[tuple[str, int, int],
 
 
 FADES_FROM = 0.5
-"""Share of the cut from which on a force fades."""
+"""Share of the cut-off gap from which a force fades out."""
 
 
 def fading(gap, cut):
-    """(w, dw/dgap): 1 up to half the cut, 0 from the cut on, a cubic without a kink between."""
+    """Return (w, dw/dgap): 1 up to FADES_FROM of the cut, 0 beyond it, a cubic with continuous
+    slope between."""
     left = (cut - gap) / ((1.0 - FADES_FROM) * cut)
     if left >= 1.0:
         return 1.0, 0.0

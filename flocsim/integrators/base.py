@@ -62,7 +62,7 @@ class Integrator(ABC):
     the step's error over what is allowed: above 1 the step is tried again, shorter; below 0 it has
     failed and is tried again much shorter. A method of controlled error writes that error to
     ``clock.step_error`` [m] and, for each body, how long a velocity is remembered to
-    ``work.errors[body].memory`` [s], which says how finely switches must be located:
+    ``work.errors[body].velocity_lifetime`` [s], which says how finely switches must be located:
     ``parts.error_ratio`` and ``parts.weigh_velocities`` do both. A method of fixed steps returns 0
     or, where the motion is no longer finite, −1, and subclasses ``parts.FixedStep``.
 
@@ -115,8 +115,8 @@ class Integrator(ABC):
         clock.largest_step = self.largest_step
         clock.estimate_share = self.estimate_share
         clock.previous_step = math.inf
-        clock.bearable_step = math.inf
-        clock.settled_step = math.inf
+        clock.feasible_step = math.inf
+        clock.step_after_switch = math.inf
         clock.across = float(self.across)
         return clock
 

@@ -9,11 +9,11 @@ from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.parts import FixedStep, all_finite, evaluate, limit_slips, move_slips
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces, take_stage
+from flocsim.integrators.rhs.forces import adopt_stage, locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
-from flocsim.state.work import DEVIATION, FIRST_STAGE, NEW, NOW
+from flocsim.state.work import FIRST_STAGE, NEW, NOW, STEP_ERROR
 
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 """Where the stages lie in the step."""
@@ -64,7 +64,7 @@ def combine(scene, work, weights, stages, base, end):
 def combine_slips(scene, work, weights, stages, step, end):
     """Tangential displacements of the closed pairs in state ``end``."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == 1:
+        if work.candidates[row].contact_mode == 1:
             total = 0.0
             for stage in range(stages):
                 total += weights[stage] * work.slip_rate[state_of(stage), row]
@@ -82,11 +82,11 @@ def evaluate_stages(scene, work, time, step):
         state = state_of(stage)
         if stage > 0:
             combine(scene, work, times(MATRIX[stage], step), stage, 1.0, state)
-        locate_and_rate(scene, work, state)
+        locate_with_slip_rates(scene, work, state)
         if stage > 0:
             combine_slips(scene, work, MATRIX[stage], stage, step, state)
         sum_forces(scene, work, time + NODES[stage] * step, state)
-    take_stage(work, state)
+    adopt_stage(work, state)
 
 
 @attrs.frozen
@@ -109,7 +109,7 @@ class DormandPrince54(Integrator):
         time = clock.time
         evaluate_stages(scene, work, time, step)
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
-        combine(scene, work, times(ESTIMATE, step), 7, 0.0, DEVIATION)
+        combine(scene, work, times(ESTIMATE, step), 7, 0.0, STEP_ERROR)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod

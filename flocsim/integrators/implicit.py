@@ -12,9 +12,9 @@ from flocsim.hooks import (
     cut,
     end_within,
     first_step,
-    leave_out_cycles,
     note_step,
     resolving_step,
+    skip_cycles,
     step_across,
     step_to_switch,
 )
@@ -22,9 +22,9 @@ from flocsim.integrators.backward_euler.method import hand_over, step_or_give_ba
 from flocsim.integrators.backward_euler.step import next_across, note_rates
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.crossings import interpolate
-from flocsim.integrators.events.cycles import leave_out_cycles as leave_out
-from flocsim.integrators.events.first_event import leave_at_once, settle_grazes
-from flocsim.integrators.events.grazes import leave_early, settle
+from flocsim.integrators.events.cycles import skip_equal_cycles as leave_out
+from flocsim.integrators.events.first_event import end_grazing_at_once, update_grazing
+from flocsim.integrators.events.grazes import end_grazing_early, update_grazing_pairs
 from flocsim.integrators.exponential.collocation import (
     carry_known,
     judge_series,
@@ -49,10 +49,10 @@ from flocsim.integrators.radau.systems import factorise_systems, is_dense
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.stated_error import (
-    bound_carried,
-    carry_vector,
-    grow_sums,
+    amplify_sums,
+    bound_propagated,
     overlap_error,
+    propagate_vector,
 )
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import NEW, NOW, START, TRIAL
@@ -68,7 +68,7 @@ def is_tried_again(scene, clock):
     """Whether the step before began here as well, and is taken anew so that it ends at a switch:
     what was found out about its start is known still. Not so with surface forces, as which pairs
     have a share in them hangs on the size of the step."""
-    staged = clock.staged_step > 0.0 and clock.staged_at == clock.time
+    staged = clock.stages_step > 0.0 and clock.stages_time == clock.time
     return staged and scene.listed_reach <= 0.0
 
 
@@ -89,13 +89,13 @@ def carry_over_step(scene, work, clock, step):
     """Carry the error over an accepted step; the largest one of a body's outline [m]."""
     if work.tally.series_terms == 0:
         return carry_error(scene, work, clock, step)
-    bound_carried(scene, work)
+    bound_propagated(scene, work)
     whole = clock.series_step
     carry_known(work, clock, whole, step / whole)
     if nothing_swings(clock):
-        grow_sums(scene, work, step)
+        amplify_sums(scene, work, step)
     add_step(work)
-    return bound_carried(scene, work)
+    return bound_propagated(scene, work)
 
 
 def within(work, step, share, body):
@@ -151,8 +151,8 @@ def forget_series(work, clock, known):
     """No series is there any more; how long ago the stages of Radau IIA, if they are there, or the
     state before, began."""
     if known:
-        staged = clock.staged_step > 0.0
-        clock.staged_step = clock.staged_at - clock.time if staged else 0.0
+        staged = clock.stages_step > 0.0
+        clock.stages_step = clock.stages_time - clock.time if staged else 0.0
 
 
 @attrs.frozen
@@ -220,8 +220,8 @@ class Implicit(Integrator):
         if clock.across == 1.0:
             return next_across(clock, step, ratio)
         factor = adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
-        if clock.pace > 0.0:
-            factor = min(factor, (COMFORTABLE_PACE / clock.pace) ** 0.5)
+        if clock.convergence_rate > 0.0:
+            factor = min(factor, (COMFORTABLE_PACE / clock.convergence_rate) ** 0.5)
         factor = max(factor, SMALLEST_FACTOR)
         if ratio <= 1.0:
             return max(min(step * factor, clock.longest_series), min(step, step * factor))
@@ -237,13 +237,13 @@ class Implicit(Integrator):
             step_to_switch: resolve_switch,
             cut: cut_series,
             first_step: step_behind_touch,
-            settle_grazes: settle,
-            leave_at_once: leave_early,
+            update_grazing: update_grazing_pairs,
+            end_grazing_at_once: end_grazing_early,
             choose_method: hand_over,
             step_across: step_or_give_back,
             note_step: note_rates,
-            leave_out_cycles: leave_out,
-            carry_vector: carry_over_step,
+            skip_cycles: leave_out,
+            propagate_vector: carry_over_step,
             overlap_error: step_overlap_error,
         }
 

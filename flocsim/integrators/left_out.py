@@ -75,8 +75,8 @@ def left_out(
     if not outlines:
         found |= {
             forces.add_outline_forces: add_none,
-            jacobian.add_outlines: differentiate_none,
-            outline_sum.outlines_apart: none_apart,
+            jacobian.add_outline_derivatives: differentiate_none,
+            outline_sum.outline_repulsion: none_apart,
         }
     if not charges:
         found |= {charge_sum.sum_charges: charge_sum.no_charges}
@@ -87,8 +87,8 @@ def left_out(
     if bodies <= DENSE:
         found |= {
             body_pairs.list_near: list_none,
-            body_pairs.wandered: none_wandered,
-            body_pairs.time_to_wander: never_wanders,
+            body_pairs.travelled_share: none_wandered,
+            body_pairs.time_to_travel: never_wanders,
             elimination.factorise_sparse: factorise_none,
             elimination.solve_sparse: solve_none,
         }

@@ -10,13 +10,13 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.fields import quantity
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed
 from flocsim.integrators.loop.step_size import adaptive_factor
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.friction import limit_slips
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.surface_gap import flag_near
@@ -41,14 +41,14 @@ __all__ = [
 
 def evaluate(scene, work, time, state):
     """Forces and torques in a state, from its motion and its tangential displacements."""
-    locate_and_rate(scene, work, state)
+    locate_with_slip_rates(scene, work, state)
     sum_forces(scene, work, time, state)
 
 
 def evaluate_as_they_lie(scene, work):
     """Forces and torques of NOW where bodies have been put: all pairs are listed and flagged anew;
     False where the list has no room."""
-    if not list_candidates(scene, work):
+    if not rebuild_list(scene, work):
         return False
     locate_contacts(scene, work, NOW)
     set_closed(work)
@@ -67,11 +67,11 @@ def acceleration(scene, work, state, body, axis):
 def move_slips(scene, work, step):
     """Contact geometry of NEW, and the tangential displacements there from the mean of their rates
     at both ends of a fixed step whose start has been evaluated."""
-    locate_and_rate(scene, work, NEW)
+    locate_with_slip_rates(scene, work, NEW)
     slip = work.slip
     for row in range(work.tally.candidates):
         slip[NEW, row] = 0.0
-        if work.candidates[row].closed == 1:
+        if work.candidates[row].contact_mode == 1:
             rate = tangential_rate(work, NEW, row)
             if work.geometry[NOW, row].gap < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))

@@ -1,6 +1,6 @@
-"""What a run of the engine knows, as records and arrays whose names say what they are.
+"""The state of a run, as records and arrays with named fields.
 
-`records` has the base of all records, `bodies`, `contacts`, `clock` and `outlines` declare them,
-`views` is what the kernels of forces see, `scene` what stays as it is in a run, and `work` what
-changes.
+`records` has the base class of all records; `bodies`, `contacts`, `clock` and `outlines` declare
+them. `views` are the arguments of force kernels. `scene` is what stays constant in a run, `work`
+what changes.
 """

@@ -1,46 +1,46 @@
-"""What the engine knows of each body: its constants, how it lies, its errors, its thermal kicks."""
+"""Records of one body: constants, pose, errors, cluster sums and thermal kicks."""
 
 from flocsim.state.records import Record
 
 
 class BodyConstants(Record):
-    """What does not change of a body in a run; the numbers of its drag as BodyView has them."""
+    """Constants of a body in a run; its resistance as in BodyView."""
 
     mass: float  # [kg]
-    buoyant_mass: float  # what gravity pulls at [kg]
+    buoyant_mass: float  # mass that gravity acts on, less buoyancy [kg]
     inertia: float  # about the centroid [kg m²]
-    free: float  # 1 for a body that moves, 0 for a fixed one
-    equivalent_radius: float  # of the disc of its area [m]
-    bounding_radius: float  # of the circle around the centroid that holds it [m]
-    radius: float  # the spheroradius [m]
-    elongation: float  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area
-    long_axis: float  # the angle of its long axis [rad]
-    identity: float  # the number that its random forces go by
-    resistance_xx: float  # over the viscosity: 0 where no drag follows shapes [m]
+    free: float  # 1 for a body that moves, 0 for a fixed one [-]
+    equivalent_radius: float  # of the disc of the same area [m]
+    bounding_radius: float  # largest distance of the outline from the centroid [m]
+    radius: float  # spheroradius [m]
+    elongation: float  # (M₁ − M₂)/(M₁ + M₂) of the principal second moments of area [-]
+    long_axis: float  # angle of the long axis in the frame of the shape [rad]
+    identity: float  # key of the body's random numbers
+    resistance_xx: float  # R over the viscosity, 0 if no drag depends on the shape [m]
     resistance_xy: float  # [m]
     resistance_yy: float  # [m]
     resistance_xs: float  # [m²]
     resistance_ys: float  # [m²]
     resistance_ss: float  # [m³]
-    strain_xx_x: float  # [m²]
+    strain_xx_x: float  # Γ: force by a strain rate over the viscosity [m²]
     strain_xx_y: float  # [m²]
     strain_xx_s: float  # [m³]
     strain_xy_x: float  # [m²]
     strain_xy_y: float  # [m²]
     strain_xy_s: float  # [m³]
-    shielding_xx: float  # Q of a body in a cluster of a swarm; 1, 0 and 1 of one alone
+    shielding_xx: float  # Q of a body in a cluster of a swarm; 1, 0, 1 alone [-]
     shielding_xy: float
     shielding_yy: float
 
 
 RESISTANCE_COLUMNS = 12
-"""How many numbers a body's resistance has: six of R, six of Γ."""
+"""Numbers of a body's resistance: six of R, six of Γ."""
 
 
 UNSHIELDED = (1.0, 0.0, 1.0)
 
 
-# Axes of places and angles, of velocities and spins, of forces and torques.
+# Axes of positions and angles, velocities and spins, forces and torques.
 (
     X,  # [m]
     Y,  # [m]
@@ -48,7 +48,7 @@ UNSHIELDED = (1.0, 0.0, 1.0)
 ) = range(3)
 
 
-# Columns of motions (n, 6) outside of a run, behind those of places.
+# Columns of motions (n, 6) outside a run, after those of positions.
 (
     VX,  # [m/s]
     VY,  # [m/s]
@@ -57,85 +57,85 @@ UNSHIELDED = (1.0, 0.0, 1.0)
 ) = range(3, 7)
 
 
-# First columns of a record.
+# First columns of a recorded row.
 (
     RECORD_TIME,  # [s]
-    RECORD_MOTION,  # from here on, of one body after another
+    RECORD_MOTION,  # from here on, six numbers per body
 ) = range(2)
 
 
 MOST_FRAMES = 3
-"""Stages for which a body keeps a frame."""
+"""Stages of an implicit step for which a Frame is stored."""
 
 
 class Frame(Record):
-    """How a body's contacts follow it through a stage of an implicit step."""
+    """Rotation and shift of a body's contacts from the start of a step to one of its stages."""
 
-    turn_cosine: float  # of the turn of their normals
+    turn_cosine: float  # of the angle by which their normals turn
     turn_sine: float
     shift_x: float  # [m]
     shift_y: float  # [m]
 
 
 class Pose(Record):
-    """How a body lies, and where it lay when pairs were last listed."""
+    """Orientation of a body, and its position when pairs were last listed."""
 
-    listed_x: float  # at the last listing [m]
+    listed_x: float  # position at the last listing [m]
     listed_y: float  # [m]
     listed_angle: float  # [rad]
-    cosine: float  # of its angle
+    cosine: float  # of its angle in the state located last
     sine: float
-    known_angle: float  # an angle whose cosine and sine are remembered [rad]
+    known_angle: float  # nearby angle whose cosine and sine are stored [rad]
     known_cosine: float
     known_sine: float
-    way: float  # how far its points move at most in a step that is a series [m]
+    series_displacement: float  # bound of its points' displacement in a series step [m]
 
 
 class Disc(Record):
-    """A body in the sweep for pairs that come near each other: its circle, and its way."""
+    """Circle of a body in the sweep for pairs that come near each other, with its displacement."""
 
-    x: float  # where it begins [m]
+    x: float  # centre at the start [m]
     y: float
-    way_x: float  # the way that it goes [m]
-    way_y: float
-    reach: float  # its radius [m]
-    moves: float  # 1 where it moves, 0 where it is fixed: no two fixed ones are near
-    left: float  # its left end, inside the box [m]
-    right: float  # and its right end [m]
+    way_x: float  # its displacement [m]
+    direction_y: float
+    reach: float  # its radius with a margin [m]
+    moves: float  # 1 if it moves, 0 if fixed: two fixed ones are never a pair
+    left: float  # its left end, along all of the displacement, within the box [m]
+    right: float  # its right end [m]
 
 
 class BodyErrors(Record):
-    """What the errors of steps, and of the times of switches, have led to, at a body's outline."""
+    """Errors of a body's outline, accumulated over a run: see rhs.stated_error."""
 
-    memory: float  # how long the body remembers a velocity [s]
-    relaxation: float  # how long drag lets a velocity last [s]
-    step_place: float  # the last step's error of place [m]
-    step_speed: float  # and of velocity [m/s]
-    place: float  # what all steps' errors have led to [m]
-    speed: float  # [m/s]
-    switch_place: float  # what those of switches have led to [m]
-    switch_speed: float  # [m/s]
-    doubt_place: float  # what contacts that may have opened have led to [m]
-    doubt_speed: float  # [m/s]
-    stated: float  # the body's stated error [m]
+    velocity_lifetime: float  # time for which a velocity error goes on displacing it [s]
+    relaxation_time: float  # of its slowest velocity component under drag [s]
+    step_displacement: float  # estimated error of the last step [m]
+    step_velocity: float  # [m/s]
+    displacement: float  # accumulated from the errors of all steps [m]
+    velocity: float  # [m/s]
+    switch_displacement: float  # accumulated from errors of switching times [m]
+    switch_velocity: float  # [m/s]
+    uncertain_displacement: float  # accumulated from contacts that may have opened [m]
+    uncertain_velocity: float  # [m/s]
+    stated: float  # stated error of the body [m]
 
 
 class Cluster(Record):
-    """Sums over bodies that act on each other, with the first of them, their leader."""
+    """Sums over a cluster of bodies that act on each other, stored with its first body."""
 
     mass: float  # [kg]
-    shift_x: float  # mass times shift [kg m]
-    shift_y: float  # [kg m]
-    force_x: float  # [N]
+    shift_x: float  # Σ mass · velocity by which contact frames shift [kg m/s]
+    shift_y: float  # [kg m/s]
+    force_x: float  # Σ force [N]
     force_y: float  # [N]
-    rate_x: float  # masses times accelerations [N]
+    rate_x: float  # Σ mass · acceleration of the stage [N]
     rate_y: float  # [N]
-    shortened: float  # the share to which the carried error is shortened
-    most_place: float  # by how much a place in it may be wrong [m]
+    scale: float  # factor that keeps the propagated error within its bound [-]
+    largest_displacement: float  # bound of a displacement error in it [m]
 
 
 class Kick(Record):
-    """The noise in the present thermal kick of a body."""
+    """Mean white noise of a body in the present thermal kick."""
 
     x: float  # [1/√s]
     y: float  # [1/√s]
@@ -143,7 +143,7 @@ class Kick(Record):
 
 
 class KickTime(Record):
-    """When the present thermal kick is."""
+    """The present thermal kick, in units of the shortest kick."""
 
-    at: float  # its beginning, in the shortest kicks
-    span: float  # and how long it is
+    start: float  # beginning of the kick, from time zero
+    duration: float  # its length; 0: none has begun

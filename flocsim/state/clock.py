@@ -1,90 +1,92 @@
-"""The time, the steps and the counters of a run."""
+"""The time, the step sizes and the counters of a run."""
 
 from flocsim.state.records import Record
 
 
 class Tally(Record):
-    """What a run's lists and sums have come to."""
+    """Sizes of a run's lists, counters of its work, and one result passed between functions."""
 
-    candidates: int  # pairs of features listed
-    pairs: int  # pairs of bodies listed
-    evaluations: int  # forces summed so far
-    rebuilds: int  # lists made so far
-    solves: int  # systems solved so far
-    kept: int  # one more than displacements set aside for a list that found no room; 0: none are
-    full: int  # what has found no room, see NOTHING_FULL
-    series_terms: int  # terms of the last step's series in ``Work.series``; 0: it was none
-    soft_gap: float  # smooth gap of the last two bodies that were asked for one [m]
+    candidates: int  # listed vertex–edge pairs: rows in use of ``Work.candidates``
+    pairs: int  # listed pairs of bodies: rows in use of ``Work.pairs``
+    evaluations: int  # force sums so far
+    rebuilds: int  # candidate lists made so far
+    solves: int  # linear systems solved so far
+    kept: int  # 1 + displacements set aside while a list had no room; 0: none are set aside
+    full: int  # which array has no room left, see NOTHING_FULL
+    series_terms: int  # terms of the last step's series in ``Work.series``; 0: it was not a series
+    smooth_gap: float  # last smooth gap evaluated (rhs.surface_gap) [m]
 
 
-# What Tally.full says.
+# Values of Tally.full.
 (
     NOTHING_FULL,
     CANDIDATES_FULL,
     PAIRS_FULL,
     BLOCKS_FULL,
-    NOT_COMPILED,  # what the engine has left out until it is reached
+    NOT_COMPILED,  # no array: code that the engine compiles only when a run reaches it
 ) = range(5)
 
 
 class Clock(Record):
-    """The times, steps and errors of a run."""
+    """Time, step sizes, tolerance and errors of a run."""
 
     time: float  # [s]
-    until: float  # end of the run, or a stop on the way [s]
-    horizon: float  # end of the run where ``until`` is a stop on the way; 0: it is not one [s]
-    step: float  # next step [s]
-    tolerance: float  # error that a step may have [m]; inf: steps are fixed
+    until: float  # end of the run, or of a window within it [s]
+    horizon: float  # end of the run if ``until`` ends a window only; else 0 [s]
+    step: float  # planned size of the next step [s]
+    tolerance: float  # allowed error of a step [m]; inf: steps have a fixed size
     error: float  # stated error of the motion so far [m]
-    largest_step: float  # [s]
-    bearable_step: float  # largest step that is expected to work at all [s]
-    step_error: float  # error of the step just taken [m]
-    estimate_share: float  # share of the method's own estimate that counts in the stated error
-    # The last steps: what the next one is chosen by.
-    previous_step: float  # size of the step before [s]; inf: there was none, 0: a trial has failed
+    largest_step: float  # upper bound of the step, from the integrator [s]
+    feasible_step: float  # upper bound after a failed step; grows again with every step [s]
+    step_error: float  # error estimate of the step just taken [m]
+    estimate_share: float  # fraction of the step estimates that the stated error counts
+    # The last steps, from which the step controller (loop.step_size) plans the next.
+    previous_step: float  # size of the last step [s]; inf: no trend is known, 0: a trial has failed
     previous_ratio: float  # its error over the tolerance
-    rejected_step: float  # size of the trial that was just rejected [s]; 0: none was
+    rejected_step: float  # size of the trial just rejected [s]; 0: the last one was accepted
     rejected_ratio: float  # its error over the tolerance
-    settling: float  # steps in a row that ended at a switch, until one has been taken that did not
-    settled_step: float  # size of the last such step [s]
-    flying_step: float  # step that was planned when the last flight ended [s]
+    switch_streak: float  # steps in a row after which contacts have switched
+    step_after_switch: float  # size of the first step that followed the last streak [s]
+    flight_step: float  # step planned when the last flight ended [s]
     # Newton's method and the stages of Radau IIA.
-    pace: float  # factor by which each iteration shrinks the last change
-    seen_pace: float  # that of the last second iteration; 0: not known
-    seen_step: float  # size of the step in which it was seen [s]
-    staged_step: float  # size of the step whose stages are still there [s]; 0: none are
-    staged_at: float  # time at which that step began [s]
-    # Motion as a series.
-    longest_series: float  # longest step whose motion may be a series; inf: any [s]
+    convergence_rate: float  # factor by which a Newton iteration shrinks the last increment
+    second_iteration_rate: float  # that of the last second iteration; 0: unknown
+    second_iteration_step: float  # size of the step in which it was measured [s]
+    # Size of the step whose stages are stored [s]; 0: none are; below 0: only its start, in START,
+    # that long ago.
+    stages_step: float
+    stages_time: float  # time at which that step began [s]
+    # Motion as a power series.
+    longest_series: float  # longest step for which the series converges; inf: not known [s]
     series_step: float  # size of the step of the series in ``Work.series`` [s]
-    series_turns: float  # that size times a bound of its fastest rate
-    # Backward Euler, whose steps go on across switches.
-    across: float  # 1 where steps go on across switches, 0 where they end there
-    rates_known: float  # 1 where the rates of the last such step (LAST_RATES) are known
-    switches: float  # switches since a method last looked how far it had come
-    looked_at: float  # when that was [s]; inf: it is to look anew
-    # Cycles of switches that are left out (events.cycles).
-    cycle_at: float  # end of the last cycle [s]
-    cycle_at_before: float  # end of the one before [s]
-    cycle_error: float  # stated error at the end of the last [m]
+    series_norm: float  # bound of ω h in that step, ω being its highest frequency
+    # Backward Euler, whose steps pass over switches.
+    across: float  # 1 if steps pass over switches, 0 if they end at them
+    rates_known: float  # 1 if the accelerations of the last such step (LAST_RATES) are stored
+    switches_since_check: float  # switches since progress was last checked
+    checked_at: float  # time of that check [s]; inf: no check yet
+    # Cycles of switches that are skipped (events.cycles).
+    cycle_end: float  # end of the last cycle [s]
+    previous_cycle_end: float  # end of the one before [s]
+    cycle_error: float  # stated error at the end of the last cycle [m]
 
 
 class Counts(Record):
-    """What a run has counted, and its budgets."""
+    """Counters of a run, and its budgets."""
 
-    steps: int  # steps taken
-    rejected: int  # steps tried in vain
-    max_steps: int  # budget of both and of located events
-    recorded: int  # rows in the record
-    pause_at: int  # steps after which to pause
-    code: int  # what the observer has said last
-    located: int  # events located
-    still: int  # steps in a row by which no time has passed
-    look_at: int  # steps after which a method looks how far it has come
-    looked_tried: int  # steps that had been tried when it last looked
-    cycle_modes: int  # contact modes in which a cycle of switches begins; 0: none has begun
-    cycle_code: int  # number that stands for what has switched since
-    cycle_code_before: int  # the same of the cycle before
+    steps: int  # steps accepted
+    rejected: int  # steps rejected
+    max_steps: int  # budget for accepted and rejected steps and located events together
+    recorded: int  # rows written to the record
+    pause_at: int  # number of steps after which to pause
+    code: int  # last return value of the observer
+    located: int  # trials spent on locating events
+    stationary_steps: int  # steps in a row that were too short to count as motion
+    next_check: int  # number of steps after which to check the progress of the method
+    trials_at_check: int  # steps and trials made by the last check
+    cycle_modes: int  # hash of the contact modes at which a cycle begins; 0: no cycle
+    cycle_code: int  # hash of the switches since
+    previous_cycle_code: int  # hash of the switches of the cycle before
     cycle_switches: int  # switches since the cycle began
-    cycles_seen: int  # cycles that have ended
-    cycle_returns: int  # how often those modes have come again
+    cycles_seen: int  # cycles completed
+    cycle_returns: int  # times the modes of its beginning have recurred since

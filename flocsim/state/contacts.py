@@ -1,105 +1,106 @@
-"""What the engine knows of pairs of bodies, of a vertex beside an edge, and of contacts there."""
+"""Records of candidate pairs (vertex–edge), their contact state, geometry, and pairs of bodies."""
 
 from flocsim.state.records import Record
 
 
 class ContactState(Record):
-    """What a pair that touches, grazes or has just parted carries from step to step."""
+    """History that a candidate pair carries from step to step."""
 
-    slip_offset: float  # error that ξ was carried with, less that of places along t [m]
-    grazing_force: float  # tangential force of a pair that grazes, now [N]
-    fresh: float  # 1 where it has only just begun to graze
-    grazing_resistance: float  # by how much that force falls with the rate of the gap [N s/m]
-    gap_offset: float  # gap at which the pair has been held, which counts as none [m]
-    flight: float  # how far the pair has been apart since it last parted [m]
-    flights: float  # how often that was next to nothing (events.grazes)
+    slip_offset: float  # propagated error of ξ beyond the errors of both positions along t [m]
+    grazing_force: float  # tangential force T of a grazing pair in the present state [N]
+    newly_grazing: float  # 1 during the first step of grazing
+    grazing_resistance: float  # K in T = T₀ − K d(gap)/dt while it grazes [N s/m]
+    gap_offset: float  # gap at which a grazing pair is pinned; gaps count from it [m]
+    flight_gap: float  # largest gap since the pair last opened [m]
+    short_flights: float  # successive flights far below the tolerance (events.grazes)
     cycle_slip: float  # ξ at the end of the last cycle of switches (events.cycles) [m]
-    cycle_slip_before: float  # ξ at the end of the cycle before [m]
+    cycle_slip_before: float  # ξ at the end of the previous cycle [m]
     cycle_gap: float  # gap at the end of the last cycle [m]
-    cycle_gap_before: float  # gap at the end of the cycle before [m]
-    flown_at: float  # when the pair last touched again after a flight next to nothing [s]
-    sampled: float  # its margin (events.crossings) at the last place looked at in a step [m]
-    sampled_rate: float  # rate of that margin [m/s]
+    cycle_gap_before: float  # gap at the end of the previous cycle [m]
+    landing_time: float  # time of touching after the last such flight [s]
+    sampled_margin: float  # margin (events.crossings) at the last sample in a step [m]
+    sampled_margin_rate: float  # its rate of change [m/s]
 
 
 class InteriorPoint(Record):
-    """The unknowns of a contact in backward Euler's interior-point iteration, and its law there.
+    """Unknowns of a contact in backward Euler's interior-point iteration, and its law there.
 
-    All forces are over ``normal_stiffness``, and so are lengths [m].
+    All forces are divided by ``normal_stiffness`` and therefore lengths [m].
     """
 
     overlap: float  # δ, complementary to the slack [m]
-    slack: float  # s, what is left of the gap: gap = s − δ [m]
-    friction: float  # tangential force as a share of its limit, from −1 to 1
-    slide_ahead: float  # how far the pair slides along the tangent [m]
-    slide_behind: float  # how far it slides against it [m]
-    normal_stiffness: float  # what the other forces are divided by [N/m]
-    friction_limit: float  # largest tangential force that friction bears [m]
-    stick_force: float  # tangential force if the pair stuck [m]
-    stick_slope: float  # derivative of the stick force by the tangential velocity [s]
-    held_overlap: float  # overlap by which friction goes from now on; 0: by δ [m]
-    step_share: float  # share of the step in which the pair touches
-    fading_gap: float  # gap within which that share falls to half as the pair opens [m]
+    slack: float  # s, the remaining gap: gap = s − δ [m]
+    friction: float  # tangential force over its limit, from −1 to 1
+    slide_ahead: float  # sliding displacement along the tangent [m]
+    slide_behind: float  # sliding displacement against it [m]
+    normal_stiffness: float  # divisor of the other forces [N/m]
+    friction_limit: float  # largest tangential force that friction allows [m]
+    stick_force: float  # tangential force if the pair sticks [m]
+    stick_slope: float  # derivative of stick_force by the tangential velocity [s]
+    held_overlap: float  # overlap that limits friction, if frozen; 0: δ does [m]
+    step_share: float  # share of the step in which the pair is closed
+    fading_gap: float  # gap at which that share is 1/2 as the pair opens [m]
 
 
 class Candidate(Record):
-    """A vertex of one body and an edge of another, which may touch."""
+    """A vertex of one body and an edge of another that may touch."""
 
-    vertex_body: int
-    vertex: int  # its core point
-    edge_body: int
+    vertex_body: int  # number of the body
+    vertex: int  # its core point, a row of Scene.vertices
+    edge_body: int  # number of the body
     edge_start: int  # first core point of the edge
-    edge_end: int  # its last
-    closed: int  # how the pair touches in this step, see OPEN
-    near: int  # 1 where it may have a share of a surface force in it
-    sliding: int  # ±1 where it slides in it, in the direction of ξ, 0 where it sticks
-    pair: int  # the row of the two bodies in ``Work.pairs``
+    edge_end: int  # last core point of the edge
+    contact_mode: int  # contact mode in this step: OPEN, CLOSED or GRAZING
+    surface_active: int  # 1 if it may transmit part of a surface force in this step
+    slide_direction: int  # ±1: slides in this step, in the direction of ξ; 0: sticks
+    pair: int  # row of the two bodies in ``Work.pairs``
 
 
-# What Candidate.closed says.
+# Contact modes (Candidate.contact_mode). A mode is fixed during a step, in which forces are
+# therefore smooth.
 (
-    OPEN,  # the pair is apart
-    TOUCHES,  # it touches, with the whole contact law
-    GRAZES,  # borne by a share of it (flocsim.integrators.rhs.friction)
+    OPEN,  # no contact force
+    CLOSED,  # the whole contact law acts
+    GRAZING,  # gap rate zero, part of the tangential force (integrators.rhs.friction)
 ) = range(3)
 
 
 class BodyPair(Record):
     """Two bodies that may come near each other."""
 
-    later: int  # the body of the larger number
-    earlier: int
-    acting: int  # 1 where they act on each other in this step
+    later: int  # the body with the larger number
+    earlier: int  # the body with the smaller number
+    acting: int  # 1 if they act on each other in this step
 
 
 class VertexAtEdge(Record):
-    """Where a vertex is beside an edge (flocsim.geometry.contact.points)."""
+    """Position of a vertex relative to an edge (flocsim.geometry.contact.points)."""
 
-    normal_x: float  # unit normal from the foot on the edge to the vertex
+    normal_x: float  # unit normal n from the foot on the edge to the vertex
     normal_y: float
-    gap: float  # [m]
+    gap: float  # distance of the outlines, negative in overlap [m]
     vertex_arm_n: (
         float  # the moment about the vertex's body of a unit force along n, at the middle …
     )
     vertex_arm_t: float  # … of the overlap, and along t [m]
-    edge_arm_n: float  # the same about the edge's body [m]
+    edge_arm_n: float  # the same moments about the edge's body [m]
     edge_arm_t: float
-    turning: float  # the angle by which n turns for every metre of the vertex along t [1/m]
-    foot: float  # how far along the edge the foot lies [m]
-    side: float  # ±1 where t goes along the edge or against it
-    share: float  # of a surface force, that acts through it
+    turning: float  # rotation of n per displacement of the vertex along t [1/m]
+    foot: float  # position of the foot along the edge [m]
+    side: float  # ±1: t points along the edge or against it
+    force_share: float  # share of the surface force that acts through this pair
 
 
-class KeptContact(Record):
-    """A pair whose displacement is set aside while the list is made anew."""
+class SavedContact(Record):
+    """A pair whose history is saved while the list is rebuilt."""
 
-    later: int  # the body of the larger number
-    earlier: int
+    later: int  # the body with the larger number
+    earlier: int  # the body with the smaller number
     vertex: int  # core point of the vertex
     edge: int  # first core point of the edge
-    mode: int  # how the pair touched, see OPEN
-    slip: float  # its displacement [m]
+    mode: int  # contact mode, see OPEN
+    slip: float  # ξ [m]
     slip_offset: float  # see ContactState
-    grazing_force: float
-    gap_offset: float
-    flights: float
+    grazing_force: float  # see ContactState [N]
+    gap_offset: float  # see ContactState [m]
+    short_flights: float  # see ContactState

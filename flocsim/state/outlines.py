@@ -1,4 +1,5 @@
-"""How outlines are laid out for forces along them: pieces, nodes, charges and their fields."""
+"""Records of outlines for distributed forces: pieces, quadrature nodes, charges and their
+fields."""
 
 from functools import cache
 from typing import Annotated, NamedTuple
@@ -11,71 +12,68 @@ from flocsim.state.records import Record
 class Piece(Record):
     """A segment or an arc of an outline, in the frame of its body."""
 
-    x: float  # of a segment its middle, of an arc the centre of its circle [m]
+    x: float  # midpoint of a segment, centre of an arc [m]
     y: float
-    way_x: float  # of a segment its unit tangent, the body on its left; of an arc the outward …
-    way_y: float  # … direction of its middle
-    half: float  # of a segment half its length [m], of an arc tan(α/2), 2 α being its angle
-    bend: float  # the radius of an arc [m], 0 of a segment
-    middle_x: float  # the centre of a circle that holds the piece [m]
+    direction_x: float  # unit tangent of a segment (body on its left); direction of an arc's …
+    direction_y: float  # … midpoint from its centre
+    half: float  # half the length of a segment [m]; tan(α/2) of an arc of angle 2α
+    arc_radius: float  # radius of an arc [m]; 0 for a segment
+    middle_x: float  # centre of a circle that encloses the piece [m]
     middle_y: float
-    extent: float  # and its radius [m]
-    inward: float  # how far behind the piece the core lies that it is the offset of [m]
+    extent: float  # radius of that circle [m]
+    core_depth: float  # distance from the piece back to the core that it is the offset of [m]
 
 
 class NearPieces(NamedTuple):
-    """Rows of the pieces of two bodies that count, each list with their number in front."""
+    """Lists of rows of relevant pieces of two bodies; element 0 of each is its length."""
 
-    first: np.ndarray  # of the body that is gone along, those that may be near the other one
-    second: np.ndarray  # of that one
-    around: np.ndarray  # of these, those that may be near the piece that is gone along
-    seen: np.ndarray  # those that may be near any piece that has been
+    first: np.ndarray  # of the body integrated over: pieces that may be near the other body
+    second: np.ndarray  # pieces of the other body that may be near this one
+    around: np.ndarray  # of these, pieces that may be near the piece being integrated over
+    seen: np.ndarray  # of these, pieces that may be near any piece integrated over so far
 
 
 class Listed(Record):
-    """For which bodies, and for which place of the first in the frame of the second, pieces are
-    listed."""
+    """The bodies, and their relative pose, for which NearPieces was made."""
 
-    first_body: int  # −1: none are
+    first_body: int  # −1: no list has been made
     second_body: int
-    x: float  # [m]
+    x: float  # position of the first body in the frame of the second [m]
     y: float
-    cosine: float
+    cosine: float  # of their relative angle
     sine: float
-    reach: float  # how near to each other pieces that are listed may have been [m]
+    reach: float  # pieces closer than this are listed [m]
 
 
 MOST_NODES = 144
-"""Nodes at a time."""
+"""Nodes that are evaluated together: loops over them vectorise."""
 
 MOST_ORDER = 16
-"""Nodes of a rule at most."""
+"""Most nodes of a Gauss–Legendre rule."""
 
 MOST_FEET = 16
-"""Feet on one piece at most (rhs.outline_sum); more are left out, with nodes further apart."""
+"""Most feet (nearest points) on one piece in rhs.outline_sum; any further are left out, and nodes
+are less dense there."""
 
 
 class Nodes(NamedTuple):
-    """Places along an outline at which the other one is looked at, or charges behind it.
+    """Quadrature nodes of an outline, or charges behind it, in arrays of MOST_NODES."""
 
-    Arrays of MOST_NODES numbers each: several nodes are worked on at once.
-    """
-
-    x: np.ndarray  # [m]
+    x: np.ndarray  # position [m]
     y: np.ndarray
-    normal_x: np.ndarray  # the outward normal; of a charge, the force on it
+    normal_x: np.ndarray  # outward normal; of a charge, the force on it
     normal_y: np.ndarray
-    weight: np.ndarray  # how much of the outline a node stands for [m]; the charge
-    gap: np.ndarray  # how far the other outline is [m]
+    weight: np.ndarray  # length of outline that a node represents [m]; strength of a charge
+    gap: np.ndarray  # distance of the other outline [m]
     attraction: np.ndarray  # S of geometry.contact.attraction [1/m³]
-    plate_gap: np.ndarray  # at which gap plates attract each other as strongly [m]
-    log_share: np.ndarray  # scratch of S: what a logarithm counts for
-    log_of: np.ndarray  # and of what it is; below 0 where there is none
+    plate_gap: np.ndarray  # gap of plates with equal attraction [m]
+    log_share: np.ndarray  # scratch of S: coefficient of a logarithm
+    log_of: np.ndarray  # scratch of S: its argument; negative without one
     cell_x: (
         np.ndarray
     )  # of a charge, where it lies in a cell of a field: from its corner, of a step
     cell_y: np.ndarray
-    # What is known at all four corners of that cell (4, MOST_NODES), see FieldNode.
+    # Field values at all four corners of that cell (4, MOST_NODES), see FieldNode.
     potential: Annotated[np.ndarray, (4, MOST_NODES)]
     by_x: Annotated[np.ndarray, (4, MOST_NODES)]
     by_y: Annotated[np.ndarray, (4, MOST_NODES)]
@@ -91,17 +89,18 @@ def nodes_of() -> Nodes:
 
 
 GROUP = 8
-"""Neighbouring charges in a group at most."""
+"""Most charges in a group of neighbours."""
 
 
 class ChargeGroup(Record):
-    """Neighbouring charges of a body, which are left out together, and a circle that holds them."""
+    """Neighbouring charges of a body, skipped together if their enclosing circle is out of
+    reach."""
 
-    x: float  # its centre, in the frame of the body [m]
+    x: float  # centre of the circle, in the frame of the body [m]
     y: float
-    extent: float  # and its radius [m]
-    first: int  # where their charges begin in ``Scene.charges``
-    count: int  # how many there are
+    extent: float  # radius of the circle [m]
+    first: int  # first of the charges in ``Scene.charges``
+    count: int  # number of charges
 
 
 class Charge(Record):
@@ -109,37 +108,37 @@ class Charge(Record):
 
     x: float  # [m]
     y: float
-    strength: float  # of charges that make a potential of 1 on the outline [-]
+    strength: float  # q, for a potential of 1 on the outline [-]
 
 
 TILE_BITS = 3
 TILE = 1 << TILE_BITS
-"""Steps along a tile; its nodes are (TILE + 1)², those along its edges being its own."""
+"""Grid steps along a tile. A tile stores all (TILE + 1)² nodes, those on its edges included."""
 
 
 class Grid(Record):
-    """Where the field of a body's charges is known, in its own frame."""
+    """Grid of the tabulated field of a body's charges, in its own frame."""
 
-    x: float  # the lower left corner [m]
+    x: float  # lower left corner [m]
     y: float
-    fineness: float  # one over the step from node to node [1/m]
-    across: int  # how many tiles there are along x
-    up: int  # and along y
-    tile: int  # where they begin in ``Scene.tiles``
+    fineness: float  # reciprocal of the grid spacing [1/m]
+    across: int  # number of tiles along x
+    up: int  # number of tiles along y
+    tile: int  # first of its tiles in ``Scene.tiles``
 
 
 class FieldNode(Record):
-    """The field of charges that make a potential of 1 on their outline, at a node."""
+    """Field, at a grid node, of charges for a potential of 1 on their outline."""
 
     potential: float  # [-]
-    by_x: float  # its derivatives, of a step
+    by_x: float  # derivatives per grid spacing [-]
     by_y: float
     by_xy: float
 
 
 @cache
 def gauss_rules() -> np.ndarray:
-    """Nodes and weights of Gauss's rules on [−1, 1], by their numbers of nodes."""
+    """Return nodes and weights of the Gauss–Legendre rules on [−1, 1], by number of nodes."""
     rules = np.zeros((MOST_ORDER + 1, 2, MOST_ORDER))
     for order in range(1, MOST_ORDER + 1):
         rules[order, :, :order] = np.polynomial.legendre.leggauss(order)

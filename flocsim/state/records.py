@@ -1,9 +1,9 @@
-"""Records: rows of numbers whose names say what they are, the same for plain Python and for numba.
+"""Records: rows of numbers with named fields, the same for plain Python and for numba.
 
-A subclass of Record declares its fields, one in a line, as ``float`` or ``int``. ``dtype`` is
-numpy's structured type of them; an element of an array of that type (``rows``), or a record alone
+A subclass of Record declares its fields, one per line, as ``float`` or ``int``. ``dtype`` is
+numpy's structured type of them. An element of an array of that type (``rows``), or a record alone
 (``one``), is read and written by name: ``clock.time``, ``contacts[row].slip_offset``. The classes
-are never instantiated: they are what type checkers take such an element for.
+are never instantiated; type checkers take them for the type of such an element.
 """
 
 from typing import Any, ClassVar, Self, get_type_hints
@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Self, get_type_hints
 import numpy as np
 
 KINDS = {float: "f8", int: "i8"}
-"""What a declared type is in an array."""
+"""Array type of each declared type."""
 
 
 class Record:
-    """Fields with names; see the module."""
+    """Base of all records; see the module."""
 
     dtype: ClassVar[np.dtype[Any]]
 
@@ -39,7 +39,8 @@ class Record:
 
     @classmethod
     def of(cls, *columns: np.ndarray) -> Any:
-        """Return an array of records whose fields, in their order, are columns, (n,) or (n, k)."""
+        """Return an array of records whose fields, in order, are the given columns, (n,) or (n,
+        k)."""
         values = np.column_stack(columns)
         found = cls.rows(len(values))
         for name, column in zip(found.dtype.names, values.T, strict=True):
@@ -60,7 +61,7 @@ def clear(value: Any) -> None:
 
 
 def copied(value: Any) -> Any:
-    """Return the same as `clear` takes in arrays of their own."""
+    """Return a copy of any value that `clear` accepts."""
     if isinstance(value, tuple):
         return type(value)(*map(copied, value))
     return value.copy()

@@ -1,4 +1,4 @@
-"""What does not change in a run: Scene."""
+"""Scene: all that stays constant in a run."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -9,28 +9,28 @@ from flocsim.state.records import Record
 
 
 class Water(Record):
-    """What the resistance of two bodies follows from, beside ``Scene.pair_table``."""
+    """Parameters of the hydrodynamic resistance of two bodies, besides ``Scene.pair_table``."""
 
     viscosity: float  # [Pa s]
-    mean_radius: float  # of the two [m]
-    floor: float  # the gap below which it stays what it is [m]
-    cut: float  # the gap at which it ends [m]; 0: there is none
-    near_cut: float  # the gap of outlines up to which they count [m]; 0: of two spheres
-    flow_x: float  # the velocity of the flow at the origin [m/s]
+    mean_radius: float  # of the two spheres [m]
+    floor: float  # gap below which the resistance is constant [m]
+    cut: float  # gap at which it ends [m]; 0: there is no resistance
+    near_cut: float  # gap up to which outlines matter [m]; 0: both are spheres
+    flow_x: float  # velocity of the flow at the origin [m/s]
     flow_y: float
-    flow_x_by_x: float  # and its gradient: ∂u_x/∂x … [1/s]
+    flow_x_by_x: float  # its gradient ∂u_x/∂x, … [1/s]
     flow_x_by_y: float
     flow_y_by_x: float
     flow_y_by_y: float
-    first_radius: float  # of the sphere that has the drag of the earlier body [m]
-    second_radius: float  # and of the later one [m]
+    first_radius: float  # of the sphere with the drag of the earlier body [m]
+    second_radius: float  # and of that of the later body [m]
 
 
 TABLE_COLUMNS = 20
 """Columns of ``Scene.pair_table``: flocsim.hydrodynamics.pair.COLUMNS."""
 
 
-# What a Scene has where there are no such forces, and where nothing repeats.
+# Values of a Scene without such forces, and without periodic boundaries.
 NO_OUTLINES = (-1.0, 0.0, 0.0, 0.0)
 
 
@@ -44,32 +44,35 @@ NO_BOX = (math.inf, math.inf)
 
 
 class Scene(NamedTuple):
-    """What does not change in a run: n bodies, all their core points, the forces' numbers."""
+    """All that stays constant in a run: n bodies, their outlines, parameters of forces, laws."""
 
     bodies: np.ndarray  # (n,) of BodyConstants
-    first: np.ndarray  # (n + 1,): where a body's core points begin
-    vertices: np.ndarray  # (points, 2 or more): geometry.contact.compounds.Outlines
-    tree: Annotated[np.ndarray, ("nodes", 3)]  # see there
-    pieces: np.ndarray  # (pieces,) of outlines.Piece; none where nothing reads them
-    first_piece: np.ndarray  # (n + 1,): where a body's pieces begin
-    groups: np.ndarray  # (groups,) of outlines.ChargeGroup; none likewise
-    first_group: np.ndarray  # (n + 1,): where a body's groups begin
+    first: np.ndarray  # (n + 1,): index of a body's first core point in ``vertices``
+    vertices: np.ndarray  # (points, 2 or more): core points [m], see compounds.Outlines
+    tree: Annotated[np.ndarray, ("nodes", 3)]  # bounding circles of them, see there
+    pieces: np.ndarray  # (pieces,) of outlines.Piece; empty if nothing reads them
+    first_piece: np.ndarray  # (n + 1,): index of a body's first piece
+    groups: np.ndarray  # (groups,) of outlines.ChargeGroup; empty likewise
+    first_group: np.ndarray  # (n + 1,): index of a body's first group
     charges: np.ndarray  # (charges,) of outlines.Charge
     grids: np.ndarray  # (n,) of outlines.Grid; zeros likewise
-    tiles: np.ndarray  # (tiles,): where the nodes of each begin in ``field``; −1: it has none
+    tiles: np.ndarray  # (tiles,): index of the tile's first node in ``field``; −1: not tabulated
     field: np.ndarray  # (nodes,) of outlines.FieldNode
-    parameters: np.ndarray  # what the laws read of the forces
-    laws: Any  # see flocsim.hooks
-    surface_reach: float = -1.0  # the gap up to which surface forces act [m]; −1: there are none
-    centre_reach: float = -1.0  # the same of centre forces [m]
-    outlines: tuple[float, float, float, float] = NO_OUTLINES  # of forces between: forces.outline
-    layer: tuple[float, float, float] = NO_LAYER  # of the charges' double layers: forces.outline
-    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)  # see flocsim.forces.outline
-    events: int = 0  # how many the contact forces have
-    box: tuple[float, float] = NO_BOX  # periods along x and y [m]
-    # How long random forces stay (integrators.loop.kicks), and what they are drawn by.
+    parameters: np.ndarray  # parameters of all forces, one after another, as the laws read them
+    laws: Any  # addresses of the laws, or functions: flocsim.hooks
+    surface_reach: float = -1.0  # gap up to which surface forces act [m]; −1: there are none
+    centre_reach: float = -1.0  # gap up to which centre forces act [m]
+    # Forces along outlines (forces.outline): reach, least gap, depth, least lens [m].
+    outlines: tuple[float, float, float, float] = NO_OUTLINES
+    layer: tuple[float, float, float] = NO_LAYER  # double layers of charges: forces.outline
+    # Smoothing length of gaps (rhs.surface_gap): at touch [m], its growth [-], where that ends [m].
+    smoothing: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    events: int = 0  # number of event functions (kinks) of the contact forces
+    box: tuple[float, float] = NO_BOX  # periods along x and y [m]; inf: not periodic
+    # Random forces (integrators.loop.kicks): lengths of their kicks, and their key.
     kicks: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     key: tuple[int, int] = (0, 0)
+    # Hydrodynamic resistance of two bodies (rhs.pair_resistance): cubics by the gap.
     pair_table: Annotated[np.ndarray, ("intervals", TABLE_COLUMNS, 4)] = NO_WATER[0]
     water: Water = NO_WATER[1]
-    listed_reach: float = -1.0  # the gap up to which outlines are listed for what acts between them
+    listed_reach: float = -1.0  # gap up to which features are listed for surface forces [m]

@@ -1,22 +1,25 @@
-"""What the kernel of a force sees: a body, a pair of bodies, a point of an outline, a contact."""
+"""Views: the read-only arguments that kernels of forces receive for a body, a pair, an outline
+point or a contact."""
 
 from collections import namedtuple
 from typing import Any, NamedTuple
 
 
 class BodyView(NamedTuple):
-    """One body, as a BodyForce kernel sees it. SI units; angle and spin counter-clockwise.
+    """One body, as a BodyForce kernel receives it. SI units; angle and spin counter-clockwise.
 
-    ``elongation`` is B = (M₁ − M₂)/(M₁ + M₂) of the shape's principal second moments of area, and
-    ``angle + long_axis`` the angle of its long axis; ``kick_x``, ``kick_y`` and ``kick_turn``
-    [1/√s] are means of white noise over the present kick, 0 where a scene has no random forces.
+    ``radius`` is the equivalent radius [m]. ``elongation`` is B = (M₁ − M₂)/(M₁ + M₂) of the
+    principal second moments of area, and ``angle + long_axis`` the angle of the long axis.
+    ``kick_x``, ``kick_y`` and ``kick_turn`` [1/√s] are means of white noise over the present kick,
+    0 without random forces.
 
-    ``resistance_xx`` … and ``strain_xx_x`` …: in the frame of the shape, over the viscosity, the
-    symmetric R of (v_x, v_y, spin) [m, m², m³] and what E_xx = −E_yy, and E_xy, put on a body that
-    goes along [m², m², m³] (flocsim.hydrodynamics.PrismDrag), 0 where no drag follows shapes.
+    ``resistance_xx`` … and ``strain_xx_x`` … are, in the frame of the shape and over the viscosity,
+    the symmetric resistance R to (v_x, v_y, spin) [m, m², m³], and the load Γ of the strains E_xx =
+    −E_yy and E_xy on a body that moves with the flow [m², m², m³]
+    (flocsim.hydrodynamics.PrismDrag); 0 unless a drag follows shapes.
 
-    ``shielding_xx``, ``_xy`` and ``_yy``: Q, symmetric, by which the drag R of a body in a cluster
-    of a swarm becomes Q R Q (flocsim.swarms.together.clusters); 1, 0 and 1 elsewhere.
+    ``shielding_xx``, ``_xy`` and ``_yy`` are the symmetric matrix Q by which the drag R of a body
+    in a cluster of a swarm becomes Q R Q (flocsim.swarms.together.clusters); 1, 0 and 1 elsewhere.
     """
 
     time: float
@@ -55,18 +58,20 @@ class BodyView(NamedTuple):
 PlainBodyView: Any = namedtuple(  # type: ignore[misc]
     "PlainBodyView", BodyView._fields[: BodyView._fields.index("resistance_xx")]
 )
-"""BodyView without the numbers of its shape, where no kernel of a scene reads any."""
+"""BodyView without the last 15 fields, for scenes in which no kernel reads them: engines then
+compile a fifth faster."""
 
 
 NUMBERS_OF_SHAPES = frozenset(BodyView._fields) - frozenset(PlainBodyView._fields)
-"""What a BodyView has besides."""
+"""Fields of BodyView that PlainBodyView lacks."""
 
 
 class PairView(NamedTuple):
-    """Two bodies, as a CentreForce or SurfaceForce kernel sees them.
+    """Two bodies, as a CentreForce or SurfaceForce kernel receives them.
 
-    ``gap`` [m] is d_c − r_i − r_j for a CentreForce, the smooth distance between the outlines for a
-    SurfaceForce; ``gap_rate`` [m/s] its rate of change; radii are equivalent radii.
+    ``gap`` [m] is d_c − r_i − r_j for a CentreForce, and the smooth distance of the outlines for a
+    SurfaceForce; ``gap_rate`` [m/s] is its rate of change. Radii are equivalent radii;
+    ``reduced_radius`` is r_i r_j/(r_i + r_j), ``effective_mass`` m_i m_j/(m_i + m_j).
     """
 
     time: float
@@ -80,11 +85,11 @@ class PairView(NamedTuple):
 
 
 class OrientedView(NamedTuple):
-    """Two bodies and how they are turned, as an OrientedForce kernel sees them.
+    """Two bodies and their orientations, as an OrientedForce kernel receives them.
 
-    i is the earlier of the two in the list of bodies. ``angle_i`` and ``angle_j`` [rad] are those
-    of the bodies, counted from the line that leads from the centroid of i to that of j; ``gap`` [m]
-    is d_c − r_i − r_j, and radii are equivalent radii.
+    i is the earlier of the two in the list of bodies. ``angle_i`` and ``angle_j`` [rad] are the
+    angles of the bodies relative to the line from the centroid of i to that of j. ``gap`` [m] is
+    d_c − r_i − r_j; radii are equivalent radii.
     """
 
     time: float
@@ -99,13 +104,13 @@ class OrientedView(NamedTuple):
 
 
 class OutlineView(NamedTuple):
-    """A point of one outline beside another, as an OutlineForce kernel sees it.
+    """A point of one outline near another, as an OutlineForce kernel receives it.
 
-    ``gap`` [m] is how far the other outline is from the point, below 0 inside of it;
-    ``parted_gap`` the same of outlines that are moved apart to d_min where they are nearer;
-    ``plate_gap`` that of two plates which van der Waals forces pull at as strongly there, and
-    ``depth_gap`` that of plates which lose as large a share to their depth; ``depth`` [m] that of
-    the bodies along the third direction; radii are equivalent radii of both.
+    ``gap`` [m]: distance of the other outline, negative inside of it. ``parted_gap``: the same with
+    the outlines moved apart to d_min if they are closer. ``plate_gap``: gap of two plates with the
+    same van der Waals attraction as here. ``depth_gap``: gap of plates that lose the same share of
+    it by their finite depth. ``depth`` [m]: extent of the bodies in the third direction. Radii are
+    equivalent radii.
     """
 
     time: float
@@ -121,12 +126,12 @@ class OutlineView(NamedTuple):
 
 
 class ContactView(NamedTuple):
-    """One contact point, as a ContactForce kernel sees it.
+    """One contact point, as a ContactForce kernel receives it.
 
-    ``overlap`` [m] > 0 and its rate; ``slip`` [m] the tangential elastic displacement ξ and its
-    rate; ``effective_mass`` M = m_i m_j/(m_i + m_j) [kg] of the pair; ``radius_i`` and
-    ``radius_j`` [m] are those of the outlines that touch (spheroradii), ``smaller_radius`` the
-    equivalent radius of the smaller body.
+    ``overlap`` [m] > 0 and its rate [m/s]; ``slip`` [m], the tangential elastic displacement ξ, and
+    its rate; ``effective_mass`` M = m_i m_j/(m_i + m_j) [kg] of the pair of bodies; ``radius_i``
+    and ``radius_j`` [m], the spheroradii in contact; ``smaller_radius`` [m], the equivalent radius
+    of the smaller body.
     """
 
     overlap: float
@@ -142,7 +147,7 @@ class ContactView(NamedTuple):
 def moved_contact(
     view: ContactView, overlap: float, overlap_rate: float, slip: float, slip_rate: float
 ) -> ContactView:
-    """Return the view of the same contact with another overlap, slip, and rates of them."""
+    """Return the view of the same contact with another overlap, slip, and rates of both."""
     return ContactView(
         overlap, overlap_rate, slip, slip_rate,
         view.effective_mass, view.radius_i, view.radius_j, view.smaller_radius,

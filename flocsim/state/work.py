@@ -1,4 +1,9 @@
-"""What changes in a run, and the scratch space of the drivers: Work, in states of a step."""
+"""Work: all that changes in a run, and the scratch space of the methods.
+
+Motion, forces, contact geometry and displacements exist in several *states*, rows of their arrays:
+NOW, NEW (the end of the step), a trial state and the stages of the method. More rows of place and
+velocity hold errors and other vectors of the same shape.
+"""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -11,7 +16,7 @@ from flocsim.state.contacts import (
     Candidate,
     ContactState,
     InteriorPoint,
-    KeptContact,
+    SavedContact,
     VertexAtEdge,
 )
 from flocsim.state.outlines import (
@@ -28,92 +33,94 @@ from flocsim.state.scene import Scene
 
 # States: rows of ``place``, ``velocity``, ``force``, ``geometry`` and ``slip`` in Work.
 (
-    NOW,  # as it is
+    NOW,  # the accepted state
     NEW,  # at the end of the step
-    TRIAL,  # wherever something is tried out in it
-    FIRST_STAGE,  # the first of its stages
+    TRIAL,  # any other instant within the step
+    FIRST_STAGE,  # first stage of the method
 ) = range(4)
 
 
 MOST_STAGES = 6
-"""Most stages of an integrator that are neither NOW nor NEW."""
+"""Largest number of stages of an integrator besides NOW and NEW."""
 
 
 STATES = FIRST_STAGE + MOST_STAGES
-"""How many states there are with all that belongs to them."""
+"""Number of states with forces, geometry and displacements."""
 
 
-# States of places and velocities alone.
+# Further rows of ``place`` and ``velocity`` alone.
 (
-    START,  # where the step began whose stages are still there
-    CHANGE,  # of velocities, by an iteration of Newton's method [m/s, rad/s]
-    DEVIATION,  # by how much NEW is likely to be wrong
-    CARRIED,  # what all such errors, carried on with the motion, have become
-    FORCING,  # in the columns of velocities: by what it is carried beside its start [N, N, N m]
-    LAST_RATES,  # there: accelerations of the last step across switches [m/s², 1/s²]
-    LOOKED,  # there: the velocities when a method last looked how far it has come
-    CYCLE_LAST,  # at the end of the last cycle of switches
-    CYCLE_BEFORE,  # at the end of the one before
+    START,  # start of the step whose stages are stored
+    CHANGE,  # increment by a Newton iteration, and scratch of the error propagation
+    STEP_ERROR,  # error estimate of NEW
+    PROPAGATED,  # errors of all steps and switches, propagated with the motion
+    FORCING,  # velocity rows: source term of the error-propagation equation [N, N, N m]
+    LAST_RATES,  # velocity rows: accelerations of the last step across switches [m/s², 1/s²]
+    AT_LAST_CHECK,  # velocity rows: velocities at the last check of progress
+    CYCLE_LAST,  # end of the last cycle of switches
+    CYCLE_BEFORE,  # end of the cycle before
     ALL_STATES,
 ) = range(STATES, STATES + 10)
 
 
 TERMS = 44
-"""Terms of a step's series at most."""
+"""Most terms of a step's power series: enough for ω h up to 12 (exponential.series)."""
 
 
-# The series in ``Work.series``, and the forces they follow from in ``Work.remainder``.
+# The series in ``Work.series``, and the nonlinear forces behind them in ``Work.remainder``.
 (
-    MOTION,  # of the motion in the step
-    CHANGED,  # of a change of it: by an iteration, by an error
+    MOTION,  # the motion in the step
+    CHANGED,  # a small change of it, by an iteration or an error
 ) = range(2)
 
 
 # Rows of ``Work.weights``.
 (
-    MOVED,  # how far a force moves a body in the square of the step [m/N, rad/(N m)]
-    LEVER,  # how far its outline moves for a unit of a coordinate [1, 1, m]
+    MOVED,  # h²/m of each coordinate [m/N, rad/(N m)]
+    LEVER,  # displacement of the outline per unit of a coordinate [1, 1, m]
 ) = range(2)
 
 
 SQUARES = 6
-"""Terms of the resistance of two bodies, rows of ``Work.squares``; in the last row stands what a
-strain pulls at them with."""
+"""Squares that the resistance of two bodies is a sum of, rows of ``Work.squares``; one more row
+holds the tension that a strain exerts on both."""
 
 
-# Matrices in ``Work.jacobian``: minus the derivatives of the forces …
+# Matrices in ``Work.jacobian``: minus the derivatives of the forces.
 (
-    DAMPING,  # … by velocity
-    STIFFNESS,  # … by place
+    DAMPING,  # −∂F/∂v
+    STIFFNESS,  # −∂F/∂q
 ) = range(2)
 
 
 class Elimination(NamedTuple):
-    """The sparse systems of a step of many bodies: flocsim.integrators.radau.elimination."""
+    """Sparse linear systems of a step of many bodies: flocsim.integrators.radau.elimination."""
 
-    place: np.ndarray  # (n,): where a body comes in the order; −1 for a fixed one
-    body: np.ndarray  # (n,): the body at a place
-    lower: np.ndarray  # (n + 1,): where a row's blocks left of the diagonal begin in ``column``
-    upper: np.ndarray  # (n,): where those right of it begin
-    column: np.ndarray  # (room,): places of the blocks
+    place: np.ndarray  # (n,): index of a body in the elimination order; −1 if fixed
+    body: np.ndarray  # (n,): body at an index, the inverse of ``place``
+    lower: np.ndarray  # (n + 1,): first entry in ``column`` of a row's blocks left of the diagonal
+    upper: np.ndarray  # (n,): first entry of those right of it
+    column: np.ndarray  # (room,): column indices of the blocks
     blocks: Annotated[np.ndarray, (3, "n + room", 3, 4)]  # see elimination.REAL_PART
-    where: np.ndarray  # (n,): the block of the row that is worked on in every column
-    pairs: np.ndarray  # (pairs,): 1 where a pair of bodies is in the pattern
+    where: np.ndarray  # (n,): block of the row being eliminated, by column
+    pairs: np.ndarray  # (pairs,): 1 if a pair of bodies is in the pattern
     graph: np.ndarray  # (room,): scratch of the ordering
     nodes: np.ndarray  # (8, n + 1): scratch of the ordering
     found: np.ndarray  # (3,): see elimination.PATTERN
 
 
 class Work(NamedTuple):
-    """What changes in a run, and the scratch space of the drivers; all arrays are reused."""
+    """All that changes in a run of n bodies, and scratch space; every array is reused."""
 
-    place: Annotated[np.ndarray, ("rows", "n", 3)]  # in all states [m, m, rad]
-    velocity: Annotated[np.ndarray, ("rows", "n", 3)]  # in all states [m/s, m/s, rad/s]
-    force: Annotated[np.ndarray, ("states", "n", 3)]  # and torque [N, N, N m]
-    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # of a motion, see MOTION [m, m, rad]
-    remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ [N, N m]
+    place: Annotated[np.ndarray, ("rows", "n", 3)]  # positions and angles in all states [m, m, rad]
+    velocity: Annotated[np.ndarray, ("rows", "n", 3)]  # velocities and spins [m/s, m/s, rad/s]
+    force: Annotated[np.ndarray, ("states", "n", 3)]  # forces and torques [N, N, N m]
+    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # terms of a motion, see MOTION [m, m, rad]
+    remainder: Annotated[
+        np.ndarray, (2, 4, "few", 3)
+    ]  # R₀, r₁, r₂, r₃ of its nonlinear force [N, N m]
     weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
-    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # what it follows from, see DAMPING
+    linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # h²K/M and h D/M, see DAMPING
     slip: np.ndarray  # (states, capacity): tangential displacements ξ [m]
     slip_rate: np.ndarray  # (states, capacity): their rates [m/s]
     contacts: np.ndarray  # (capacity,) of ContactState
@@ -124,52 +131,52 @@ class Work(NamedTuple):
     clusters: np.ndarray  # (n,) of Cluster
     kicks: np.ndarray  # (n,) of Kick
     kick: KickTime
-    cluster: np.ndarray  # (n,): first of the bodies that one acts on, through others, too
-    jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # see DAMPING and rhs.blocks
+    cluster: np.ndarray  # (n,): first body of the cluster of bodies that act on each other
+    jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # 3 × 3 blocks, see rhs.blocks
     loads: np.ndarray  # (2, 3 n), complex: right-hand sides, then solutions
-    system: np.ndarray  # (2, 3 n, 3 n), complex: few bodies' systems, factorised
-    pivots: np.ndarray  # (2, 3 n): which rows have changed places
-    elimination: Elimination  # systems of many bodies
+    system: np.ndarray  # (2, 3 n, 3 n), complex: dense systems of few bodies, factorised
+    pivots: np.ndarray  # (2, 3 n): row exchanges of these
+    elimination: Elimination  # sparse systems of many bodies
     candidates: np.ndarray  # (capacity,) of Candidate
     geometry: np.ndarray  # (states, capacity) of VertexAtEdge
     kept: np.ndarray  # (capacity,) of KeptContact
     near: NearPieces
     listed: Listed
-    feet: np.ndarray  # scratch of rhs.outline_sum
+    feet: np.ndarray  # (MOST_FEET,): parameters of the feet on a piece: rhs.outline_nodes
     nodes: Nodes
-    rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss's: nodes, weights
-    squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # of velocities of both bodies, and a load
+    rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss rules: nodes, weights
+    squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # rows q of rhs.pair_resistance
     pairs: np.ndarray  # (pairs,) of BodyPair
-    coordinates: Annotated[np.ndarray, (12,)]  # of two bodies: events.cycles
-    budget: np.ndarray  # (pairs,): how far two bodies may move until a list is to be made anew [m]
-    along: Annotated[np.ndarray, ("pairs", 4)]  # what acts along outlines now, and by how both are
-    # turned: F_x, F_y on the later body [N], the torques on it and on the earlier one [N m]
+    cycle_coordinates: Annotated[np.ndarray, (12,)]  # of two bodies, see events.cycles
+    budget: np.ndarray  # (pairs,): relative motion for which a pair's list is valid [m]
+    # Forces along outlines and oriented forces now: F_x, F_y on the later body [N], torques on the
+    # later and on the earlier body [N m].
+    outline_forces: Annotated[np.ndarray, ("pairs", 4)]
     discs: np.ndarray  # (n,) of Disc
-    order: np.ndarray  # (n,): discs by their left ends
-    starts: np.ndarray  # (n + 1,): where the near ones of a disc begin in ``pairs``
+    order: np.ndarray  # (n,): discs in the order of their left ends
+    starts: np.ndarray  # (n + 1,): index of a disc's first pair in ``pairs``
     tally: Tally
 
 
 ALL_PAIRS = 12
-"""Of so many bodies at most, all pairs that count are watched; of more, those that may come
-near."""
+"""Up to this number of bodies all pairs are watched; above it, only those that may come near."""
 
 
 DENSE = 6
-"""Of so many bodies at most, the linear systems are dense."""
+"""Up to this number of bodies linear systems are dense, and steps may be power series."""
 
 
 PAIRS_A_BODY, BLOCKS_A_BODY = 8, 24
-"""Room at first for the pairs of bodies, and for the blocks of sparse systems, of a body."""
+"""Initial room per body for pairs of bodies, and for blocks of sparse systems."""
 
 
 def counts_as_pair(bodies: np.ndarray, a: int, b: int) -> bool:
-    """Whether two bodies can act on each other: one of them is free."""
+    """Return True if two bodies can act on each other: at least one of them is free."""
     return bool(bodies[a].free + bodies[b].free > 0.0)
 
 
 def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
-    """Write all (later, earlier) that can act on each other, sorted; how many there are."""
+    """Write all pairs (later, earlier) that can act on each other, sorted; return their number."""
     count = 0
     for later in range(bodies.shape[0]):
         for earlier in range(later):
@@ -180,7 +187,7 @@ def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
 
 
 def elimination_of(n: int, pairs: int, room: int) -> Elimination:
-    """Arrays for the sparse systems of n bodies (none for up to DENSE)."""
+    """Return arrays for the sparse systems of n bodies, empty ones for up to DENSE."""
     if n <= DENSE:
         n = pairs = room = 0
     return Elimination(
@@ -207,9 +214,11 @@ def work_of(
     blocks: int | None = None,
     all_pairs: bool = True,
 ) -> Work:
-    """Work arrays for a scene at the given position and velocity (n, 3), no contact yet; room for
-    so many pairs of features and of bodies, and blocks of sparse systems; ``all_pairs``: whether
-    all pairs of few bodies are watched."""
+    """Return work arrays for a scene at the given position and velocity (n, 3), without contacts.
+
+    ``capacity``, ``pairs`` and ``blocks`` are the room for pairs of features, pairs of bodies and
+    blocks of sparse systems; ``all_pairs`` is True if all pairs of few bodies are watched.
+    """
     n = len(scene.bodies)
     dense = n if n <= DENSE else 0
     if n <= ALL_PAIRS and all_pairs:
@@ -242,7 +251,7 @@ def work_of(
         elimination=elimination_of(n, pairs, BLOCKS_A_BODY * n if blocks is None else blocks),
         candidates=Candidate.rows(capacity),
         geometry=VertexAtEdge.rows(STATES, capacity),
-        kept=KeptContact.rows(capacity),
+        kept=SavedContact.rows(capacity),
         near=NearPieces(*np.zeros((4, len(scene.pieces) + 1), dtype=np.int64)),
         listed=Listed.one(),
         feet=np.zeros(MOST_FEET),
@@ -250,9 +259,9 @@ def work_of(
         rules=gauss_rules(),
         squares=np.zeros((SQUARES + 1, 7)),
         pairs=BodyPair.rows(pairs),
-        coordinates=np.zeros(12),
+        cycle_coordinates=np.zeros(12),
         budget=np.zeros(pairs),
-        along=np.zeros((pairs, 4)),
+        outline_forces=np.zeros((pairs, 4)),
         discs=Disc.rows(n),
         order=np.zeros(n, dtype=np.int64),
         starts=np.zeros(n + 1, dtype=np.int64),
@@ -265,7 +274,7 @@ def work_of(
 def begin(
     work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray, all_pairs: bool = True
 ) -> None:
-    """Write into work arrays that are 0 where a run of a scene begins."""
+    """Write the start of a run into work arrays that are 0."""
     work.listed.first_body = -1
     work.budget.fill(-1.0)
     work.order[:] = range(len(work.order))
@@ -275,8 +284,7 @@ def begin(
 
 
 def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
-    """Make work arrays what work_of makes them of a scene of as many bodies: that takes less time
-    than to make new ones."""
+    """Reset work arrays to those of work_of for a scene of as many bodies, faster than new ones."""
     for name in Work._fields:
         if name not in ("elimination", "rules"):
             clear(getattr(work, name))
@@ -284,7 +292,7 @@ def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndar
 
 
 def motion_of(work: Work, state: int) -> np.ndarray:
-    """Return places and velocities in a state (n, 6: x, y, angle, vx, vy, spin), a copy."""
+    """Return a copy of positions and velocities in a state (n, 6: x, y, angle, vx, vy, spin)."""
     return np.hstack([work.place[state], work.velocity[state]])
 
 
@@ -294,13 +302,13 @@ def put_motion(work: Work, state: int, motion: np.ndarray) -> None:
 
 
 def copy_of(work: Work) -> Work:
-    """The same work in arrays of its own."""
+    """Return the same work in arrays of its own."""
     copies: Work = copied(work)
     return copies
 
 
 def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
-    """The array with room for more along an axis, zeros behind what is there."""
+    """Return the array enlarged to ``size`` along an axis, with zeros at the end."""
     shape = list(array.shape)
     shape[axis] = size
     larger = np.zeros(shape, dtype=array.dtype)
@@ -309,19 +317,19 @@ def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
 
 
 def wider(arrays: Any, size: int, **axes: int) -> Any:
-    """A NamedTuple of arrays in which some {name: axis} have room for so many along an axis."""
+    """Return a NamedTuple of arrays in which those of {name: axis} are enlarged to ``size``."""
     return arrays._replace(
         **{name: grown(getattr(arrays, name), axis, size) for name, axis in axes.items()}
     )
 
 
 def with_room(work: Work) -> Work:
-    """The same work with twice the room for what has found none (Tally.full)."""
+    """Return the same work with twice the room in the arrays that were full (Tally.full)."""
     full, elimination = work.tally.full, work.elimination
     work.tally.full = NOTHING_FULL
     if full == PAIRS_FULL:
         pairs = 2 * len(work.pairs)
-        work = wider(work, pairs, pairs=0, budget=0, along=0)
+        work = wider(work, pairs, pairs=0, budget=0, outline_forces=0)
         work = wider(work, 2 * len(work.poses) + 2 * pairs, jacobian=1)
         return work._replace(elimination=wider(elimination, pairs, pairs=0))
     if full == BLOCKS_FULL:
@@ -332,6 +340,6 @@ def with_room(work: Work) -> Work:
 
 
 def with_capacity(work: Work, capacity: int) -> Work:
-    """The same work arrays with room for more contact candidates."""
+    """Return the same work with room for more candidate pairs of features."""
     by_row = dict.fromkeys(("candidates", "contacts", "interior", "kept"), 0)
     return wider(work, capacity, slip=1, slip_rate=1, geometry=1, **by_row)

@@ -8,7 +8,7 @@ from flocsim.state.bodies import MOTION_COLUMNS, Disc
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
-"""Columns of ``errors``: ``place`` to ``doubt_speed`` of BodyErrors."""
+"""Columns of ``errors``: ``place`` to ``uncertain_velocity`` of BodyErrors."""
 
 # Which of an island's clocks, and of its counts.
 (

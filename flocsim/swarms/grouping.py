@@ -16,8 +16,8 @@ import math
 
 import flocsim.swarms.arrays as sw
 from flocsim.geometry.contact.body_pairs import near_pairs
-from flocsim.geometry.contact.compounds import ONWARD, SWELL
-from flocsim.geometry.contact.points import nearest_way
+from flocsim.geometry.contact.compounds import EDGE_OFFSET, EXCESS_RADIUS
+from flocsim.geometry.contact.points import nearest_displacement
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
 from flocsim.integrators.radau.contact_frames import unite
 from flocsim.state.bodies import ANGLE, SPIN, VX, VY, X, Y
@@ -58,11 +58,11 @@ def core_distance2(swarm, wall, x, y):
     x, y = cosine * x + sine * y, cosine * y - sine * x
     first, v, least = swarm.first[wall], swarm.vertices, math.inf
     points = swarm.first[wall + 1] - first
-    rings = v.shape[1] > ONWARD
+    rings = v.shape[1] > EDGE_OFFSET
     for start in range(first, first + (points if rings else max(edge_count(points), 1))):
         end = edge_end(first, points, start) if points > 1 else start
         if rings:
-            end = start + int(v[start, ONWARD])
+            end = start + int(v[start, EDGE_OFFSET])
         distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
         least = min(least, distance2)
     return least
@@ -71,17 +71,17 @@ def core_distance2(swarm, wall, x, y):
 def widest_swell(swarm, wall):
     """By how much the widest disk of a fixed body is wider than its narrowest [m]."""
     widest = 0.0
-    if swarm.vertices.shape[1] > SWELL:
+    if swarm.vertices.shape[1] > EXCESS_RADIUS:
         for point in range(swarm.first[wall], swarm.first[wall + 1]):
-            widest = max(widest, swarm.vertices[point, SWELL])
+            widest = max(widest, swarm.vertices[point, EXCESS_RADIUS])
     return widest
 
 
 def reaches_wall(swarm, body, wall, span, reach, width, height):
     """Whether a body can come to act on a fixed one in a window."""
     m = swarm.motion
-    x = nearest_way(m[body, X] - m[wall, X], width)
-    y = nearest_way(m[body, Y] - m[wall, Y], height)
+    x = nearest_displacement(m[body, X] - m[wall, X], width)
+    y = nearest_displacement(m[body, Y] - m[wall, Y], height)
     way = span * math.hypot(m[body, VX] - m[wall, VX], m[body, VY] - m[wall, VY])
     way += span * abs(m[wall, SPIN]) * swarm.bodies[wall].bounding_radius
     near = swarm.bodies[body].bounding_radius + swarm.bodies[wall].radius + reach
@@ -112,8 +112,8 @@ def share_to_touch(swarm, a, b, span, width, height):
     """The share of a window after which the circles of two bodies touch, on their straight paths; 1
     where they do not in it."""
     m, bodies = swarm.motion, swarm.bodies
-    x = nearest_way(m[a, X] - m[b, X], width)
-    y = nearest_way(m[a, Y] - m[b, Y], height)
+    x = nearest_displacement(m[a, X] - m[b, X], width)
+    y = nearest_displacement(m[a, Y] - m[b, Y], height)
     way_x, way_y = span * (m[a, VX] - m[b, VX]), span * (m[a, VY] - m[b, VY])
     near = bodies[a].bounding_radius + bodies[b].bounding_radius
     apart, closing = max(x * x + y * y - near * near, 0.0), -(x * way_x + y * way_y)
@@ -181,7 +181,7 @@ def set_boxes(swarm, reach):
 
 def gap_along(low, high, other_low, other_high, period):
     """How far two stretches of an axis are apart [m], by their nearest images."""
-    between = abs(nearest_way(0.5 * (low + high - other_low - other_high), period))
+    between = abs(nearest_displacement(0.5 * (low + high - other_low - other_high), period))
     return max(between - 0.5 * (high - low + other_high - other_low), 0.0)
 
 

@@ -9,13 +9,13 @@ in which order they run, and in how many threads, changes no number.
 import math
 
 import flocsim.swarms.arrays as sw
-from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import keep_slips
+from flocsim.geometry.contact.body_pairs import lists_all_pairs
+from flocsim.geometry.contact.candidates import save_contacts
 from flocsim.integrators.loop.driver import FINISHED, NO_ROOM, advance
 from flocsim.state.bodies import MOST_FRAMES, VX, VY, X, Y
 from flocsim.state.clock import CANDIDATES_FULL
 from flocsim.state.contacts import OPEN
-from flocsim.state.work import ALL_STATES, CARRIED, NOW, STATES, all_counting
+from flocsim.state.work import ALL_STATES, NOW, PROPAGATED, STATES, all_counting
 
 
 def box_at(stretch):
@@ -92,11 +92,17 @@ def clear_body(work, body):
         work.kicks[body],
     )
     pose.listed_x = pose.listed_y = pose.listed_angle = pose.cosine = pose.sine = 0.0
-    pose.known_angle = pose.known_cosine = pose.known_sine = pose.way = 0.0
-    errors.memory = errors.relaxation = errors.step_place = errors.step_speed = errors.stated = 0.0
-    errors.place = errors.speed = errors.switch_place = errors.switch_speed = 0.0
-    errors.doubt_place = errors.doubt_speed = 0.0
-    cluster.mass = cluster.shift_x = cluster.shift_y = cluster.shortened = cluster.most_place = 0.0
+    pose.known_angle = pose.known_cosine = pose.known_sine = pose.series_displacement = 0.0
+    errors.velocity_lifetime = errors.relaxation_time = errors.step_displacement = (
+        errors.step_velocity
+    ) = errors.stated = 0.0
+    errors.displacement = errors.velocity = errors.switch_displacement = errors.switch_velocity = (
+        0.0
+    )
+    errors.uncertain_displacement = errors.uncertain_velocity = 0.0
+    cluster.mass = cluster.shift_x = cluster.shift_y = cluster.scale = (
+        cluster.largest_displacement
+    ) = 0.0
     cluster.force_x = cluster.force_y = cluster.rate_x = cluster.rate_y = 0.0
     kick.x = kick.y = kick.turn = 0.0
     for stage in range(MOST_FRAMES):
@@ -118,19 +124,19 @@ def put_state(swarm, work, members, first):
         clear_body(work, body)
         for axis in range(3):
             work.place[NOW, body, axis] = swarm.motion[member, axis]
-            work.place[CARRIED, body, axis] = swarm.carried[member, axis]
+            work.place[PROPAGATED, body, axis] = swarm.carried[member, axis]
             work.velocity[NOW, body, axis] = swarm.motion[member, VX + axis]
-            work.velocity[CARRIED, body, axis] = swarm.carried[member, VX + axis]
+            work.velocity[PROPAGATED, body, axis] = swarm.carried[member, VX + axis]
         known = work.errors[body]
-        known.place = swarm.errors[member, 0]
-        known.speed = swarm.errors[member, 1]
-        known.switch_place = swarm.errors[member, 2]
-        known.switch_speed = swarm.errors[member, 3]
-        known.doubt_place = swarm.errors[member, 4]
-        known.doubt_speed = swarm.errors[member, 5]
+        known.displacement = swarm.errors[member, 0]
+        known.velocity = swarm.errors[member, 1]
+        known.switch_displacement = swarm.errors[member, 2]
+        known.switch_velocity = swarm.errors[member, 3]
+        known.uncertain_displacement = swarm.errors[member, 4]
+        known.uncertain_velocity = swarm.errors[member, 5]
         work.order[body] = body
         work.cluster[body] = body
-    work.kick.at = work.kick.span = 0.0
+    work.kick.start = work.kick.duration = 0.0
     work.tally.candidates = work.tally.pairs = work.tally.kept = work.tally.full = 0
     work.tally.evaluations = work.tally.rebuilds = work.tally.solves = work.tally.series_terms = 0
     for place in range(work.elimination.found.shape[0]):
@@ -172,7 +178,7 @@ def put_slips(swarm, scene, work, members, first):
             kept = work.kept[count]
             kept.slip, kept.slip_offset = swarm.slips[link, 0], swarm.slips[link, 1]
             kept.grazing_force, kept.gap_offset = swarm.slips[link, 2], swarm.slips[link, 3]
-            kept.flights = swarm.slips[link, 4]
+            kept.short_flights = swarm.slips[link, 4]
             count += 1
     work.tally.kept = count + 1
     return True
@@ -236,7 +242,7 @@ def put_times(swarm, work, observed, clocks, counts, members, first):
 
 def take_slips(swarm, scene, work, found, members, first):
     """Write down the displacements of its contacts; False without room."""
-    count, begin = keep_slips(work), found.filled[0]
+    count, begin = save_contacts(work), found.filled[0]
     work.tally.kept = 0
     if begin + count > found.links.shape[0]:
         return False
@@ -256,7 +262,7 @@ def take_slips(swarm, scene, work, found, members, first):
         found.slips[row, 1] = work.kept[kept].slip_offset
         found.slips[row, 2] = work.kept[kept].grazing_force
         found.slips[row, 3] = work.kept[kept].gap_offset
-        found.slips[row, 4] = work.kept[kept].flights
+        found.slips[row, 4] = work.kept[kept].short_flights
     found.filled[0] = begin + count
     return True
 
@@ -273,16 +279,16 @@ def take_state(swarm, work, observed, clock, members, first):
             continue
         for axis in range(3):
             swarm.new_motion[member, axis] = work.place[NOW, body, axis]
-            swarm.new_carried[member, axis] = work.place[CARRIED, body, axis]
+            swarm.new_carried[member, axis] = work.place[PROPAGATED, body, axis]
             swarm.new_motion[member, VX + axis] = work.velocity[NOW, body, axis]
-            swarm.new_carried[member, VX + axis] = work.velocity[CARRIED, body, axis]
+            swarm.new_carried[member, VX + axis] = work.velocity[PROPAGATED, body, axis]
         known = work.errors[body]
-        swarm.new_errors[member, 0] = known.place
-        swarm.new_errors[member, 1] = known.speed
-        swarm.new_errors[member, 2] = known.switch_place
-        swarm.new_errors[member, 3] = known.switch_speed
-        swarm.new_errors[member, 4] = known.doubt_place
-        swarm.new_errors[member, 5] = known.doubt_speed
+        swarm.new_errors[member, 0] = known.displacement
+        swarm.new_errors[member, 1] = known.velocity
+        swarm.new_errors[member, 2] = known.switch_displacement
+        swarm.new_errors[member, 3] = known.switch_velocity
+        swarm.new_errors[member, 4] = known.uncertain_displacement
+        swarm.new_errors[member, 5] = known.uncertain_velocity
         swarm.new_steps[member] = clock.step
         swarm.stated[member] = work.errors[body].stated
         swarm.new_methods[member] = clock.across
@@ -304,7 +310,7 @@ def run_islands(
         put_state(swarm, work, members, begin)
         for pair in range(work.budget.shape[0]):
             work.budget[pair] = -1.0
-        if watches_all(work):
+        if lists_all_pairs(work):
             work.tally.pairs = all_counting(scene.bodies, work.pairs)
         if not put_slips(swarm, scene, work, members, begin):
             work.tally.full = CANDIDATES_FULL

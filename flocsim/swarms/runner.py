@@ -14,7 +14,7 @@ import numpy as np
 
 import flocsim.swarms.arrays as sw
 from flocsim.integrators.base import Integrator
-from flocsim.run import with_more
+from flocsim.run import extended
 from flocsim.state.clock import NOTHING_FULL, Clock, Counts
 from flocsim.state.contacts import BodyPair
 from flocsim.state.scene import Scene
@@ -235,7 +235,7 @@ class Runner:
             if place.work.tally.full == NOTHING_FULL:
                 own.make_room(len(own.found.links))
             else:
-                self.driver, work = with_more(self.driver, place.work)
+                self.driver, work = extended(self.driver, place.work)
                 own.enlarge(size, work)
 
     def run(

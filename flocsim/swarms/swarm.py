@@ -14,7 +14,7 @@ from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
 from flocsim.fields import above_zero, check_whole, in_unit
 from flocsim.forces.base import Force
-from flocsim.forces.body_forces import kicks_of
+from flocsim.forces.body_forces import kick_parameters
 from flocsim.forces.drag import shields_clusters
 from flocsim.forces.outline import refuse_outlines
 from flocsim.forces.pair_resistance import refuse_pair_resistance
@@ -162,7 +162,7 @@ class Swarm:
                     "set all_pairs=True"
                 )
         self.check_box()
-        if kicks_of(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
+        if kick_parameters(self.forces, self.bodies, self.fluid)[HALVINGS] > 0.0:
             raise UsageError(
                 "a swarm needs kicks of the same length in all of its islands: give the "
                 'thermal force a kick, as "1 ms", and leave finest out'

@@ -12,11 +12,11 @@ import attrs
 import numpy as np
 
 from flocsim.body import Body, Fluid, of_forces
-from flocsim.forces.base import ContactForce, Force, names_of
+from flocsim.forces.base import ContactForce, Force, force_names
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.pair_resistance import PairResistance
-from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.body_pairs import lists_all_pairs
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import contact_point, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
@@ -102,7 +102,7 @@ class Instant:
     def contacts(self) -> list[Contact]:
         """All contact points."""
         work, found = self.work, []
-        for row in np.flatnonzero(work.candidates[: work.tally.candidates]["closed"] == 1):
+        for row in np.flatnonzero(work.candidates[: work.tally.candidates]["contact_mode"] == 1):
             candidate = work.candidates[row]
             a, b = int(candidate.vertex_body), int(candidate.edge_body)
             geometry, (x, y, _) = work.geometry[NOW, row], work.place[NOW, a]
@@ -141,7 +141,7 @@ class Replay:
     def single_scenes(self) -> dict[str, Scene]:
         """{name of a force: the scene with it alone}."""
         forces = self.origin.forces
-        named = zip(names_of(forces), forces, strict=True)
+        named = zip(force_names(forces), forces, strict=True)
         return {name: self.scene_of([force]) for name, force in named}
 
     def to_step(self, step: int) -> None:
@@ -197,8 +197,8 @@ class Replay:
         work = copy_of(self.run.work)
         put_motion(work, NOW, motion)
         touching = has(self.scene, CONTACT_FORCE) or self.scene.listed_reach > 0.0
-        if touching or not watches_all(work):
-            while not work.tally.candidates and not list_candidates(self.scene, work):
+        if touching or not lists_all_pairs(work):
+            while not work.tally.candidates and not rebuild_list(self.scene, work):
                 work = with_room(work)
         if touching:
             locate_contacts(self.scene, work, NOW)
@@ -232,10 +232,10 @@ def step_motion(
     stages = np.array(
         [motion_of(work, each) for each in (START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]
     )
-    whole = float(clock.staged_step)
+    whole = float(clock.stages_step)
     if whole == 0.0 and np.array_equal(stages[3], motion_of(work, NOW)):
         whole = end - begin
-    own = origin.has_stages and clock.staged_at == begin and whole > 0.0
+    own = origin.has_stages and clock.stages_time == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
         return hermite(begin, end, start, motion_of(work, NOW), time)
     return cubic(stage_weights((time - begin) / whole), *stages)

@@ -18,7 +18,7 @@ from flocsim.bonds.certificate import (
     is_certain,
     is_certain_in_kicks,
 )
-from flocsim.bonds.rest import FAR_LONGER, is_hooked, kind_at_rest
+from flocsim.bonds.rest import NESTED_REST_TIMES, is_hooked, kind_at_rest
 from flocsim.constants import BOLTZMANN
 from flocsim.forces import Contact, VanDerWaals
 from tests.helpers.hydration import Hydration
@@ -66,14 +66,14 @@ def test_a_well_above_the_touch_is_judged_by_the_most_that_it_bears(share):
     # Whatever it bears, no shape holds a sphere: at most it rests, if it does so for long.
     assert not is_hooked(two.scene, two.work, two.bond, pull)
     known = two.scene, two.work, 0.0, two.bond, pull
-    assert [kind_at_rest(*known, rested) for rested in (1.0, FAR_LONGER)] == [NO_BOND, REST]
+    assert [kind_at_rest(*known, rested) for rested in (1.0, NESTED_REST_TIMES)] == [NO_BOND, REST]
     assert HOOK not in [kind_at_rest(*known, 1e9)]
 
 
 @pytest.mark.parametrize(("speed", "held"), [(0.0, True), (0.9, True), (-0.9, True), (1.1, False)])
 def test_only_what_is_calm_is_held_by_its_well(speed, held):
     motion = np.zeros((2, 3))
-    motion[1, 1] = -speed * certificate.CALM * 1e-3
+    motion[1, 1] = -speed * certificate.CALM_SPEED * 1e-3
     two, _ = in_well(1e-12, motion=motion)
     pull = load(1e-12)
     assert is_certain(two.scene, two.work, 0.0, two.bond, pull) == held

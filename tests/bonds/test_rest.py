@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds import rest
-from flocsim.bonds.certificate import is_closed, size_of
+from flocsim.bonds.certificate import is_closed, smaller_bounding_radius
 from flocsim.forces import Contact
 from flocsim.geometry.contact.points import contact_point
 from tests.helpers.tiers import rest_slow
@@ -117,14 +117,14 @@ def entangled(rng, friction):
 def by_linear_program(two, drift, grip):
     """Whether forces at the contacts balance every load, by scipy."""
     bond, work = two.bond, two.work
-    size = size_of(two.scene, 0, 1)
+    size = smaller_bounding_radius(two.scene, 0, 1)
     pushes = []
     for row in range(work.tally.candidates):
         if not is_closed(work, row):
             continue
         n = np.array(rest.normal_on(work, bond, row))
         t = np.array([-n[1], n[0]])
-        for aside in (-rest.SLACK * size, rest.SLACK * size):
+        for aside in (-rest.BALANCE_TOLERANCE * size, rest.BALANCE_TOLERANCE * size):
             place = np.array(contact_point(work, row, 1)) + aside * t
             for along in (-grip, grip):
                 force = n + along * t
@@ -151,7 +151,7 @@ def by_linear_program(two, drift, grip):
 @pytest.mark.parametrize("friction", rest_slow(["none", 0.3, 0.0], lambda mu: mu == 0.3))
 def test_hooks_are_those_of_a_linear_program(friction):
     rng = np.random.default_rng(4)
-    grip = {"none": rest.GRIP, 0.0: rest.SLACK}.get(friction, friction)
+    grip = {"none": rest.UNLIMITED_FRICTION, 0.0: rest.BALANCE_TOLERANCE}.get(friction, friction)
     found = []
     for case in range(25):
         _, _, two = entangled(rng, friction)

@@ -91,7 +91,7 @@ def test_a_mechanism_without_a_factor_is_named(folder, capsys):
 def test_equivalent_spheres_are_known_in_water(folder, monkeypatch, capsys, meeting, sizes, known):
     """``known``: alpha of quartz in water at 10 1/s; by steps as long as 2 % allow."""
     monkeypatch.setattr(encounters, "STEP", 3.0 * encounters.STEP)
-    monkeypatch.setattr(encounters, "SMOOTH", 3.0 * encounters.SMOOTH)
+    monkeypatch.setattr(encounters, "SMOOTHNESS", 3.0 * encounters.SMOOTHNESS)
     changes = {"more": "[forces]\ndouble_layer = false", "meeting": meeting, "sizes": sizes}
     (folder / "kernel.toml").write_text(kernel_text(**SHEAR | changes), "utf-8")
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0

@@ -11,7 +11,7 @@ from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import KernelError, KernelWarning, UsageError
 from flocsim.fields import quantity
 from flocsim.forces import CentreForce, Contact, Gravity
-from flocsim.forces.base import names_of
+from flocsim.forces.base import force_names
 from flocsim.forces.codegen import laws_of
 from flocsim.swarms.swarm import Swarm
 
@@ -76,11 +76,11 @@ def test_forces_and_work_of_a_run_are_those_of_each(count):
     forces = [Pull(1e-15 * (k + 1)) for k in range(count)]
     run = System(APART, forces).run(1e-6, jit=False)
     found = run.forces()
-    assert [*found] == names_of(forces)
+    assert [*found] == force_names(forces)
     pulls = [found[name][0, 0, 0] for name in found]
     assert pulls == pytest.approx([1e-15 * (k + 1) for k in range(count)], rel=1e-3)
     work = run.energies().work
-    assert [*work] == names_of(forces)
+    assert [*work] == force_names(forces)
     totals = [work[name][-1] for name in work]
     assert np.array(totals) / totals[0] == pytest.approx(np.arange(1, count + 1), rel=1e-6)
 
@@ -95,6 +95,6 @@ def test_a_report_names_all():
 @pytest.mark.parametrize("wrong", [0, 1, 2])
 def test_the_one_that_gives_no_number_is_blamed(wrong):
     forces = [Pull(hole=1.0 if k == wrong else 0.0) for k in range(3)]
-    name = names_of(forces)[wrong].replace("(", r"\(").replace(")", r"\)")
+    name = force_names(forces)[wrong].replace("(", r"\(").replace(")", r"\)")
     with pytest.warns(KernelWarning, match=rf"{name}: Pull.kernel"):
         System(APART, forces).run(1e-6, jit=False, max_steps=100)

@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Fluid
 from flocsim.forces import DoubleLayer, SurfaceForce, VanDerWaals
-from flocsim.forces.outline import change_lengths, smoothness
+from flocsim.forces.outline import decay_lengths, smoothness
 
 GAPS = np.geomspace(1e-11, 1e-3, 160)
 
@@ -17,7 +17,7 @@ GAPS = np.geomspace(1e-11, 1e-3, 160)
     DoubleLayer(debye_length=0.98e-6, gap="surface"), DoubleLayer(debye_length=3e-9, gap="surface"),
 ])  # fmt: skip
 def test_an_exponential_changes_over_its_decay_length(force):
-    found = change_lengths(force, Fluid())[GAPS[:-1] < 0.4 * force.reach]
+    found = decay_lengths(force, Fluid())[GAPS[:-1] < 0.4 * force.reach]
     assert found == pytest.approx(force.debye_length, rel=0.05)
 
 
@@ -50,5 +50,5 @@ def test_the_line_stays_below_the_lengths_of_all_forces(forces):
     line = np.minimum(least + slope * GAPS[:-1], most)
     for force in forces:
         within = GAPS[:-1] < min(force.reach, 1e-4)
-        assert np.all(line[within] <= change_lengths(force, Fluid())[within] * (1.0 + 1e-9))
+        assert np.all(line[within] <= decay_lengths(force, Fluid())[within] * (1.0 + 1e-9))
     assert line.min() > 0.0

@@ -8,7 +8,7 @@ import pytest
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.errors import RangeError, UsageError
 from flocsim.forces import Contact, Lubrication, StokesDrag, Thermal
-from flocsim.forces.body_forces import kicks_of
+from flocsim.forces.body_forces import kick_parameters
 from flocsim.forces.check import SAMPLE_BODIES
 from flocsim.integrators import Implicit
 from flocsim.plausibility import plausibility_warnings
@@ -42,7 +42,7 @@ def spheres(*radii, **more):
 
 def test_automatic_kicks_go_by_the_smallest_radius():
     bodies = spheres(1e-6, 2e-6)
-    kick, halvings, spread, least = kicks_of([ROOM, Contact()], bodies, WATER)
+    kick, halvings, spread, least = kick_parameters([ROOM, Contact()], bodies, WATER)
     assert spread == pytest.approx(3.0 * ROOM.diffusion(WATER, 1e-6), abs=0.0, rel=1e-12)
     assert math.sqrt(spread * kick) == pytest.approx(1e-7, abs=0.0, rel=1e-9)
     assert least == 1e-9
@@ -51,11 +51,11 @@ def test_automatic_kicks_go_by_the_smallest_radius():
 
 def test_kicks_are_halved_where_asked_and_where_bodies_act_on_each_other():
     bodies = spheres(1e-6, 1e-6)
-    assert kicks_of([Thermal(kick="1 ms"), Contact()], bodies, WATER)[1] == 0.0
-    assert kicks_of([Thermal(kick="1 ms", finest="2 nm"), Contact()], bodies, WATER)[1] > 0.0
-    assert kicks_of([ROOM, StokesDrag()], bodies, WATER)[1] == 0.0
-    assert kicks_of([ROOM, Contact()], bodies[:1], WATER)[1] == 0.0
-    assert kicks_of([ROOM, Contact()], spheres(1e-6, fixed=True), WATER)[0] == 0.0
+    assert kick_parameters([Thermal(kick="1 ms"), Contact()], bodies, WATER)[1] == 0.0
+    assert kick_parameters([Thermal(kick="1 ms", finest="2 nm"), Contact()], bodies, WATER)[1] > 0.0
+    assert kick_parameters([ROOM, StokesDrag()], bodies, WATER)[1] == 0.0
+    assert kick_parameters([ROOM, Contact()], bodies[:1], WATER)[1] == 0.0
+    assert kick_parameters([ROOM, Contact()], spheres(1e-6, fixed=True), WATER)[0] == 0.0
 
 
 def test_a_scene_has_one_temperature():

@@ -9,7 +9,7 @@ import numpy as np
 from flocsim import Body, Sphere, SpheroPolygon, System
 from flocsim.body import Fluid
 from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaals
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.parts import evaluate_as_they_lie
@@ -25,7 +25,7 @@ def flagged(system):
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
     work.budget[:] = -1.0
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     set_modes(scene, work)
     return scene, work

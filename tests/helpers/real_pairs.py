@@ -86,8 +86,8 @@ def multiblobs(shapes, places):
             rigid_bodies.surface(*each, spacing) for each in zip(outlines, heights, strict=True)
         ]
         owner = np.repeat(range(len(shapes)), [len(each) for each in blobs])
-        loads = rigid_bodies.loads(
-            np.concatenate(blobs), rigid_bodies.RADIUS * spacing, owner, places[:, :2] / SIZE
+        loads = rigid_bodies.rigid_loads(
+            np.concatenate(blobs), rigid_bodies.SPHERE_RADIUS * spacing, owner, places[:, :2] / SIZE
         )
         spacings.append(spacing)
         found.append(0.5 * (loads[:, :-2] + loads[:, :-2].T))

@@ -6,7 +6,7 @@ import numpy as np
 
 from flocsim import Body, SpheroPolygon, System
 from flocsim.bonds.certificate import Load, bond_between
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.state.work import NOW, work_of
@@ -33,7 +33,7 @@ class TwoBodies:
         self.scene = System(bodies, forces, fluid=WATER).scene(jit=False)
         motion = np.zeros((2, 3)) if motion is None else np.asarray(motion)
         self.work = work_of(self.scene, np.asarray(places, dtype=float), motion)
-        assert list_candidates(self.scene, self.work)
+        assert rebuild_list(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
 

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from flocsim.hydrodynamics import SpherePair, rigid_bodies
-from flocsim.hydrodynamics.rigid_bodies import LESS_ACROSS, LESS_ALONG, mobilities
+from flocsim.hydrodynamics.rigid_bodies import (
+    RIGID_REDUCTION_ACROSS,
+    RIGID_REDUCTION_ALONG,
+    mobilities,
+)
 from tests.helpers.tiers import rest_slow
 
 RADIUS = 2.0e-6
@@ -37,7 +41,9 @@ def by_multiblobs(places, count=80):
     middle = np.mean(places, axis=0)
     whole = np.concatenate([one + [*(np.array(place) - middle), 0.0] for place in places])
     several, alone = (
-        np.linalg.inv(rigid_bodies.loads(each, rigid_bodies.RADIUS * spacing)[:, :3])[:2, :2]
+        np.linalg.inv(rigid_bodies.rigid_loads(each, rigid_bodies.SPHERE_RADIUS * spacing)[:, :3])[
+            :2, :2
+        ]
         / ALONE
         for each in (whole, one)
     )
@@ -52,7 +58,7 @@ def test_two_that_touch_are_exact():
     assert along == pytest.approx(1.5497, abs=1e-3)
     plain = [0.625, 0.4375]
     assert 1.0 - (np.array([along, across]) - 1.0) / plain == pytest.approx(
-        [LESS_ALONG, LESS_ACROSS], abs=2e-3
+        [RIGID_REDUCTION_ALONG, RIGID_REDUCTION_ACROSS], abs=2e-3
     )
 
 
@@ -109,5 +115,5 @@ def test_cells_of_many_bodies_count_as_the_bodies_do(monkeypatch):
     places = np.cumsum(2.0 * np.column_stack([np.cos(turns), np.sin(turns)]), axis=0)
     radii = rng.uniform(0.7, 1.0, 400)
     by_cells = mobility(places, radii)
-    monkeypatch.setattr(rigid_bodies, "FEW", 1000)
+    monkeypatch.setattr(rigid_bodies, "ALL_PAIRS_UP_TO", 1000)
     assert by_cells == pytest.approx(mobility(places, radii), rel=1e-2, abs=1e-3)

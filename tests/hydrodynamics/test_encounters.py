@@ -13,7 +13,7 @@ from tests.helpers.tiers import rest_slow
 def long_steps(monkeypatch):
     """Ways in three times as long steps: an error that two sides of an equation share."""
     monkeypatch.setattr(encounters, "STEP", 3.0 * encounters.STEP)
-    monkeypatch.setattr(encounters, "SMOOTH", 3.0 * encounters.SMOOTH)
+    monkeypatch.setattr(encounters, "SMOOTHNESS", 3.0 * encounters.SMOOTHNESS)
 
 
 def attraction(radii, k):

@@ -14,7 +14,7 @@ from flocsim.forces import Contact, StokesDrag
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
-from flocsim.integrators.loop.driver import keep_lists, take_new_state
+from flocsim.integrators.loop.driver import adopt_new_state, keep_lists
 from flocsim.state.work import NEW, NOW, motion_of, work_of
 from tests.helpers.methods import name_of
 from tests.helpers.tiers import rest_slow
@@ -31,7 +31,7 @@ def even_steps(scene, work, clock, counts, step, count):
         if attempt(scene, work, clock, step) < 0.0:
             return False
         locate_contacts(scene, work, NEW)
-        take_new_state(work)
+        adopt_new_state(work)
         clock.time += step
     return True
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, Swarm
-from flocsim.bonds.certificate import CALM, CERTIFICATE, HOOK, NO_BOND, REST
+from flocsim.bonds.certificate import CALM_SPEED, CERTIFICATE, HOOK, NO_BOND, REST
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.constants import BOLTZMANN
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import REST_TIME, bond_of, start_rest
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal, VanDerWaals
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.geometry.shapes.outline import core_gap
 from flocsim.integrators.events.first_event import set_modes
@@ -226,10 +226,10 @@ def test_two_bodies_are_judged_as_a_pair_of_a_study_is(tmp_path, gap, ends):
         for case in range(6):
             places = touching_places(rng, shapes)
             motion = np.hstack([places, np.zeros((2, 3))])
-            calm = CALM * math.hypot(*encounter.drift)
+            calm = CALM_SPEED * math.hypot(*encounter.drift)
             motion[1, 3:5] = (0.0, 0.5, 0.9, 1.1)[case % 4] * calm * rng.choice([-0.7, 0.7], 2)
             work, observed = work_of(scene, places, motion[:, 3:]), encounter.observed()
-            assert list_candidates(scene, work)
+            assert rebuild_list(scene, work)
             locate_contacts(scene, work, NOW)
             set_modes(scene, work)
             start_rest(scene, work, observed, 0.0)

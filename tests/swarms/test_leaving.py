@@ -7,7 +7,7 @@ import pytest
 
 from flocsim import Body, Sphere
 from flocsim.integrators import Status
-from flocsim.state.contacts import TOUCHES
+from flocsim.state.contacts import CLOSED
 from flocsim.swarms.arrays import with_links
 from flocsim.swarms.placement import REENTER, REMOVE, Leaving
 from flocsim.swarms.swarm import Swarm
@@ -67,7 +67,7 @@ def test_a_cluster_comes_back_as_it_is():
     others = [(x * 3.0 * R, HIGH - 0.2 * R) for x in range(1, 5)]
     swarm = swarm_at([*pair, *others])
     progress = progress_of(swarm, REENTER)
-    links = np.array([[1, 0, 1, 0, TOUCHES]])
+    links = np.array([[1, 0, 1, 0, CLOSED]])
     progress.swarm = with_links(progress.swarm, links, np.array([[1e-9, 0.0, 0.0, 0.0, 0.0]]))
     progress.swarm.motion[:2, 3:] = [1e-4, -2e-4, 3.0]
     before = progress.swarm.motion.copy()

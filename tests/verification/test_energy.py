@@ -26,7 +26,7 @@ def energies(run):
     velocity, listed = work.velocity[NOW], int(work.tally.candidates)
     speeds = bodies["mass"] * (velocity[:, 0] ** 2 + velocity[:, 1] ** 2)
     kinetic = 0.5 * np.sum(speeds + bodies["inertia"] * velocity[:, 2] ** 2)
-    closed = work.candidates[:listed]["closed"] > 0
+    closed = work.candidates[:listed]["contact_mode"] > 0
     overlap = -work.geometry[NOW, :listed]["gap"][closed]
     slip = work.slip[NOW, :listed][closed]
     parts = kinetic, 0.5 * K_N * np.sum(overlap**2), 0.5 * K_T * np.sum(slip**2)

@@ -16,7 +16,7 @@ from flocsim.forces import Contact, Gravity
 from flocsim.integrators import Implicit, Status
 from flocsim.integrators.amplification import end_distance
 from flocsim.state.bodies import X, Y
-from flocsim.state.contacts import GRAZES, TOUCHES
+from flocsim.state.contacts import CLOSED, GRAZING
 from flocsim.state.work import NOW
 
 HALF, RADIUS = 5e-6, 1e-6
@@ -51,7 +51,7 @@ def energy(run, gravity):
     total = 0.5 * mass * (vx**2 + vy**2) + 0.5 * inertia * spin**2 + mass * gravity * y
     law = Contact()
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == TOUCHES:
+        if work.candidates[row].contact_mode == CLOSED:
             overlap, slip = work.geometry[NOW, row].gap, work.slip[NOW, row]
             total += 0.5 * law.k_n * overlap**2 + 0.5 * law.k_t * slip**2
     return total
@@ -63,7 +63,7 @@ def carried(system, gravity=0.0, until=UNTIL):
     grazing, energies = 0, []
     while (status := run.advance(1)) == Status.PAUSED:
         rows = run.work.candidates[: run.work.tally.candidates]
-        grazing += bool(np.any(rows["closed"] == GRAZES))
+        grazing += bool(np.any(rows["contact_mode"] == GRAZING))
         energies.append(energy(run, gravity))
     assert status == Status.FINISHED
     return run, grazing, np.array(energies)

@@ -26,7 +26,7 @@ from flocsim.ensembles.collision.attraction import (
 )
 from flocsim.ensembles.collision.draw import orientations
 from flocsim.ensembles.config.pair_scene import PairScene
-from flocsim.forces.body_forces import key_of, thermal_in
+from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
 from flocsim.geometry.contact.compounds import Outlines, outlines_of
@@ -139,7 +139,7 @@ class Encounter(abc.ABC):
             return self
         # The same cached values but for the key: a scene made anew would compile its laws again.
         other = object.__new__(type(self))
-        scene = self.scene._replace(key=key_of(*numbers))
+        scene = self.scene._replace(key=random_key(*numbers))
         vars(other).update(vars(self), scene=scene, system=self.system.changed(seed=numbers))
         return other
 
@@ -156,7 +156,7 @@ class Encounter(abc.ABC):
     @functools.cached_property
     def kick_energy(self) -> float:
         """k_B T of the thermal motion [J], 0 without."""
-        return max((each.energy for each in thermal_in(self.system.forces)), default=0.0)
+        return max((each.energy for each in thermal_forces(self.system.forces)), default=0.0)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:

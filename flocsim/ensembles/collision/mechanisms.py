@@ -38,10 +38,10 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.errors import ConfigError, UsageError
 from flocsim.forces import Gravity
 from flocsim.forces.drag import body_resistance, follows_shape, resistance_matrices
-from flocsim.forces.settling import held_mobility, least_mobility, terminal_motion
+from flocsim.forces.settling import least_mobility, nonrotating_mobility, terminal_motion
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hydrodynamics import SpherePair, bend
-from flocsim.hydrodynamics.pair import node_radii, slots
+from flocsim.hydrodynamics.pair import interpolation_weights, node_radii
 from flocsim.hydrodynamics.two_spheres import FADES_FROM
 from flocsim.system import System
 
@@ -372,7 +372,7 @@ def offset_near(ratio: float, speeds: float, gap: float) -> float:
     # By nodes of the ratio, as the tables: functions of any other take half a second.
     bends = sum(
         weight * bend(SpherePair(node_radii(place)), (speeds, 1.0), 2.0 * (1.0 + gap))
-        for place, weight in slots(ratio)
+        for place, weight in interpolation_weights(ratio)
     )
     return math.exp(-bends)
 
@@ -382,7 +382,7 @@ def yield_of(system: System, body: Body) -> tuple[float, float]:
     the arm r that balances the torque of a strain of 1/s."""
     resistance, strain = resistance_matrices(body_resistance(body))
     torque = system.fluid.viscosity * max(resistance[2, 2], math.hypot(*strain[2]))
-    return held_mobility(system, body), torque / body.shape.equivalent_radius
+    return nonrotating_mobility(system, body), torque / body.shape.equivalent_radius
 
 
 def refuse_release(options: PairScene, shapes: Sequence[Shape]) -> None:

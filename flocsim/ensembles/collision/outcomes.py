@@ -46,10 +46,10 @@ from flocsim.bonds.certificate import (
     doublet_pose,
     is_certain,
     is_certain_in_kicks,
+    pose_change,
     radii_of,
-    way_between,
 )
-from flocsim.bonds.rest import FAR_LONGER, STILL, kind_at_rest, swings
+from flocsim.bonds.rest import NESTED_REST_TIMES, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import (
@@ -293,11 +293,11 @@ def rest_of(scene, work, observed, time, load):
     """Return how long the doublet has kept its pose without swinging, in rest times."""
     before = observed[REST_X], observed[REST_Y], observed[REST_ANGLE]
     pose = doublet_pose(scene, work, NOW, BODY_I, BODY_J)
-    moved = way_between(scene, BODY_I, BODY_J, pose, before)
-    if moved > STILL * load.drift * observed[REST_TIME]:
+    moved = pose_change(scene, BODY_I, BODY_J, pose, before)
+    if moved > STABLE_POSE * load.drift * observed[REST_TIME]:
         start_rest(scene, work, observed, time)
         return 0.0
-    if swings(scene, work, BODY_I, BODY_J, load):
+    if is_swinging(scene, work, BODY_I, BODY_J, load):
         return 0.0
     return (time - observed[REST_SINCE]) / observed[REST_TIME]
 
@@ -348,7 +348,7 @@ def is_held_apart(scene, work, observed, time):
     """Return True if two that never touched stay where they are: without kicks, as they have kept
     still for far longer than the rest time; in a secondary minimum, if kicks do not lead out."""
     if observed[KICK_ENERGY] == 0.0:
-        return rest_of(scene, work, observed, time, load_on(observed)) >= FAR_LONGER
+        return rest_of(scene, work, observed, time, load_on(observed)) >= NESTED_REST_TIMES
     if observed[CAGE_HIGH] <= observed[CAGE_LOW]:
         return False
     bond = bond_between(scene, work, time, BODY_I, BODY_J)

@@ -9,7 +9,7 @@ import attrs
 from flocsim.ensembles.config import pair_scene
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, field, one_of, quantity, several, whole, word_or_quantity
-from flocsim.forces.body_forces import thermal_in
+from flocsim.forces.body_forces import thermal_forces
 
 
 @attrs.frozen
@@ -119,7 +119,7 @@ class KernelScene(pair_scene.PairScene):
     def problems(self, config: Any) -> Iterator[pair_scene.Problem]:
         """Yield what does not go together with the other tables of a config."""
         yield from super().problems(config)
-        if thermal_in(config.forces):
+        if thermal_forces(config.forces):
             text = "brings bodies together from beyond the offsets that are sampled: leave it out"
             yield "forces.thermal", text
         yield from pair_scene.uneven_points(

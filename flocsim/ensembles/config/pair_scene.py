@@ -21,9 +21,9 @@ from flocsim.fields import (
     whole,
     word_or_quantity,
 )
-from flocsim.forces.body_forces import thermal_in
+from flocsim.forces.body_forces import thermal_forces
 from flocsim.forces.drag import shields_clusters
-from flocsim.forces.outline import ASK_FOR_BOTH, asks_for_both
+from flocsim.forces.outline import NEEDS_BOTH_SHAPES, needs_both_shapes
 
 LARGEST_LENGTH = 0.01
 """[m] Upper limit of sizes: a larger one is a length in µm whose unit was forgotten."""
@@ -95,14 +95,14 @@ def outline_problems(config: Any, *, settles: bool) -> Iterator[Problem]:
 
     ``settles``: whether the scene is one of two bodies that settle.
     """
-    found = next(filter(asks_for_both, config.forces), None)
+    found = next(filter(needs_both_shapes, config.forces), None)
     if found is None:
         return
-    words, advice = ASK_FOR_BOTH[found.acts_on]
+    words, advice = NEEDS_BOTH_SHAPES[found.acts_on]
     name = type(found).__name__
     if not settles:
         yield "forces", f"{name} {words}, which is for pairs that settle: {advice}"
-    elif thermal_in(config.forces):
+    elif thermal_forces(config.forces):
         yield "forces.thermal", f"cannot be combined with {name}, which {words}"
 
 
@@ -312,7 +312,7 @@ class PairScene:
         for name in ("velocity", "gradient") if self.meeting != SETTLING else ():
             if any(getattr(config.fluid, name)):
                 yield f"fluid.{name}", "would move the bodies besides scene.meeting: leave it out"
-        kicks = thermal_in(config.forces)
+        kicks = thermal_forces(config.forces)
         if self.meeting == BROWNIAN and not kicks:
             text = '"brownian" needs kicks: add [forces.thermal], with a temperature above 0 K'
             yield "scene.meeting", text

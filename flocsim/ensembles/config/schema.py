@@ -47,7 +47,7 @@ from flocsim.forces import (
     VanDerWaals,
 )
 from flocsim.forces.base import Force
-from flocsim.forces.contact import INSTEAD
+from flocsim.forces.contact import REPLACED_BY
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators import (
     BackwardEuler,
@@ -422,7 +422,7 @@ EXCLUSIVE = [
     ("zone.root", "zone.centre"),
     ("zone.distance", "zone.centre"),
     ("integrator.class", "integrator.name"),
-    *((f"forces.contact.{key}", f"forces.contact.{other}") for key, other in INSTEAD.items()),
+    *((f"forces.contact.{key}", f"forces.contact.{other}") for key, other in REPLACED_BY.items()),
 ]
 """Pairs of keys that cannot both be given: one of them replaces the other from below."""
 

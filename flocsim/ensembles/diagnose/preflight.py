@@ -28,13 +28,13 @@ from flocsim.ensembles.config.schema import PRESETS, Config
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force
-from flocsim.forces.body_forces import kicks_of
+from flocsim.forces.body_forces import kick_parameters
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import impact_exponent
 from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
-from flocsim.run import wrong_answer
+from flocsim.run import invalid_value
 from flocsim.state.views import ContactView, OrientedView, OutlineView, PairView
 from flocsim.system import System
 
@@ -127,7 +127,7 @@ def check_laws(pair: Encounter) -> None:
     """Raise KernelError where a kernel cannot be compiled, or gives no number at touch, and
     UsageError where thermal kicks cannot act on the bodies."""
     system = pair.system
-    kicks_of(system.forces, system.bodies, system.fluid)
+    kick_parameters(system.forces, system.bodies, system.fluid)
     for law in system.pieces.laws.values():
         refuse_interpreter(law)
     refuse_interpreter(advance, system.fillings(OBSERVER))
@@ -135,7 +135,7 @@ def check_laws(pair: Encounter) -> None:
         system.laws()
     views = close_views(system)
     for name, force in system.pieces.used.items():
-        if words := wrong_answer(force, laws_of([force], system.fluid), views, system.fluid):
+        if words := invalid_value(force, laws_of([force], system.fluid), views, system.fluid):
             raise KernelError(
                 f"{name}: {words}, which every collision reaches: bound whatever it divides by or "
                 "takes a root, power or logarithm of, as in max(pair.gap, 1e-10)"

@@ -24,7 +24,7 @@ from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import Config
 from flocsim.errors import UsageError
 from flocsim.forces import VanDerWaals
-from flocsim.forces.body_forces import thermal_in
+from flocsim.forces.body_forces import thermal_forces
 from flocsim.forces.drag import solid_radius
 from flocsim.hydrodynamics import Meeting, SpherePair
 from flocsim.plausibility import settled
@@ -59,7 +59,7 @@ def sphere_facts(config: Config, flocs: Sequence[Floc] | None = None) -> list[di
         forces, ends = pair.system.forces, pair.ends
         radius_i, radius_j = (shape.equivalent_radius for shape in pair.shapes)
         radii = radius_i, radius_j
-        [thermal] = thermal_in(forces)
+        [thermal] = thermal_forces(forces)
         known: dict[str, Any] = {"temperature": thermal.temperature, "fluid": pair.system.fluid}
         with np.errstate(all="ignore"):
             found = {
@@ -115,7 +115,7 @@ def share_in(pair: Encounter, water: bool) -> float:
 
 def unknown_in_water(pair: Encounter) -> str:
     """Return why the effect of water on two spheres is not known; "" where it is."""
-    if thermal_in(pair.system.forces):
+    if thermal_forces(pair.system.forces):
         return "with thermal kicks: leave [forces.thermal] out"
     if any(body.fixed for body in pair.system.bodies):
         return "with a fixed receiver: choose scene.receiver = 'free'"

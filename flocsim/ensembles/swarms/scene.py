@@ -13,7 +13,7 @@ from flocsim.ensembles.config.pair_scene import (
 )
 from flocsim.errors import ConfigError
 from flocsim.fields import choice, field, flag, number, quantity, several, whole, word_or_quantity
-from flocsim.forces.dlvo import unlike
+from flocsim.forces.dlvo import has_unlike_potentials
 
 BOX = several(number("m", above=0.0), 2, distinct=False)
 """Reader of a width and a height."""
@@ -155,7 +155,7 @@ class SwarmScene:
         """Yield what does not go together with the other tables of a config."""
         yield from outline_problems(config, settles=False)
         for name, force in zip(config.force_names, config.forces, strict=True):
-            if unlike(force):
+            if has_unlike_potentials(force):
                 text = "is given for two unlike bodies: those of a swarm are alike"
                 yield f"forces.{name}.potential", text
         shapes = config.shapes

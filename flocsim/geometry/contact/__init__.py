@@ -1,5 +1,5 @@
-"""Where two bodies touch: candidates, their contact points, and how slip passes between them; and
-what two outlines do to each other all along.
+"""Contact geometry: candidate lists, contact points, the transfer of tangential displacements, and
+interactions of whole outlines.
 
-Kernels on scalars and on the arrays of a run.  May import ``geometry.shapes``.
+Kernels on scalars and on the arrays of a run. May import ``geometry.shapes``.
 """

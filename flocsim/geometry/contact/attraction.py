@@ -1,31 +1,35 @@
-"""Outlines that attract each other as −C/r⁶: what one comes to at a point outside of it, which is
-summed in a run, and the energy of two, to some eight digits.
+"""Attraction of outlines with the pair energy −C/r⁶: the field of one outline at a point, and the
+energy of two.
 
-Of bodies without an end along the third direction, by Green's theorem over the outline,
+**Field.** For bodies that are infinite in the third direction, Green's theorem gives the field of
+an outline with outward normal n as
 
-    S(x) = ∮ n·(y − x)/|y − x|⁵ ds(y),
+    S(x) = ∮ n·(y − x)/|y − x|⁵ ds(y).
 
-n being outward. (H/8π) S is the energy of a unit volume at x, and −4/(3 h³) the sum over a plane at
-the distance h. Of a segment, x being p = n·(x − y) above its line, S is −p ∫ ds/ρ⁵, and
+(H/8π) S is the energy per unit volume at x; for a half plane at the distance h, S = −4/(3 h³).
+
+For a segment, with x at the height p = n·(x − y) above its line, S = −p ∫ ds/ρ⁵, and
 
     T(s) = ∫ p ds/ρ⁵ from s to ∞ = p (2 + s/ρ)/(3 ρ² (ρ + s)²)
 
-has no like numbers that cancel, however far beside a segment x lies.
+has no cancellation, however far beside the segment x lies.
 
-Of an arc of radius R, x being p outside of its circle and q = R + p from its centre, ρ² = p² + u²
-with u = 2 √(R q) sin(φ/2), φ from the direction of x on. With w = u²/(4 R q),
+For an arc of radius R, with x at the distance p outside of its circle and q = R + p from its
+centre, ρ² = p² + u² with u = 2 √(R q) sin(φ/2), where φ is measured from the direction of x. With w
+= u²/(4 R q),
 
     S = √(R/q) ∫ (u²/(2R) − p) ρ⁻⁵ (1 − w)^{−1/2} du,
 
 whose terms in powers of w have closed forms.
 
-The energy of bodies of a depth W, H_A = π² C, by Green's theorem over both, is
+**Energy.** For two bodies of depth W, H_A = π² C, Green's theorem over both outlines gives
 
     E = W ∮∮ (n₁·n₂) f(ρ) ds₁ ds₂,  f = H_A/(24πρ³) q(ρ/W),
-    q(τ) = (2/π) (atan(1/τ) − τ/2 + (τ³/2) ln(1 + 1/τ²)),  1 where they have no end,
+    q(τ) = (2/π) (atan(1/τ) − τ/2 + (τ³/2) ln(1 + 1/τ²)),  q = 1 for infinite depth.
 
-the one by panels that shrink towards where the other is near, the other in closed form, or by
-panels as well. It takes milliseconds: runs have sums of their own (integrators.rhs.outline_sum).
+The outer integral uses panels graded towards the points where the other outline is near, the inner
+one a closed form or panels; about eight digits. This takes milliseconds. Runs use faster sums of
+their own (integrators/rhs/outline_sum.py).
 """
 
 import math
@@ -37,16 +41,16 @@ from flocsim.compiler.linker import loops_apart
 from flocsim.geometry.shapes.pieces import (
     Pose,
     at_parameter,
-    between_cores,
+    closest_points,
     distance_to,
     ends_of,
-    parameter_beside,
+    parameter_facing,
     piece_at,
     placed,
 )
 
-# Gauss's rule of eight nodes on [−1, 1].
-EIGHT = (
+# Gauss–Legendre rule with eight nodes on [−1, 1].
+GAUSS_EIGHT = (
     (-0.9602898564975363, 0.10122853629037626), (-0.7966664774136267, 0.22238103445337448),
     (-0.525532409916329, 0.31370664587788727), (-0.1834346424956498, 0.362683783378362),
     (0.1834346424956498, 0.362683783378362), (0.525532409916329, 0.31370664587788727),
@@ -54,28 +58,30 @@ EIGHT = (
 )  # fmt: skip
 
 NO_ATTRACTION = 1e3
-"""The gap [m] of plates that stands for none."""
+"""Plate gap [m] that stands for no attraction."""
 
-FACING = 0.7
-"""Of w = sin²(φ/2): arcs that go on beyond that are taken from their middle."""
+SERIES_LIMIT = 0.7
+"""Largest w = sin²(φ/2) at which the series in w is used; arcs that extend further are integrated
+by Gauss's rule."""
 
-# Of (1 − w)^{−1/2} in powers of w.
-ROOT = (1.0, 0.5, 0.375, 0.3125, 0.2734375, 0.24609375)
+# Coefficients of (1 − w)^{−1/2} in powers of w.
+ROOT_SERIES = (1.0, 0.5, 0.375, 0.3125, 0.2734375, 0.24609375)
 
 CUBE_ROOT = (2.48719599, -4.51910029, 4.92375927, -1.86079247)
-"""Of r^{−1/3} in powers of r, from 0.1 to 1.25 within 4 %: where a root begins from."""
+"""Coefficients of r^{−1/3} in powers of r, within 4 % for r from 0.1 to 1.25: start of an
+iteration."""
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
-PANEL = 1.5
-"""The longest panel of t."""
+LONGEST_PANEL = 1.5
+"""Largest panel in t (s = p sinh t) of the rule with twelve nodes."""
 
-FINEST = 0.25
-"""The smallest panel at a place, over how far the other piece is from there."""
+FINEST_PANEL = 0.25
+"""Smallest panel at a point over the distance of the other piece from there."""
 
 
-def beyond(p, s):
-    """T(s), of s ≥ 0 [1/m³]."""
+def segment_tail(p, s):
+    """Return T(s) for s ≥ 0 [1/m³]."""
     rho = math.sqrt(p * p + s * s)
     inverse = 1.0 / (rho * (rho + s))
     return p * (2.0 + s * (rho + s) * inverse) * inverse * inverse / 3.0
@@ -83,56 +89,70 @@ def beyond(p, s):
 
 @loops_apart
 def add_segment(nodes, count, piece, inset, lens):
-    """Add S of a segment within ``lens`` [m] to each of some nodes, the outline being ``inset`` [m]
-    further in, and take its gap to them."""
-    # Without a branch, so that several nodes are taken at once.
+    """Add S of a segment to each of ``count`` nodes, and update the nodes' gap.
+
+    Only parts within ``lens`` [m] of a node count. The outline is moved inward by ``inset`` [m].
+    """
+    # No branches, so that the compiler evaluates several nodes at once.
     for k in range(count):
         dx, dy = nodes.x[k] - piece.x, nodes.y[k] - piece.y
-        height = dx * piece.way_y - dy * piece.way_x
-        along = dx * piece.way_x + dy * piece.way_y
+        height = dx * piece.direction_y - dy * piece.direction_x
+        along = dx * piece.direction_x + dy * piece.direction_y
+        # Distance from the core of the piece, less the distance of core and outline.
         past = abs(along) - piece.half
         past = past if past > 0.0 else 0.0
-        deep = height + piece.inward
-        gap = math.sqrt(deep * deep + past * past) - piece.inward
+        deep = height + piece.core_depth
+        gap = math.sqrt(deep * deep + past * past) - piece.core_depth
         known = nodes.gap[k]
         nodes.gap[k] = gap if gap < known else known
         p = height + inset
+        # The segment is cut to the part within the lens around the node.
         reach = lens * lens - p * p
         reach = math.sqrt(reach if reach > 0.0 else 0.0)
         low, high = -piece.half - along, piece.half - along
         low, high = low if low > -reach else -reach, high if high < reach else reach
-        first, last = beyond(p, abs(low)), beyond(p, abs(high))
+        first, last = segment_tail(p, abs(low)), segment_tail(p, abs(high))
         first = first if low >= 0.0 else -first
         last = last if high > 0.0 else -last
-        # Where the foot lies between them, all of the line less what is beyond both ends.
+        # Both T are defined for s ≥ 0: with the foot inside, integrate the whole line, less both
+        # tails.
         whole = 4.0 / (3.0 * p * p * p) if (low < 0.0) & (high > 0.0) else 0.0
         found = whole + first - last
         nodes.attraction[k] -= found if (low < high) & (p != 0.0) else 0.0
 
 
-def averted_arc(x, y, piece, radius, lens):
-    """S of an arc from its middle, x as seen from its centre."""
+def arc_by_gauss(x, y, piece, radius, lens):
+    """Return S of an arc by Gauss's rule; x, y as seen from its centre."""
     total = 0.0
-    for node, weight in EIGHT:
+    for node, weight in GAUSS_EIGHT:
+        # The arc is parametrised by t = tan(φ/2) from its middle.
         t = piece.half * node
-        grown = 1.0 + t * t
-        c, s = (1.0 - t * t) / grown, 2.0 * t / grown
-        nx, ny = c * piece.way_x - s * piece.way_y, c * piece.way_y + s * piece.way_x
+        denominator = 1.0 + t * t
+        c, s = (1.0 - t * t) / denominator, 2.0 * t / denominator
+        nx, ny = (
+            c * piece.direction_x - s * piece.direction_y,
+            c * piece.direction_y + s * piece.direction_x,
+        )
         dx, dy = radius * nx - x, radius * ny - y
         squared = dx * dx + dy * dy
         if squared < lens * lens:
             ahead = nx * dx + ny * dy
-            total += weight * ahead / (grown * squared * squared * math.sqrt(squared))
+            total += weight * ahead / (denominator * squared * squared * math.sqrt(squared))
     return 2.0 * radius * piece.half * total
 
 
-def facing_arc(p, radius, distance, low, high):
-    """S of an arc that x faces, from u = ``low`` to ``high``: a, b and c of a + b log c."""
+def arc_by_series(p, radius, distance, low, high):
+    """Return S of an arc that faces the point, from u = ``low`` to ``high``, as a + b log c: a, b,
+    c.
+
+    The logarithm is left to the caller so that this part vectorises.
+    """
     squared, start, end = p * p, abs(low), abs(high)
     rho, rho_2 = math.sqrt(squared + start * start), math.sqrt(squared + end * end)
     v, v_2 = start / rho, end / rho_2
     inverse, inverse_2 = 1.0 / (rho * (rho + start)), 1.0 / (rho_2 * (rho_2 + end))
-    # 3 ∫ ρ⁻⁵ du and 3 ∫ u² ρ⁻⁵ du from each end to ∞.
+    # 3 ∫ ρ⁻⁵ du and 3 ∫ u² ρ⁻⁵ du from each end to infinity; ends on either side of the foot
+    # combine as for a segment.
     zeroth, zeroth_2 = (2.0 + v) * inverse * inverse, (2.0 + v_2) * inverse_2 * inverse_2
     first, first_2 = (1.0 + v + v * v) * inverse, (1.0 + v_2 + v_2 * v_2) * inverse_2
     sign, sign_2 = 1.0 if low >= 0.0 else -1.0, 1.0 if high > 0.0 else -1.0
@@ -140,16 +160,16 @@ def facing_arc(p, radius, distance, low, high):
     whole = 2.0 / squared if inside else 0.0
     zeroth = (2.0 * whole / squared if inside else 0.0) + sign * zeroth - sign_2 * zeroth_2
     first = whole + sign * first - sign_2 * first_2
-    # The difference of asinh(u/p) at both ends.
+    # The ratio whose logarithm is the difference of asinh(u/p) at both ends.
     steep, steep_2 = rho + start, rho_2 + end
     ratio = steep_2 / steep if sign > 0.0 else steep / steep_2
     ratio = steep * steep_2 / squared if inside else ratio
-    # ∫ u⁴ ρ⁻⁵ du, and from it those of higher powers: a number, and what the logarithm is times.
+    # ∫ u⁴ ρ⁻⁵ du = rest + times · log(ratio), and the integrals of higher powers by recursion.
     v, v_2 = sign * v, sign_2 * v_2
     cube, cube_2 = v * v * v, v_2 * v_2 * v_2
     rest, times = v - v_2 - (cube_2 - cube) / 3.0, 1.0
     bend, share = 0.5 / radius, 0.25 / (radius * distance)
-    factor = share * ROOT[1]
+    factor = share * ROOT_SERIES[1]
     total = (bend * first - p * zeroth + factor * (3.0 * bend * rest - p * first)) / 3.0
     logarithm = factor * bend
     factor = share * share
@@ -157,8 +177,8 @@ def facing_arc(p, radius, distance, low, high):
         cube, cube_2 = cube * start * start, cube_2 * end * end
         down, falling = 1.0 / (2 * k - 2), (2 * k + 1) * squared
         next_rest, next_times = down * (cube_2 - cube - falling * rest), -down * falling * times
-        total += ROOT[k] * factor * (bend * next_rest - p * rest)
-        logarithm += ROOT[k] * factor * (bend * next_times - p * times)
+        total += ROOT_SERIES[k] * factor * (bend * next_rest - p * rest)
+        logarithm += ROOT_SERIES[k] * factor * (bend * next_times - p * times)
         rest, times = next_rest, next_times
         factor *= share
     root = math.sqrt(radius / distance)
@@ -166,30 +186,32 @@ def facing_arc(p, radius, distance, low, high):
 
 
 def arc_ends(piece):
-    """The directions of the two ends of an arc from its centre, (x, y), (x, y)."""
+    """Return the unit vectors from the centre of an arc to its two ends, (x, y), (x, y)."""
     squared = piece.half * piece.half
     c, s = (1.0 - squared) / (1.0 + squared), 2.0 * piece.half / (1.0 + squared)
-    x, y = piece.way_x, piece.way_y
+    x, y = piece.direction_x, piece.direction_y
     return (c * x + s * y, c * y - s * x), (c * x - s * y, c * y + s * x)
 
 
 def chord_to(x, y, distance, radius, end):
-    """u of an end of an arc from the direction of a point that is seen from its centre, and whether
-    the point faces it."""
+    """Return u of an end of an arc, and whether that end faces the point.
+
+    x, y: the point as seen from the centre; ``end``: the direction of the end.
+    """
     ahead, aside = x * end[0] + y * end[1], x * end[1] - y * end[0]
-    facing = ahead > (1.0 - 2.0 * FACING) * distance
+    facing = ahead > (1.0 - 2.0 * SERIES_LIMIT) * distance
     return aside * math.sqrt(2.0 * radius / (distance + ahead if facing else distance)), facing
 
 
 @loops_apart
 def add_arc(nodes, count, piece, inset, lens):
-    """The same as add_segment, of an arc."""
+    """Add S of an arc to each of ``count`` nodes, as `add_segment` does for a segment."""
     start, end = arc_ends(piece)
-    radius = max(piece.bend - inset, 0.5 * piece.bend)
+    radius = max(piece.arc_radius - inset, 0.5 * piece.arc_radius)
     for k in range(count):
         x, y = nodes.x[k] - piece.x, nodes.y[k] - piece.y
         distance = math.sqrt(x * x + y * y)
-        gap, known = distance - piece.inward, nodes.gap[k]
+        gap, known = distance - piece.core_depth, nodes.gap[k]
         nodes.gap[k] = gap if gap < known else known
         p = distance - radius
         reach = lens * lens - p * p
@@ -198,50 +220,58 @@ def add_arc(nodes, count, piece, inset, lens):
         high, faces_too = chord_to(x, y, distance, radius, end)
         low, high = low if low > -reach else -reach, high if high < reach else reach
         seen = low < high
+        # An empty interval would give log(0): use a harmless one, its result is discarded.
         high = high if seen else low + radius
-        found, logarithm, ratio = facing_arc(p, radius, distance, low, high)
+        found, logarithm, ratio = arc_by_series(p, radius, distance, low, high)
         faces = faces & faces_too & (p <= radius)
         seen = seen & faces
         nodes.attraction[k] += found if seen else 0.0
         nodes.log_share[k] = logarithm if seen else 0.0
         nodes.log_of[k] = ratio if faces else -1.0
-    # A logarithm is taken of one number at a time.
+    # Logarithms are scalar calls: a loop of its own keeps the loop above vectorised.
     for k in range(count):
         if nodes.log_of[k] < 0.0:
             x, y = nodes.x[k] - piece.x, nodes.y[k] - piece.y
-            nodes.attraction[k] += averted_arc(x, y, piece, radius, lens)
+            nodes.attraction[k] += arc_by_gauss(x, y, piece, radius, lens)
         elif nodes.log_share[k] != 0.0:
             log = math.log(nodes.log_of[k])
             nodes.attraction[k] += nodes.log_share[k] * log
 
 
-MADE_UP = 12.88
-"""Of 1 + 3s + c s², s = (gap/lens)²: with 6 the share of S that counts fades as smoothly as can be,
-and with this it is larger before that by what is missed where the gap of outlines that bend away
-from each other goes on growing beyond the lens. A fade that is steeper costs steps."""
+FADE_COEFFICIENT = 12.88
+"""c in the weight (1 − s)³ (1 + 3s + c s²), s = (gap/lens)², that fades S out towards the lens.
+
+c = 6 makes the fade as flat as possible. The larger value exceeds 1 before the end, by what is
+missed beyond the lens where the gap keeps growing as outlines curve apart. Steeper fades cost
+steps: a fade as 1 − (gap/lens)⁶ took a fifth more.
+"""
 
 
 @loops_apart
-def find_plates(nodes, count, inset, lens):
-    """From S at so many nodes the gaps (−3S/4)^{−1/3} [m] of plates that attract each other as
-    strongly; what is as far as ``lens`` [m] no longer counts."""
+def convert_to_plate_gaps(nodes, count, inset, lens):
+    """Convert S at the nodes to plate gaps (−3S/4)^{−1/3} [m]: plates at these gaps attract
+    equally.
+
+    S fades to zero at the distance ``lens`` [m].
+    """
     for k in range(count):
         share = nodes.gap[k] / lens
         share *= share
-        left = 1.0 - share
-        left *= left * left * (1.0 + share * (3.0 + share * MADE_UP))
-        cube = -0.75 * nodes.attraction[k] * left
+        weight = 1.0 - share
+        weight *= weight * weight * (1.0 + share * (3.0 + share * FADE_COEFFICIENT))
+        cube = -0.75 * nodes.attraction[k] * weight
         nodes.attraction[k] = cube
-        # Nearly that of a plane as near: two steps from there leave 1e-16 of it.
-        parted = nodes.gap[k] + inset
-        ratio = cube * parted * parted * parted
+        # The plate gap is close to the gap itself, so S gap³ is near 1: two steps of a fourth-order
+        # iteration for the cube root leave 1e-16.
+        shifted_gap = nodes.gap[k] + inset
+        ratio = cube * shifted_gap * shifted_gap * shifted_gap
         known = (ratio > 0.1) & (ratio < 1.25)
         root = CUBE_ROOT[2] + ratio * CUBE_ROOT[3]
         root = CUBE_ROOT[0] + ratio * (CUBE_ROOT[1] + ratio * root)
         for _ in range(2):
             off = 1.0 - ratio * root * root * root
             root *= 1.0 + off * (1.0 / 3.0 + off * (2.0 / 9.0 + off * (14.0 / 81.0)))
-        nodes.plate_gap[k] = parted * root if known else -1.0
+        nodes.plate_gap[k] = shifted_gap * root if known else -1.0
     for k in range(count):
         if nodes.plate_gap[k] < 0.0:
             cube = nodes.attraction[k]
@@ -249,62 +279,71 @@ def find_plates(nodes, count, inset, lens):
             nodes.plate_gap[k] = min(far, NO_ATTRACTION)
 
 
-def share_of_depth(distance, depth):
-    """q at a distance; depth inf: 1."""
+def finite_depth_factor(distance, depth):
+    """Return q at a distance; 1 for infinite depth."""
     if depth == math.inf:
         return 1.0
     t = distance / depth
     if t > 30.0:
-        # What is left of large numbers, whose rounding grows as t³.
+        # Asymptotic series: the closed form cancels, with rounding errors that grow as t³.
         return 2.0 / math.pi * (0.75 - 1.0 / (6.0 * t * t)) / t
     rest = math.atan(1.0 / t) - 0.5 * t + 0.5 * t * t * t * math.log1p(1.0 / (t * t))
     return 2.0 / math.pi * rest
 
 
-def on_line(p, low, high, depth, rule):
-    """∫ q ρ⁻³ ds along a line at the distance p, over a part of it on one side of the foot, by
-    s = p sinh(t) [1/m²]."""
+def line_integral(p, low, high, depth, rule):
+    """Return ∫ q ρ⁻³ ds along a line at the distance p, on one side of its foot [1/m²].
+
+    The substitution s = p sinh(t) makes the integrand smooth.
+    """
     total, p = 0.0, abs(p)
     first, last = math.asinh(low / p), math.asinh(high / p)
-    count = 1 + int((last - first) / PANEL)
+    count = 1 + int((last - first) / LONGEST_PANEL)
     half = 0.5 * (last - first) / count
     for panel in range(count):
         middle = first + (2.0 * panel + 1.0) * half
         for k in range(rule.shape[1]):
             rise = math.cosh(middle + half * rule[0, k])
-            total += rule[1, k] * share_of_depth(p * rise, depth) / (rise * rise)
+            total += rule[1, k] * finite_depth_factor(p * rise, depth) / (rise * rise)
     return half * total / (p * p)
 
 
-def from_segment(x, y, piece, depth, rule):
-    """∫ q ρ⁻³ ds over a segment, seen from a point [1/m²]."""
+def segment_integral(x, y, piece, depth, rule):
+    """Return ∫ q ρ⁻³ ds over a segment, seen from a point [1/m²]."""
     dx, dy = x - piece.x, y - piece.y
-    p, along = dx * piece.way_y - dy * piece.way_x, dx * piece.way_x + dy * piece.way_y
+    p, along = (
+        dx * piece.direction_y - dy * piece.direction_x,
+        dx * piece.direction_x + dy * piece.direction_y,
+    )
     low, high = -piece.half - along, piece.half - along
     if low < 0.0 < high or abs(p) > 1e-3 * min(abs(low), abs(high)):
+        # Closed form: ∫ ρ⁻³ ds = s/(p² ρ).
         if depth == math.inf:
             first, last = low / math.sqrt(p * p + low * low), high / math.sqrt(p * p + high * high)
             return (last - first) / (p * p)
         if low < 0.0 < high:
-            below = on_line(p, low, 0.0, depth, rule)
-            return below + on_line(p, 0.0, high, depth, rule)
-        return on_line(p, low, high, depth, rule)
-    # On the line of the segment, beside it: by the logarithm of the distance, which may be small.
+            below = line_integral(p, low, 0.0, depth, rule)
+            return below + line_integral(p, 0.0, high, depth, rule)
+        return line_integral(p, low, high, depth, rule)
+    # The point lies (nearly) on the line beyond an end: integrate over the logarithm of the
+    # distance, which may be small.
     total = 0.0
     first, last = math.log(min(abs(low), abs(high))), math.log(max(abs(low), abs(high)))
     middle, half = 0.5 * (first + last), 0.5 * (last - first)
     for k in range(rule.shape[1]):
         s = math.exp(middle + half * rule[0, k])
         squared = p * p + s * s
-        share = share_of_depth(math.sqrt(squared), depth)
+        share = finite_depth_factor(math.sqrt(squared), depth)
         total += rule[1, k] * share * s / (squared * math.sqrt(squared))
     return half * total
 
 
-def from_arc(x, y, nx, ny, piece, depth, rule):
-    """∫ (n·n(s)) q ρ⁻³ ds over an arc, seen from a point with a normal [1/m²]: by panels that grow
-    with the distance from where the point faces its circle."""
-    foot = min(max(parameter_beside(piece, x, y), -piece.half), piece.half)
+def arc_integral(x, y, nx, ny, piece, depth, rule):
+    """Return ∫ (n·n(s)) q ρ⁻³ ds over an arc, seen from a point with a normal [1/m²].
+
+    Panels double in size away from the point of the circle that faces the given one.
+    """
+    foot = min(max(parameter_facing(piece, x, y), -piece.half), piece.half)
     fx, fy, _, _, metres = at_parameter(piece, foot)
     near = math.sqrt((x - fx) * (x - fx) + (y - fy) * (y - fy)) / metres
     total = 0.0
@@ -320,71 +359,75 @@ def from_arc(x, y, nx, ny, piece, depth, rule):
             for k in range(rule.shape[1]):
                 x_2, y_2, nx_2, ny_2, length = at_parameter(piece, middle + half * rule[0, k])
                 squared = (x - x_2) * (x - x_2) + (y - y_2) * (y - y_2)
-                share = share_of_depth(math.sqrt(squared), depth)
+                share = finite_depth_factor(math.sqrt(squared), depth)
                 alike = nx * nx_2 + ny * ny_2
                 total += half * rule[1, k] * length * share * alike / (squared * math.sqrt(squared))
             begin, step = stop, 2.0 * step
     return total
 
 
-def on_panel(one, other, low, high, depth, rule):
-    """The sum over a panel of a piece and all of another [1/m]."""
+def panel_integral(one, other, low, high, depth, rule):
+    """Return the integral over a panel of one piece and the whole of another [1/m]."""
     total, middle, half = 0.0, 0.5 * (low + high), 0.5 * (high - low)
     for k in range(rule.shape[1]):
         x, y, nx, ny, metres = at_parameter(one, middle + half * rule[0, k])
-        if other.bend > 0.0:
-            found = from_arc(x, y, nx, ny, other, depth, rule)
+        if other.arc_radius > 0.0:
+            found = arc_integral(x, y, nx, ny, other, depth, rule)
         else:
-            alike = nx * other.way_y - ny * other.way_x
-            found = alike * from_segment(x, y, other, depth, rule)
+            alike = nx * other.direction_y - ny * other.direction_x
+            found = alike * segment_integral(x, y, other, depth, rule)
         total += rule[1, k] * metres * found
     return half * total
 
 
-def between_marks(one, other, mark, end, depth, rule):
-    """The sum from a mark to an end of a piece, by panels each twice as long as the one before."""
+def graded_integral(one, other, mark, end, depth, rule):
+    """Return the integral from a mark to an end of a piece, by panels that double in size."""
     x, y, _, _, metres = at_parameter(one, mark)
-    step = FINEST * max(abs(distance_to(x, y, other)), 1e-9 * one.extent) / metres
+    step = FINEST_PANEL * max(abs(distance_to(x, y, other)), 1e-9 * one.extent) / metres
     total, begin, way = 0.0, mark, 1.0 if end > mark else -1.0
     while (end - begin) * way > 0.0:
         stop = begin + way * step
         if (end - stop) * way < 0.5 * step:
             stop = end
-        total += on_panel(one, other, min(begin, stop), max(begin, stop), depth, rule)
+        total += panel_integral(one, other, min(begin, stop), max(begin, stop), depth, rule)
         begin, step = stop, 2.0 * step
     return total
 
 
-def between_pieces(one, other, depth, rule, marks):
-    """∬ (n₁·n₂) q ρ⁻³ ds₁ ds₂ of two pieces [1/m]."""
+def piece_pair_integral(one, other, depth, rule, marks):
+    """Return ∬ (n₁·n₂) q ρ⁻³ ds₁ ds₂ of two pieces [1/m]."""
     first, last = ends_of(one)
-    _, _, _, x, y = between_cores(one, other)
-    marks[0] = min(max(parameter_beside(one, x, y), first), last)
+    _, _, _, x, y = closest_points(one, other)
+    # Marks where the integrand peaks: nearest to the other piece and to its two ends.
+    marks[0] = min(max(parameter_facing(one, x, y), first), last)
     low, high = ends_of(other)
     for k in range(2):
         x, y, _, _, _ = at_parameter(other, low if k == 0 else high)
-        marks[1 + k] = min(max(parameter_beside(one, x, y), first), last)
+        marks[1 + k] = min(max(parameter_facing(one, x, y), first), last)
+    # Sort the three marks by insertion.
     for k in range(1, 3):
         place = k
         while place > 0 and marks[place - 1] > marks[place]:
             marks[place - 1], marks[place] = marks[place], marks[place - 1]
             place -= 1
-    total = between_marks(one, other, marks[0], first, depth, rule)
-    total += between_marks(one, other, marks[2], last, depth, rule)
+    # Grade panels away from each mark, on both sides.
+    total = graded_integral(one, other, marks[0], first, depth, rule)
+    total += graded_integral(one, other, marks[2], last, depth, rule)
     for k in range(2):
         middle = 0.5 * (marks[k] + marks[k + 1])
-        total += between_marks(one, other, marks[k], middle, depth, rule)
-        total += between_marks(one, other, marks[k + 1], middle, depth, rule)
+        total += graded_integral(one, other, marks[k], middle, depth, rule)
+        total += graded_integral(one, other, marks[k + 1], middle, depth, rule)
     return total
 
 
 def sum_of_pairs(pieces_a, pieces_b, x, y, angle, depth, rule, marks):
-    """∮∮ (n₁·n₂) q ρ⁻³ ds₁ ds₂ of two outlines, a lying at x, y [m] and an angle from b [1/m]."""
+    """Return ∮∮ (n₁·n₂) q ρ⁻³ ds₁ ds₂ of two outlines [1/m]; a lies at x, y [m] and an angle in b's
+    frame."""
     pose, total = Pose(x, y, math.cos(angle), math.sin(angle)), 0.0
     for i in range(pieces_a.shape[0]):
         one = placed(pieces_a, i, pose)
         for j in range(pieces_b.shape[0]):
-            total += between_pieces(one, piece_at(pieces_b, j), depth, rule, marks)
+            total += piece_pair_integral(one, piece_at(pieces_b, j), depth, rule, marks)
     return total
 
 
@@ -395,10 +438,27 @@ def attraction_energy(
     hamaker: float,
     depth: float = math.inf,
 ) -> float:
-    """E [J] of two outlines of a depth [m], or that of a metre of it [J/m] where it is inf.
+    """Return the van der Waals energy of two outlines that do not touch.
 
-    ``pieces_a``, ``pieces_b``: of `outline_pieces`; ``pose``: x, y [m] and angle [rad] of a in the
-    frame of b. The outlines may not touch.
+    Parameters
+    ----------
+    pieces_a, pieces_b : arrays of Piece
+        Outlines, from `outline_pieces` or `polygon_pieces`.
+    pose : (float, float, float)
+        Position [m] and angle [rad] of a in the frame of b.
+    hamaker : float
+        Hamaker constant H_A [J].
+    depth : float, optional
+        Extent in the third direction [m]; infinite by default.
+
+    Returns
+    -------
+    float
+        Energy [J]; per metre of depth [J/m] if the depth is infinite.
+
+    Notes
+    -----
+    Pairwise summation of −C/r⁶ (Hamaker 1937); equations at the top of the module.
     """
     rule = np.array([NODES, WEIGHTS])
     x, y, angle = (float(each) for each in pose)

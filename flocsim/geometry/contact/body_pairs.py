@@ -1,46 +1,47 @@
-"""Which bodies may come near each other before they have moved much: the pairs that are watched.
+"""Lists of pairs of bodies that may approach each other before the next listing (broad phase).
 
-A pair counts where one of its bodies is free: fixed ones do not act on each other, however many
-there are, and may overlap. Of few bodies all such pairs are watched; of many, those whose bounding
-circles are near. A pair that counts and is not listed lies further apart than what acts on it
-reaches, and than two bodies may go until the next listing.
+A pair can interact if at least one of its bodies is free; fixed bodies do not act on each other,
+and may overlap. Among few bodies all such pairs are listed, among many those whose bounding circles
+are near. A pair that can interact and is not listed lies further apart than the reach of its forces
+plus the distance that two bodies may travel until the next listing.
 
-Which of many discs come near each other while each goes straight on is found by a sweep along x:
-discs lie in the order of their left ends, and each is compared with those that begin before it
-ends; that order is kept from one time to the next, so that sorting it anew costs next to nothing.
-Where space repeats itself, the sweep goes on round the seam.
+The near pairs of many discs, each moving along a straight line, are found by sweep and prune along
+x: discs are sorted by their left ends, and each is compared with those that begin before it ends.
+The order is kept from one listing to the next, so sorting costs next to nothing. In a periodic
+domain the sweep continues across the seam.
 """
 
 import math
 
-from flocsim.geometry.contact.points import length_of, nearest_way
+from flocsim.geometry.contact.points import length_of, nearest_displacement
 from flocsim.hooks import hook
 from flocsim.state.bodies import X, Y
 from flocsim.state.clock import PAIRS_FULL
 from flocsim.state.work import ALL_PAIRS, NOW
 
-WANDER = 0.25
-"""How far a body may go against the mean of all, in mean bounding radii, until pairs are listed
-anew."""
+TRAVEL = 0.25
+"""Displacement relative to the mean of all bodies, over their mean bounding radius, that triggers a
+new listing."""
 
 
-def watches_all(work):
-    """Whether all pairs that count are watched."""
+def lists_all_pairs(work):
+    """Return True if all pairs that can interact are listed."""
     return work.poses.shape[0] <= ALL_PAIRS
 
 
-def wander_of(scene):
-    """How far a body may go until the pairs are listed anew [m]."""
+def travel_limit(scene):
+    """Return how far a body may travel until pairs are listed again [m]."""
     total, free = 0.0, 0
     for body in range(scene.bodies.shape[0]):
         if scene.bodies[body].free == 1.0:
             total += scene.bodies[body].bounding_radius
             free += 1
-    return WANDER * total / max(free, 1)
+    return TRAVEL * total / max(free, 1)
 
 
-def drift_of(scene, work, state):
-    """The mean way (x, y) of all bodies since the listing; none where one is fixed."""
+def mean_displacement(scene, work, state):
+    """Return the mean displacement (x, y) [m] of all bodies since the listing; 0 if one is
+    fixed."""
     x = y = 0.0
     for body in range(scene.bodies.shape[0]):
         pose = work.poses[body]
@@ -54,7 +55,7 @@ def drift_of(scene, work, state):
 
 
 def mean_velocity(scene, work):
-    """The mean velocity (x, y) of all bodies; none where one is fixed."""
+    """Return the mean velocity (x, y) [m/s] of all bodies; 0 if one is fixed."""
     x = y = 0.0
     for body in range(scene.bodies.shape[0]):
         if scene.bodies[body].free == 0.0:
@@ -65,10 +66,10 @@ def mean_velocity(scene, work):
 
 
 @hook
-def wandered(scene, work, state):
-    """The largest share of its way that a body has gone since the listing, against the mean."""
-    most, furthest = wander_of(scene), 0.0
-    drift_x, drift_y = drift_of(scene, work, state)
+def travelled_share(scene, work, state):
+    """Return the largest displacement relative to the mean since the listing, over its limit."""
+    most, furthest = travel_limit(scene), 0.0
+    drift_x, drift_y = mean_displacement(scene, work, state)
     for body in range(scene.bodies.shape[0]):
         pose = work.poses[body]
         x = work.place[state, body, X] - pose.listed_x - drift_x
@@ -78,9 +79,10 @@ def wandered(scene, work, state):
 
 
 @hook
-def time_to_wander(scene, work, share):
-    """The time [s] in which no body goes further than a share of its way, at constant speed."""
-    most, fastest = wander_of(scene), 0.0
+def time_to_travel(scene, work, share):
+    """Return the time [s] in which no body uses more than a share of its limit, at constant
+    speed."""
+    most, fastest = travel_limit(scene), 0.0
     drift_x, drift_y = mean_velocity(scene, work)
     for body in range(scene.bodies.shape[0]):
         x = work.velocity[NOW, body, X] - drift_x
@@ -91,12 +93,14 @@ def time_to_wander(scene, work, share):
 
 @hook
 def list_near(scene, work, cut):
-    """List the pairs whose bounding circles are nearer than a gap, sorted; False without room."""
+    """List the pairs whose bounding circles are closer than ``cut`` [m], sorted; False without
+    room."""
     discs, (width, height) = work.discs, scene.box
     for body in range(work.poses.shape[0]):
         discs[body].x = work.place[NOW, body, X]
         discs[body].y = work.place[NOW, body, Y]
         discs[body].way_x = discs[body].way_y = 0.0
+        # Half of the cut-off is added to each circle.
         discs[body].reach = scene.bodies[body].bounding_radius + 0.5 * cut
         discs[body].moves = scene.bodies[body].free
     total = near_pairs(discs, work.order, width, height, work.starts, work.pairs)
@@ -110,14 +114,15 @@ def list_near(scene, work, cut):
 
 
 def list_pairs(scene, work, cut):
-    """List the pairs of bodies that may come nearer than a gap [m]; False without room."""
-    if watches_all(work):
+    """List the pairs of bodies that may come closer than a gap [m]; return False without room."""
+    if lists_all_pairs(work):
         return True
-    return list_near(scene, work, cut + 2.0 * wander_of(scene))
+    # Both bodies may travel by the limit before the next listing.
+    return list_near(scene, work, cut + 2.0 * travel_limit(scene))
 
 
-def place_ends(discs, width):
-    """Fill in where every disc begins and ends along x, all of its way."""
+def update_extents(discs, width):
+    """Store the left and right ends of every disc's swept extent along x."""
     for disc in range(discs.shape[0]):
         way, reach = discs[disc].way_x, discs[disc].reach
         left = discs[disc].x + min(way, 0.0) - reach
@@ -128,8 +133,10 @@ def place_ends(discs, width):
 
 
 def sort_discs(discs, order):
-    """Sort the discs by their left ends, equal ones by their numbers, by insertion: their order
-    has hardly changed."""
+    """Sort the discs by left end, ties by number.
+
+    Insertion sort: the order has hardly changed since the last listing.
+    """
     for place in range(1, order.shape[0]):
         disc, free = order[place], place
         left = discs[disc].left
@@ -142,14 +149,15 @@ def sort_discs(discs, order):
         order[free] = disc
 
 
-def come_near(discs, a, b, width, height):
-    """Whether two discs touch at any time of their ways."""
+def paths_meet(discs, a, b, width, height):
+    """Return True if two discs touch at any time along their paths."""
     if discs[a].moves + discs[b].moves == 0.0:
         return False
     way_x, way_y = discs[a].way_x - discs[b].way_x, discs[a].way_y - discs[b].way_y
-    # By the image that is nearest half way.
-    x = nearest_way(discs[a].x - discs[b].x + 0.5 * way_x, width) - 0.5 * way_x
-    y = nearest_way(discs[a].y - discs[b].y + 0.5 * way_y, height) - 0.5 * way_y
+    # The periodic image that is nearest halfway along the relative path.
+    x = nearest_displacement(discs[a].x - discs[b].x + 0.5 * way_x, width) - 0.5 * way_x
+    y = nearest_displacement(discs[a].y - discs[b].y + 0.5 * way_y, height) - 0.5 * way_y
+    # Closest approach: minimise |x + share · way| over shares in [0, 1].
     length2, share = way_x * way_x + way_y * way_y, 0.0
     if length2 > 0.0:
         share = min(max(-(x * way_x + y * way_y) / length2, 0.0), 1.0)
@@ -159,13 +167,17 @@ def come_near(discs, a, b, width, height):
 
 
 def sweep(discs, order, width, height, starts, pairs, fill):
-    """Count the near ones among the discs before every disc, in ``starts``; or, where ``fill``,
-    write (later, earlier) of every near pair to ``pairs``, from the later one's start on."""
+    """Count or store the pairs of discs that come near.
+
+    If ``fill`` is False, add to ``starts[later]`` the number of near pairs of each later disc; else
+    write (later, earlier) to ``pairs``, from ``starts[later]`` on.
+    """
     n = order.shape[0]
     for place in range(n):
         a = order[place]
         for step in range(1, n):
             there, shift = place + step, 0.0
+            # Beyond the last disc the sweep goes on with the first ones, shifted by one period.
             if there >= n:
                 if width == math.inf:
                     break
@@ -173,11 +185,11 @@ def sweep(discs, order, width, height, starts, pairs, fill):
             b = order[there]
             if discs[b].left + shift > discs[a].right:
                 break
-            # Round the box, two long discs find each other twice: the shorter way counts.
+            # Across the seam two long discs can meet twice: keep the shorter way round.
             longer = width < math.inf and (2 * step > n or (2 * step == n and a > b))
             if longer and discs[a].left + width - shift <= discs[b].right:
                 continue
-            if come_near(discs, a, b, width, height):
+            if paths_meet(discs, a, b, width, height):
                 later = max(a, b)
                 if fill:
                     pairs[starts[later]].later, pairs[starts[later]].earlier = later, min(a, b)
@@ -185,7 +197,7 @@ def sweep(discs, order, width, height, starts, pairs, fill):
 
 
 def sort_rows(pairs, first, end):
-    """Sort one disc's pairs by the other one."""
+    """Sort the pairs of one disc by the number of the other."""
     for row in range(first + 1, end):
         other, free = pairs[row].earlier, row
         while free > first and pairs[free - 1].earlier > other:
@@ -195,14 +207,17 @@ def sort_rows(pairs, first, end):
 
 
 def near_pairs(discs, order, width, height, starts, pairs):
-    """Write all (later, earlier) that come near each other, sorted; how many there are, more than
-    ``pairs`` has room for where they are not all written."""
+    """Write all pairs (later, earlier) that come near, sorted; return their number.
+
+    If there are more than ``pairs`` has room for, not all are written.
+    """
     n = discs.shape[0]
-    place_ends(discs, width)
+    update_extents(discs, width)
     sort_discs(discs, order)
     for disc in range(n):
         starts[disc] = 0
     sweep(discs, order, width, height, starts, pairs, False)
+    # Counting sort by the later disc: counts become start indices.
     total = 0
     for disc in range(n):
         count = starts[disc]
@@ -211,7 +226,7 @@ def near_pairs(discs, order, width, height, starts, pairs):
     if total > pairs.shape[0]:
         return total
     sweep(discs, order, width, height, starts, pairs, True)
-    # Every start has come to the next one's by now.
+    # The fill has advanced every start index to the next disc's start.
     first = 0
     for disc in range(n):
         sort_rows(pairs, first, starts[disc])

@@ -1,80 +1,105 @@
-"""Candidates: which vertex–edge pairs can touch before the bodies have moved much further; and
-their tangential displacements, kept as lists are made anew and passed on as contacts roll.
+"""Lists of candidates: vertex–edge pairs that may touch before the bodies have moved much further.
 
-Pairs are listed while their gap is below a cut-off, and the list holds as long as the relative
-motion of the two bodies stays within a budget. Which pairs of bodies are watched at all:
-body_pairs.py.
+This is a Verlet list with a skin. Pairs are listed while their gap is below a cut-off (the skin).
+The list of two bodies stays valid until their relative motion exceeds a budget. Which pairs of
+bodies are considered: body_pairs.py.
+
+Tangential displacements ξ are stored per row. They are saved and restored as lists are rebuilt, and
+passed to the neighbouring pair of features as a contact rolls from one edge to the next.
 """
 
 import math
 
-from flocsim.geometry.contact.body_pairs import list_pairs, time_to_wander, wandered, watches_all
+from flocsim.geometry.contact.body_pairs import (
+    list_pairs,
+    lists_all_pairs,
+    time_to_travel,
+    travelled_share,
+)
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
 from flocsim.geometry.contact.points import contact_point, length_of, separation
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.contacts import GRAZES
-from flocsim.state.work import CARRIED, NOW
+from flocsim.state.contacts import GRAZING
+from flocsim.state.work import NOW, PROPAGATED
 
 SKIN = 0.1
-"""Pairs are listed up to a gap of this share of r_i + r_j, or up to the smaller one of …"""
+"""Smallest skin over r_i + r_j (spheroradii).
+
+The skin is the larger of this, and of the smaller of SKIN_OF_EDGE and SKIN_OF_SIZE.
+"""
 
 SKIN_OF_EDGE = 0.3
-"""… this share of the shorter edges' length, so that few are listed but lists last, …"""
+"""Skin over the mean edge length: few pairs are listed, yet lists last."""
 
 SKIN_OF_SIZE = 0.1
-"""… and this share of the smaller body, whatever is larger."""
+"""Skin over the smaller bounding radius, an upper bound for coarse polygons."""
 
-LASTING, WIDEST = 2.2, 12.0
-"""Lists are made for so many steps at the speeds of now, up to so many times as wide: half of that
-is for the first."""
+STEPS_PER_LIST, MOST_WIDENING = 2.2, 12.0
+"""STEPS_PER_LIST: list for so many steps at the present speed. MOST_WIDENING: at most so many times
+the skin.
 
-TOO_WIDE = 4.0
-"""Of few bodies they are made anew where they are so many times as wide as that."""
+A listed but distant row costs 30 ns per step, a rebuild 3 µs. Half of the budget is for the first
+step.
+"""
 
-ONE_POINT = 1e-6
-"""Contact points that are no farther apart than this share of r_i + r_j are one."""
+EXCESS_WIDTH = 4.0
+"""Lists of few bodies are rebuilt if their budget is so many times the needed skin: after a long
+flight an impact would otherwise carry its long list."""
 
-MOST_AHEAD, LEAST_USED = 0.8, 0.1
-"""Shares of its budget that a pair of few bodies may have spent behind a step, and that it has to
-have spent before lists are made anew for the sake of a longer step."""
+SAME_POINT = 1e-6
+"""Contact points closer than this share of r_i + r_j coincide (up to four pairs at a corner)."""
+
+MOST_SPENT, LEAST_SPENT = 0.8, 0.1
+"""MOST_SPENT: share of its budget that a pair of few bodies may spend by the end of a step.
+LEAST_SPENT: share that it must have spent before a longer step justifies a rebuild.
+
+In contact half of the budget is the limit: with longer steps one hook in three hundred let go.
+"""
 
 
 def edge_length(scene, body):
-    """The mean length of a body's edges [m], as if its outline were a circle's."""
+    """Return the mean edge length of a body [m], its outline taken as a circle."""
     points = scene.first[body + 1] - scene.first[body]
     return 2.0 * math.pi * scene.bodies[body].equivalent_radius / points
 
 
-def widened(skin, way):
-    """A cut-off gap for bodies that come nearer to each other by so much in a step [m]."""
-    return min(max(skin, LASTING * way), WIDEST * skin)
+def widened_skin(skin, approach):
+    """Return the skin for bodies that approach by ``approach`` [m] in a step, within its limits."""
+    return min(max(skin, STEPS_PER_LIST * approach), MOST_WIDENING * skin)
 
 
 def skin_of(scene, work, a, b, ahead):
-    """Cut-off gap of the list of a pair of bodies for steps of ``ahead`` [s] [m]."""
+    """Return the skin [m] of two bodies for steps of ``ahead`` [s]."""
     size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)
     edge = min(edge_length(scene, a), edge_length(scene, b))
     contact = scene.bodies[a].radius + scene.bodies[b].radius
     skin = max(SKIN * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * size))
-    return widened(skin, relative_speed(scene, work, a, b) * ahead)
+    return widened_skin(skin, relative_speed(scene, work, a, b) * ahead)
 
 
 def list_for_surface_force(scene, work, pair, skin, reach):
-    """List what can become the closest pair before the budget is spent; the budget [m]."""
+    """List the pairs that can become the closest before the budget is spent; return the
+    budget [m]."""
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
     least = gap_between(scene, work, a, b)
+    # Beyond the reach nothing has to be listed until the bodies have moved by the difference.
     if least > reach + skin:
         return least - reach
-    spend = max(0.5 * skin, 0.1 * least)
-    if list_polygons(scene, work, pair, max(skin, least + 2.0 * spend)):
-        return spend
+    # If the bodies move by ``budget``, the closest pair can recede and any other approach by as
+    # much: pairs with gaps up to least + 2 budget can become the closest.
+    budget = max(0.5 * skin, 0.1 * least)
+    if list_polygons(scene, work, pair, max(skin, least + 2.0 * budget)):
+        return budget
+    # No room: a budget that is spent at once.
     return -math.inf
 
 
-def widest_cut(scene, work, ahead):
-    """The gap of bounding circles from which on no two bodies act, nor are they listed for steps of
-    ``ahead`` [s] [m]."""
+def largest_cutoff(scene, work, ahead):
+    """Return the gap [m] of bounding circles beyond which no two bodies interact or are listed.
+
+    ``ahead``: size of the coming steps [s].
+    """
     largest, contact, edge, fastest = 0.0, 0.0, 0.0, 0.0
     for body in range(scene.bodies.shape[0]):
         if scene.bodies[body].free == 1.0:
@@ -84,50 +109,57 @@ def widest_cut(scene, work, ahead):
         contact = max(contact, scene.bodies[body].radius)
     skin = max(SKIN * 2.0 * contact, min(SKIN_OF_EDGE * edge, SKIN_OF_SIZE * largest))
     reach = max(0.0, scene.listed_reach, scene.centre_reach)
-    return reach + widened(skin, 2.0 * fastest * ahead)
+    return reach + widened_skin(skin, 2.0 * fastest * ahead)
 
 
 def list_pair(scene, work, pair, ahead):
-    """List the candidates of two bodies for steps of ``ahead`` [s]; how far they may move before it
-    must be made again."""
+    """List the candidates of two bodies for steps of ``ahead`` [s].
+
+    Return how far they may move relative to each other before the list must be rebuilt [m].
+    """
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
     ox, oy = separation(scene, work, NOW, a, b)
     reach = scene.listed_reach
     skin = skin_of(scene, work, a, b, ahead)
-    apart = length_of(ox, oy) - scene.bodies[a].bounding_radius - scene.bodies[b].bounding_radius
-    if apart > max(0.0, reach) + skin:
-        return apart - max(0.0, reach)
+    # First test with bounding circles, then by the features.
+    clearance = (
+        length_of(ox, oy) - scene.bodies[a].bounding_radius - scene.bodies[b].bounding_radius
+    )
+    if clearance > max(0.0, reach) + skin:
+        return clearance - max(0.0, reach)
     if reach > 0.0:
         return list_for_surface_force(scene, work, pair, skin, reach)
     before = work.tally.candidates
     if not list_polygons(scene, work, pair, skin):
         return -math.inf
+    # Nothing is within the skin: the exact distance allows more motion than the skin does.
     if work.tally.candidates == before:
         return max(skin, gap_between(scene, work, a, b))
     return skin
 
 
 def core_radius(scene, body):
-    """Largest distance of a core point from the centroid [m]: 0 for a sphere."""
+    """Return the largest distance of a core point from the centroid [m]: 0 for a sphere."""
     return scene.bodies[body].bounding_radius - scene.bodies[body].radius
 
 
-def shifted_by(dx, dy, ox, oy, turn):
-    """How far (dx, dy) lies from (ox, oy) turned by an angle."""
+def distance_after_turn(dx, dy, ox, oy, turn):
+    """Return the distance [m] of (dx, dy) from (ox, oy) turned by an angle."""
     c, s = math.cos(turn), math.sin(turn)
     x, y = dx - (c * ox - s * oy), dy - (s * ox + c * oy)
     return length_of(x, y)
 
 
-def moved(scene, work, state, a, b, enough):
-    """How far the cores of two bodies may have moved against each other since the listing [m].
+def relative_displacement(scene, work, state, a, b, enough):
+    """Return an upper bound [m] of the relative displacement of two cores since the listing.
 
-    Seen from b, all of a's core has moved by no more than its centroid, plus the relative turn
-    times its size; seen from a, the same holds of b: a doublet that turns as one does not count.
-    Where a plainer bound, which needs no turning, stays below ``enough``, that one is given.
+    Seen from b, every point of a's core has moved by at most the displacement of a's centroid plus
+    the relative rotation times a's size; the same holds seen from a. A doublet that rotates rigidly
+    therefore spends nothing. If a simpler bound, without cosines, is below ``enough``, that one is
+    returned.
     """
     dx, dy = separation(scene, work, state, a, b)
-    # Of the same image of a as now.
+    # In a periodic domain: measured to the same image as at the listing.
     ox = work.poses[a].listed_x - work.poses[b].listed_x
     oy = work.poses[a].listed_y - work.poses[b].listed_y
     ox += dx - (work.place[state, a, X] - work.place[state, b, X])
@@ -135,33 +167,41 @@ def moved(scene, work, state, a, b, enough):
     turn_a = work.place[state, a, ANGLE] - work.poses[a].listed_angle
     turn_b = work.place[state, b, ANGLE] - work.poses[b].listed_angle
     size_a, size_b = core_radius(scene, a), core_radius(scene, b)
-    plain = shifted_by(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
-    if plain < enough:
-        return plain
+    # Simple bound: displacement of the centroids plus both rotations times the sizes.
+    simple_bound = (
+        distance_after_turn(dx, dy, ox, oy, 0.0) + abs(turn_a) * size_a + abs(turn_b) * size_b
+    )
+    if simple_bound < enough:
+        return simple_bound
     turn = abs(turn_a - turn_b)
-    seen_from_b = shifted_by(dx, dy, ox, oy, turn_b) + turn * size_a
-    seen_from_a = shifted_by(dx, dy, ox, oy, turn_a) + turn * size_b
-    return min(plain, seen_from_b, seen_from_a)
+    seen_from_b = distance_after_turn(dx, dy, ox, oy, turn_b) + turn * size_a
+    seen_from_a = distance_after_turn(dx, dy, ox, oy, turn_a) + turn * size_b
+    return min(simple_bound, seen_from_b, seen_from_a)
 
 
-def spent(scene, work, state):
-    """Largest share of its motion budget that any pair of bodies has used (above 1: too far)."""
+def spent_budget(scene, work, state):
+    """Return the largest used share of a motion budget over all pairs of bodies (above 1:
+    invalid)."""
     worst = 0.0
-    if not watches_all(work):
+    if not lists_all_pairs(work):
+        # Nothing has been listed yet.
         if work.tally.rebuilds == 0:
             return math.inf
-        worst = wandered(scene, work, state)
+        worst = travelled_share(scene, work, state)
     for pair in range(work.tally.pairs):
         budget = work.budget[pair]
         if budget <= 0.0:
             return math.inf
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
-        worst = max(worst, moved(scene, work, state, a, b, 0.25 * budget) / budget)
+        worst = max(worst, relative_displacement(scene, work, state, a, b, 0.25 * budget) / budget)
     return worst
 
 
 def relative_speed(scene, work, a, b):
-    """How fast the cores of two bodies can move against each other now [m/s]; see `moved`."""
+    """Return an upper bound of the relative speed of two cores [m/s].
+
+    It is the rate of `relative_displacement`.
+    """
     x, y = separation(scene, work, NOW, a, b)
     vx, vy = (
         work.velocity[NOW, a, X] - work.velocity[NOW, b, X],
@@ -175,14 +215,15 @@ def relative_speed(scene, work, a, b):
 
 
 def outline_speed(scene, work, body):
-    """A bound of how fast the core of a body moves now [m/s]."""
+    """Return an upper bound of the speed of a body's core points [m/s]."""
     turning = abs(work.velocity[NOW, body, ANGLE]) * core_radius(scene, body)
     return length_of(work.velocity[NOW, body, X], work.velocity[NOW, body, Y]) + turning
 
 
-def time_within(scene, work, share):
-    """The time [s] in which no pair spends more than a share of its budget, at constant speed."""
-    longest = math.inf if watches_all(work) else time_to_wander(scene, work, share)
+def time_to_spend(scene, work, share):
+    """Return the time [s] in which no pair spends more than a share of its budget, at constant
+    speed."""
+    longest = math.inf if lists_all_pairs(work) else time_to_travel(scene, work, share)
     for pair in range(work.tally.pairs):
         speed = relative_speed(scene, work, work.pairs[pair].later, work.pairs[pair].earlier)
         if speed > 0.0:
@@ -190,45 +231,51 @@ def time_within(scene, work, share):
     return longest
 
 
-def share_ahead(scene, work):
-    """The share of the budgets that the next step may spend at constant speed: half of them or, of
-    few bodies, whose lists are soon made anew, most of what is left."""
-    if not watches_all(work):
+def spendable_share(scene, work):
+    """Return the share of the budgets that the next step may spend at constant speed.
+
+    Half of them; for few bodies, whose lists are cheap to rebuild, most of what remains.
+    """
+    if not lists_all_pairs(work):
         return 0.5
-    return max(MOST_AHEAD - spent(scene, work, NOW), 0.5)
+    return max(MOST_SPENT - spent_budget(scene, work, NOW), 0.5)
 
 
-def outlived(scene, work, ahead):
-    """Whether lists are to be made anew before a step of ``ahead`` [s]."""
-    used = spent(scene, work, NOW)
+def needs_rebuild(scene, work, ahead):
+    """Return True if the lists must be rebuilt before a step of ``ahead`` [s]."""
+    used = spent_budget(scene, work, NOW)
     if used > 0.5:
         return True
-    few = used > LEAST_USED and watches_all(work)
-    return few and time_within(scene, work, MOST_AHEAD - used) < ahead
+    few = used > LEAST_SPENT and lists_all_pairs(work)
+    return few and time_to_spend(scene, work, MOST_SPENT - used) < ahead
 
 
-def too_wide(scene, work, ahead):
-    """Whether the lists of few bodies are far wider than steps of ``ahead`` [s] need."""
+def is_too_wide(scene, work, ahead):
+    """Return True if the lists of few bodies are far wider than steps of ``ahead`` [s] need."""
     before = -1
-    if watches_all(work):
+    if lists_all_pairs(work):
         for row in range(work.tally.candidates):
             candidate = work.candidates[row]
             pair = candidate.pair
             a, b = candidate.vertex_body, candidate.edge_body
-            if pair != before and work.budget[pair] > TOO_WIDE * skin_of(scene, work, a, b, ahead):
+            # Rows of two bodies are consecutive: test each pair of bodies once.
+            if pair != before and work.budget[pair] > EXCESS_WIDTH * skin_of(
+                scene, work, a, b, ahead
+            ):
                 return True
             before = pair
     return False
 
 
-def list_candidates(scene, work):
-    """Make the list anew at the current position; False where it has no room."""
-    return list_ahead(scene, work, 0.0)
+def rebuild_list(scene, work):
+    """Rebuild the list at the present positions; return False if it has no room."""
+    return rebuild_list_ahead(scene, work, 0.0)
 
 
-def list_ahead(scene, work, ahead):
-    """The same, for steps of ``ahead`` [s]."""
-    kept = keep_slips(work)
+def rebuild_list_ahead(scene, work, ahead):
+    """Rebuild the list for steps of ``ahead`` [s]; return False if it has no room."""
+    # The rows are about to be overwritten: save what contacts carry from step to step.
+    saved = save_contacts(work)
     work.tally.candidates = 0
     work.tally.rebuilds += 1
     for body in range(scene.bodies.shape[0]):
@@ -236,7 +283,7 @@ def list_ahead(scene, work, ahead):
         pose.listed_x = work.place[NOW, body, X]
         pose.listed_y = work.place[NOW, body, Y]
         pose.listed_angle = work.place[NOW, body, ANGLE]
-    if not list_pairs(scene, work, widest_cut(scene, work, ahead)):
+    if not list_pairs(scene, work, largest_cutoff(scene, work, ahead)):
         return False
     room = True
     for pair in range(work.tally.pairs):
@@ -244,15 +291,15 @@ def list_ahead(scene, work, ahead):
         work.budget[pair] = budget
         room = room and budget > 0.0
     if room:
-        restore_slips(work, kept)
+        restore_contacts(work, saved)
     return room
 
 
-def keep_slips(work):
-    """Set aside the tangential displacements, and the grazing, of the listed pairs; how many there
-    are.
+def save_contacts(work):
+    """Save the tangential displacements and grazing states of the listed pairs; return their
+    number.
 
-    Those that an earlier attempt has set aside, whose list found no room, are still the ones.
+    If an earlier attempt found no room, its saved values are still the valid ones.
     """
     if work.tally.kept > 0:
         return work.tally.kept - 1
@@ -260,10 +307,10 @@ def keep_slips(work):
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         contact = work.contacts[row]
-        mode = candidate.closed
-        # Whether there is anything to be known of a pair besides where its bodies are.
-        known = work.slip[NOW, row] != 0.0 or contact.gap_offset != 0.0
-        if known or contact.flights != 0.0 or mode == GRAZES:
+        mode = candidate.contact_mode
+        # Only rows with a history are saved.
+        has_history = work.slip[NOW, row] != 0.0 or contact.gap_offset != 0.0
+        if has_history or contact.short_flights != 0.0 or mode == GRAZING:
             a, b = candidate.vertex_body, candidate.edge_body
             work.kept[count].later = max(a, b)
             work.kept[count].earlier = min(a, b)
@@ -274,32 +321,34 @@ def keep_slips(work):
             work.kept[count].grazing_force = contact.grazing_force
             work.kept[count].gap_offset = contact.gap_offset
             work.kept[count].slip_offset = contact.slip_offset
-            work.kept[count].flights = contact.flights
+            work.kept[count].short_flights = contact.short_flights
             count += 1
     work.tally.kept = count + 1
     return count
 
 
-def comes_before(work, kept, later, earlier):
-    """Whether the bodies of a kept displacement come before two others in the list."""
+def precedes(work, kept, later, earlier):
+    """Return True if the bodies of a saved displacement precede two others in the list."""
     if work.kept[kept].later != later:
         return work.kept[kept].later < later
     return work.kept[kept].earlier < earlier
 
 
-def restore_slips(work, count):
-    """Give the kept displacements back to the same pairs of the new list; both are in the order of
-    their bodies."""
+def restore_contacts(work, count):
+    """Give the saved displacements back to the same pairs of features in the new list.
+
+    Both lists are sorted by their bodies, so one merging pass suffices.
+    """
     first = 0
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         contact = work.contacts[row]
         work.slip[NOW, row] = contact.slip_offset = 0.0
         contact.gap_offset = 0.0
-        contact.flight = contact.flights = 0.0
+        contact.flight_gap = contact.short_flights = 0.0
         a, b = candidate.vertex_body, candidate.edge_body
         later, earlier = max(a, b), min(a, b)
-        while first < count and comes_before(work, first, later, earlier):
+        while first < count and precedes(work, first, later, earlier):
             first += 1
         for k in range(first, count):
             if work.kept[k].later != later or work.kept[k].earlier != earlier:
@@ -309,50 +358,54 @@ def restore_slips(work, count):
                 work.slip[NOW, row] = work.kept[k].slip
                 contact.slip_offset = work.kept[k].slip_offset
                 contact.gap_offset = work.kept[k].gap_offset
-                contact.flights = work.kept[k].flights
-                if work.kept[k].mode == GRAZES:
-                    candidate.closed = GRAZES
+                contact.short_flights = work.kept[k].short_flights
+                if work.kept[k].mode == GRAZING:
+                    candidate.contact_mode = GRAZING
                     contact.grazing_force = work.kept[k].grazing_force
-                    contact.fresh = 0.0
+                    contact.newly_grazing = 0.0
     work.tally.kept = 0
 
 
 @hook
-def same_corner(scene, body, point, other):
-    """Whether two core points of a body are the same one or follow each other."""
+def are_adjacent(scene, body, point, other):
+    """Return True if two core points of a body coincide or are neighbours."""
     count = scene.first[body + 1] - scene.first[body]
     apart = abs(point - other)
     return apart <= 1 or apart == count - 1
 
 
-def rolls_on_to(scene, work, row, other):
-    """Whether a pair of features of the same two bodies neighbours another, either way round."""
+def are_neighbours(scene, work, row, other):
+    """Return True if two pairs of features of the same bodies are neighbours, in either role."""
     pairs = work.candidates
     point, start, end = pairs[row].vertex, pairs[row].edge_start, pairs[row].edge_end
     on = pairs[other].vertex
     first, last = pairs[other].edge_start, pairs[other].edge_end
+    # Same roles: neighbouring vertices and edges with a common end. Swapped roles: each vertex is
+    # an end of the other pair's edge.
     if pairs[row].vertex_body == pairs[other].vertex_body:
-        near = same_corner(scene, pairs[row].vertex_body, point, on)
+        near = are_adjacent(scene, pairs[row].vertex_body, point, on)
         return near and (start in (first, last) or end in (first, last))
     return on in (start, end) and point in (first, last)
 
 
-def heir_of(scene, work, row):
-    """The closed pair that a contact rolls on to when this one opens, −1 where it does not.
+def successor_of(scene, work, row):
+    """Return the closed pair that takes over a contact's displacement as it opens, −1 without one.
 
-    The nearest contact point of the same two bodies, if it is of a neighbouring pair of features
-    or within r_i + r_j of the spheroradii. Where two corners meet, four pairs have one point: that
-    which is displaced least takes over, as rounding would else decide.
+    It is the pair of the same two bodies with the nearest contact point, if it is a neighbouring
+    pair of features or within r_i + r_j (spheroradii). Where two corners meet, up to four pairs
+    share one point. Then the pair with the smallest displacement takes over; otherwise rounding
+    would decide.
     """
     candidate = work.candidates[row]
-    found, least, displaced = -1, math.inf, math.inf
+    successor, least, displaced = -1, math.inf, math.inf
     low = min(candidate.vertex_body, candidate.edge_body)
     high = max(candidate.vertex_body, candidate.edge_body)
     near = scene.bodies[low].radius + scene.bodies[high].radius
     x, y = contact_point(work, row, low)
     pair, first = candidate.pair, row
+    # The rows of two bodies are consecutive.
     while first > 0 and work.candidates[first - 1].pair == pair:
-        first -= 1  # the rows of two bodies follow one another
+        first -= 1
     for other in range(first, work.tally.candidates):
         if work.candidates[other].pair != pair:
             break
@@ -360,53 +413,63 @@ def heir_of(scene, work, row):
             ox, oy = contact_point(work, other, low)
             distance = math.hypot(ox - x, oy - y)
             own = abs(work.slip[NOW, other])
-            nearer = distance < least - ONE_POINT * near
-            if not (nearer or (distance <= least + ONE_POINT * near and own < displaced)):
+            # Points closer than SAME_POINT count as equally near: the displacement decides between
+            # them.
+            nearer = distance < least - SAME_POINT * near
+            if not (nearer or (distance <= least + SAME_POINT * near and own < displaced)):
                 continue
-            if distance <= near or rolls_on_to(scene, work, row, other):
-                found, least, displaced = other, min(distance, least), own
-    return found
+            if distance <= near or are_neighbours(scene, work, row, other):
+                successor, least, displaced = other, min(distance, least), own
+    return successor
 
 
-def hand_over(scene, work):
-    """Pass the displacement of every pair that has opened on to the pair that it rolls on to.
+def transfer_slips(scene, work):
+    """Pass the displacement of every pair that has opened to the pair that its contact rolls on to.
 
-    The tangential force of a contact that rolls on then does not jump, as far as energy allows:
-    Σ ½ k_t ξ² of the two bodies never grows, since what it grew by would drive them without end.
-    Without an heir ξ vanishes. Expects the geometry of the current position.
+    The tangential force of a rolling contact then does not jump, as far as energy allows: Σ ½ k_t
+    ξ² of the two bodies never grows, or the increments would drive the doublet without end (2.5e-10
+    J per 0.1 s in a hanging doublet). Without a successor ξ vanishes. The geometry must be that of
+    the present positions.
     """
     for row in range(work.tally.candidates):
         opened = work.geometry[NOW, row].gap >= 0.0
-        grazes = work.candidates[row].closed == GRAZES
+        grazes = work.candidates[row].contact_mode == GRAZING
         if work.slip[NOW, row] != 0.0 and opened and not grazes:
-            heir = heir_of(scene, work, row)
-            if heir >= 0:
-                own, given = work.slip[NOW, heir], work.slip[NOW, row]
-                most = math.hypot(own, given)
-                agreement = tangent_agreement(work, row, heir)
-                total = own + given * agreement
-                work.slip[NOW, heir] = min(max(total, -most), most)
-                wrong = slip_error(work, row, work.place) + work.contacts[row].slip_offset
-                work.contacts[heir].slip_offset += wrong * agreement
+            successor = successor_of(scene, work, row)
+            if successor >= 0:
+                own, given = work.slip[NOW, successor], work.slip[NOW, row]
+                # Energy bound: ξ_new² ≤ ξ_own² + ξ_given², with the same k_t for both.
+                largest = math.hypot(own, given)
+                # The passed displacement is projected on the successor's tangent.
+                cosine = tangent_cosine(work, row, successor)
+                total = own + given * cosine
+                work.slip[NOW, successor] = min(max(total, -largest), largest)
+                # The propagated error of ξ is passed on in the same proportion.
+                error = slip_error(work, row, work.place) + work.contacts[row].slip_offset
+                work.contacts[successor].slip_offset += error * cosine
             work.slip[NOW, row] = 0.0
 
 
 def slip_error(work, row, of):
-    """How wrong a pair's two contact points lie along the tangent, as carried on with the motion
-    [m], ``of`` places; how wrong they move there [m/s], of velocities."""
+    """Return the propagated error of a pair's tangential displacement, from the errors of both
+    bodies.
+
+    ``of`` = work.place: error of the displacement [m]; ``of`` = work.velocity: of its rate [m/s].
+    """
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    along = g[NOW, row].normal_x * (of[CARRIED, a, Y] - of[CARRIED, b, Y])
-    along -= g[NOW, row].normal_y * (of[CARRIED, a, X] - of[CARRIED, b, X])
-    along += g[NOW, row].vertex_arm_t * of[CARRIED, a, ANGLE]
-    return along - g[NOW, row].edge_arm_t * of[CARRIED, b, ANGLE]
+    along = g[NOW, row].normal_x * (of[PROPAGATED, a, Y] - of[PROPAGATED, b, Y])
+    along -= g[NOW, row].normal_y * (of[PROPAGATED, a, X] - of[PROPAGATED, b, X])
+    along += g[NOW, row].vertex_arm_t * of[PROPAGATED, a, ANGLE]
+    return along - g[NOW, row].edge_arm_t * of[PROPAGATED, b, ANGLE]
 
 
-def tangent_agreement(work, row, other):
-    """How much of one pair's tangential force another pair can carry: a cosine.
+def tangent_cosine(work, row, other):
+    """Return the cosine between the tangents of two pairs, in the sense of their displacements.
 
-    A pair listed the other way round has the opposite tangent, and its slip the same sign.
+    A pair with swapped roles has the opposite tangent, but the sign of its displacement is the
+    same.
     """
     geometry = work.geometry[NOW]
     cosine = (

@@ -1,23 +1,24 @@
-"""The double layer of an outline at a constant potential, as that of line charges behind it, and
-the potential that they make around it, in tables.
+"""Double layer of an outline at constant potential, as line charges behind it, and tables of their
+field.
 
-Outside of the body its potential, by linear theory, is that of a single layer σ on the outline,
-φ(x) = (1/2πε) ∮ σ K₀(κρ) ds, which is constant along it. Charges a little behind the outline make
-the same potential outside, where it is unique, and so feel the same force in the field of another
-body: the energy by linear superposition is
+In linear (Debye–Hückel) theory the potential outside a body is that of a single layer σ on its
+outline, φ(x) = (1/2πε) ∮ σ K₀(κρ) ds, constant along the outline. Charges a little behind the
+outline create the same outside potential, which is unique, and feel the same force in the field of
+another body (method of fundamental solutions). The energy by linear superposition is
 
     E = (1/2πε) ∮∮ σ₁ σ₂ K₀(κρ) ds ds = 2πε φ₁ φ₂ Σ Σ q₁ q₂ K₀(κρ)
 
-a length, the charges q being those of potential 1 on the outline. Unlike σ they see the other body
-from afar even at touch, where sums over the outlines themselves would need nodes as near as the
-gap. Each lies DEEP behind the point at which the potential is asked for, in units of the radius by
-which the core is rounded or of 1/κ, whichever is less; next ones are as far apart. That makes
-energies right within 2e-3 (tests/geometry/contact/test_charges.py).
+per unit length, where q are the charges for a potential of 1 on the outline. Unlike σ they keep a
+distance from the other body even at contact, where sums over the outlines themselves would need
+nodes as dense as the gap. Depth and spacing of the charges are CHARGE_DEPTH times the smaller of
+the spheroradius and 1/κ. Energies are then right within 2e-3
+(tests/geometry/contact/test_charges.py).
 
-Nodes of the tables lie on a grid, STEP of a charge's unit apart, in square tiles wherever a charge
-of another body may be; at each stand the potential and its derivatives, exactly, between which
-Hermite's bicubic polynomials go. A potential of charges at touch is within 1e-4 of the sum over
-them, its slope within 1e-3, and the force that follows is the slope of the potential in the tables.
+**Tables.** Nodes of a field lie on a grid of spacing GRID_STEP (in units of `unit_of`), in square
+tiles, wherever a charge of another body may be. Each node stores the potential and its derivatives,
+exact; between nodes the field is interpolated by bicubic Hermite polynomials. The potential of
+charges at contact is within 1e-4 of the sum over them, its slope within 1e-3. The force is the
+slope of the interpolated potential.
 """
 
 import math
@@ -33,29 +34,30 @@ from flocsim.geometry.shapes.pieces import at_parameter, piece_at, pieces_of_sha
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.state.outlines import GROUP, TILE, Charge, ChargeGroup, FieldNode, Grid
 
-DEEP = 0.6
-"""Depth of charges, and their distance from each other."""
+CHARGE_DEPTH = 0.6
+"""Depth of charges behind the outline, and their spacing, over the smaller of spheroradius
+and 1/κ."""
 
-THIN = 60.0
-"""κ times the least radius of curvature from which on double layers are as those of plates, within
-1 % (1/(2κr) of a cylinder over a plate)."""
+THIN_LAYER = 60.0
+"""κ times the smallest radius of curvature from which double layers act as between plates, within 1
+% (1/(2κr) for a cylinder above a plate)."""
 
-MOST = 20_000
-"""Charges of an outline at most: their potentials are solved for in seconds."""
+MOST_CHARGES = 20_000
+"""Largest number of charges of an outline: solving for them takes seconds."""
 
-FAR = 16.0
-"""κρ beyond which charges are not seen in that."""
+SOLVE_RANGE = 16.0
+"""κρ beyond which a charge is neglected when solving for charges."""
 
-NEAR = 0.15
-"""Charges nearer to each other than that, as behind reflex corners, are one: two would grow without
-bound against each other."""
+MERGE_DISTANCE = 0.15
+"""Charges closer than this (in units of `unit_of`), as behind reflex corners, are merged: two would
+grow without bound with opposite signs."""
 
 DENSE = 2000
-"""Up to so many charges all of them are solved for at once; more, by what is near each alone."""
+"""Up to this number of charges the system is dense, beyond that sparse."""
 
 EULER = 0.5772156649015329
 
-# Below z = 2: 1/(k! (k+1)!), k + 1, and the harmonic number H_k.
+# Power series of K₀ and K₁ for z < 2: 1/(k! (k+1)!), k + 1, and the harmonic number H_k.
 SERIES = (
     (1.0, 1.0, 0.0), (0.5, 2.0, 1.0), (1.0 / 12.0, 3.0, 1.5), (1.0 / 144.0, 4.0, 11.0 / 6.0),
     (1.0 / 2880.0, 5.0, 25.0 / 12.0), (1.0 / 86400.0, 6.0, 137.0 / 60.0),
@@ -63,7 +65,7 @@ SERIES = (
     (1.0 / 14631321600.0, 9.0, 761.0 / 280.0), (1.0 / 1316818944000.0, 10.0, 7129.0 / 2520.0),
 )  # fmt: skip
 
-# √z e^z K₀(z) and √z e^z K₁(z) from z = 2 on in powers of 2/z: fitted at Chebyshev nodes.
+# √z e^z K₀(z) and √z e^z K₁(z) for z ≥ 2 in powers of 2/z, fitted at Chebyshev nodes.
 LARGE = (
     (1.2533141372113017, 1.2533141374358714),
     (-0.07833210681280316, 0.23499636984375394),
@@ -78,43 +80,45 @@ LARGE = (
     (0.00018755861732605998, -0.0002196952815597351),
 )
 
-STEP = 0.3
+GRID_STEP = 0.3
 
-FADED = 12.0
-"""Debye lengths beyond which charges are not seen: e^−12 of the force at touch, 6e-6."""
+LAYER_REACH = 12.0
+"""Distance in Debye lengths beyond which charges are neglected: e^−12 = 6e-6 of the force at
+contact."""
 
-INSIDE = 1.0
-"""Units behind an outline up to which there are nodes."""
+FIELD_DEPTH = 1.0
+"""Depth behind an outline (in units of `unit_of`) to which the field is tabulated."""
 
-LEAST = 1e-4
-"""(κρ)² below which a charge is not taken for nearer."""
+LEAST_SQUARED = 1e-4
+"""Lower bound of (κρ)² in the field of a charge, which diverges at ρ = 0."""
 
 MOST_NODES = 2_000_000
-"""Of a body, 64 MB."""
+"""Largest number of nodes of a body's field: 64 MB."""
 
 
 def is_thin(shapes: Sequence[Shape], kappa: float) -> bool:
-    """Whether the double layers of some bodies are thin beside all that is round in them."""
-    return min(float(part.radius) for shape in shapes for part in shape.parts) * kappa >= THIN
+    """Return True if double layers are thin compared with all radii of curvature of some bodies."""
+    return min(float(part.radius) for shape in shapes for part in shape.parts) * kappa >= THIN_LAYER
 
 
 def unit_of(shape: Shape, kappa: float) -> float:
-    """1/κ, or the least radius by which a shape is rounded where that is less [m]."""
+    """Return the length unit of charges [m]: the smaller of 1/κ and the smallest spheroradius."""
     return min(1.0 / kappa, *(float(part.radius) for part in shape.parts))
 
 
 def spacings(pieces, kappa):
-    """How far charges behind each piece lie from each other [m], and their numbers."""
-    spacing = DEEP * np.minimum(pieces["inward"], 1.0 / kappa)
-    bend, size = pieces["bend"], pieces["half"]
+    """Return the spacing [m] and number of charges behind each piece of an outline."""
+    spacing = CHARGE_DEPTH * np.minimum(pieces["core_depth"], 1.0 / kappa)
+    bend, size = pieces["arc_radius"], pieces["half"]
+    # ``half`` of an arc is tan of a quarter of its angle.
     lengths = np.where(bend > 0.0, 4.0 * np.arctan(size) * bend, 2.0 * size)
-    # A corner that is not rounded would need infinitely many.
+    # A sharp corner would need infinitely many.
     with np.errstate(divide="ignore"):
         return spacing, np.maximum(np.ceil(lengths / spacing), 1.0)
 
 
 def too_long(shape: Shape, kappa: float, takes: str) -> ShapeError:
-    """What to say of an outline that takes more of something than there may be."""
+    """Return a ShapeError for an outline that needs too many charges or nodes."""
     radius = min(float(part.radius) for part in shape.parts)
     return ShapeError(
         f"the outline of a body of r_eq = {shape.equivalent_radius:.3g} m, rounded by "
@@ -125,22 +129,25 @@ def too_long(shape: Shape, kappa: float, takes: str) -> ShapeError:
 
 
 def check_length(shape: Shape, kappa: float) -> None:
-    """ShapeError where a shape's outline takes more charges than can be solved for."""
+    """Raise ShapeError if a shape's outline needs more charges than can be solved for."""
     _, counts = spacings(pieces_of_shape(shape), kappa)
-    if counts.sum() > MOST:
-        raise too_long(shape, kappa, f"{counts.sum():.3g} charges, of {MOST}")
+    if counts.sum() > MOST_CHARGES:
+        raise too_long(shape, kappa, f"{counts.sum():.3g} charges, of {MOST_CHARGES}")
 
 
 def points_of(pieces, kappa, times=1):
-    """(points on an outline (n, 2), what lies behind them as deep as charges (n, 2)) [m], so many
-    times as many as charges."""
+    """Return points on an outline (n, 2) and the positions of charges behind them (n, 2) [m].
+
+    ``times``: number of points per charge.
+    """
     spacing, counts = spacings(pieces, kappa)
     points, places = [], []
     for row, (depth, count) in enumerate(zip(spacing, times * counts.astype(int), strict=True)):
         piece = piece_at(pieces, row)
         share = (2.0 * np.arange(count) + 1.0) / count - 1.0
         parameter = share * piece.half
-        if piece.bend > 0.0:
+        if piece.arc_radius > 0.0:
+            # Evenly spaced angles: the parameter of an arc is tan(φ/2).
             parameter = np.tan(share * math.atan(piece.half))
         x, y, nx, ny, _ = at_parameter(piece, parameter)
         points.append(np.column_stack([x, y]))
@@ -150,10 +157,10 @@ def points_of(pieces, kappa, times=1):
 
 @lru_cache(maxsize=256)
 def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
-    """The charges (n, 3) of a shape around its centroid: x, y [m] and q [-], at κ [1/m], by least
-    squares of the potential at twice as many points.
+    """Return the charges (n, 3) of a shape around its centroid: x, y [m] and q [-], at κ [1/m].
 
-    ShapeError for an outline that takes too many.
+    They minimise the squared error of the potential at twice as many points of the outline. Raises
+    ShapeError for an outline that needs too many.
     """
     from scipy.sparse.linalg import spsolve
     from scipy.spatial import cKDTree
@@ -161,37 +168,38 @@ def charges_of_shape(shape: Shape, kappa: float) -> np.ndarray:
 
     check_length(shape, kappa)
     pieces = pieces_of_shape(shape)
-    places = parted(points_of(pieces, kappa)[1], NEAR * unit_of(shape, kappa))
+    places = without_close(points_of(pieces, kappa)[1], MERGE_DISTANCE * unit_of(shape, kappa))
     points, _ = points_of(pieces, kappa, 2)
     if len(places) <= DENSE:
         matrix, solve = k0(kappa * distances(points, places)), np.linalg.solve
     else:
-        trees, far = (cKDTree(points), cKDTree(places)), FAR / kappa
+        trees, far = (cKDTree(points), cKDTree(places)), SOLVE_RANGE / kappa
         near = trees[0].sparse_distance_matrix(trees[1], far, output_type="coo_matrix")
         near.data = k0(kappa * near.data)
         matrix, solve = near.tocsc(), spsolve
+    # Normal equations of the least-squares problem: potential 1 at all points.
     charges = solve(matrix.T @ matrix, matrix.T @ np.ones(len(points)))
     return np.column_stack([places, charges])
 
 
-def parted(places, near):
-    """Places without those that are nearer than that [m] to an earlier one."""
+def without_close(places, near):
+    """Return the positions without those closer than ``near`` [m] to an earlier one."""
     from scipy.spatial import cKDTree
 
-    kept = np.ones(len(places), bool)
+    remaining = np.ones(len(places), bool)
     pairs = cKDTree(places).query_pairs(near, output_type="ndarray")
     for first, second in sorted(map(sorted, pairs.tolist())):
-        kept[second] &= not kept[first]
-    return places[kept]
+        remaining[second] &= not remaining[first]
+    return places[remaining]
 
 
 def distances(points, others):
-    """(n, m) from each of some points to each of others."""
+    """Return the distances (n, m) between two sets of points."""
     return np.hypot(*(points[:, None, :2] - others[None, :, :2]).transpose(2, 0, 1))
 
 
 def clusters(charges):
-    """Some charges as lists of up to GROUP neighbours."""
+    """Split charges into lists of up to GROUP neighbours, halving along the longer side."""
     if len(charges) <= GROUP:
         return [charges]
     axis = int(np.argmax(np.ptp(charges[:, :2], axis=0)))
@@ -200,7 +208,7 @@ def clusters(charges):
 
 
 class Charges(NamedTuple):
-    """The charges of some bodies in groups of neighbours; a Scene has the same fields."""
+    """Charges of some bodies in groups of neighbours; a Scene has the same fields."""
 
     groups: np.ndarray
     first_group: np.ndarray
@@ -209,7 +217,7 @@ class Charges(NamedTuple):
 
 @lru_cache(maxsize=256)
 def grouped_charges(shape: Shape, kappa: float) -> Charges:
-    """The Charges of a shape around its centroid, at κ [1/m]."""
+    """Return the Charges of a shape around its centroid, at κ [1/m]."""
     found = clusters(charges_of_shape(shape, kappa))
     groups, first = ChargeGroup.rows(len(found)), 0
     for group, members in zip(groups, found, strict=True):
@@ -222,7 +230,8 @@ def grouped_charges(shape: Shape, kappa: float) -> Charges:
 
 
 def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
-    """The Charges of bodies of these shapes at κ [1/m]; 0: of so many bodies with none."""
+    """Return the Charges of bodies of these shapes at κ [1/m]; for κ = 0, of bodies without
+    charges."""
     none = Charges(ChargeGroup.rows(0), np.zeros(2, np.int64), Charge.rows(0))
     found = [grouped_charges(shape, kappa) if kappa > 0.0 else none for shape in shapes]
     groups = np.concatenate([each.groups for each in found])
@@ -236,9 +245,9 @@ def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
 def layer_energy(
     shape_a: Shape, shape_b: Shape, pose: tuple[float, float, float], kappa: float
 ) -> float:
-    """E/(2πε φ₁ φ₂ W) [-] of two bodies of a depth W by linear superposition, at κ [1/m].
+    """Return E/(2πε φ₁ φ₂ W) [-] of two bodies of depth W by linear superposition, at κ [1/m].
 
-    ``pose``: x, y [m] and angle [rad] of a in the frame of b. All charges count, however far.
+    ``pose``: position [m] and angle [rad] of a in the frame of b. All pairs of charges are summed.
     """
     from scipy.special import k0
 
@@ -250,7 +259,7 @@ def layer_energy(
 
 
 def bessel_pair(squared):
-    """(K₀(z), K₁(z)/z) of z²."""
+    """Return (K₀(z), K₁(z)/z) for z²."""
     if squared < 4.0:
         t = 0.25 * squared
         log, power, zero, first = 0.5 * math.log(t) + EULER, 1.0, 0.0, 0.0
@@ -270,7 +279,7 @@ def bessel_pair(squared):
 
 
 class Field(NamedTuple):
-    """The grid, tiles and nodes of a body, or of some; a Scene has the same fields."""
+    """Grids, tiles and nodes of one or several bodies; a Scene has the same fields."""
 
     grids: np.ndarray
     tiles: np.ndarray
@@ -278,7 +287,8 @@ class Field(NamedTuple):
 
 
 def list_groups(groups, x, y, reach, near):
-    """List the groups of charges that may be within a reach [m] of a point; how many they are."""
+    """List the groups of charges that may lie within a reach [m] of a point; return their
+    number."""
     count = 0
     for row in range(groups.shape[0]):
         group = groups[row]
@@ -290,9 +300,8 @@ def list_groups(groups, x, y, reach, near):
     return count
 
 
-def at_node(groups, charges, near, count, kappa, x, y):
-    """(φ, and its derivatives by x, by y [1/m], by both [1/m²]) of the groups listed, at a point;
-    what is FADED is left out."""
+def field_at(groups, charges, near, count, kappa, x, y):
+    """Return φ, ∂φ/∂x, ∂φ/∂y [1/m] and ∂²φ/∂x∂y [1/m²] of the listed groups at a point."""
     value, by_x, by_y, by_both = 0.0, 0.0, 0.0, 0.0
     for k in range(count):
         group = groups[near[k]]
@@ -300,11 +309,13 @@ def at_node(groups, charges, near, count, kappa, x, y):
             charge = charges[row]
             dx, dy = x - charge.x, y - charge.y
             squared = kappa * kappa * (dx * dx + dy * dy)
-            if squared > (FADED + 1.0) * (FADED + 1.0):
+            if squared > (LAYER_REACH + 1.0) * (LAYER_REACH + 1.0):
                 continue
-            squared = max(squared, LEAST)
+            squared = max(squared, LEAST_SQUARED)
             zero, first = bessel_pair(squared)
             size = charge.strength
+            # K₀' = −K₁, so ∂φ/∂x = −q κ² (K₁(z)/z) dx, and K₂ = K₀ + 2 K₁/z in the mixed
+            # derivative.
             slope = -size * kappa * kappa * first
             value += size * zero
             by_x += slope * dx
@@ -313,18 +324,19 @@ def at_node(groups, charges, near, count, kappa, x, y):
     return value, by_x, by_y, by_both
 
 
-def fill(groups, charges, kappa, step, corners, near, field):
-    """Write the nodes of tiles with these lower left corners (m, 2); ``near`` is scratch."""
+def fill_tiles(groups, charges, kappa, step, corners, near, field):
+    """Write the nodes of tiles with the given lower left corners (m, 2); ``near`` is scratch."""
     side, half = TILE + 1, 0.5 * TILE * step
     for tile in range(corners.shape[0]):
         x, y = corners[tile, 0] + half, corners[tile, 1] + half
-        reach = (FADED + 1.0) / kappa + 1.5 * half
+        reach = (LAYER_REACH + 1.0) / kappa + 1.5 * half
         count = list_groups(groups, x, y, reach, near)
         for node in range(side * side):
             x = corners[tile, 0] + step * (node % side)
             y = corners[tile, 1] + step * (node // side)
-            value, by_x, by_y, by_both = at_node(groups, charges, near, count, kappa, x, y)
+            value, by_x, by_y, by_both = field_at(groups, charges, near, count, kappa, x, y)
             known = field[tile * side * side + node]
+            # Derivatives per grid step, as Hermite interpolation needs them.
             known.potential = value
             known.by_x = step * by_x
             known.by_y = step * by_y
@@ -332,33 +344,34 @@ def fill(groups, charges, kappa, step, corners, near, field):
 
 
 def tiles_around(shape, kappa, step):
-    """(lower left corner, (across, up), whether a tile has nodes (across · up,)) around a shape."""
+    """Return (lower left corner, (across, up), whether each tile has nodes) around a shape."""
     from scipy.spatial import cKDTree
 
     points, places = points_of(pieces_of_shape(shape), kappa)
-    width, reach = TILE * step, FADED / kappa
+    width, reach = TILE * step, LAYER_REACH / kappa
     low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
     counts = np.ceil((high - low) / width).astype(int)
     x, y = (low[k] + width * (np.arange(counts[k]) + 0.5) for k in range(2))
     middles = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    most, inside = reach + 0.75 * width, INSIDE * unit_of(shape, kappa) + 0.75 * width
-    away, nearest = cKDTree(points).query(middles, distance_upper_bound=most)
-    used = np.isfinite(away)
+    most, inside = reach + 0.75 * width, FIELD_DEPTH * unit_of(shape, kappa) + 0.75 * width
+    distance, nearest = cKDTree(points).query(middles, distance_upper_bound=most)
+    used = np.isfinite(distance)
     nearest = nearest[used]
     outward = points[nearest] - places[nearest]
+    # Tiles further behind the outline than FIELD_DEPTH are not tabulated.
     behind = np.sum((middles[used] - points[nearest]) * outward, axis=1) < 0.0
-    used[used] = ~behind | (away[used] < inside)
+    used[used] = ~behind | (distance[used] < inside)
     return low, counts, used
 
 
 @lru_cache(maxsize=32)
 def field_of_shape(shape: Shape, kappa: float) -> Field:
-    """The Field of a shape around its centroid, at κ [1/m].
+    """Return the Field of a shape around its centroid, at κ [1/m].
 
-    ShapeError for an outline that takes too many charges, or nodes around it.
+    Raises ShapeError for an outline that needs too many charges, or nodes around it.
     """
     check_length(shape, kappa)
-    step, side = STEP * unit_of(shape, kappa), TILE + 1
+    step, side = GRID_STEP * unit_of(shape, kappa), TILE + 1
     low, counts, used = tiles_around(shape, kappa, step)
     nodes = int(used.sum()) * side * side
     if nodes > MOST_NODES:
@@ -369,7 +382,7 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
     field = FieldNode.rows(nodes)
     groups, _, charges = grouped_charges(shape, kappa)
     near = np.zeros(len(groups), np.int64)
-    compiled(fill)(groups, charges, kappa, step, corners, near, field)
+    compiled(fill_tiles)(groups, charges, kappa, step, corners, near, field)
     grid = Grid.rows(1)
     grid["x"], grid["y"] = low
     grid["across"], grid["up"] = counts
@@ -378,10 +391,13 @@ def field_of_shape(shape: Shape, kappa: float) -> Field:
 
 
 def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
-    """The Field of bodies of these shapes at κ [1/m], of all in whose field others are gone along:
-    the larger one of two; 0: of so many bodies with none."""
+    """Return the Field of bodies of these shapes at κ [1/m]; for κ = 0, of bodies without fields.
+
+    Sums run over the charges of the smaller body in the field of the larger one, so of two bodies
+    only the larger is tabulated.
+    """
     bounds = [shape.bounding_radius for shape in shapes]
-    # The earlier one of two that are as large: outline_sum.between_outlines.
+    # The earlier one of two that are as large: outline_sum.outline_forces_at.
     asked = {bounds.index(max(bounds))} if len(shapes) == 2 else set(range(len(shapes)))
     none = Field(Grid.rows(1), np.zeros(0, np.int64), FieldNode.rows(0))
     found = [

@@ -1,15 +1,14 @@
-"""Which vertex–edge pairs of two bodies are near each other, and how near the two outlines are.
+"""Broad phase for two outlines: near vertex–edge pairs and smallest distance, by trees of circles.
 
-A hierarchy of circles lies over each outline, and two of them are walked down against each other. A
-body's core points, each with the edge that starts at it, are halved by their number until few are
-left: a full binary tree, whose node i has the children 2i and 2i + 1. Every node keeps a circle
-around its run of core points and edges, in the body's frame. Two trees are walked without a stack:
-which of them is split next follows from the sizes of their pieces alone, so that the way back up
-is known as well.
+Each outline has a binary tree of bounding circles. The core points of a body, each with the edge
+that starts at it, are halved by number until LEAF to 2 LEAF points remain: a full tree whose node i
+has the children 2i and 2i + 1. Every node stores a circle around its run of core points and edges,
+in the body's frame. Two trees are traversed against each other without a stack: which of the two is
+split next follows from the sizes of their pieces alone, so the way back up is known as well.
 
-Distances are taken in the frame of one body: a *pose* (c, s, x, y) turns and shifts the other's
-points into it, and only those of the nodes that are met. Inner functions are handed scalars and
-single arrays instead of the whole scene, which would cost more to pass than they do.
+Distances are computed in the frame of one body. A *pose* (c, s, x, y) rotates and shifts points of
+the other body into it, for visited nodes only. Inner functions receive scalars and single arrays
+instead of the whole scene, which would cost more to pass than they do to run.
 """
 
 import math
@@ -26,18 +25,18 @@ from flocsim.state.clock import CANDIDATES_FULL
 from flocsim.state.work import NOW
 
 LEAF = 2
-"""Core points in a run that is not split any more: from this to twice as many."""
+"""Core points in a leaf: from this to twice as many."""
 
 ROUNDING = 1e-13
-"""Circles are drawn larger by this share of the outline's size, for the rounding of distances."""
+"""Circles are enlarged by this share of the outline's size to cover rounding of distances."""
 
 
 CIRCLE_X, CIRCLE_Y, CIRCLE_RADIUS = range(3)
-"""Columns of a tree."""
+"""Columns of a tree [m]."""
 
 
 def leaves_of(points):
-    """How many runs that many core points are halved into: a power of two."""
+    """Return the number of leaves for that many core points: a power of two."""
     leaves = 1
     while 2 * leaves * LEAF <= points:
         leaves *= 2
@@ -45,7 +44,8 @@ def leaves_of(points):
 
 
 def level_runs(points, nodes):
-    """Core points (nodes, most) of the runs of a level; short rows repeat their last point.
+    """Return the core points (nodes, most) of the runs on one level; short rows repeat their last
+    point.
 
     Each run includes the end of its last edge.
     """
@@ -55,9 +55,9 @@ def level_runs(points, nodes):
 
 
 def tree_of(vertices: np.ndarray) -> np.ndarray:
-    """The tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
+    """Return the tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
 
-    Rows that the tree does not fill, row 0 among them, are 0.
+    Unused rows, row 0 among them, are 0.
     """
     points = len(vertices)
     tree = np.zeros((2 * points, 3))
@@ -66,6 +66,8 @@ def tree_of(vertices: np.ndarray) -> np.ndarray:
     while nodes <= leaves_of(points):
         runs = vertices[level_runs(points, nodes)]
         middle, ends = runs.min(axis=1) + runs.max(axis=1), runs[:, 0] + runs[:, -1]
+        # Two candidate centres, the middle of the bounding box and of the chord: keep the smaller
+        # circle.
         choices = []
         for centre in (0.5 * middle, 0.5 * ends):
             reach = np.hypot(*np.moveaxis(runs - centre[:, None], -1, 0)).max(axis=1)
@@ -76,43 +78,43 @@ def tree_of(vertices: np.ndarray) -> np.ndarray:
     return tree
 
 
-def side_of(outlines, body):
-    """(first core point, their number, first row of the tree, leaves) of a body's outline."""
+def tree_side(outlines, body):
+    """Return (first core point, number, first row of the tree, leaves) of a body's outline."""
     first = outlines.first[body]
     points = outlines.first[body + 1] - first
     return first, points, 2 * first, leaves_of(points)
 
 
-def run_of(side, leaf):
-    """(first, end) of the core points of a leaf."""
+def leaf_points(side, leaf):
+    """Return (first, end) of the core points of a leaf."""
     first, points, _, leaves = side
-    # Exact: the divisor is a power of two.
+    # The same integer bounds as in `level_runs`: exact, since the divisor is a power of two.
     share = points / leaves
     place = leaf - leaves
     return first + int(place * share), first + int((place + 1) * share)
 
 
 def reversed_pose(pose):
-    """The pose that takes the other body's points into the frame of this one."""
+    """Return the inverse pose, which maps the other body's points into the frame of this one."""
     c, s, x, y = pose
     return c, -s, -c * x - s * y, s * x - c * y
 
 
-def posed(pose, x, y):
-    """A point of one body in the frame of the other."""
+def in_other_frame(pose, x, y):
+    """Return a point of one body in the frame of the other [m]."""
     c, s, shift_x, shift_y = pose
     return c * x - s * y + shift_x, s * x + c * y + shift_y
 
 
 def edge_distance2(vertices, x, y, start, end):
-    """Squared distance of a point from the edge between two core points [m²]."""
+    """Return the squared distance of a point from the edge between two core points [m²]."""
     return segment_distance2(
         x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
     )
 
 
-def plan_of(tree, side_a, side_b):
-    """What steers a walk: first rows and leaves of both trees, radii of their largest circles."""
+def traversal_plan(tree, side_a, side_b):
+    """Return the constants of a traversal: first rows, leaves and root radii of both trees."""
     _, _, row_a, leaves_a = side_a
     _, _, row_b, leaves_b = side_b
     size_a, size_b = tree[row_a + 1, CIRCLE_RADIUS], tree[row_b + 1, CIRCLE_RADIUS]
@@ -120,31 +122,34 @@ def plan_of(tree, side_a, side_b):
 
 
 START = (1, 1, 1, 1)
-"""The walk at both roots: node of a, node of b, nodes on a's level, on b's level.
+"""The traversal at both roots: node of a, node of b, number of nodes on a's level, on b's level.
 
-A walk is over when its first number is 0.
+A traversal has ended when its first number is 0.
 """
 
 
-def goes_on(walk):
+def has_nodes(walk):
     i, _, _, _ = walk
     return i > 0
 
 
-def circles_met(tree, pose, plan, walk):
-    """(squared distance of centres, sum of radii) of the circles of the two nodes."""
+def circle_distance(tree, pose, plan, walk):
+    """Return (squared distance of centres, sum of radii) of the circles of the two nodes."""
     i, j, _, _ = walk
     row_a, row_b, _, _, _, _ = plan
     one, other = row_a + i, row_b + j
-    x, y = posed(pose, tree[one, CIRCLE_X], tree[one, CIRCLE_Y])
+    # Only the centre of a's circle is transformed, and only here.
+    x, y = in_other_frame(pose, tree[one, CIRCLE_X], tree[one, CIRCLE_Y])
     dx, dy = x - tree[other, CIRCLE_X], y - tree[other, CIRCLE_Y]
     return dx * dx + dy * dy, tree[one, CIRCLE_RADIUS] + tree[other, CIRCLE_RADIUS]
 
 
-def within(tree, pose, plan, walk, distance):
-    """Whether the runs of the two nodes can be nearer to each other than a distance, which is below
-    0 where swollen cores overlap (compounds.py)."""
-    distance2, radii = circles_met(tree, pose, plan, walk)
+def may_be_closer(tree, pose, plan, walk, distance):
+    """Return True if the runs of the two nodes may be closer to each other than a distance [m].
+
+    The distance is negative where swollen cores overlap (compounds.py).
+    """
+    distance2, radii = circle_distance(tree, pose, plan, walk)
     reach = radii + distance
     return reach > 0.0 and distance2 < reach * reach
 
@@ -155,22 +160,24 @@ def at_leaves(plan, walk):
     return level_a == leaves_a and level_b == leaves_b
 
 
-def descended(plan, walk):
-    """The walk at the first child of the larger piece, a's where they are alike."""
+def descend(plan, walk):
+    """Return the traversal at the first child of the larger piece, a's if they are equal."""
     i, j, level_a, level_b = walk
     _, _, leaves_a, leaves_b, size_a, size_b = plan
+    # A piece on a level of n nodes is about 1/n of its outline.
     larger = size_a * level_b >= size_b * level_a
     if level_a < leaves_a and (larger or level_b == leaves_b):
         return 2 * i, j, 2 * level_a, level_b
     return i, 2 * j, level_a, 2 * level_b
 
 
-def passed(plan, walk):
-    """The walk at what comes after the two nodes and all below them."""
+def skip_subtree(plan, walk):
+    """Return the traversal at the successor of the two nodes, skipping everything below them."""
     i, j, level_a, level_b = walk
     _, _, _, _, size_a, size_b = plan
     while level_a * level_b > 1:
-        # Pieces are split in the order of their sizes, so the smaller piece was split last.
+        # Pieces are split in the order of their sizes, so the smaller piece was split last. Move to
+        # its sibling, or go up if it is the second child (odd number).
         if level_b == 1 or (level_a > 1 and size_a * level_b < size_b * level_a):
             if i & 1 == 0:
                 return i + 1, j, level_a, level_b
@@ -183,15 +190,15 @@ def passed(plan, walk):
 
 
 @hook
-def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """The smaller of ``least`` and the distances from a's points to b's edges [m]."""
+def leaf_distance_one_way(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
+    """Return the smaller of ``least`` and the distances from a's points to b's edges [m]."""
     first_b, points_b, _, _ = side_b
     edges = first_b + max(edge_count(points_b), 1)
-    start_a, end_a = run_of(side_a, leaf_a)
-    start_b, end_b = run_of(side_b, leaf_b)
+    start_a, end_a = leaf_points(side_a, leaf_a)
+    start_b, end_b = leaf_points(side_b, leaf_b)
     least2 = math.inf
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, X], vertices[point, Y])
+        x, y = in_other_frame(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             least2 = min(least2, edge_distance2(vertices, x, y, start, end))
@@ -199,53 +206,56 @@ def run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
 
 
 def leaf_distance(vertices, pose, side_a, side_b, walk, least):
-    """The smaller of ``least`` and the distance of the runs of two leaves [m]."""
+    """Return the smaller of ``least`` and the distance of the runs of two leaves [m]."""
     i, j, _, _ = walk
-    least = run_distance(vertices, pose, side_a, i, side_b, j, least)
-    return run_distance(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
+    least = leaf_distance_one_way(vertices, pose, side_a, i, side_b, j, least)
+    return leaf_distance_one_way(vertices, reversed_pose(pose), side_b, j, side_a, i, least)
 
 
 def nearer_child(tree, pose, plan, walk):
-    """The walk at that child of the larger piece which seems to be nearer to the other piece."""
+    """Return the traversal at the child of the larger piece whose circle is closer to the other
+    piece."""
     _, _, level_a, level_b = walk
-    child = descended(plan, walk)
+    child = descend(plan, walk)
     i, j, child_a, child_b = child
     sibling = i + (child_a > level_a), j + (child_b > level_b), child_a, child_b
-    near, radii = circles_met(tree, pose, plan, child)
-    far, other_radii = circles_met(tree, pose, plan, sibling)
+    near, radii = circle_distance(tree, pose, plan, child)
+    far, other_radii = circle_distance(tree, pose, plan, sibling)
     if math.sqrt(near) - radii <= math.sqrt(far) - other_radii:
         return child
     return sibling
 
 
 def core_distance(outlines, a, b, pose):
-    """Smallest distance [m] between a core point of one body and the core of the other; of swollen
-    cores below 0 where they overlap.
+    """Return the smallest distance [m] between the cores of two bodies, from core points to edges.
 
-    ``pose`` takes a's points into b's frame. Branch and bound: straight down to two runs that are
-    near, then through all that can be nearer.
+    ``pose`` maps a's points into b's frame. For swollen cores (compounds.py) it is negative where
+    they overlap. Branch and bound: descend directly to two close leaves for a first bound, then
+    visit only pairs of nodes that can be closer.
     """
     vertices, tree = outlines.vertices, outlines.tree
-    side_a, side_b = side_of(outlines, a), side_of(outlines, b)
-    plan = plan_of(tree, side_a, side_b)
+    side_a, side_b = tree_side(outlines, a), tree_side(outlines, b)
+    plan = traversal_plan(tree, side_a, side_b)
+    # First bound: greedy descent.
     walk = START
     while not at_leaves(plan, walk):
         walk = nearer_child(tree, pose, plan, walk)
     least = leaf_distance(vertices, pose, side_a, side_b, walk, math.inf)
+    # Full traversal, pruned with the best distance so far.
     walk = START
-    while goes_on(walk):
-        if not within(tree, pose, plan, walk, least):
-            walk = passed(plan, walk)
+    while has_nodes(walk):
+        if not may_be_closer(tree, pose, plan, walk, least):
+            walk = skip_subtree(plan, walk)
         elif at_leaves(plan, walk):
             least = leaf_distance(vertices, pose, side_a, side_b, walk, least)
-            walk = passed(plan, walk)
+            walk = skip_subtree(plan, walk)
         else:
-            walk = descended(plan, walk)
+            walk = descend(plan, walk)
     return least
 
 
 def pose_of(scene, work, a, b):
-    """(c, s, x, y): the turn and the shift that take a's points into b's frame now."""
+    """Return the present pose (c, s, x, y) that maps a's points into b's frame."""
     x, y = separation(scene, work, NOW, a, b)
     turn = work.place[NOW, a, ANGLE] - work.place[NOW, b, ANGLE]
     c, s = math.cos(work.place[NOW, b, ANGLE]), math.sin(work.place[NOW, b, ANGLE])
@@ -253,7 +263,7 @@ def pose_of(scene, work, a, b):
 
 
 def add_pair(work, pair, a, point, b, start, end):
-    """Append a pair of features to the list; False where no room is left."""
+    """Append a pair of features to the list; return False if there is no room."""
     row = work.tally.candidates
     if row == work.candidates.shape[0]:
         work.tally.full = CANDIDATES_FULL
@@ -261,23 +271,24 @@ def add_pair(work, pair, a, point, b, start, end):
     new = work.candidates
     new[row].vertex_body, new[row].vertex = a, point
     new[row].edge_body, new[row].edge_start, new[row].edge_end = b, start, end
-    new[row].closed, new[row].near = 0, 0
-    new[row].sliding, new[row].pair = 0, pair
+    new[row].contact_mode, new[row].surface_active = 0, 0
+    new[row].slide_direction, new[row].pair = 0, pair
     work.tally.candidates = row + 1
     return True
 
 
 @hook
 def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
-    """List pairs of a leaf's points and another's edges nearer than the reach; False if full."""
+    """List pairs of one leaf's points and another leaf's edges closer than the reach; False if
+    full."""
     vertices = scene.vertices
     first_b, points_b, _, _ = side_b
     edges = first_b + edge_count(points_b)
-    start_a, end_a = run_of(side_a, leaf_a)
-    start_b, end_b = run_of(side_b, leaf_b)
+    start_a, end_a = leaf_points(side_a, leaf_a)
+    start_b, end_b = leaf_points(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = posed(pose, vertices[point, X], vertices[point, Y])
+        x, y = in_other_frame(pose, vertices[point, X], vertices[point, Y])
         for start in range(start_b, min(end_b, edges)):
             end = edge_end(first_b, points_b, start)
             if edge_distance2(vertices, x, y, start, end) < reach * reach:
@@ -287,9 +298,9 @@ def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, 
 
 @hook
 def list_polygons(scene, work, pair, cutoff):
-    """List the pairs of features of two bodies, both ways round; False for a full list."""
+    """List the pairs of features of two bodies in both roles; return False if the list is full."""
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
-    side_a, side_b = side_of(scene, a), side_of(scene, b)
+    side_a, side_b = tree_side(scene, a), tree_side(scene, b)
     _, points_a, _, _ = side_a
     _, points_b, _, _ = side_b
     if points_a == 1 and points_b == 1:
@@ -297,24 +308,25 @@ def list_polygons(scene, work, pair, cutoff):
     reach = scene.bodies[a].radius + scene.bodies[b].radius + cutoff
     pose = pose_of(scene, work, a, b)
     back = reversed_pose(pose)
-    plan = plan_of(scene.tree, side_a, side_b)
+    plan = traversal_plan(scene.tree, side_a, side_b)
     walk = START
     room = True
-    while goes_on(walk) and room:
-        if not within(scene.tree, pose, plan, walk, reach):
-            walk = passed(plan, walk)
+    while has_nodes(walk) and room:
+        if not may_be_closer(scene.tree, pose, plan, walk, reach):
+            walk = skip_subtree(plan, walk)
         elif at_leaves(plan, walk):
             i, j, _, _ = walk
+            # Vertices of a against edges of b, then the reverse.
             room = list_one_way(scene, work, pair, pose, a, b, side_a, i, side_b, j, reach)
             room = room and list_one_way(scene, work, pair, back, b, a, side_b, j, side_a, i, reach)
-            walk = passed(plan, walk)
+            walk = skip_subtree(plan, walk)
         else:
-            walk = descended(plan, walk)
+            walk = descend(plan, walk)
     return room
 
 
 def list_spheres(scene, work, pair, cutoff):
-    """List the one pair of two spheres where its gap is below the cut-off; False if full."""
+    """List the one pair of two spheres if its gap is below the cut-off; return False if full."""
     a, b = work.pairs[pair].later, work.pairs[pair].earlier
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
@@ -323,27 +335,26 @@ def list_spheres(scene, work, pair, cutoff):
 
 
 def sphere_gap(scene, work, a, b):
-    """The gap of two spheres now [m]."""
+    """Return the present gap of two spheres [m]."""
     ox, oy = separation(scene, work, NOW, a, b)
     return length_of(ox, oy) - scene.bodies[a].radius - scene.bodies[b].radius
 
 
 @hook
 def gap_between(scene, work, a, b):
-    """The distance between two outlines now [m], negative where they overlap."""
+    """Return the present distance between two outlines [m], negative where they overlap."""
     contact = scene.bodies[a].radius + scene.bodies[b].radius
     return core_distance(scene, a, b, pose_of(scene, work, a, b)) - contact
 
 
-def turn_nothing(work, state, body):
-    """Spheres look the same at every angle."""
+def skip_rotation(work, state, body):
+    """Do nothing: spheres look the same at every angle."""
 
 
 SPHERES_ONLY: dict[Callable, Callable] = {
-    contacts.turn_body: turn_nothing,
+    contacts.update_rotation: skip_rotation,
     list_polygons: list_spheres,
     gap_between: sphere_gap,
     contacts.locate_polygons: contacts.locate_spheres,
 }
-"""What replaces the polygon code in a scene of spheres, for flocsim.compiler.composer.compose: one
-pair per two bodies."""
+"""{hook: its replacement in scenes of spheres}, where two bodies form one pair."""

@@ -1,23 +1,23 @@
-"""Where bodies touch: how far two lie apart, and where and how listed vertex–edge pairs of them do,
-in kernels; and of placed shapes, where they touch, and whether they overlap too deeply to start.
+"""Contact geometry: gap, normal and contact point of listed vertex–edge pairs, as kernels, and
+overlaps of placed shapes.
 
-A contact pair is a vertex of one core and an edge of the other (MODEL: Alonso-Marroquín's
-vertex–edge method); two spheres are one pair of points.
+A contact pair is a vertex of one core and an edge of the other (vertex–edge method,
+Alonso-Marroquín 2008); two spheres form one pair of points. The result is a VertexAtEdge of
+flocsim.state in ``geometry[state, row]``. The normal n points from the foot (the closest point of
+the edge) to the vertex, and the tangent is t = (−n_y, n_x). The contact point is the middle of the
+overlap.
 
-``geometry[state, row]`` is a VertexAtEdge of flocsim.state. The normal n points from the foot on
-the edge to the vertex, t = (−n_y, n_x). It turns by ``turning`` for every metre by which the vertex
-is shifted along t: 0 where the foot lies inside the edge, which alone turns it then, 1/distance
-where it is an end.
+n turns by ``turning`` [1/m] per displacement of the vertex along t: 0 where the foot lies inside
+the edge, so that n turns with the edge only, and 1/distance where the foot is an end of the edge.
 
-A run needs cosine and sine of angles some ten times a step, of angles that hardly differ, and a
-library's functions for them take more time there than anything else. So they are asked for at
-multiples of 1/64 alone, and from the nearest one, δ away,
+Cosines and sines are needed some ten times per step, for angles that hardly change, and library
+calls would dominate the cost here. So they are evaluated at multiples of 1/64 rad only. From the
+nearest multiple φ, at a distance δ,
 
     cos(φ + δ) = cos φ cos δ − sin φ sin δ,  sin(φ + δ) = sin φ cos δ + cos φ sin δ,
 
-with the series of cos δ and sin δ, of which what is left out is below 1e-17. What is remembered
-depends on the angle alone and not on the way there, so that a run that is gone on with, or is
-turned back, finds the same.
+with truncated series for cos δ and sin δ, errors below 1e-17. The stored values depend on the angle
+alone, not on its history, so a resumed or repeated step yields identical numbers.
 """
 
 import math
@@ -35,65 +35,68 @@ from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import NOW
 
-TINY = 1e-300
-"""Keeps the reciprocal of a distance finite."""
+LEAST_DISTANCE = 1e-300
+"""Lower bound of a distance in a reciprocal [m]."""
 
-PER_RADIAN = 64.0
-"""Angles for which both are known lie this close."""
+ANGLES_PER_RADIAN = 64.0
+"""Stored angles per radian: |δ| ≤ 1/128, for which the short series below suffice."""
 
-LARGEST = 1e6
-"""Beyond that angle [rad] the library is asked every time."""
+LARGEST_ANGLE = 1e6
+"""Angle [rad] beyond which the library functions are used."""
 
 TOUCHING = 1e-12
-"""Gap [m] below which outlines are shown as touching."""
+"""Gap [m] below which outlines are reported as touching."""
 
 
 def length_of(x, y):
-    """The length of a vector: a root, where math.hypot calls a library's function, which costs more
-    than most of what is done with it. Squares of what a run has in it neither overflow nor vanish.
+    """Return the length of a vector.
+
+    A square root instead of math.hypot, a library call that would cost more than most of its
+    callers. Squares of the lengths in a run neither overflow nor underflow.
     """
     return math.sqrt(x * x + y * y)
 
 
 @hook
 def separation(scene, work, state, a, b):
-    """(x, y) of body a as seen from body b, in a state [m]."""
+    """Return the vector (x, y) [m] from the centroid of body b to that of body a, in a state."""
     return work.place[state, a, X] - work.place[state, b, X], work.place[state, a, Y] - work.place[
         state, b, Y
     ]
 
 
-def nearest_way(length, period):
-    """A way along an axis, by the nearest image [m]."""
+def nearest_displacement(displacement, period):
+    """Return a displacement along one axis, reduced to the nearest periodic image [m]."""
     if period < math.inf:
-        return length - period * math.floor(length / period + 0.5)
-    return length
+        return displacement - period * math.floor(displacement / period + 0.5)
+    return displacement
 
 
 def nearest_image(scene, work, state, a, b):
-    """The same where space repeats itself: of a's image that is nearest to b."""
+    """Return `separation` in a periodic domain: to the image of a that is nearest to b."""
     width, height = scene.box
-    x = nearest_way(work.place[state, a, X] - work.place[state, b, X], width)
-    return x, nearest_way(work.place[state, a, Y] - work.place[state, b, Y], height)
+    x = nearest_displacement(work.place[state, a, X] - work.place[state, b, X], width)
+    return x, nearest_displacement(work.place[state, a, Y] - work.place[state, b, Y], height)
 
 
 PERIODIC: dict[Callable, Callable] = {separation: nearest_image}
-"""The replacement for scenes that repeat themselves."""
+"""{hook: its replacement in periodic scenes}."""
 
 
 def cosine_and_sine(work, body, angle):
-    """(cos, sin) of an angle of a body [rad], each within 3e-16."""
-    if not abs(angle) < LARGEST:
+    """Return (cos, sin) of an angle of a body [rad], each within 3e-16."""
+    if not abs(angle) < LARGEST_ANGLE:
         return math.cos(angle), math.sin(angle)
-    nearest = math.floor(PER_RADIAN * angle + 0.5) / PER_RADIAN
+    nearest = math.floor(ANGLES_PER_RADIAN * angle + 0.5) / ANGLES_PER_RADIAN
     pose = work.poses[body]
-    # No cosine of a multiple of 1/64 is 0.
+    # cos(k/64) is never exactly 0, so 0 marks values not yet computed.
     if nearest != pose.known_angle or pose.known_cosine == 0.0:
         pose.known_angle = nearest
         pose.known_cosine = math.cos(nearest)
         pose.known_sine = math.sin(nearest)
     rest = angle - nearest
     square = rest * rest
+    # Taylor series in δ = rest, then the addition theorems.
     c = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0))
     s = rest * (1.0 - square * (1.0 / 6.0 - square / 120.0))
     cosine, sine = pose.known_cosine, pose.known_sine
@@ -101,21 +104,21 @@ def cosine_and_sine(work, body, angle):
 
 
 @hook
-def turn_body(work, state, body):
-    """Cosine and sine of a body's angle in a state, into ``work.poses``."""
+def update_rotation(work, state, body):
+    """Store cosine and sine of a body's angle in a state in ``work.poses``."""
     pose = work.poses[body]
     cosine, sine = cosine_and_sine(work, body, work.place[state, body, ANGLE])
     pose.cosine, pose.sine = cosine, sine
 
 
-def turn_bodies(work, state):
-    """The same of all bodies."""
+def update_rotations(work, state):
+    """Store cosine and sine of the angles of all bodies."""
     for body in range(work.poses.shape[0]):
-        turn_body(work, state, body)
+        update_rotation(work, state, body)
 
 
-def turned(scene, work, body, point):
-    """A core point relative to its body's centroid, in the frame of the scene."""
+def rotated_point(scene, work, body, point):
+    """Return a core point relative to its body's centroid, with the axes of the scene [m]."""
     pose = work.poses[body]
     x = scene.vertices[point, X]
     y = scene.vertices[point, Y]
@@ -124,12 +127,17 @@ def turned(scene, work, body, point):
     return c * x - s * y, s * x + c * y
 
 
-def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side):
-    """Write one geometry row from the normal and the two arms of the contact point."""
+def store_geometry(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side):
+    """Store one geometry row from the normal and the contact point relative to both centroids.
+
+    (ax, ay), (bx, by): contact point relative to the centroids of the vertex's and the edge's body.
+    """
     geometry = work.geometry
     geometry[state, row].normal_x = nx
     geometry[state, row].normal_y = ny
+    # A grazing contact counts as touching at the gap at which it has been pinned (friction.py).
     geometry[state, row].gap = gap - work.contacts[row].gap_offset
+    # Arms: moments about the centroid of a unit force along n (r × n) and along t (r × t).
     geometry[state, row].vertex_arm_n = ax * ny - ay * nx
     geometry[state, row].vertex_arm_t = ax * nx + ay * ny
     geometry[state, row].edge_arm_n = bx * ny - by * nx
@@ -140,8 +148,8 @@ def store_row(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot, side
 
 
 @hook
-def row_radii(scene, work, row):
-    """(of the vertex, of the edge) of a pair: the radii of the disks that sweep them [m]."""
+def contact_radii(scene, work, row):
+    """Return the spheroradii (of the vertex, of the edge) of a pair [m]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     return scene.bodies[a].radius, scene.bodies[b].radius
@@ -149,7 +157,10 @@ def row_radii(scene, work, row):
 
 @hook
 def locate_polygons(scene, work, state, row):
-    """Geometry of one vertex–edge pair; a vertex right on the edge gets an arbitrary normal."""
+    """Store the geometry of one vertex–edge pair.
+
+    A vertex exactly on the edge gets an arbitrary normal.
+    """
     candidate = work.candidates[row]
     a, point = candidate.vertex_body, candidate.vertex
     b, start, end = (
@@ -157,10 +168,12 @@ def locate_polygons(scene, work, state, row):
         candidate.edge_start,
         candidate.edge_end,
     )
-    px, py = turned(scene, work, a, point)
-    sx, sy = turned(scene, work, b, start)
-    ex, ey = turned(scene, work, b, end)
+    # All points relative to b's centroid.
+    px, py = rotated_point(scene, work, a, point)
+    sx, sy = rotated_point(scene, work, b, start)
+    ex, ey = rotated_point(scene, work, b, end)
     ox, oy = separation(scene, work, state, a, b)
+    # Foot f: the closest point of the segment, share 0 and 1 being its ends.
     share = closest_share(px + ox, py + oy, sx, sy, ex, ey)
     fx = sx + share * (ex - sx)
     fy = sy + share * (ey - sy)
@@ -170,19 +183,23 @@ def locate_polygons(scene, work, state, row):
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
-    radius_a, radius_b = row_radii(scene, work, row)
-    middle = 0.5 * (distance + radius_b - radius_a)
-    bx = fx + middle * nx
-    by = fy + middle * ny
+    # The contact point lies on the normal, midway between the two outlines.
+    radius_a, radius_b = contact_radii(scene, work, row)
+    contact_distance = 0.5 * (distance + radius_b - radius_a)
+    bx = fx + contact_distance * nx
+    by = fy + contact_distance * ny
     gap = distance - radius_a - radius_b
-    turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, TINY)
+    # An interior foot moves along the edge with the vertex; an end stays, and the normal turns
+    # about it.
+    turning = 0.0 if 0.0 < share < 1.0 else 1.0 / max(distance, LEAST_DISTANCE)
+    # Position along the edge, for the tangential displacement (integrators/rhs/friction.rolled).
     foot = share * length_of(ex - sx, ey - sy)
     side = 1.0 if (ey - sy) * nx - (ex - sx) * ny >= 0.0 else -1.0
-    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, foot, side)
+    store_geometry(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, foot, side)
 
 
 def locate_spheres(scene, work, state, row):
-    """Geometry of two spheres: nothing to turn."""
+    """Store the geometry of two spheres, whose angles do not matter."""
     candidate = work.candidates[row]
     a = candidate.vertex_body
     b = candidate.edge_body
@@ -191,17 +208,18 @@ def locate_spheres(scene, work, state, row):
     nx, ny = 0.0, 1.0
     if distance > 0.0:
         nx, ny = ox / distance, oy / distance
-    middle = 0.5 * (distance + scene.bodies[b].radius - scene.bodies[a].radius)
+    contact_distance = 0.5 * (distance + scene.bodies[b].radius - scene.bodies[a].radius)
     gap = distance - scene.bodies[a].radius - scene.bodies[b].radius
-    bx, by = middle * nx, middle * ny
-    turning = 1.0 / max(distance, TINY)
-    store_row(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
+    bx, by = contact_distance * nx, contact_distance * ny
+    turning = 1.0 / max(distance, LEAST_DISTANCE)
+    store_geometry(work, state, row, nx, ny, gap, bx - ox, by - oy, bx, by, turning, 0.0, 1.0)
 
 
 @apart
 def locate_contacts(scene, work, state):
-    """Geometry of all listed pairs in a state; the smallest gap (inf without pairs)."""
-    turn_bodies(work, state)
+    """Store the geometry of all listed pairs in a state; return the smallest gap (inf without
+    pairs)."""
+    update_rotations(work, state)
     least = math.inf
     for row in range(work.tally.candidates):
         locate_polygons(scene, work, state, row)
@@ -211,16 +229,17 @@ def locate_contacts(scene, work, state):
 
 @hook
 def locate_acting(scene, work, state):
-    """Geometry, in a state, of the listed pairs through which forces act in this step."""
-    turn_bodies(work, state)
+    """Store the geometry, in a state, of the listed pairs that exert a force in this step."""
+    update_rotations(work, state)
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed + candidate.near > 0:
+        if candidate.contact_mode + candidate.surface_active > 0:
             locate_polygons(scene, work, state, row)
 
 
 def least_listed_gap(work):
-    """The smallest gap among the listed pairs now (inf where none is listed)."""
+    """Return the smallest gap among the listed pairs in the present state (inf if none is listed)
+    [m]."""
     least = math.inf
     for row in range(work.tally.candidates):
         least = min(least, work.geometry[NOW, row].gap)
@@ -228,22 +247,23 @@ def least_listed_gap(work):
 
 
 def contact_point(work, row, body):
-    """The middle of a pair's overlap, relative to the centroid of one of its bodies."""
+    """Return the contact point of a pair relative to the centroid of one of its bodies [m]."""
     geometry = work.geometry[NOW]
     nx, ny = geometry[row].normal_x, geometry[row].normal_y
     if work.candidates[row].vertex_body == body:
         across, along = geometry[row].vertex_arm_n, geometry[row].vertex_arm_t
     else:
         across, along = geometry[row].edge_arm_n, geometry[row].edge_arm_t
+    # The point from its two arms: r = (r × t) n − (r × n) t.
     return along * nx + across * ny, along * ny - across * nx
 
 
 def overlap_fault(
     a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
 ) -> str | None:
-    """What is wrong with two placed bodies, by their parts, in words; None if nothing is.
+    """Describe why two placed bodies may not start like this; return None if they may.
 
-    ``along_outlines``: the overlap [m] up to which what acts all along them is known.
+    ``along_outlines``: largest overlap [m] for which forces along outlines are defined.
     """
     gaps = [(core_gap(one, other), one.radius + other.radius) for one, other in product(a, b)]
     if min(gaps)[0] == 0.0:
@@ -261,25 +281,26 @@ def overlap_fault(
 
 
 def touching_points(a: np.ndarray, radius_a: float, b: np.ndarray, radius_b: float) -> np.ndarray:
-    """Middles (c, 2) [m] of the overlaps of two placed rings (N, 2) with their radii.
+    """Return the contact points (c, 2) [m] of two placed rings (N, 2) with their spheroradii.
 
-    A gap of less than TOUCHING counts: a step that ends at a first touch ends on either side of it.
+    Gaps below TOUCHING count: a step that ends at a first touch ends on either side of it.
     """
-    found = []
+    points_found = []
+    # Vertices of each ring against edges of the other, as in the vertex–edge method.
     for points, radius, core, other in ((a, radius_a, b, radius_b), (b, radius_b, a, radius_a)):
         if len(core) == 1 < len(points):
             continue  # A sphere has no edge for the vertices of a polygon to touch.
-        away = points[:, None] - core if len(core) == 1 else from_edges(points, *edges_of(core))
-        distance = np.hypot(away[..., 0], away[..., 1])
-        normal = away / np.maximum(distance, 1e-300)[..., None]
-        feet = points[:, None] - away
+        offsets = points[:, None] - core if len(core) == 1 else from_edges(points, *edges_of(core))
+        distance = np.hypot(offsets[..., 0], offsets[..., 1])
+        normal = offsets / np.maximum(distance, 1e-300)[..., None]
+        feet = points[:, None] - offsets
         middle = feet + normal * (0.5 * (distance + other - radius))[..., None]
-        found.append(middle[distance < radius + other + TOUCHING])
-    return np.concatenate(found)
+        points_found.append(middle[distance < radius + other + TOUCHING])
+    return np.concatenate(points_found)
 
 
 def placed_contacts(shapes: Sequence[Shape], places: np.ndarray) -> np.ndarray:
-    """Where any two of the bodies at these places (n, 3) touch: (c, 2) [m]."""
+    """Return the points (c, 2) [m] where any two bodies at these positions (n, 3) touch."""
     bodies = [shape.placed_parts(*place) for shape, place in zip(shapes, places, strict=True)]
     found = [
         touching_points(ring, one.radius, core, other.radius)

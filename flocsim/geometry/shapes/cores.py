@@ -1,10 +1,10 @@
-"""Cores as points and edges, and Parts, cores swept by disks, of which every shape is made.
+"""Cores (points and edges), and Parts, cores swept by disks, from which every shape is built.
 
-What is between points and edges (distances, areas, crossings, inside or outside) is here alone,
-twice at most: on scalars, for kernels, which run compiled or not, and on arrays of points.
+Geometry of points and edges (distances, areas, crossings, point in polygon) is implemented only
+here, in up to two forms: on scalars, for kernels, compiled or not, and on arrays of points.
 
-A part is a core of one or several rings, swept by one disk: a sphere, a segment and a polygon are
-one part of one ring; a polygon with holes is one part with a ring more for each of them; several
+A part is a core of one or several rings, swept by one disk. A sphere, a segment and a polygon are
+one part of one ring; a polygon with holes is one part with a further ring for each hole; several
 parts fixed to each other are a composite.
 """
 
@@ -15,12 +15,13 @@ import numpy as np
 
 
 def closest_share(px, py, ax, ay, bx, by):
-    """Where the point of segment a–b nearest to p lies: 0 at a, 1 at b; 0 for a point a = b."""
+    """Return the position on segment a–b closest to p: 0 at a, 1 at b; 0 if a = b."""
     dx = bx - ax
     dy = by - ay
     length2 = dx * dx + dy * dy
     if length2 == 0.0:
         return 0.0
+    # Orthogonal projection on the line, clipped to the segment.
     share = ((px - ax) * dx + (py - ay) * dy) / length2
     return min(max(share, 0.0), 1.0)
 
@@ -33,9 +34,9 @@ def segment_distance2(px, py, ax, ay, bx, by):
 
 
 def is_near(px, py, ax, ay, bx, by, limit):
-    """Whether p is within √limit of segment a–b, without a division.
+    """Return True if p is within √limit of segment a–b, without a division.
 
-    Exact on whole numbers, where centres of pixels often lie just at the limit.
+    Exact for integers: centres of pixels often lie just at the limit.
     """
     ux, uy = bx - ax, by - ay
     wx, wy = px - ax, py - ay
@@ -46,29 +47,31 @@ def is_near(px, py, ax, ay, bx, by, limit):
     if along >= length2:
         wx, wy = px - bx, py - by
         return wx * wx + wy * wy <= limit
+    # Inside the segment: distance² = across²/length².
     across = wx * uy - wy * ux
     return across * across <= limit * length2
 
 
 def side(ax, ay, bx, by, px, py):
-    """Twice the signed area of the triangle a, b, p: above 0 where p is to the left of a–b."""
+    """Return twice the signed area of the triangle a, b, p: positive if p is to the left of a–b."""
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
 def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-    """Whether the segments a–b and c–d cross at an inner point of both."""
+    """Return True if the segments a–b and c–d cross at an inner point of both."""
     return (side(ax, ay, bx, by, cx, cy) > 0.0) != (side(ax, ay, bx, by, dx, dy) > 0.0) and (
         side(cx, cy, dx, dy, ax, ay) > 0.0
     ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
 
 
 def edge_count(points):
-    """Edges of a core of that many points: none, one, or as many as points."""
+    """Return the number of edges of a core with that many points: none, one, or as many as
+    points."""
     return points - 1 if points < 3 else points
 
 
 def edge_end(first, points, start):
-    """The core point at which the edge that begins at ``start`` ends.
+    """Return the core point at which the edge that begins at ``start`` ends.
 
     ``first`` is the first of the body's core points, ``points`` their number.
     """
@@ -79,7 +82,8 @@ def edge_end(first, points, start):
 
 
 def edges_of(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(starts, ends) of the core's edges: none for a point, one for a segment, N for a polygon."""
+    """Return (starts, ends) of a core's edges: none for a point, one for a segment, N for a
+    polygon."""
     if len(vertices) == 2:
         return vertices[:1], vertices[1:]
     if len(vertices) == 1:
@@ -94,29 +98,32 @@ def unit_edges(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The z component of the cross product of plane vectors, elementwise."""
+    """Return the z component of the cross product of plane vectors, elementwise."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def signed_area(vertices: np.ndarray) -> float:
-    """Area of the core polygon [m²], positive when its vertices run counter-clockwise."""
+    """Return the area of the core polygon [m²], positive for counter-clockwise vertices."""
     return 0.5 * np.sum(cross(vertices, np.roll(vertices, -1, axis=0)))
 
 
 def from_edges(points: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Vectors (k, edges, 2) from the nearest place of each edge to each of the points (k, 2)."""
+    """Return the vectors (k, edges, 2) from the closest point of each edge to each of the points
+    (k, 2)."""
     ax, ay = (ends - starts).T
     x, y = points.T[..., None] - starts.T[:, None]
+    # Orthogonal projection on every edge, clipped to it.
     share = np.clip((x * ax + y * ay) / (ax * ax + ay * ay), 0.0, 1.0)
     return np.moveaxis(np.stack([x - share * ax, y - share * ay]), 0, -1)
 
 
 def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Which of the points (k, 2) lie inside the core polygon (crossing number)."""
+    """Return which of the points (k, 2) lie inside the core polygon (crossing number)."""
     if len(vertices) < 3:
         return np.zeros(len(points), dtype=bool)
     a, b = vertices, np.roll(vertices, -1, axis=0)
     x, y = points[:, :1], points[:, 1:]
+    # Edges that a horizontal ray to the right of the point crosses; an odd number means inside.
     straddles = (a[:, 1] > y) != (b[:, 1] > y)
     rise = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
     crossing = a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
@@ -124,7 +131,7 @@ def inside_polygon(points: np.ndarray, vertices: np.ndarray) -> np.ndarray:
 
 
 def inside_rings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
-    """Which of the points (k, 2) lie inside a core of several rings: an outer one, and holes."""
+    """Return which of the points (k, 2) lie inside a core with holes: an outer ring, then holes."""
     found = inside_polygon(points, rings[0])
     for ring in rings[1:]:
         found = found ^ inside_polygon(points, ring)
@@ -132,15 +139,18 @@ def inside_rings(points: np.ndarray, rings: Sequence[np.ndarray]) -> np.ndarray:
 
 
 class Part(NamedTuple):
-    """``rings``: (k, 2) [m] each, a point, the ends of a segment or the corners of a polygon, the
-    outer one counter-clockwise, those of holes behind it clockwise; ``radius`` [m] of the disk."""
+    """A core swept by one disk.
+
+    ``rings``: (k, 2) [m] each, a point, the ends of a segment or the corners of a polygon; the
+    outer ring first, counter-clockwise, then holes, clockwise. ``radius`` [m] of the disk.
+    """
 
     rings: tuple[np.ndarray, ...]
     radius: float
 
     @property
     def points(self) -> np.ndarray:
-        """The core points of all rings (N, 2) [m]."""
+        """Core points of all rings (N, 2) [m]."""
         return self.rings[0] if len(self.rings) == 1 else np.concatenate(self.rings)
 
 
@@ -148,12 +158,12 @@ Parts = tuple[Part, ...]
 
 
 def is_compound(parts: Sequence[Part]) -> bool:
-    """Whether there is more than one ring."""
+    """Return True if there is more than one ring."""
     return len(parts) > 1 or len(parts[0].rings) > 1
 
 
 def moved_parts(parts: Sequence[Part], x: float, y: float, angle: float) -> Parts:
-    """Parts turned by an angle [rad] about the origin, then shifted."""
+    """Return parts rotated by an angle [rad] about the origin, then shifted."""
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])
     return tuple(
@@ -162,7 +172,8 @@ def moved_parts(parts: Sequence[Part], x: float, y: float, angle: float) -> Part
 
 
 def scaled_parts(parts: Sequence[Part], factor: float, radii: float | None = None) -> Parts:
-    """Parts ``factor`` times as large, their radii ``radii`` times (as well unless given)."""
+    """Return parts scaled by ``factor``, their spheroradii by ``radii`` (by default also
+    ``factor``)."""
     wider = factor if radii is None else radii
     return tuple(
         Part(tuple(ring * factor for ring in part.rings), part.radius * wider) for part in parts
@@ -170,8 +181,11 @@ def scaled_parts(parts: Sequence[Part], factor: float, radii: float | None = Non
 
 
 class PointTable(NamedTuple):
-    """Parts as columns, for files: of every core point its ``place`` (N, 2) [m], the numbers of its
-    ``part`` and of its ``ring`` in there (N,), and the ``radius`` (N,) [m] of its part."""
+    """Parts as columns, for files.
+
+    For every core point its ``place`` (N, 2) [m], the numbers of its ``part`` and of its ``ring``
+    in that part (N,), and the ``radius`` (N,) [m] of its part.
+    """
 
     place: np.ndarray
     part: np.ndarray
@@ -180,7 +194,7 @@ class PointTable(NamedTuple):
 
 
 def table_of(parts: Sequence[Part]) -> PointTable:
-    """The PointTable of some parts."""
+    """Return the PointTable of some parts."""
     rows = [
         (ring, np.full(len(ring), number), np.full(len(ring), place),
          np.full(len(ring), part.radius))
@@ -190,16 +204,20 @@ def table_of(parts: Sequence[Part]) -> PointTable:
 
 
 def parts_in(table: PointTable) -> Parts:
-    """The parts of a PointTable, as it was read; ValueError where its numbers do not count up from
-    0, or points of a part have several radii."""
+    """Return the parts of a PointTable read from a file.
+
+    Raises ValueError if part or ring numbers do not count up from 0, or a part has several radii.
+    """
     place, part, ring, radius = (np.asarray(column) for column in table)
     found: list[Part] = []
     names = np.column_stack([part, ring])
+    # A new ring begins where the part or ring number changes.
     breaks = np.flatnonzero(np.any(np.diff(names, axis=0) != 0, axis=1)) + 1
     for rows in np.split(np.arange(len(place)), breaks):
         number, hole = names[rows[0]].tolist()
         if np.any(radius[rows] != radius[rows[0]]):
             raise ValueError("core points of a part have several radii")
+        # A new part begins with its outer ring; further rings of it are holes.
         if hole == 0 and number == len(found):
             found.append(Part((place[rows],), float(radius[rows[0]])))
         elif number == len(found) - 1 and hole == len(found[-1].rings):

@@ -1,5 +1,7 @@
-"""Outlines as point lists, whether a polygon is simple, how far cores are apart; and shape measures
-of an outline, as they are published of flocs. The only file that imports shapely."""
+"""Outlines as point lists, tests of simple polygons, distances of cores, and shape measures.
+
+The only file that imports shapely.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,12 +13,14 @@ from flocsim.errors import ShapeError
 from flocsim.geometry.shapes.cores import Part
 
 MEASURED_QUADRANT = 64
-"""Chords in the place of a quarter of a circle where an outline is measured."""
+"""Chords per quarter circle in measured outlines."""
 
 
 def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> str | None:
-    """None where the closed polygon (N ≥ 3, 2) is simple and its holes lie inside, apart from each
-    other, else where it fails, in words."""
+    """Return None if a closed polygon (N ≥ 3, 2) is simple, else a description of the fault.
+
+    Holes must lie inside and apart from each other.
+    """
     import shapely
 
     polygon = shapely.Polygon(vertices, holes)
@@ -24,7 +28,7 @@ def simplicity_fault(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> 
 
 
 def require_simple(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> None:
-    """Raise ShapeError where edges of the closed polygon cross or touch, or a hole is none."""
+    """Raise ShapeError if edges of the closed polygon cross or touch, or a hole is invalid."""
     fault = simplicity_fault(vertices, holes)
     if fault is not None and holes:
         raise ShapeError(
@@ -39,15 +43,17 @@ def require_simple(vertices: np.ndarray, holes: Sequence[np.ndarray] = ()) -> No
 
 
 def core_gap(a: Part, b: Part) -> float:
-    """Smallest distance [m] between the cores of two parts, 0 where they overlap."""
+    """Return the smallest distance [m] between the cores of two parts, 0 if they overlap."""
     if len(a.points) == len(b.points) == 1:
         return float(np.hypot(*(a.points[0] - b.points[0])))
     return float(core_geometry(a.rings).distance(core_geometry(b.rings)))
 
 
 def loose_parts(parts: Sequence[Part], slack: float) -> np.ndarray:
-    """The numbers of the parts that do not hang together with the first; what is nearer than a
-    share ``slack`` of the smaller radius touches."""
+    """Return the numbers of the parts that are not connected with the first.
+
+    Parts touch if their gap is below a share ``slack`` of the smaller radius.
+    """
     import shapely
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -55,6 +61,7 @@ def loose_parts(parts: Sequence[Part], slack: float) -> np.ndarray:
     radius = np.array([part.radius for part in parts])
     cores = np.array([core_geometry(part.rings) for part in parts])
     farthest = (2.0 + slack) * radius.max()
+    # Close pairs by a spatial index, then connected components of the graph of touching parts.
     one, other = shapely.STRtree(cores).query(cores, "dwithin", farthest)
     reach = radius[one] + radius[other] + slack * np.minimum(radius[one], radius[other])
     near = shapely.distance(cores[one], cores[other]) <= reach
@@ -64,8 +71,10 @@ def loose_parts(parts: Sequence[Part], slack: float) -> np.ndarray:
 
 
 def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np.ndarray]:
-    """The outline of all parts, each core ⊕ disk, as closed rings [(k, 2), …] in metres: the outer
-    ones first, the largest before others, then the rings of holes."""
+    """Return the outline of all parts, each core ⊕ disk, as closed rings [(k, 2), …] [m].
+
+    Outer rings first, the largest before others, then holes.
+    """
     whole = swept_geometry(parts, points_per_quadrant)
     pieces = sorted(getattr(whole, "geoms", [whole]), key=lambda piece: -piece.area)
     rings = [piece.exterior for piece in pieces]
@@ -74,7 +83,7 @@ def swept_rings(parts: Sequence[Part], points_per_quadrant: int = 16) -> list[np
 
 
 def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
-    """All parts, each core ⊕ disk, as shapely has them."""
+    """Return all parts, each core ⊕ disk, as a shapely geometry."""
     import shapely
 
     swept = [
@@ -85,7 +94,7 @@ def swept_geometry(parts: Sequence[Part], points_per_quadrant: int) -> Any:
 
 
 def core_geometry(rings: Sequence[np.ndarray]) -> Any:
-    """A core as shapely has it."""
+    """Return a core as a shapely geometry."""
     import shapely
 
     if len(rings[0]) < 3:
@@ -97,9 +106,9 @@ def core_geometry(rings: Sequence[np.ndarray]) -> Any:
 class ShapeMeasures:
     """Measures of an outline; lengths in the unit of the outline.
 
-    - ``perimeter``: length of the outline, that of holes included;
+    - ``perimeter``: length of the outline, holes included;
     - ``aspect_ratio`` ≥ 1: long over short axis of the ellipse with the same second moments;
-    - ``circularity``: 4πA/P², 1 for a disc (the form factor of ISO 9276-6);
+    - ``circularity``: 4πA/P², 1 for a disc (form factor of ISO 9276-6);
     - ``solidity``: area over that of the convex hull;
     - ``feret_max``, ``feret_min``: largest and smallest distance of two parallel tangents.
     """
@@ -113,15 +122,16 @@ class ShapeMeasures:
 
 
 def measures_of(parts: Sequence[Part], elongation: float) -> ShapeMeasures:
-    """The ShapeMeasures of all parts, each core ⊕ disk [m], of an area of this ``elongation``
-    B = (M₁ − M₂)/(M₁ + M₂): the ellipse of these moments has the axes (a/b)² = (1 + B)/(1 − B).
+    """Return the ShapeMeasures of all parts, each core ⊕ disk [m].
 
-    Arcs are replaced by chords of 1.4°: lengths and areas are right to 1e-4.
+    ``elongation`` B = (M₁ − M₂)/(M₁ + M₂): the ellipse with these moments has (a/b)² = (1 + B)/(1 −
+    B). Arcs are replaced by chords of 1.4°; lengths and areas are right to 1e-4.
     """
     aspect = float(np.sqrt((1.0 + elongation) / (1.0 - elongation)))
     if len(parts) == 1 and len(parts[0].points) == 1:
         width = 2.0 * parts[0].radius
         return ShapeMeasures(np.pi * width, 1.0, 1.0, 1.0, width, width)
+    # Perimeter and hull from chords.
     whole = swept_geometry(parts, MEASURED_QUADRANT)
     hull, perimeter = whole.convex_hull, whole.length
     return ShapeMeasures(
@@ -131,13 +141,14 @@ def measures_of(parts: Sequence[Part], elongation: float) -> ShapeMeasures:
 
 
 def feret_diameters(hull: np.ndarray) -> tuple[float, float]:
-    """(largest, smallest) distance of two parallel tangents of a convex ring (k, 2).
+    """Return the (largest, smallest) distance of two parallel tangents of a convex ring (k, 2).
 
-    The largest is that of two corners; the smallest has one tangent along an edge.
+    The largest is the distance of two corners; the smallest has one tangent along an edge.
     """
     points = hull[:, 0] + 1j * hull[:, 1]
     largest = np.abs(points[:, np.newaxis] - points).max()
     edges = np.roll(points, -1) - points
     edges = edges[np.abs(edges) > 0.0]
+    # Distance of every corner from the line of every edge, with complex numbers as plane vectors.
     across = (points[:, np.newaxis] * np.conj(edges / np.abs(edges))).imag
     return float(largest), float(np.ptp(across, axis=0).min())

@@ -1,13 +1,12 @@
-"""The outline of a shape as pieces, segments and arcs; how far those of two outlines lie apart, and
-where to look at one for what another does to it.
+"""Outlines as pieces (segments and arcs), distances of pieces, and quadrature along them.
 
-Distances are those of the parts of the cores that pieces are offsets of, negative where outlines
-overlap. A piece is seen through a Placed: its numbers in the frame of the other body.
+Distances are those of the cores that pieces are offsets of, minus the offsets; negative where
+outlines overlap. A Placed holds a piece in the frame of the other body.
 
-What another outline does peaks where it is near, at feet, and falls off over a length of its own
-from there. So a piece is cut between its feet; on each side of one Gauss's rule takes what lies
-nearer than the length a over which the gap grows by twice itself, and once more what lies beyond
-it, by the logarithm of the way.
+The influence of another outline peaks at the feet, where it is nearest, and decays over a length of
+its own from there. So a piece is cut between its feet. On each side one Gauss rule covers the part
+within the length a over which the gap grows by twice itself, and another one the rest, in the
+logarithm of the distance.
 """
 
 import math
@@ -23,16 +22,19 @@ from flocsim.geometry.shapes.moments import exposed_arcs, exposed_chords, is_dis
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.state.outlines import Piece
 
-WIDEST = 0.5 * math.pi
-"""No arc is longer than this angle [rad]."""
+WIDEST_ARC = 0.5 * math.pi
+"""Largest angle of an arc [rad]; longer ones are split."""
 
-ROUNDED = 1e-7
-"""Of the longest piece: segments that are shorter are what rounding has left of a side at a reflex
+SHORTEST_SEGMENT = 1e-7
+"""Shortest segment over the longest piece: shorter ones are rounding remnants of a side at a reflex
 corner."""
 
 
 def segment_rows(starts, units, low, high, radius):
-    """Rows of segments: each from ``low`` to ``high`` along its unit tangent from its start."""
+    """Return segments as rows, each from ``low`` to ``high`` along its unit tangent from its
+    start."""
+    # A segment encloses itself: its midpoint is the centre, its half-length the radius of the
+    # circle.
     middle = starts + 0.5 * (low + high)[:, None] * units
     half = 0.5 * (high - low)
     radii = np.broadcast_to(radius, half.shape)
@@ -41,8 +43,9 @@ def segment_rows(starts, units, low, high, radius):
 
 
 def arc_rows(centres, radii, low, high):
-    """Rows of arcs from one angle to another, none of them longer than WIDEST."""
-    counts = np.maximum(np.ceil((high - low) / WIDEST - 1e-9), 1.0).astype(int)
+    """Return arcs as rows, from one angle to another, split at WIDEST_ARC."""
+    # Equal parts of at most WIDEST_ARC; the margin keeps rounding from adding one more.
+    counts = np.maximum(np.ceil((high - low) / WIDEST_ARC - 1e-9), 1.0).astype(int)
     owner = np.repeat(np.arange(len(counts)), counts)
     place = np.concatenate([np.arange(count) for count in counts]) if len(counts) else owner
     half = 0.5 * (high - low)[owner] / counts[owner]
@@ -50,17 +53,31 @@ def arc_rows(centres, radii, low, high):
     way = np.column_stack([np.cos(angle), np.sin(angle)])
     radius, centre = radii[owner], centres[owner]
     middle = centre + (radius * np.cos(half))[:, None] * way
+    # tan of a quarter of the arc's angle: the end of the parameter tan(φ/2), φ measured from the
+    # middle.
     size, extent = np.tan(0.5 * half), radius * np.sin(half)
     return Piece.of(centre, way, size, radius, middle, extent, radius)
 
 
 def outline_pieces(parts: Sequence[Part]) -> np.ndarray:
-    """The pieces (k,) of the outline of parts, each core ⊕ disk, exact: offset edges
-    and arcs as far as no other part of the shape covers them, holes included."""
+    """Return the exact outline of a shape's parts as pieces.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        Cores, each swept by its disk, e.g. ``shape.parts``.
+
+    Returns
+    -------
+    array (k,) of Piece
+        Offset edges and arcs, cut where another part of the shape covers them, holes included.
+    """
     if is_disc(parts):
         [centre] = parts[0].rings[0]
+        # A disc is four arcs of a quarter circle.
         radius = np.array([float(parts[0].radius)])
         return arc_rows(centre[None], radius, np.zeros(1), np.full(1, 2.0 * np.pi))
+    # The exposed chords and arcs of moments.py are the pieces.
     found = pieces_of(parts)
     origins, units, low, high, radius = exposed_chords(parts, found)
     segments = segment_rows(origins, units, low, high, radius)
@@ -68,9 +85,21 @@ def outline_pieces(parts: Sequence[Part]) -> np.ndarray:
 
 
 def polygon_pieces(vertices: np.ndarray) -> np.ndarray:
-    """The pieces of a polygon with sharp corners (N, 2) [m], in either sense.
+    """Return the outline of a polygon with sharp corners as pieces.
 
-    ShapeError for fewer than three corners.
+    Parameters
+    ----------
+    vertices : (N, 2) array
+        Corners [m], in either direction.
+
+    Returns
+    -------
+    array (N,) of Piece
+
+    Raises
+    ------
+    ShapeError
+        For fewer than three corners.
     """
     corners = np.asarray(vertices, dtype=float)
     if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3:
@@ -85,7 +114,7 @@ def polygon_pieces(vertices: np.ndarray) -> np.ndarray:
 
 
 class Pieces(NamedTuple):
-    """The pieces of some bodies; a Scene has the same fields."""
+    """Pieces of some bodies; a Scene has the same fields."""
 
     pieces: np.ndarray
     first_piece: np.ndarray
@@ -93,26 +122,29 @@ class Pieces(NamedTuple):
 
 @lru_cache(maxsize=256)
 def pieces_of_shape(shape: Shape) -> np.ndarray:
-    """The pieces of a shape's outline around its centroid."""
+    """Return the pieces of a shape's outline around its centroid."""
     return outline_pieces(shape.parts)
 
 
 def pieces_that_count(shape: Shape) -> np.ndarray:
-    """The pieces of a shape's outline without those that are nothing but rounding: they would be
-    looked at as often as any other."""
+    """Return the pieces of a shape's outline without rounding remnants, which cost as much as
+    others."""
     rows = pieces_of_shape(shape)
-    return rows[(rows["bend"] > 0.0) | (rows["extent"] > ROUNDED * rows["extent"].max())]
+    return rows[
+        (rows["arc_radius"] > 0.0) | (rows["extent"] > SHORTEST_SEGMENT * rows["extent"].max())
+    ]
 
 
 def pieces_of_bodies(shapes: Sequence[Shape], count: int) -> Pieces:
-    """The Pieces of bodies of these shapes; of so many bodies with none where there are none."""
+    """Return the Pieces of bodies of these shapes; without shapes, of ``count`` bodies without
+    pieces."""
     rows = [pieces_that_count(shape) for shape in shapes] or [Piece.rows(0)] * count
     first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
     return Pieces(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))
 
 
 class Pose(NamedTuple):
-    """Where a body lies in the frame of another: x, y [m], cosine and sine of its angle."""
+    """Pose of a body in the frame of another: x, y [m], cosine and sine of its angle."""
 
     x: float
     y: float
@@ -125,50 +157,50 @@ class Placed(NamedTuple):
 
     x: float
     y: float
-    way_x: float
-    way_y: float
+    direction_x: float
+    direction_y: float
     half: float
-    bend: float
+    arc_radius: float
     middle_x: float
     middle_y: float
     extent: float
-    inward: float
+    core_depth: float
 
 
 def piece_at(pieces, row):
-    """A piece in the frame of its own body."""
+    """Return a piece in the frame of its own body."""
     own = pieces[row]
     return Placed(
-        own.x, own.y, own.way_x, own.way_y, own.half, own.bend,
-        own.middle_x, own.middle_y, own.extent, own.inward,
+        own.x, own.y, own.direction_x, own.direction_y, own.half, own.arc_radius,
+        own.middle_x, own.middle_y, own.extent, own.core_depth,
     )  # fmt: skip
 
 
 def placed(pieces, row, pose):
-    """A piece of a body that lies in a Pose."""
+    """Return a piece of a body in a Pose."""
     x, y, c, s = pose
     own = piece_at(pieces, row)
     return Placed(
         x + c * own.x - s * own.y, y + s * own.x + c * own.y,
-        c * own.way_x - s * own.way_y, s * own.way_x + c * own.way_y,
-        own.half, own.bend,
+        c * own.direction_x - s * own.direction_y, s * own.direction_x + c * own.direction_y,
+        own.half, own.arc_radius,
         x + c * own.middle_x - s * own.middle_y, y + s * own.middle_x + c * own.middle_y,
-        own.extent, own.inward,
+        own.extent, own.core_depth,
     )  # fmt: skip
 
 
 def core_of(piece):
-    """(middle, half the way from it to either end) of the core of a piece, (x, y), (x, y) [m]."""
-    if piece.bend > 0.0:
+    """Return (midpoint, half the vector between the ends) of the core of a piece [m]."""
+    if piece.arc_radius > 0.0:
         return (piece.x, piece.y), (0.0, 0.0)
     # The outward normal is the tangent turned clockwise.
-    x = piece.x - piece.inward * piece.way_y
-    y = piece.y + piece.inward * piece.way_x
-    return (x, y), (piece.half * piece.way_x, piece.half * piece.way_y)
+    x = piece.x - piece.core_depth * piece.direction_y
+    y = piece.y + piece.core_depth * piece.direction_x
+    return (x, y), (piece.half * piece.direction_x, piece.half * piece.direction_y)
 
 
-def place_beside(x, y, middle, half):
-    """Where on a core, from −1 to 1, it is nearest to a point."""
+def closest_position(x, y, middle, half):
+    """Return the position on a core, from −1 to 1, closest to a point."""
     squared = half[0] * half[0] + half[1] * half[1]
     if squared == 0.0:
         return 0.0
@@ -176,114 +208,138 @@ def place_beside(x, y, middle, half):
     return min(max(along, -1.0), 1.0)
 
 
-def from_core(x, y, piece):
-    """(dx, dy) to a point from where the core of a piece is nearest to it [m], and whether that is
-    an end of the core."""
+def vector_from_core(x, y, piece):
+    """Return (dx, dy) from the closest core point of a piece to a point [m], and whether it is an
+    end."""
     middle, half = core_of(piece)
-    place = place_beside(x, y, middle, half)
+    place = closest_position(x, y, middle, half)
     dx, dy = x - middle[0] - place * half[0], y - middle[1] - place * half[1]
-    return dx, dy, piece.bend > 0.0 or abs(place) == 1.0
+    return dx, dy, piece.arc_radius > 0.0 or abs(place) == 1.0
 
 
 def distance_to(x, y, piece):
-    """How far a point is outside of what lies behind a piece [m], negative inside of it."""
-    dx, dy, _ = from_core(x, y, piece)
-    return math.sqrt(dx * dx + dy * dy) - piece.inward
+    """Return the distance of a point from the swept core behind a piece [m], negative inside."""
+    dx, dy, _ = vector_from_core(x, y, piece)
+    return math.sqrt(dx * dx + dy * dy) - piece.core_depth
 
 
-def beside_end(end, middle, half, middle_2, half_2):
-    """(squared distance, x, y of an end of a core, x, y on the other one) where that is nearest."""
+def end_distance(end, middle, half, middle_2, half_2):
+    """Return (squared distance, end of one core, closest point of the other core)."""
     x, y = middle[0] + end * half[0], middle[1] + end * half[1]
-    place = place_beside(x, y, middle_2, half_2)
+    place = closest_position(x, y, middle_2, half_2)
     x_2, y_2 = middle_2[0] + place * half_2[0], middle_2[1] + place * half_2[1]
     return (x - x_2) * (x - x_2) + (y - y_2) * (y - y_2), x, y, x_2, y_2
 
 
-def between_cores(one, other):
-    """(squared distance, x, y on the one's core, x, y on the other's) where two are nearest."""
+def closest_points(one, other):
+    """Return (squared distance, x, y on one core, x, y on the other) of two cores."""
     (middle, half), (middle_2, half_2) = core_of(one), core_of(other)
-    # The core of an arc is a point.
-    if one.bend > 0.0:
-        return beside_end(0.0, middle, half, middle_2, half_2)
+    # The core of an arc is a point. The distance of two segments is attained at an end of one of
+    # them (cores do not cross).
+    if one.arc_radius > 0.0:
+        return end_distance(0.0, middle, half, middle_2, half_2)
     least = math.inf
     x, y, x_2, y_2 = 0.0, 0.0, 0.0, 0.0
     for end in (-1.0, 1.0):
-        if other.bend == 0.0:
-            squared, px, py, qx, qy = beside_end(end, middle, half, middle_2, half_2)
+        if other.arc_radius == 0.0:
+            squared, px, py, qx, qy = end_distance(end, middle, half, middle_2, half_2)
             if squared < least:
                 least, x, y, x_2, y_2 = squared, px, py, qx, qy
-        squared, qx, qy, px, py = beside_end(end, middle_2, half_2, middle, half)
+        squared, qx, qy, px, py = end_distance(end, middle_2, half_2, middle, half)
         if squared < least:
             least, x, y, x_2, y_2 = squared, px, py, qx, qy
     return least, x, y, x_2, y_2
 
 
 def may_be_within(one, other, reach):
-    """Whether two pieces may be nearer to each other than a reach [m], by the circles that hold
-    them."""
+    """Return True if two pieces may be closer than a reach [m], by their enclosing circles."""
     dx, dy = one.middle_x - other.middle_x, one.middle_y - other.middle_y
     most = one.extent + other.extent + reach
     return most > 0.0 and dx * dx + dy * dy < most * most
 
 
 def are_within(one, other, reach):
-    """Whether two pieces, or what lies behind them, are nearer to each other than a reach [m]."""
+    """Return True if two pieces, or the swept cores behind them, are closer than a reach [m]."""
     if not may_be_within(one, other, reach):
         return False
-    squared, _, _, _, _ = between_cores(one, other)
-    most = reach + one.inward + other.inward
+    squared, _, _, _, _ = closest_points(one, other)
+    most = reach + one.core_depth + other.core_depth
     return squared < most * most
 
 
 def ends_of(piece):
-    """The parameters at both ends of a piece: metres along a segment, tan(φ/2) along an arc."""
+    """Return the parameters at both ends of a piece: metres along a segment, tan(φ/2) along
+    an arc."""
     return -piece.half, piece.half
 
 
 def at_parameter(piece, parameter):
-    """(x, y), (outward normal), and metres for a unit of the parameter, at one of a piece."""
-    if piece.bend == 0.0:
-        x, y = piece.x + parameter * piece.way_x, piece.y + parameter * piece.way_y
-        return x, y, piece.way_y, -piece.way_x, 1.0
+    """Return (x, y, outward normal, metres per unit of the parameter) at a parameter of a piece."""
+    if piece.arc_radius == 0.0:
+        x, y = piece.x + parameter * piece.direction_x, piece.y + parameter * piece.direction_y
+        return x, y, piece.direction_y, -piece.direction_x, 1.0
+    # cos φ and sin φ from t = tan(φ/2), without trigonometric functions.
     grown = 1.0 + parameter * parameter
     c, s = (1.0 - parameter * parameter) / grown, 2.0 * parameter / grown
-    nx, ny = c * piece.way_x - s * piece.way_y, c * piece.way_y + s * piece.way_x
-    return piece.x + piece.bend * nx, piece.y + piece.bend * ny, nx, ny, 2.0 * piece.bend / grown
+    nx, ny = (
+        c * piece.direction_x - s * piece.direction_y,
+        c * piece.direction_y + s * piece.direction_x,
+    )
+    return (
+        piece.x + piece.arc_radius * nx,
+        piece.y + piece.arc_radius * ny,
+        nx,
+        ny,
+        2.0 * piece.arc_radius / grown,
+    )
 
 
-def parameter_beside(piece, x, y):
-    """The parameter at which the normal of a piece, or of the line or circle that it is part of,
-    leads to a point."""
+def parameter_facing(piece, x, y):
+    """Return the parameter at which the normal of a piece points to a point.
+
+    The piece is extended to its line or circle.
+    """
     dx, dy = x - piece.x, y - piece.y
-    ahead = dx * piece.way_x + dy * piece.way_y
-    if piece.bend == 0.0:
+    ahead = dx * piece.direction_x + dy * piece.direction_y
+    if piece.arc_radius == 0.0:
         return ahead
-    aside = dy * piece.way_x - dx * piece.way_y
+    aside = dy * piece.direction_x - dx * piece.direction_y
     distance = math.sqrt(dx * dx + dy * dy)
+    # Opposite to the middle of the arc: φ = ±π, tan(φ/2) is infinite.
     if distance + ahead <= 1e-9 * distance:
         return math.inf if aside >= 0.0 else -math.inf
+    # tan(φ/2) = sin φ/(1 + cos φ).
     return aside / (distance + ahead)
 
 
 def foot_of(piece, other):
-    """The parameter at which a piece is nearest to another; it may lie beyond its ends."""
-    _, x, y, x_2, y_2 = between_cores(piece, other)
-    if piece.bend == 0.0:
-        return (x - piece.x) * piece.way_x + (y - piece.y) * piece.way_y
-    return parameter_beside(piece, x_2, y_2)
+    """Return the parameter at which a piece is closest to another; it may lie beyond its ends."""
+    _, x, y, x_2, y_2 = closest_points(piece, other)
+    if piece.arc_radius == 0.0:
+        return (x - piece.x) * piece.direction_x + (y - piece.y) * piece.direction_y
+    return parameter_facing(piece, x_2, y_2)
 
 
-def parameter_before(piece, x, y, way, most):
-    """The parameter at which a ray from a point along a unit vector ``way`` meets a piece, or the
-    line or circle that it is part of, no further than ``most`` [m] away; inf where it does not."""
+def ray_parameter(piece, x, y, way, most):
+    """Return the parameter at which a ray from a point along a unit vector meets a piece.
+
+    The piece is extended to its line or circle; inf if it lies further than ``most`` [m] away, or
+    the ray misses.
+    """
     dx, dy = piece.x - x, piece.y - y
-    if piece.bend == 0.0:
-        crossing = way[0] * piece.way_y - way[1] * piece.way_x
-        along = (dx * piece.way_y - dy * piece.way_x) / crossing if crossing != 0.0 else math.inf
+    if piece.arc_radius == 0.0:
+        # Intersection of two lines, by cross products.
+        crossing = way[0] * piece.direction_y - way[1] * piece.direction_x
+        along = (
+            (dx * piece.direction_y - dy * piece.direction_x) / crossing
+            if crossing != 0.0
+            else math.inf
+        )
     else:
+        # Ray and circle: the first of two intersections.
         ahead, aside = dx * way[0] + dy * way[1], dx * way[1] - dy * way[0]
-        squared = piece.bend * piece.bend - aside * aside
+        squared = piece.arc_radius * piece.arc_radius - aside * aside
         along = ahead - math.sqrt(squared) if squared > 0.0 else math.inf
     if not 0.0 < along < most:
         return math.inf
-    return parameter_beside(piece, x + along * way[0], y + along * way[1])
+    return parameter_facing(piece, x + along * way[0], y + along * way[1])

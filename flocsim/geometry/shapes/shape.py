@@ -1,5 +1,4 @@
-"""Shape: what every body outline has, core points swept by a disk, and what follows from them; and
-the plainest one, Sphere."""
+"""Shape: base class of body outlines, core points swept by a disk; and the simplest one, Sphere."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -22,14 +21,14 @@ from flocsim.geometry.shapes.outline import (
     swept_rings,
 )
 
-ROUND = 1e-12
-"""Shapes whose principal moments differ by less than this share of their sum have no long axis."""
+LEAST_ELONGATION = 1e-12
+"""Elongation below which a shape has no long axis."""
 
 TOO_CLOSE = 1e-12
-"""Core points nearer than this share of the core's extent count as repeated."""
+"""Core points closer than this share of the core's extent count as repeated."""
 
 TOUCHING = 1e-6
-"""Parts nearer to each other than this share of the smaller radius are fixed to each other."""
+"""Parts closer than this share of the smaller radius are connected."""
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -38,8 +37,10 @@ def read_only(array: np.ndarray) -> np.ndarray:
 
 
 def positive_radius(radius: Any) -> float:
-    """``radius``, a number or a text such as "5 um", as a float; ShapeError unless it is finite
-    and above 0."""
+    """Return ``radius``, a number or a text such as "5 um", as a float.
+
+    Raises ShapeError unless it is finite and above 0.
+    """
     if isinstance(radius, np.generic):
         radius = radius.item()
     try:
@@ -52,7 +53,8 @@ def positive_radius(radius: Any) -> float:
 
 
 def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
-    """``points`` as a fresh (N, 2) float array; ShapeError for another form or non-finite."""
+    """Return ``points`` as a new (N, 2) float array; raise ShapeError for another form or
+    non-finite."""
     try:
         array = np.array(points, dtype=float)
     except (TypeError, ValueError) as error:
@@ -70,6 +72,7 @@ def read_points(name: str, points: ArrayLike, fewest: int = 1) -> np.ndarray:
 
 def require_distinct(vertices):
     extent = np.ptp(vertices, axis=0).max()
+    # Distances of successive vertices, around the ring.
     steps = np.hypot(*(np.roll(vertices, -1, axis=0) - vertices).T)
     repeated = np.flatnonzero(steps <= TOO_CLOSE * extent)
     if len(repeated):
@@ -81,12 +84,12 @@ def require_distinct(vertices):
 
 
 class Swept(NamedTuple):
-    """What follows from a core and a radius.
+    """Properties that follow from a core and a radius.
 
-    Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; where that
-    centroid was in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴];
-    B = (M₁ − M₂)/(M₁ + M₂) of the principal second moments; the angle of the long axis [rad];
-    ``parts``, around the centroid as well.
+    Core points (N, 2) [m], counter-clockwise around the centroid of the swept area; that centroid
+    in the frame of the given core (2,) [m]; A [m²]; J = ∫ρ² dA about it [m⁴]; B = (M₁ − M₂)/(M₁ +
+    M₂) of the principal second moments; the angle of the long axis [rad]; ``parts``, around the
+    centroid as well.
     """
 
     vertices: np.ndarray
@@ -99,22 +102,23 @@ class Swept(NamedTuple):
 
 
 class Shape:
-    """Core points swept by a disk: all that the disk covers while its centre goes over the core.
+    """Core points swept by a disk (Minkowski sum of the core and the disk).
 
     All shapes are one family: a sphere is one core point. A core may have holes, and a shape may
-    be of several parts (Composite): those have all their core points one after another in
-    ``vertices``, and in ``parts`` which of them belong together.
+    have several parts (Composite). ``vertices`` lists the core points of all parts, ``parts`` their
+    grouping.
 
-    A shape of one's own is a frozen subclass that gives two things, each a field or a property
-    (examples/own_shape.py):
+    Notes
+    -----
+    A user's shape is a frozen subclass with two fields or properties (examples/own_shape.py):
 
     - ``core``: (N, 2) [m], one point, the two ends of a segment, or the corners of a simple
-      polygon, convex or not, in any frame and either sense;
+      polygon, convex or not, in any frame and either direction;
     - ``radius`` [m] > 0, the spheroradius.
 
-    All the rest follows, is computed once, and is the same for the same core: ``vertices``, the
-    core points around the centroid of the swept area, which is the origin of the shape's frame,
-    ``area`` and ``second_moment``. ShapeError where the core is no such polygon.
+    Everything else follows, is computed once, and depends only on the core: ``vertices``, the core
+    points around the centroid of the swept area (the origin of the shape's frame), ``area`` and
+    ``second_moment``. Raises ShapeError if the core is no such polygon.
     """
 
     if TYPE_CHECKING:
@@ -126,7 +130,7 @@ class Shape:
         def radius(self) -> float: ...
 
     def __new__(cls, *values: object, **named: object) -> "Shape":
-        """TypeError of Shape itself, which has no outline."""
+        """Raise TypeError for Shape itself, which has no outline."""
         if cls is Shape:
             raise TypeError("Shape is abstract: subclass it, and give `core` and `radius`")
         return super().__new__(cls)
@@ -136,6 +140,7 @@ class Shape:
         for name in ("core", "radius"):
             if getattr_static(self, name, None) is None:
                 raise ShapeError(f"the shape {type(self).__name__} gives no {name}")
+        # A user's shape gives any core: check it once, at first use.
         core, radius = read_points("core", self.core), positive_radius(self.radius)
         return swept_parts([Part((core,), radius)])
 
@@ -146,22 +151,22 @@ class Shape:
 
     @property
     def centroid(self) -> np.ndarray:
-        """Where the centroid of the swept area lies in the frame of the core given (2,) [m]."""
+        """Centroid of the swept area in the frame of the given core (2,) [m]."""
         return self.swept.centroid
 
     @property
     def parts(self) -> Parts:
-        """The parts, each of one or more rings, around the centroid of the whole."""
+        """Parts of one or more rings each, around the centroid of the whole."""
         return (Part((self.vertices,), self.radius),)
 
     @property
     def is_compound(self) -> bool:
-        """Whether the core has more than one ring: holes, or parts."""
+        """True if the core has more than one ring: holes, or parts."""
         return is_compound(self.parts)
 
     @property
     def area(self) -> float:
-        """Area A of the swept outline [m²]: what parts share counts once, holes do not count."""
+        """Area A of the swept outline [m²]; overlaps of parts count once, holes do not count."""
         return self.swept.area
 
     @property
@@ -191,6 +196,7 @@ class Shape:
     @property
     def bounding_radius(self) -> float:
         """R, the largest distance from the centroid to the outline [m]."""
+        # The farthest core point of each part, plus the radius of its disk.
         return max(float(np.hypot(*each.points.T).max() + each.radius) for each in self.parts)
 
     @cached_property
@@ -200,31 +206,34 @@ class Shape:
         return measures_of(self.parts, self.elongation)
 
     def scaled(self, factor: float) -> "Shape":
-        """The same outline, ``factor`` times as large: a Sphere, a SpheroPolygon or a Composite."""
+        """Return the same outline scaled by ``factor``: a Sphere, a SpheroPolygon or a
+        Composite."""
         from flocsim.geometry.shapes.spheropolygon import scaled_outline
 
         return scaled_outline(self, factor)
 
     def placed_vertices(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> np.ndarray:
-        """Core points (N, 2) [m] of the body at (x, y), turned by ``angle`` [rad]."""
+        """Return the core points (N, 2) [m] of the body at (x, y), rotated by ``angle`` [rad]."""
         c, s = np.cos(angle), np.sin(angle)
         return self.vertices @ np.array([[c, s], [-s, c]]) + (x, y)
 
     def placed_parts(self, x: float = 0.0, y: float = 0.0, angle: float = 0.0) -> Parts:
-        """The parts of the body at (x, y), turned by ``angle`` [rad]."""
+        """Return the parts of the body at (x, y), rotated by ``angle`` [rad]."""
         return moved_parts(self.parts, x, y, angle)
 
     def outline(
         self, x: float = 0.0, y: float = 0.0, angle: float = 0.0, points_per_quadrant: int = 16
     ) -> list[np.ndarray]:
-        """Closed rings [(k, 2), …] of the placed outline, for drawing: the outer one, or several of
-        parts that touch in a point, then the rings of holes."""
+        """Return closed rings [(k, 2), …] of the placed outline [m], for drawing.
+
+        Outer rings (several if parts touch in a point), then holes.
+        """
         return swept_rings(self.placed_parts(x, y, angle), points_per_quadrant)
 
 
 @attrs.frozen(eq=False)
 class Sphere(Shape):
-    """A disk of ``radius`` [m] in the plane of motion, one core point at its centre."""
+    """A disk of ``radius`` [m] in the plane of motion: one core point at its centre."""
 
     radius: float = attrs.field(converter=positive_radius)
 
@@ -234,7 +243,8 @@ class Sphere(Shape):
 
 
 def swept_parts(parts: Sequence[Part]) -> Swept:
-    """The Swept of some parts fixed to each other; ShapeError where they make no body."""
+    """Return the Swept of some parts fixed to each other; raise ShapeError if they are not
+    connected."""
     parts = tuple(checked_part(part) for part in parts)
     if len(parts) > 1 and len(loose := loose_parts(parts, TOUCHING)):
         raise ShapeError(
@@ -247,6 +257,7 @@ def swept_parts(parts: Sequence[Part]) -> Swept:
     unit = [Part(tuple(ring / extent for ring in p.rings), p.radius / extent) for p in parts]
     area, centroid, moment, stretch = all_moments(unit)
     centroid = centroid * extent
+    # Move the centroid to the origin.
     around = tuple(
         Part(tuple(read_only(ring - centroid) for ring in part.rings), part.radius)
         for part in parts
@@ -258,8 +269,10 @@ def swept_parts(parts: Sequence[Part]) -> Swept:
 
 
 def checked_part(part: Part) -> Part:
-    """A part with its outer ring counter-clockwise and its holes clockwise; ShapeError where it is
-    none."""
+    """Return a part with its outer ring counter-clockwise and its holes clockwise.
+
+    Raises ShapeError for an invalid core.
+    """
     outer, *holes = part.rings
     for ring in part.rings:
         if len(ring) > 1:
@@ -268,20 +281,22 @@ def checked_part(part: Part) -> Part:
         if holes:
             raise ShapeError("a point or a segment has no holes")
         return part
+    # Only after this is the signed area meaningful.
     require_simple(outer, holes)
     return Part((facing(outer, 1.0), *(facing(ring, -1.0) for ring in holes)), part.radius)
 
 
 def facing(ring: np.ndarray, sense: float) -> np.ndarray:
-    """The ring counter-clockwise (1) or clockwise (−1), the first point kept."""
+    """Return the ring counter-clockwise (1) or clockwise (−1), beginning at the same point."""
     if sense * signed_area(ring - ring.mean(axis=0)) > 0.0:
         return ring
     return np.roll(ring[::-1], 1, axis=0)
 
 
 def stretched(stretch: np.ndarray, moment: float) -> tuple[float, float]:
-    """(elongation, long axis) of how an area is stretched (2,) and its polar second moment."""
+    """Return (elongation, long axis) from the deviatoric second moments (2,) and the polar one."""
     elongation = float(np.hypot(*stretch)) / moment
-    if elongation <= ROUND:
+    if elongation <= LEAST_ELONGATION:
         return 0.0, 0.0
+    # (cos 2ψ, sin 2ψ) is the direction of the deviatoric moments.
     return elongation, 0.5 * float(np.arctan2(stretch[1], stretch[0]))

@@ -1,6 +1,8 @@
-"""SpheroPolygon: a simple polygon, with or without holes, swept by a disk (paper section 2.2,
-eq. 1); a wall, which is a segment; Composite, several shapes fixed to each other, one rigid body;
-and any outline in another size, or of a wanted spheroradius."""
+"""Spheropolygons, walls and composites; and outlines of another size or spheroradius.
+
+A spheropolygon is the Minkowski sum of a simple polygon, with or without holes, and a disk (Tang et
+al. 2014, section 2.2, eq. 1). A wall is a segment. A Composite is one rigid body of several shapes.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -22,12 +24,13 @@ from flocsim.geometry.shapes.shape import (
     swept_parts,
 )
 
-SETTLED = 3e-5
-"""Relative error of the area from which one more step of the model below leaves less than 1e-9."""
+AREA_TOLERANCE = 3e-5
+"""Relative error of the area at which the last iteration of `parts_factor` leaves less than
+1e-9."""
 
 FLATNESS = 1e6
-"""A wall counts as a sphere of so many times its length in forces between surfaces: a reduced
-radius is then that of what comes near, to a millionth."""
+"""Equivalent radius of a wall over its length: forces between surfaces then use the reduced radius
+of the other body, to a millionth."""
 
 
 def read_vertices(vertices: ArrayLike) -> np.ndarray:
@@ -42,19 +45,30 @@ def read_holes(holes: Iterable[ArrayLike]) -> tuple[np.ndarray, ...]:
     return tuple(read_points("a hole", ring, fewest=3) for ring in listed)
 
 
-# A dictionary, not slots: a copy keeps what has been computed.
+# A __dict__ instead of slots: a copy keeps cached properties.
 @attrs.frozen(eq=False, slots=False)
 class SpheroPolygon(Shape):
     """Minkowski sum of a simple polygon, convex or not, and a disk.
 
-    Parameters: ``vertices`` (N, 2) [m], N ≥ 2 (two make a segment), in any frame and sense;
-    ``radius`` [m] > 0, the spheroradius; ``holes``, rings of 3 corners or more inside the polygon,
-    which the disk makes smaller by its radius. The stored vertices run counter-clockwise around the
-    centroid of the swept area at the origin, those of holes behind them and clockwise; ``centroid``
-    keeps where that was.
+    Parameters
+    ----------
+    vertices : (N, 2) array
+        Corners [m], N ≥ 2 (two make a segment), in any frame and direction.
+    radius : float
+        Spheroradius [m].
+    holes : sequence of (k, 2) arrays, optional
+        Rings of 3 corners or more inside the polygon; the disk makes them smaller by its radius.
 
-    Raises ShapeError for repeated or non-finite vertices, crossing edges, a non-positive radius, a
-    hole that is not inside.
+    Raises
+    ------
+    ShapeError
+        For repeated or non-finite vertices, crossing edges, a non-positive radius, or a hole that
+        is not inside.
+
+    Notes
+    -----
+    The stored ``vertices`` run counter-clockwise around the centroid of the swept area at the
+    origin, followed by those of holes, clockwise; ``centroid`` is its position in the given frame.
     """
 
     core: np.ndarray = attrs.field(converter=read_vertices, alias="vertices")
@@ -62,7 +76,7 @@ class SpheroPolygon(Shape):
     holes: tuple[np.ndarray, ...] = attrs.field(converter=read_holes, default=(), kw_only=True)
 
     def __attrs_post_init__(self):
-        # What is wrong with a polygon is said when it is made, not when it is used.
+        # Faults of a polygon are reported when it is made, not when it is used.
         self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
 
     @property
@@ -72,19 +86,20 @@ class SpheroPolygon(Shape):
 
 @attrs.frozen(eq=False, slots=False)
 class WallShape(Shape):
-    """A segment between two points swept by a disk: half of the ``radius`` [m] is its thickness."""
+    """A segment between two points swept by a disk of ``radius`` [m], half of the wall's
+    thickness."""
 
     core: np.ndarray = attrs.field(converter=read_vertices, alias="vertices")
     radius: float = attrs.field(converter=positive_radius)
 
     @property
     def equivalent_radius(self) -> float:
-        """What forces between surfaces take for its radius [m]: flat."""
+        """Radius [m] that forces between surfaces use: practically flat."""
         return FLATNESS * float(np.hypot(*(self.vertices[1] - self.vertices[0])))
 
 
 def read_parts(parts: Iterable[Any]) -> Parts:
-    """The Parts that a Composite is given: (shape, (x, y)) or (shape, (x, y), angle) each."""
+    """Return the Parts given to a Composite: (shape, (x, y)) or (shape, (x, y), angle) each."""
     try:
         listed = list(parts)
     except TypeError:
@@ -97,7 +112,7 @@ def read_parts(parts: Iterable[Any]) -> Parts:
 
 
 def placed(number: int, given: Any) -> Parts:
-    """The Parts of one of a Composite's shapes at its place."""
+    """Return the Parts of one of a Composite's shapes in its place."""
     if isinstance(given, Part):
         rings = tuple(read_points("a ring", ring) for ring in given.rings)
         return (Part(rings, positive_radius(given.radius)),)
@@ -121,12 +136,19 @@ def placed(number: int, given: Any) -> Parts:
 class Composite(Shape):
     """A rigid body of several shapes fixed to each other.
 
-    Parameters: ``parts``, a list of (shape, (x, y)) or (shape, (x, y), angle): where the centroid
-    of each lies [m], and its turn [rad], in any frame. Parts may overlap; what they share counts
-    once in area and second moment. Each keeps its own spheroradius; ``radius`` is the smallest.
+    Parameters
+    ----------
+    parts : list of (shape, (x, y)) or (shape, (x, y), angle)
+        Position of each shape's centroid [m], and its angle [rad], in any frame. Parts may overlap;
+        overlaps count once in area and second moment. Each keeps its own spheroradius.
 
-    Raises ShapeError where a part lies apart from all others.
+    Raises
+    ------
+    ShapeError
+        If a part lies apart from all others.
 
+    Examples
+    --------
     >>> from flocsim import Composite, Sphere
     >>> pair = Composite([(Sphere(1e-6), (0.0, 0.0)), (Sphere(2e-6), (3e-6, 0.0))])
     >>> len(pair.parts), pair.radius
@@ -140,7 +162,7 @@ class Composite(Shape):
 
     @classmethod
     def known(cls, swept: Swept) -> "Composite":
-        """The one that has already been swept."""
+        """Return a Composite that has already been swept."""
         made = object.__new__(cls)
         made.__dict__.update(given=swept.parts, swept=swept)
         return made
@@ -155,20 +177,22 @@ class Composite(Shape):
 
     @property
     def radius(self) -> float:
-        """The smallest spheroradius of its parts [m]."""
+        """Smallest spheroradius of its parts [m]."""
         return min(part.radius for part in self.given)
 
 
 def scaled_outline(shape: Shape, factor: float) -> Shape:
-    """A Sphere, SpheroPolygon or Composite ``factor`` times as large; ShapeError unless finite,
-    above 0."""
+    """Return a Sphere, SpheroPolygon or Composite scaled by ``factor``.
+
+    Raises ShapeError unless the factor is finite and positive.
+    """
     if not np.isfinite(factor) or factor <= 0.0:
         raise ShapeError(f"a shape can be scaled by a finite factor above 0, found {factor!r}")
     factor = float(factor)
     if len(shape.vertices) == 1:
         return Sphere(shape.radius * factor)
     vertices = read_only(shape.vertices * factor)
-    # Nothing has to be computed again: areas go with factor², second moments with factor⁴.
+    # Areas scale with factor², second moments with factor⁴: nothing is computed again.
     swept = Swept(
         vertices,
         shape.centroid * factor,
@@ -186,7 +210,7 @@ def scaled_outline(shape: Shape, factor: float) -> Shape:
 
 
 def shape_of_parts(parts: Sequence[Part]) -> Shape:
-    """The plainest shape of these parts; ShapeError where they make no body."""
+    """Return the simplest shape of these parts; raise ShapeError if they make no body."""
     if len(parts) > 1:
         return Composite(parts)
     (outer, *holes), radius = parts[0]
@@ -196,37 +220,38 @@ def shape_of_parts(parts: Sequence[Part]) -> Shape:
 
 
 def parts_factor(parts: Sequence[Part], area: float) -> float:
-    """The factor by which cores of one radius must be scaled for the swept outline to have an area;
-    the radius stays what it is.
+    """Return the factor that scales cores of one radius such that the swept outline has an area.
 
-    While the outline keeps its form, the area is disc + b·factor + c·factor², of which each trial
-    gives b and c: scaled as a whole, radius and all, the area goes with the square, and with the
-    radius alone it grows by the length of the outline.
+    The radius itself is not scaled. As long as the outline keeps its topology the area is disc +
+    b·factor + c·factor², and each trial gives b and c: the area of the whole scales with the
+    square, and its derivative with respect to the radius is the length of the outline.
     """
     [radius] = {part.radius for part in parts}
     room = area - np.pi * radius**2
 
     factor = 1.0
     for _ in range(60):
+        # c and b from the area and its derivative: see the docstring; room = b·factor + c·factor².
         found, growth = area_and_growth(scaled_parts(parts, factor, 1.0))
         slope = (2.0 * found - radius * growth) / factor
         above = found - area + room
         c = (slope * factor - above) / factor**2
         b = slope - 2.0 * c * factor
+        # Positive root of the quadratic model, in the form without cancellation.
         root = b * b + 4.0 * c * room
         step = 2.0 * room / (b + np.sqrt(root)) if root > 0.0 else 0.0
-        # Far from the model's reach the area still goes roughly with the square.
+        # Far from the model's validity the area still scales roughly with the square.
         factor = step if 0.2 * factor < step < 5.0 * factor else factor * np.sqrt(area / found)
-        if abs(found - area) <= SETTLED * area:
+        if abs(found - area) <= AREA_TOLERANCE * area:
             break
     return factor
 
 
 def resized(shape: Shape, equivalent_radius: float, radius: float) -> Shape:
-    """The shape's core scaled so that, swept by ``radius`` [m], r_eq is exact [m]; a
-    Composite, whose parts would come apart, is scaled as a whole, its radii with it.
+    """Return the shape with its core scaled so that r_eq is exact when swept by ``radius`` [m].
 
-    Raises ShapeError where the disk alone is already as large as the wanted body.
+    A Composite, whose parts would come apart, is scaled as a whole, radii included. Raises
+    ShapeError if the disk alone is already as large as the wanted body.
     """
     if len(shape.parts) > 1:
         return shape.scaled(equivalent_radius / shape.equivalent_radius)
@@ -235,9 +260,10 @@ def resized(shape: Shape, equivalent_radius: float, radius: float) -> Shape:
             f"a spheroradius of {radius:g} m leaves no room for a core in a body of "
             f"r_eq = {equivalent_radius:g} m: choose a smaller spheroradius"
         )
-    # Solved in units of the wanted body, far from underflow.
+    # In units of the wanted body, far from underflow.
     extent = shape.equivalent_radius
     unit = Part(tuple(ring / extent for ring in shape.parts[0].rings), radius / equivalent_radius)
     factor = parts_factor([unit], np.pi) * equivalent_radius
+    # The factor is right to 1e-9; scaling the whole shape makes r_eq exact.
     sized = shape_of_parts([Part(tuple(ring * factor for ring in unit.rings), radius)])
     return sized.scaled(equivalent_radius / sized.equivalent_radius)

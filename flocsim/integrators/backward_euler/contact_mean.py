@@ -22,12 +22,17 @@ from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, s
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
-    add_product,
-    add_turning,
+    add_geometric_stiffness,
+    add_outer_products,
     normal_rows,
     tangent_rows,
 )
-from flocsim.integrators.rhs.views import effective_mass, push_pair, smaller_radius, tangential_rate
+from flocsim.integrators.rhs.views import (
+    add_pair_force,
+    effective_mass,
+    smaller_radius,
+    tangential_rate,
+)
 from flocsim.state.views import ContactView, moved_contact
 from flocsim.state.work import DAMPING, NEW, NOW, STIFFNESS, TRIAL
 
@@ -104,7 +109,7 @@ def friction_view(scene, work, row, step):
         if abs(slip) > limit:
             side = 1 if slip > 0.0 else -1
             slip = side * limit
-    work.slip[NEW, row], work.candidates[row].sliding = slip, side
+    work.slip[NEW, row], work.candidates[row].slide_direction = slip, side
     return view_with(scene, work, row, step, bearing, slip, rate)
 
 
@@ -137,9 +142,9 @@ def add_mean_forces(scene, work, step):
             work.interior[row].step_share = closed_share(work, row)
         if takes_part(work, row):
             normal = normal_force(scene, work, row, step, work.interior[row].overlap)
-            push_pair(work, NOW, row, normal, friction_force(scene, work, row, step))
+            add_pair_force(work, NOW, row, normal, friction_force(scene, work, row, step))
         else:
-            work.slip[NEW, row], work.candidates[row].sliding = 0.0, 0
+            work.slip[NEW, row], work.candidates[row].slide_direction = 0.0, 0
 
 
 @apart
@@ -170,10 +175,10 @@ def add_slopes(scene, work, row, normal, tangential, coupled):
     a, b = candidate.vertex_body, candidate.edge_body
     pair = candidate.pair
     along, across = normal_rows(work, row), tangent_rows(work, row)
-    add_product(scene, work, STIFFNESS, pair, a, b, along, along, normal)
+    add_outer_products(scene, work, STIFFNESS, pair, a, b, along, along, normal)
     if coupled != 0.0:
-        add_product(scene, work, STIFFNESS, pair, a, b, across, along, coupled)
-    add_product(scene, work, DAMPING, pair, a, b, across, across, tangential)
+        add_outer_products(scene, work, STIFFNESS, pair, a, b, across, along, coupled)
+    add_outer_products(scene, work, DAMPING, pair, a, b, across, across, tangential)
 
 
 def friction_slopes(scene, work, row, step):
@@ -181,7 +186,7 @@ def friction_slopes(scene, work, row, step):
     overlap [N/m] and its part of the step [N]."""
     view = friction_view(scene, work, row, step)
     found = contact_derivatives(scene, view)
-    part, side = work.interior[row].step_share, work.candidates[row].sliding
+    part, side = work.interior[row].step_share, work.candidates[row].slide_direction
     by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
     if side != 0:
         by_limit = side * limit_slope(scene, work, NOW, row) * found[7]
@@ -210,7 +215,7 @@ def add_all_derivatives(scene, work, step):
                 coupled = 0.0
             add_slopes(scene, work, row, stiffness, slope, coupled)
             force = normal_force(scene, work, row, step, after)
-            add_turning(scene, work, row, force, friction_force(scene, work, row, step))
+            add_geometric_stiffness(scene, work, row, force, friction_force(scene, work, row, step))
 
 
 CLOSE = 0.01
@@ -225,4 +230,4 @@ def flag_close(scene, work):
         a, b = candidate.vertex_body, candidate.edge_body
         near = CLOSE * (scene.bodies[a].radius + scene.bodies[b].radius)
         if work.geometry[NOW, row].gap < near or work.geometry[TRIAL, row].gap < 0.0:
-            candidate.closed = 1
+            candidate.contact_mode = 1

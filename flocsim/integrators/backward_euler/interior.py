@@ -46,8 +46,8 @@ from flocsim.integrators.backward_euler.contact_mean import (
     sticking_slopes,
     view_with,
 )
-from flocsim.integrators.rhs.jacobian import add_turning, normal_rows, tangent_rows
-from flocsim.integrators.rhs.views import pressed_view, push_pair, tangential_rate
+from flocsim.integrators.rhs.jacobian import add_geometric_stiffness, normal_rows, tangent_rows
+from flocsim.integrators.rhs.views import add_pair_force, tangential_rate, view_without_slip
 from flocsim.state.work import CHANGE, NOW, TRIAL
 
 FAR_FROM_WALL = 0.99
@@ -67,7 +67,7 @@ SMALL = 0.01
 
 
 def in_play(work, row):
-    return work.candidates[row].closed == 1
+    return work.candidates[row].contact_mode == 1
 
 
 def rate_along(work, row, kind, entries):
@@ -114,7 +114,7 @@ def press(scene, work, row, step, turns):
         bearing = bearing_of(work, row)
         if not hardness > 0.0:
             # The law has clipped what pulls.
-            pressed = contact_derivatives(scene, pressed_view(view, overlap, 0.0))
+            pressed = contact_derivatives(scene, view_without_slip(view, overlap, 0.0))
             hardness = pressed[2] + pressed[4] / step
         borne = view_with(scene, work, row, step, bearing, 0.0, 0.0)
         held = slip_limit(scene, borne)
@@ -227,12 +227,12 @@ def write_forces(scene, work, step, target, turns):
                 tangential, slope, coupled = limited_friction(work, row, target)
             elif contact.stick_slope > 0.0:
                 tangential, slope, coupled = other_friction(scene, work, row, step, target)
-            push_pair(work, NOW, row, normal, tangential)
+            add_pair_force(work, NOW, row, normal, tangential)
             works = overlap / (overlap + left)
             if works > NOTHING:
                 add_slopes(scene, work, row, works * stiffness, slope, coupled)
                 if turns:
-                    add_turning(scene, work, row, normal, tangential)
+                    add_geometric_stiffness(scene, work, row, normal, tangential)
 
 
 def room(share, size, change):

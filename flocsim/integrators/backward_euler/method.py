@@ -32,7 +32,7 @@ from flocsim.integrators.backward_euler.step import (
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.views import lever
 from flocsim.state.clock import NOT_COMPILED
-from flocsim.state.work import LOOKED, NOW
+from flocsim.state.work import AT_LAST_CHECK, NOW
 
 RESOLVED_BOUNCE = 0.003
 """Steps are this share of 1/ω0 at most while bodies touch that fly apart again."""
@@ -97,7 +97,7 @@ def largest_change(scene, work):
         if scene.bodies[body].free == 1.0:
             for axis in range(3):
                 now = work.velocity[NOW, body, axis]
-                change = abs(now - work.velocity[LOOKED, body, axis])
+                change = abs(now - work.velocity[AT_LAST_CHECK, body, axis])
                 largest = max(largest, lever(scene, body, axis) * change)
     return largest
 
@@ -120,26 +120,26 @@ def hand_over(scene, work, clock, counts):
     if not has(scene, CONTACT_FORCE) and clock.across == 0.0:
         return
     tried = counts.steps + counts.rejected + counts.located
-    trials = tried - counts.looked_tried
+    trials = tried - counts.trials_at_check
     if clock.across == 1.0:
         enough = trials >= ENOUGH_TRIALS * crowd(work)
-        quiet = enough and clock.switches < FEW_SWITCHES * trials
+        quiet = enough and clock.switches_since_check < FEW_SWITCHES * trials
         if quiet or least_listed_gap(work) >= 0.0:
             end_at_switches(scene, work, clock)
         elif not enough:
             return
-    elif clock.looked_at < math.inf:
-        if counts.steps < counts.look_at:
+    elif clock.checked_at < math.inf:
+        if counts.steps < counts.next_check:
             return
-        passed = clock.time - clock.looked_at
+        passed = clock.time - clock.checked_at
         if pays(scene, work, clock, trials, passed) and least_listed_gap(work) < 0.0:
             go_across(clock, passed)
     probe = max(LEAST_PROBE, int(PROBE / crowd(work)))
-    counts.look_at, counts.looked_tried = counts.steps + probe, tried
-    clock.looked_at, clock.switches = clock.time, 0.0
+    counts.next_check, counts.trials_at_check = counts.steps + probe, tried
+    clock.checked_at, clock.switches_since_check = clock.time, 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.velocity[LOOKED, body, axis] = work.velocity[NOW, body, axis]
+            work.velocity[AT_LAST_CHECK, body, axis] = work.velocity[NOW, body, axis]
 
 
 def across_not_compiled(scene, work, clock, step):

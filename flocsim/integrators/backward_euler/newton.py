@@ -27,13 +27,13 @@ from flocsim.integrators.backward_euler.contact_mean import (
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler, solve_real
 from flocsim.integrators.radau.tableau import REAL
-from flocsim.integrators.rhs.error import end_of_run, rounding_size
-from flocsim.integrators.rhs.forces import keep_start, sum_other_forces
-from flocsim.integrators.rhs.jacobian import assemble_others
+from flocsim.integrators.rhs.error import end_of_run, rounding_error
+from flocsim.integrators.rhs.forces import save_start, sum_other_forces
+from flocsim.integrators.rhs.jacobian import assemble_without_contacts
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.bodies import X, Y
-from flocsim.state.contacts import OPEN, TOUCHES
+from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
 
 NEWTON_SHARE = 0.01
@@ -45,10 +45,10 @@ MOST_ITERATIONS = 8
 
 def begin_step(work, clock):
     """Keep the start of the step."""
-    keep_start(work)
+    save_start(work)
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
-        work.candidates[row].closed, work.interior[row].held_overlap = OPEN, 0.0
+        work.candidates[row].contact_mode, work.interior[row].held_overlap = OPEN, 0.0
         least = FADING * clock.tolerance
         work.interior[row].fading_gap = max(-work.geometry[NOW, row].gap, least)
 
@@ -70,7 +70,7 @@ def end_step(work):
             work.velocity[NEW, body, axis] = work.velocity[NOW, body, axis]
     put_back(work)
     for row in range(work.tally.candidates):
-        work.candidates[row].closed = TOUCHES if takes_part(work, row) else OPEN
+        work.candidates[row].contact_mode = CLOSED if takes_part(work, row) else OPEN
         work.geometry[NOW, row] = work.geometry[TRIAL, row]
 
 
@@ -163,7 +163,7 @@ def write_load(scene, work, step):
 def assemble_rest(scene, work, clock, step):
     """Derivatives of all forces at the end of the step but those of contacts."""
     remaining = max(end_of_run(clock) - clock.time, step)
-    assemble_others(scene, work, clock.time + step, remaining)
+    assemble_without_contacts(scene, work, clock.time + step, remaining)
 
 
 def refresh(scene, work, clock, step):
@@ -184,7 +184,7 @@ def solve_change(scene, work, step):
     work.tally.solves += 1
     largest = 0.0
     for body in range(work.poses.shape[0]):
-        memory = step + work.errors[body].memory
+        memory = step + work.errors[body].velocity_lifetime
         for axis in range(3):
             change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body].free
             work.velocity[CHANGE, body, axis] = change
@@ -203,7 +203,7 @@ def go_along(work, way):
 
 def goal_of(scene, work, clock, step):
     """What a change may be at most where it is the last one [m]."""
-    return max(NEWTON_SHARE * clock.tolerance, rounding_size(scene, work, NOW, step))
+    return max(NEWTON_SHARE * clock.tolerance, rounding_error(scene, work, NOW, step))
 
 
 @apart

@@ -151,7 +151,7 @@ def begin_as_before(scene, work, step, usual):
                 contact.slack = max(geometry.gap, FOUND * usual)
                 contact.overlap = target / contact.slack
             press(scene, work, row, step, True)
-            limit, side = contact.friction_limit, work.candidates[row].sliding
+            limit, side = contact.friction_limit, work.candidates[row].slide_direction
             if limit > 0.0:
                 share = float(side) if side != 0 else contact.stick_force / limit
                 share = min(max(share, FOUND - 1.0), 1.0 - FOUND)

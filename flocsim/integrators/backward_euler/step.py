@@ -28,10 +28,10 @@ from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, inertia, memory_of
+from flocsim.integrators.rhs.stated_error import secant_stiffness
+from flocsim.integrators.rhs.views import contact_view, inertia, velocity_lifetime_of
 from flocsim.state.bodies import X, Y
-from flocsim.state.work import CHANGE, DEVIATION, LAST_RATES, NOW, START, STIFFNESS, TRIAL
+from flocsim.state.work import CHANGE, LAST_RATES, NOW, START, STEP_ERROR, STIFFNESS, TRIAL
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
 """The next step is that much shorter than would just do; bounds of the change."""
@@ -80,9 +80,9 @@ def fastest_bounce(scene, work, clock, lasting):
             speed = speed_along(work, row, START)
             if lasting:
                 speed = max(abs(speed), abs(speed_along(work, row, NOW)))
-            if speed * memory_of(work, row) > clock.tolerance:
+            if speed * velocity_lifetime_of(work, row) > clock.tolerance:
                 view = contact_view(scene, work, NOW, row)
-                stiffness = pressed_stiffness(scene, view, clock.tolerance)
+                stiffness = secant_stiffness(scene, view, clock.tolerance)
                 if stiffness > 0.0:
                     frequency = math.sqrt(stiffness / view.effective_mass)
                     if bounces(scene, view, speed, frequency):
@@ -110,28 +110,28 @@ def note_rates(scene, work, clock, step):
         write_rates(work, step)
     for row in range(work.tally.candidates):
         before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
-        clock.switches += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
+        clock.switches_since_check += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
 
 
 def go_across(clock, step):
     """From now on, steps go on across switches; the size of the first one."""
     clock.across, clock.step = 1.0, step
-    clock.rates_known = clock.staged_step = 0.0
-    clock.bearable_step = math.inf
+    clock.rates_known = clock.stages_step = 0.0
+    clock.feasible_step = math.inf
 
 
 @apart
 def end_at_switches(scene, work, clock):
     """From now on, steps end at switches, as pairs are flagged by gaps and displacements now."""
-    clock.across, clock.step, clock.looked_at = (
+    clock.across, clock.step, clock.checked_at = (
         0.0,
         FIRST_SHARE * clock.step,
         math.inf,
     )
-    clock.previous_step = clock.bearable_step = clock.settled_step = math.inf
-    clock.settling = 0.0
+    clock.previous_step = clock.feasible_step = clock.step_after_switch = math.inf
+    clock.switch_streak = 0.0
     for row in range(work.tally.candidates):
-        work.candidates[row].sliding = 0
+        work.candidates[row].slide_direction = 0
     set_modes(scene, work)
 
 
@@ -152,7 +152,7 @@ def solve_loads(scene, work, weight):
 
 @apart
 def estimate_step(scene, work, clock, step):
-    """The error of the step, whose end stands in NOW, into DEVIATION."""
+    """The error of the step, whose end stands in NOW, into STEP_ERROR."""
     loads = work.loads
     if clock.rates_known == 0.0:
         write_rates(work, step)
@@ -170,10 +170,10 @@ def estimate_step(scene, work, clock, step):
         for axis in range(3):
             speed = loads[REAL, 3 * body + axis].real
             error = free * step * (0.5 * work.place[CHANGE, body, axis] + speed)
-            work.place[DEVIATION, body, axis] = work.place[CHANGE, body, axis] = error
+            work.place[STEP_ERROR, body, axis] = work.place[CHANGE, body, axis] = error
             loads[REAL, 3 * body + axis] = inertia(scene, body, axis) / step * speed
     solve_loads(scene, work, 1.0)
     for body in range(work.place.shape[1]):
         free = scene.bodies[body].free
         for axis in range(3):
-            work.velocity[DEVIATION, body, axis] = free * loads[REAL, 3 * body + axis].real
+            work.velocity[STEP_ERROR, body, axis] = free * loads[REAL, 3 * body + axis].real

@@ -1,4 +1,5 @@
-"""What ends a step early: a pair that touches, parts or becomes the closest, a law with a kink.
+"""Events that end a step early: a pair touches, parts or becomes the deepest contact, a law has a
+kink.
 
 May import ``rhs``.
 """

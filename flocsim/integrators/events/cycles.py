@@ -1,59 +1,59 @@
-"""Rattling: many equal cycles of switches are left out at once.
+"""Skipping of equal cycles in which two contacts of a doublet throw each other open in turn.
 
-Two contacts of a doublet may throw each other open in turn, for ever, where no state of rest
-satisfies the contact law: a cycle of some microseconds and 1e-13 m, by which the doublet creeps by
-next to nothing. What comes of it in the long run is what a cycle does, times their number: where
-the switches, and all that a cycle changes, have been the same in two cycles on end, the pair goes
-on by as many cycles as leave their form as it is (envelope following, or multirevolution: Petzold
-1981; Calvo, Montijano and Rández 2007).
+If no state of rest satisfies the contact law, such a doublet rattles for ever, in cycles of some
+microseconds and 1e-13 m, by which it creeps very slowly. Its long-term motion is the change per
+cycle, times their number. So once switches and all changes were the same in two consecutive cycles,
+the pair advances by as many cycles at once as leave their shape unchanged (envelope following, or
+multirevolution methods: Petzold 1981; Calvo, Montijano and Rández 2007).
 
-A pair is described as it is seen from its first body: by where the other one is and how both move,
-which a cycle gives back but for next to nothing, and by where the whole of it is, which it moves
-evenly. What a cycle changes is carried on along a line in the first, and along a parabola in the
-second: of the time, as a cycle is found to end a little earlier or later by chance. So do gaps and
-displacements at its end scatter; where they do no more than that, they stay as they are.
+The pair is described in the frame of its first body: relative position and velocities, which a
+cycle reproduces almost exactly, and the position of the whole pair, which it moves steadily.
+Changes per cycle are extrapolated linearly for the first, quadratically for the second, both in
+time, since the end of a cycle is located slightly early or late at random. Gaps and displacements
+at its end scatter for the same reason; if they do no more than that, they are left as they are.
 """
 
 import math
 
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.events.grazes import hums, takes_part
-from flocsim.integrators.events.resolution import above_rounding
+from flocsim.integrators.events.grazes import chatters, touched_recently
+from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.work import CARRIED, CYCLE_BEFORE, CYCLE_LAST, NOW
+from flocsim.state.work import CYCLE_BEFORE, CYCLE_LAST, NOW, PROPAGATED
 
 MOST_SWITCHES = 64
-"""A cycle of more switches is none."""
+"""A sequence of more switches is not taken for a cycle."""
 
 FEWEST, MOST_AT_ONCE = 4.0, 1e5
-"""Fewer cycles at once are not worth it; more are never left out."""
+"""Fewest cycles that are worth a jump, and the most in one."""
 
-FORM = 0.2
-"""By that share of what they are gaps and displacements may change over the cycles left out, …"""
+SHAPE_CHANGE = 0.2
+"""Gaps and displacements may change by this fraction over the skipped cycles, …"""
 
-FORM_ERROR = 0.02
-"""… and be wrong, …"""
+SHAPE_ERROR = 0.02
+"""… with an error of this fraction; …"""
 
-PACE = 0.1
-"""… so may the motion of the pair as a whole, …"""
+MOTION_CHANGE = 0.1
+"""… the motion of the pair as a whole may change by this fraction, …"""
 
 MOST_TURN = 0.05
-"""… which may turn by so much [rad]; what is wrong of it has to stay below the tolerance."""
+"""… and it may turn by so much [rad]. Its error has to stay below the tolerance."""
 
-CHANCE = 3.0
-"""A trend changes by less than one part in so many of itself from one cycle to the next."""
+SCATTER_RATIO = 3.0
+"""A trend differs from one cycle to the next by less than 1/3 of itself; a small change that does
+not is scatter."""
 
 RETURNS = 2
-"""So often the modes in which a cycle begins come again until it ends: what changes to and fro from
-one time to the next has done so once, then."""
+"""The initial modes must recur this often until a cycle ends, so that whatever alternates has done
+so once."""
 
 BASE, MODULUS = 31, 2147483647
-"""Of the numbers by which modes of contacts, and series of them, are told apart."""
+"""Base and modulus of the hash of contact modes, and of sequences of them."""
 
-TURNED, WHOLE = 2, 9
-"""The coordinate that is the angle of one body against the other; from WHOLE on they say where the
-pair as a whole is: angle, place (x, y)."""
+RELATIVE_ANGLE, PAIR_MOTION = 2, 9
+"""Indices of coordinates: the relative angle; and the first of those of the whole pair (angle, x,
+y)."""
 
 COORDINATES = 12
 
@@ -61,8 +61,9 @@ TINY = 1e-300
 """Keeps a quotient finite."""
 
 
-def share_of_second(scene):
-    """Where the point that stands for the pair lies between its bodies: their centre of mass."""
+def mass_fraction_of_second(scene):
+    """Return where the reference point of the pair lies between its bodies: their centre of mass,
+    or a fixed body."""
     if scene.bodies[0].free == 0.0:
         return 0.0
     if scene.bodies[1].free == 0.0:
@@ -71,39 +72,46 @@ def share_of_second(scene):
 
 
 def coordinate(scene, work, state, which):
-    """A coordinate of the pair: place (x, y) and angle of the second body as seen from the first,
-    velocities (x, y, spin) of both along its axes, then its angle, and the place of the pair."""
+    """Return one coordinate of the pair.
+
+    In order: position (x, y) and angle of the second body relative to the first, velocities (x, y,
+    spin) of both along its axes, its angle, and the position of the pair.
+    """
+    # Axes of the first body.
     turn = work.place[state, 0, ANGLE]
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = (
         work.place[state, 1, X] - work.place[state, 0, X],
         work.place[state, 1, Y] - work.place[state, 0, Y],
     )
+    # Relative position and angle.
     if which == 0:
         return c * dx + s * dy
     if which == 1:
         return c * dy - s * dx
     if which == 2:
         return work.place[state, 1, ANGLE] - turn
-    if which < WHOLE:
+    # Velocities of both bodies along these axes.
+    if which < PAIR_MOTION:
         body, axis = (which - 3) // 3, (which - 3) % 3
         if axis == 0:
             return c * work.velocity[state, body, X] + s * work.velocity[state, body, Y]
         if axis == 1:
             return c * work.velocity[state, body, Y] - s * work.velocity[state, body, X]
         return work.velocity[state, body, ANGLE]
-    if which == WHOLE:
+    if which == PAIR_MOTION:
         return turn
-    share = share_of_second(scene)
-    if which == WHOLE + 1:
+    # Reference point of the pair.
+    share = mass_fraction_of_second(scene)
+    if which == PAIR_MOTION + 1:
         return work.place[state, 0, X] + share * dx
     return work.place[state, 0, Y] + share * dy
 
 
-def place_by(scene, work):
-    """Make ``work.coordinates`` the motion of NOW."""
-    q = work.coordinates
-    turn, share = q[9], share_of_second(scene)
+def write_motion(scene, work):
+    """Write the motion given by ``work.cycle_coordinates`` to NOW."""
+    q = work.cycle_coordinates
+    turn, share = q[9], mass_fraction_of_second(scene)
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = c * q[0] - s * q[1], s * q[0] + c * q[1]
     work.place[NOW, 0, X], work.place[NOW, 0, Y] = (
@@ -126,33 +134,33 @@ def place_by(scene, work):
     )
 
 
-def modes_of(work):
-    """A number for how all listed pairs touch."""
+def mode_code(work):
+    """Return a hash of the modes of all listed pairs."""
     code = 1
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        mode = 3 * candidate.closed + candidate.sliding + 1
+        mode = 3 * candidate.contact_mode + candidate.slide_direction + 1
         code = (code * BASE + mode + 1) % MODULUS
     return code
 
 
-def any_hums(work):
-    """Whether a pair hums: where none does, the cycles are bounces, which somebody may want to
-    see."""
+def any_chatters(work):
+    """Return True if a pair chatters. Otherwise the cycles are bounces, which are to be
+    followed."""
     for row in range(work.tally.candidates):
-        if hums(work, row):
+        if chatters(work, row):
             return True
     return False
 
 
-def begin_at(counts, modes):
-    """Let cycles be counted from these modes on."""
+def restart_cycles(counts, modes):
+    """Begin to count cycles from these modes."""
     counts.cycle_modes, counts.cycles_seen, counts.cycle_switches = modes, 0, 0
-    counts.cycle_code = counts.cycle_code_before = 0
+    counts.cycle_code = counts.previous_cycle_code = 0
 
 
 def end_cycle(work, clock, counts):
-    """Keep the state at the end of a cycle beside that of the end before."""
+    """Store the state at the end of a cycle, next to that of the cycle before."""
     for body in range(2):
         for axis in range(3):
             work.place[CYCLE_BEFORE, body, axis] = work.place[CYCLE_LAST, body, axis]
@@ -165,159 +173,175 @@ def end_cycle(work, clock, counts):
         contact.cycle_slip = work.slip[NOW, row]
         contact.cycle_gap_before = contact.cycle_gap
         contact.cycle_gap = work.geometry[NOW, row].gap
-    clock.cycle_at_before, clock.cycle_at = clock.cycle_at, clock.time
+    clock.previous_cycle_end, clock.cycle_end = clock.cycle_end, clock.time
     clock.cycle_error = clock.error
-    counts.cycle_code_before, counts.cycle_code = counts.cycle_code, 0
+    counts.previous_cycle_code, counts.cycle_code = counts.cycle_code, 0
     counts.cycle_switches = counts.cycle_returns = 0
     counts.cycles_seen += 1
 
 
-def known(change, least):
-    """A change of a length, nothing where it may be rounding."""
+def above_noise(change, least):
+    """Return a change, 0 if it may be rounding."""
     return change if abs(change) > least else 0.0
 
 
-def changes_of(now, last, before, least):
-    """By how much a length differs from what it was a cycle ago, and that from the same of the
-    cycle before; what may be rounding is nothing."""
-    return known(now - last, least), known(now - 2.0 * last + before, 2.0 * least)
+def differences(now, last, before, least):
+    """Return first and second differences over the last two cycles, 0 where they may be
+    rounding."""
+    return above_noise(now - last, least), above_noise(now - 2.0 * last + before, 2.0 * least)
 
 
-def is_chance(change, bend, size):
-    """Whether a change is due to where switches happen to be found: small, and another one each
-    time."""
-    return max(abs(change), abs(bend)) <= FORM_ERROR * size and abs(change) <= CHANCE * abs(bend)
+def is_scatter(change, curvature, size):
+    """Return True if a change comes from where switches happened to be located: small, and
+    different each time."""
+    # A real trend keeps its sign and size; the scatter of located switches does not.
+    return max(abs(change), abs(curvature)) <= SHAPE_ERROR * size and abs(
+        change
+    ) <= SCATTER_RATIO * abs(curvature)
 
 
 def trend(now, last, before, size, least):
-    """What a cycle changes of a length of such a size, which was so much behind the last ones;
-    nothing where that is rounding, or chance."""
-    change, bend = changes_of(now, last, before, least)
-    return 0.0 if is_chance(change, bend, size) else change
+    """Return the change per cycle of a length of a given size; 0 if it is rounding or scatter."""
+    change, curvature = differences(now, last, before, least)
+    return 0.0 if is_scatter(change, curvature, size) else change
 
 
-def allowed(most, now, last, before, size, least):
-    """How many cycles may be left out where a length of such a size was so much behind the last
-    ones; what is below ``least`` is rounding."""
-    change, bend = changes_of(now, last, before, least)
-    chance = is_chance(change, bend, size)
-    largest = max(abs(change), abs(bend)) if chance else abs(change)
-    if largest * most > FORM * size:
-        most = FORM * size / largest
-    if not chance and abs(bend) * most * most > 2.0 * FORM_ERROR * size:
-        most = math.sqrt(2.0 * FORM_ERROR * size / abs(bend))
+def allowed_cycles(most, now, last, before, size, least):
+    """Return how many cycles, at most ``most``, a length of a given size may be extrapolated
+    over."""
+    change, curvature = differences(now, last, before, least)
+    chance = is_scatter(change, curvature, size)
+    largest = max(abs(change), abs(curvature)) if chance else abs(change)
+    # Linear change below SHAPE_CHANGE.
+    if largest * most > SHAPE_CHANGE * size:
+        most = SHAPE_CHANGE * size / largest
+    # Quadratic error below SHAPE_ERROR.
+    if not chance and abs(curvature) * most * most > 2.0 * SHAPE_ERROR * size:
+        most = math.sqrt(2.0 * SHAPE_ERROR * size / abs(curvature))
     return most
 
 
 def sizes_of(work):
-    """The largest (gap, tangential displacement) of the pairs that take part [m]."""
+    """Return the largest gap and tangential displacement of the contacts that take part [m]."""
     gaps = slips = 0.0
     for row in range(work.tally.candidates):
-        if takes_part(work, row):
+        if touched_recently(work, row):
             gaps = max(gaps, abs(work.geometry[NOW, row].gap))
             slips = max(slips, abs(work.slip[NOW, row]))
     return gaps, slips
 
 
-def cycles_of_form(work):
-    """How many cycles leave gaps and displacements about as they are."""
-    least, most = above_rounding(work, NOW, 0.0), MOST_AT_ONCE
+def cycles_keeping_shape(work):
+    """Return how many cycles leave gaps and displacements nearly unchanged."""
+    least, most = at_least_rounding(work, NOW, 0.0), MOST_AT_ONCE
     gaps, slips = sizes_of(work)
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
         now, last = work.geometry[NOW, row].gap, contact.cycle_gap
-        size = gaps if takes_part(work, row) else now
-        most = allowed(most, now, last, contact.cycle_gap_before, size, least)
-        if takes_part(work, row):
+        # An open pair that takes no part only must not close: its own gap is its size.
+        size = gaps if touched_recently(work, row) else now
+        most = allowed_cycles(most, now, last, contact.cycle_gap_before, size, least)
+        if touched_recently(work, row):
             now, last = work.slip[NOW, row], contact.cycle_slip
-            most = allowed(most, now, last, contact.cycle_slip_before, slips, least)
+            most = allowed_cycles(most, now, last, contact.cycle_slip_before, slips, least)
     return most
 
 
-def lasted(clock):
-    """How long the last cycle took, and the one before [s]."""
-    at_last, at_before = clock.cycle_at, clock.cycle_at_before
+def cycle_durations(clock):
+    """Return the durations of the last cycle and the one before [s]."""
+    at_last, at_before = clock.cycle_end, clock.previous_cycle_end
     return clock.time - at_last, at_last - at_before
 
 
-def period_of(clock):
-    """(How long the next cycle takes [s], by how much longer each is than the one before)."""
-    last, before = lasted(clock)
-    if abs(last - before) <= FORM_ERROR * last:
+def cycle_period(clock):
+    """Return the duration of the next cycle [s], and its growth per cycle."""
+    last, before = cycle_durations(clock)
+    if abs(last - before) <= SHAPE_ERROR * last:
         return 0.5 * (last + before), 0.0
     return last, last - before
 
 
-def rates_of(scene, work, clock, which):
-    """Rate of change of a coordinate over the last cycle [1/s], and of that rate [1/s²]: what moves
-    evenly does so in time, wherever in it a cycle has been found to end."""
-    late, early = lasted(clock)
+def coordinate_rates(scene, work, clock, which):
+    """Return the rate of a coordinate over the last cycle [1/s], and the derivative of that rate
+    [1/s²].
+
+    Steady motion is steady in time, wherever in it the end of a cycle was located.
+    """
+    last_duration, previous_duration = cycle_durations(clock)
     now = coordinate(scene, work, NOW, which)
     last = coordinate(scene, work, CYCLE_LAST, which)
     before = coordinate(scene, work, CYCLE_BEFORE, which)
-    rate = (now - last) / late
-    return rate, 2.0 * (rate - (last - before) / early) / (late + early)
+    rate = (now - last) / last_duration
+    return rate, 2.0 * (rate - (last - before) / previous_duration) / (
+        last_duration + previous_duration
+    )
 
 
-def way_of(scene, work, clock, first):
-    """(Largest change over a cycle in three coordinates from ``first`` on, of which the angle
-    counts in the place of an outline, by how much it differs from the one before) [m]."""
+def largest_change(scene, work, clock, first):
+    """Return the largest change per cycle of three coordinates, and the change of that [m].
+
+    Angles count as displacements of an outline.
+    """
     size = scene.bodies[0].bounding_radius + scene.bodies[1].bounding_radius
-    way = bend = 0.0
-    period, _ = period_of(clock)
+    displacement_per_cycle = curvature = 0.0
+    period, _ = cycle_period(clock)
     for which in range(first, first + 3):
-        lever = size if which in (TURNED, WHOLE) else 1.0
-        rate, more = rates_of(scene, work, clock, which)
-        way = max(way, lever * abs(rate) * period)
-        bend = max(bend, lever * abs(more) * period * period)
-    return way, bend
+        lever = size if which in (RELATIVE_ANGLE, PAIR_MOTION) else 1.0
+        rate, more = coordinate_rates(scene, work, clock, which)
+        displacement_per_cycle = max(displacement_per_cycle, lever * abs(rate) * period)
+        curvature = max(curvature, lever * abs(more) * period * period)
+    return displacement_per_cycle, curvature
 
 
-def error_of(scene, work, clock, many):
-    """What the place of a body is wrong by where so many cycles are left out [m]: the next term of
-    the line that its place against the other one is carried on along, and of the parabola of
-    both."""
-    _, creep = way_of(scene, work, clock, 0)
-    way, bend = way_of(scene, work, clock, WHOLE)
-    beyond = many * bend / max(way, TINY) / 3.0
-    return 0.5 * many * many * (creep + beyond * bend)
+def extrapolation_error(scene, work, clock, many):
+    """Return the error of a body's position [m] if ``many`` cycles are skipped: the next term of
+    the linear extrapolation of the relative position, and of the quadratic one of the whole
+    pair."""
+    _, relative_curvature = largest_change(scene, work, clock, 0)
+    displacement_per_cycle, curvature = largest_change(scene, work, clock, PAIR_MOTION)
+    beyond = many * curvature / max(displacement_per_cycle, TINY) / 3.0
+    return 0.5 * many * many * (relative_curvature + beyond * curvature)
 
 
-def cycles_of_motion(scene, work, clock, until):
-    """How many cycles leave the motion of the pair as a whole about as it is, and its error below
-    the tolerance."""
-    way, bend = way_of(scene, work, clock, WHOLE)
-    period, longer = period_of(clock)
-    turn = rates_of(scene, work, clock, WHOLE)[0] * period
+def cycles_within_tolerance(scene, work, clock, until):
+    """Return how many cycles keep the motion of the pair nearly unchanged, and its error below the
+    tolerance."""
+    displacement_per_cycle, curvature = largest_change(scene, work, clock, PAIR_MOTION)
+    period, growth = cycle_period(clock)
+    turn = coordinate_rates(scene, work, clock, PAIR_MOTION)[0] * period
+    # Bounds of speed, turn and period.
     most = MOST_AT_ONCE
-    if bend * most > PACE * way:
-        most = PACE * way / bend
+    if curvature * most > MOTION_CHANGE * displacement_per_cycle:
+        most = MOTION_CHANGE * displacement_per_cycle / curvature
     if abs(turn) * most > MOST_TURN:
         most = MOST_TURN / abs(turn)
-    if abs(longer) * most > PACE * period:
-        most = PACE * period / abs(longer)
+    if abs(growth) * most > MOTION_CHANGE * period:
+        most = MOTION_CHANGE * period / abs(growth)
     for power in (3.0, 3.0, 2.0):
-        # It goes with the square of their number at least, and with its third power at most.
-        error = error_of(scene, work, clock, most)
+        # The error grows with the second to third power of their number.
+        error = extrapolation_error(scene, work, clock, most)
         if error > clock.tolerance:
             most *= (clock.tolerance / error) ** (1.0 / power)
     return min(most, 0.5 * (until - clock.time) / period)
 
 
-def leave_out(scene, work, clock, many):
-    """Go on by so many cycles."""
-    period, longer = period_of(clock)
-    time = many * period + 0.5 * many * (many + 1.0) * longer
-    bent = 0.5 * time * (time + lasted(clock)[0])
+def extrapolate_cycles(scene, work, clock, many):
+    """Advance by ``many`` cycles."""
+    # Time: an arithmetic series.
+    period, growth = cycle_period(clock)
+    time = many * period + 0.5 * many * (many + 1.0) * growth
+    half_square = 0.5 * time * (time + cycle_durations(clock)[0])
+    # Motion.
     for which in range(COORDINATES):
-        rate, more = rates_of(scene, work, clock, which)
+        rate, more = coordinate_rates(scene, work, clock, which)
         now = coordinate(scene, work, NOW, which) + rate * time
-        work.coordinates[which] = now + bent * more if which >= WHOLE else now
-    place_by(scene, work)
+        work.cycle_coordinates[which] = now + half_square * more if which >= PAIR_MOTION else now
+    write_motion(scene, work)
+    # Contacts: displacements now, gaps after they have been located anew.
     gaps, slips = sizes_of(work)
-    least = above_rounding(work, NOW, 0.0)
+    least = at_least_rounding(work, NOW, 0.0)
     for row in range(work.tally.candidates):
-        if takes_part(work, row):
+        if touched_recently(work, row):
             contact = work.contacts[row]
             slip, gap = work.slip[NOW, row], work.geometry[NOW, row].gap
             last, before = contact.cycle_slip, contact.cycle_slip_before
@@ -329,60 +353,70 @@ def leave_out(scene, work, clock, many):
 
 
 def restore_gaps(work):
-    """Count the gaps of pairs that take part as what a cycle makes of them: what a turn bends them
-    by is far below them."""
+    """Set the gaps of the contacts that take part to those that a cycle leaves, by an offset: the
+    pair's turn changes them by far more than their own size."""
     for row in range(work.tally.candidates):
-        if takes_part(work, row):
+        if touched_recently(work, row):
             geometry = work.geometry[NOW, row]
             contact = work.contacts[row]
             contact.gap_offset += geometry.gap - contact.cycle_gap
             geometry.gap = contact.cycle_gap
 
 
-def carry_on_errors(work, clock, many, more):
-    """Let what is stated of errors grow on as it has in the last cycle, and by ``more`` [m]."""
+def extrapolate_errors(work, clock, many, more):
+    """Let the stated errors grow as in the last cycle, for ``many`` cycles, and by ``more`` [m]."""
     grown = many * max(clock.error - clock.cycle_error, 0.0) + more
     if grown > 0.0:
+        # All sums and the propagated vector grow by the same factor as the stated error.
         factor = 1.0 + grown / max(clock.error, TINY)
         for body in range(2):
             errors = work.errors[body]
-            errors.place *= factor
-            errors.switch_place *= factor
-            errors.doubt_place *= factor
+            errors.displacement *= factor
+            errors.switch_displacement *= factor
+            errors.uncertain_displacement *= factor
             errors.stated *= factor
             for axis in range(3):
-                work.place[CARRIED, body, axis] *= factor
-                work.velocity[CARRIED, body, axis] *= factor
+                work.place[PROPAGATED, body, axis] *= factor
+                work.velocity[PROPAGATED, body, axis] *= factor
         clock.error *= factor
 
 
-def leave_out_cycles(scene, work, clock, counts, until):
-    """Look at a switch of two bodies that has just been, and leave out the cycles that it ends, if
-    they have been alike."""
-    if work.poses.shape[0] != 2 or not any_hums(work):
+def skip_equal_cycles(scene, work, clock, counts, until):
+    """Follow the switches of two bodies; at the end of a cycle skip many, if the last ones were
+    equal.
+
+    Called after every step in which contacts have switched.
+    """
+    if work.poses.shape[0] != 2 or not any_chatters(work):
         counts.cycle_modes = 0
         return
-    modes = modes_of(work)
+    # Hash the modes since the cycle began; start again if none appears within MOST_SWITCHES.
+    modes = mode_code(work)
     counts.cycle_code = (counts.cycle_code * BASE + modes) % MODULUS
     counts.cycle_switches += 1
     if counts.cycle_switches > MOST_SWITCHES or counts.cycle_modes == 0:
-        begin_at(counts, modes)
+        restart_cycles(counts, modes)
+    # A cycle ends when its initial modes have recurred RETURNS times.
     if modes != counts.cycle_modes:
         return
     counts.cycle_returns += 1
     if counts.cycles_seen > 0 and counts.cycle_returns < RETURNS:
         return
+    # Two cycles with the same sequence of modes: how many may be skipped?
     many = 0.0
     if counts.cycles_seen >= 2:
-        if counts.cycle_code != counts.cycle_code_before:
+        if counts.cycle_code != counts.previous_cycle_code:
             counts.cycle_modes = 0
             return
-        many = math.floor(min(cycles_of_form(work), cycles_of_motion(scene, work, clock, until)))
+        many = math.floor(
+            min(cycles_keeping_shape(work), cycles_within_tolerance(scene, work, clock, until))
+        )
+    # Skip them, then count cycles from here.
     if many >= FEWEST:
-        error = error_of(scene, work, clock, many)
-        leave_out(scene, work, clock, many)
+        error = extrapolation_error(scene, work, clock, many)
+        extrapolate_cycles(scene, work, clock, many)
         restore_gaps(work)
-        carry_on_errors(work, clock, many, error)
+        extrapolate_errors(work, clock, many, error)
         set_modes(scene, work)
-        begin_at(counts, modes_of(work))
+        restart_cycles(counts, mode_code(work))
     end_cycle(work, clock, counts)

@@ -1,11 +1,12 @@
-"""When pairs begin and cease to graze: decided by forces at the end of a step.
+"""Beginning and end of grazing, decided from the forces at the end of a step.
 
-A pair that has just parted goes on grazing (rhs/friction.py) instead of being apart where its own
-tangential force has lifted it and all that comes of it is far below the tolerance: how high it
-would fly, and the displacement that its tangential spring would lose. What the spring lets go of
-has to be next to nothing, too, unless the pair has parted and touched again several times like
-that: then it hums. Two contacts that throw each other open in turn do not graze: their cycles are
-followed, and left out (cycles.py). Where the tolerance resolves these, the law is followed.
+A pair that has just parted goes on grazing (rhs/friction.py) instead of opening if its own
+tangential force has lifted it and the consequences are far below the tolerance: how high it would
+fly, and the displacement that its tangential spring would lose. The force that the spring releases
+must be negligible, too, unless the pair chatters, having parted and touched again several times
+like that: a first graze in an impact caused errors of fifty tolerances. Two contacts that throw
+each other open in turn do not graze; their cycles are followed, and skipped (cycles.py). Where the
+tolerance resolves all this, the contact law itself is followed.
 """
 
 import math
@@ -14,198 +15,221 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.events.resolution import above_rounding
-from flocsim.integrators.rhs.friction import STIFFER, coupling, grazing_force, normal_mobility
+from flocsim.integrators.events.resolution import at_least_rounding
+from flocsim.integrators.rhs.friction import (
+    GRAZING_STIFFNESS_RATIO,
+    grazing_force,
+    normal_mobility,
+    tangential_coupling,
+)
 from flocsim.integrators.rhs.views import (
     contact_view,
-    memory_of,
     normal_rate,
-    pressed_view,
     tangential_rate,
+    velocity_lifetime_of,
+    view_without_slip,
 )
-from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
+from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW
 
-SHARE_OF_FLIGHT = 0.1
-"""The speed with which a pair parts may lift it by this share of the tolerance, where it has done
-so before, …"""
+FLIGHT_HEIGHT = 0.1
+"""A chattering pair grazes if its speed would lift it by less than this fraction of the
+tolerance."""
 
-SHARE_OF_FIRST = 1e-3
-"""… and by this one where it has not, …"""
+FIRST_FLIGHT_HEIGHT = 1e-3
+"""The same for a pair that does not chatter yet."""
 
-SHARE_OF_SLIP = 1.0
-"""… and the displacement that is lost with its tangential spring be this share of it at most."""
+MOST_LOST_SLIP = 1.0
+"""Largest ξ, in tolerances, that may be lost with the tangential spring."""
 
-FIRST_KICK = 30.0
-"""The speed that a tangential spring lets go of where a contact parts displaces bodies by so many
-tolerances at most, or it has to have hummed before."""
+FIRST_RELEASE = 30.0
+"""Largest displacement, in tolerances, by the speed that a tangential spring releases when a
+contact parts that does not chatter yet."""
 
-MANY = 5
-"""So often a pair has parted by no more than SHARE_OF_FLIGHT and touched again that it hums."""
+CHATTER_COUNT = 5
+"""A pair chatters after this many flights in a row of no more than FLIGHT_HEIGHT."""
 
 LEAST_COUPLING = 0.1
-"""A tangential force is taken to accelerate the gap by this share of what a normal one does, at
-least: through other contacts, if not by itself."""
+"""Lower bound of a tangential force's effect on the gap, over that of a normal force: other
+contacts may couple the two even if this one does not."""
 
 LEAST_PULL = 1e-3
-"""A contact force that pulls at no overlap with more than this share of T holds by itself."""
+"""A contact force that pulls at no overlap by more than this fraction of T holds the pair by
+itself."""
 
-SAME_PLACE = 1e-9
-"""Contact points nearer than this [m] may be one."""
+SAME_POINT = 1e-9
+"""Contact points nearer than this [m] are one."""
 
 FAR = 1e3
-"""A gap so many times as large as the one that counted as none is far from it."""
+"""A gap that exceeds its offset by this factor is far from where the pair grazed."""
 
-LATE = 0.1
-"""A step may go on behind the end of grazing where that leads to less than this share of the
-tolerance; …"""
+LATE_EFFECT = 0.1
+"""A step may pass the end of grazing if that displaces bodies by less than this fraction of the
+tolerance; the force passes through zero there."""
 
-BEHIND = 1.01
-"""… one that may not ends that little behind it."""
+END_OVERSHOOT = 1.01
+"""A step that may not pass the end of grazing ends this little after it."""
 
-AT_ONCE = 0.02
-"""What ceases within this share of a step ceases at its start."""
+START_FRACTION = 0.02
+"""Grazing that ends within this fraction of a step ends at its start."""
 
 TOUCHING_GAP = -1e-30
-"""The gap of a pair that touches without overlap [m]: its sign tells."""
+"""Gap of a pair that touches without overlap [m]: only its sign matters."""
 
 
-def pull_of(scene, work, row):
-    """About by how much a newton along the tangent of a pair accelerates the gap [1/kg]."""
+def gap_coupling(scene, work, row):
+    """Return the acceleration of the gap per unit tangential force on a pair [1/kg], bounded from
+    below."""
     least = LEAST_COUPLING * normal_mobility(scene, work, row)
-    return max(abs(coupling(scene, work, row)), least)
+    return max(abs(tangential_coupling(scene, work, row)), least)
 
 
-def begins(scene, work, clock, row):
-    """Whether a pair that has just parted grazes from now on."""
-    if work.candidates[row].sliding != 0 or rattles(work, row):
+def begins_grazing(scene, work, clock, row):
+    """Return True if a pair that has just parted grazes from now on."""
+    # Neither sliding pairs (there is a Coulomb limit) nor two that throw each other open.
+    if work.candidates[row].slide_direction != 0 or chatters_in_turn(work, row):
         return False
+    # Height of the flight: v²/(2 a), with the acceleration a that its own tangential force causes.
     view = contact_view(scene, work, NOW, row)
     _, force = contact_force(scene, view)
-    speed, pull = normal_rate(work, NOW, row), abs(force) * pull_of(scene, work, row)
-    share = SHARE_OF_FLIGHT if hums(work, row) else SHARE_OF_FIRST
+    speed, pull = normal_rate(work, NOW, row), abs(force) * gap_coupling(scene, work, row)
+    share = FLIGHT_HEIGHT if chatters(work, row) else FIRST_FLIGHT_HEIGHT
     if speed * speed > 2.0 * pull * share * clock.tolerance:
         return False
-    pull, _ = contact_force(scene, pressed_view(view, 0.0, 0.0))
+    # A normal force that acts without overlap, such as cohesion, holds or opens the pair by itself.
+    pull, _ = contact_force(scene, view_without_slip(view, 0.0, 0.0))
     if abs(pull) > LEAST_PULL * abs(force):
         return False
-    spring = spring_of(scene, view)
+    # Effects of the spring that is lost: the speed it releases, and its displacement.
+    spring = tangential_stiffness(scene, view)
     if spring == 0.0:
         return True
-    if not hums(work, row):
+    if not chatters(work, row):
         kick = abs(force) / math.sqrt(spring * view.effective_mass)
-        if kick * memory_of(work, row) > FIRST_KICK * clock.tolerance:
+        if kick * velocity_lifetime_of(work, row) > FIRST_RELEASE * clock.tolerance:
             return False
-    return abs(force) <= SHARE_OF_SLIP * clock.tolerance * spring
+    return abs(force) <= MOST_LOST_SLIP * clock.tolerance * spring
 
 
-def spring_of(scene, view):
-    """By how much the tangential force of a contact falls with its displacement [N/m]."""
+def tangential_stiffness(scene, view):
+    """Return −∂T/∂ξ of a contact [N/m]."""
     return max(-contact_derivatives(scene, view)[7], 0.0)
 
 
-def near(work, row, other):
-    """Whether two rows have one contact point."""
+def same_point(work, row, other):
+    """Return True if two rows have the same contact point."""
     body = work.candidates[row].vertex_body
     x, y = contact_point(work, row, body)
     other_x, other_y = contact_point(work, other, body)
-    return math.hypot(other_x - x, other_y - y) < SAME_PLACE
+    return math.hypot(other_x - x, other_y - y) < SAME_POINT
 
 
-def shares_point(work, row, other):
-    """Whether two rows of the same two bodies have one contact point and gap: two corners that
-    touch are up to four rows, of both bodies' edges."""
+def coincides(work, row, other):
+    """Return True if two rows of the same two bodies have one contact point and gap.
+
+    Two corners that touch are up to four rows, with edges of both bodies.
+    """
     if work.candidates[row].pair != work.candidates[other].pair:
         return False
-    if abs(work.geometry[NOW, row].gap - work.geometry[NOW, other].gap) > above_rounding(
+    if abs(work.geometry[NOW, row].gap - work.geometry[NOW, other].gap) > at_least_rounding(
         work, NOW, 0.0
     ):
         return False
-    return near(work, row, other)
+    return same_point(work, row, other)
 
 
-def enter(scene, work, row):
-    """Let a pair graze."""
+def start_grazing(scene, work, row):
+    """Let a pair graze, with its present tangential force, so that no force jumps."""
     contact = work.contacts[row]
     _, force = contact_force(scene, contact_view(scene, work, NOW, row))
-    work.candidates[row].closed = GRAZES
+    work.candidates[row].contact_mode = GRAZING
     contact.grazing_force = force
-    contact.fresh = 1.0
+    contact.newly_grazing = 1.0
 
 
-def share_forces(work):
-    """Rows of one contact point bear the same force."""
+def equalise_forces(work):
+    """Give all grazing rows of one contact point the mean of their forces."""
+    # grazing_resistance stores the means until all are known.
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == GRAZES:
+        if work.candidates[row].contact_mode == GRAZING:
             total, count = 0.0, 0
             for other in range(work.tally.candidates):
-                if work.candidates[other].closed == GRAZES and shares_point(work, row, other):
+                if work.candidates[other].contact_mode == GRAZING and coincides(work, row, other):
                     total, count = total + work.contacts[other].grazing_force, count + 1
             work.contacts[row].grazing_resistance = total / max(count, 1)
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == GRAZES:
+        if work.candidates[row].contact_mode == GRAZING:
             contact = work.contacts[row]
             contact.grazing_force = contact.grazing_resistance
 
 
-def hold_gap(work, row, gap):
-    """Count the gap that a pair has now as another one."""
+def redefine_gap(work, row, gap):
+    """Let the present gap of a pair count as ``gap`` [m]; the difference is stored as an offset."""
     geometry = work.geometry[NOW, row]
     work.contacts[row].gap_offset += geometry.gap - gap
     geometry.gap = gap
 
 
 def sliding_speed(work, row):
-    """How fast the bodies of a pair that grazes slide against its force [m/s]."""
+    """Return the speed at which the bodies of a grazing pair slide against its tangential force
+    [m/s]."""
     speed = tangential_rate(work, NOW, row)
     return -speed if work.contacts[row].grazing_force > 0.0 else speed
 
 
-def sticks(scene, work, row):
-    """Whether a pair that grazes has ceased to slide; its spring takes the force over then, as far
-    as it held that before. Without a spring the law's whole force is what it needs then."""
+def resticks(scene, work, row):
+    """Return True if a grazing pair has ceased to slide; then its spring takes the force over.
+
+    It does so only as far as it bore that before, so no energy is gained. Without a spring, the
+    pair sticks once the law's whole force is no more than it needs.
+    """
     view = contact_view(scene, work, NOW, row)
-    force, spring = work.contacts[row].grazing_force, spring_of(scene, view)
+    force, spring = work.contacts[row].grazing_force, tangential_stiffness(scene, view)
     if spring == 0.0:
         _, whole = contact_force(scene, view)
         return whole * force <= force * force
     if sliding_speed(work, row) >= 0.0:
         return False
-    needed, held = -force / spring, work.slip[NOW, row]
-    if needed * held <= 0.0:
+    # Displacement that would give T, and the one stored.
+    required, stored = -force / spring, work.slip[NOW, row]
+    if required * stored <= 0.0:
         work.slip[NOW, row] = 0.0
-    elif abs(needed) < abs(held):
-        work.slip[NOW, row] = needed
+    elif abs(required) < abs(stored):
+        work.slip[NOW, row] = required
     return True
 
 
-def leave(work, row, mode, gap):
-    """Let a pair cease to graze."""
-    work.candidates[row].closed = mode
-    hold_gap(work, row, gap)
+def end_grazing(work, row, mode, gap):
+    """Let a pair cease to graze, with a mode and a gap [m] from which it continues."""
+    work.candidates[row].contact_mode = mode
+    redefine_gap(work, row, gap)
 
 
-def go_on(scene, work, row):
-    """Whether a pair goes on grazing behind a step."""
+def continues_grazing(scene, work, row):
+    """Return True if a pair goes on grazing after a step; otherwise set its mode."""
     contact = work.contacts[row]
-    if contact.fresh != 0.0:
-        # Its first step takes what is left of the gap's rate away, of which no load tells.
-        contact.fresh = 0.0
+    if contact.newly_grazing != 0.0:
+        # The first step removes the gap rate with which the pair parted; T says nothing of the load
+        # yet.
+        contact.newly_grazing = 0.0
         return True
+    # T at the end of the step, from the rate of the gap.
     before, rate = contact.grazing_force, normal_rate(work, NOW, row)
     after = before - contact.grazing_resistance * rate
     contact.grazing_force = after
+    # T has passed through zero: the pair opens.
     if after * before <= 0.0:
-        leave(work, row, OPEN, 0.0)
+        end_grazing(work, row, OPEN, 0.0)
         return False
-    if sticks(scene, work, row):
-        leave(work, row, TOUCHES, TOUCHING_GAP)
+    # It no longer slides: the spring takes over.
+    if resticks(scene, work, row):
+        end_grazing(work, row, CLOSED, TOUCHING_GAP)
         return False
     return True
 
 
-def forget_gap(work, row):
-    """The gap of a pair that has gone far from where it grazed counts as it is."""
+def drop_gap_offset(work, row):
+    """Drop the gap offset of a pair that is far from where it grazed."""
     geometry = work.geometry[NOW, row]
     contact = work.contacts[row]
     offset = contact.gap_offset
@@ -214,146 +238,162 @@ def forget_gap(work, row):
         contact.gap_offset = 0.0
 
 
-def hums(work, row):
-    """Whether a pair has parted and touched again and again, by far less than the tolerance."""
-    return work.contacts[row].flights >= MANY
+def chatters(work, row):
+    """Return True if a pair has parted and touched again and again, by far less than the
+    tolerance."""
+    return work.contacts[row].short_flights >= CHATTER_COUNT
 
 
-def rattles(work, row):
-    """Whether another contact of the same bodies has done that since this one last touched again:
-    they throw each other open in turn."""
-    if not hums(work, row):
+def chatters_in_turn(work, row):
+    """Return True if another contact of the same bodies has chattered since this one last touched
+    again: they throw each other open in turn."""
+    if not chatters(work, row):
         return False
     for other in range(work.tally.candidates):
         same = work.candidates[other].pair == work.candidates[row].pair
-        later = work.contacts[other].flown_at > work.contacts[row].flown_at
-        if same and later and hums(work, other) and not near(work, row, other):
+        later = work.contacts[other].landing_time > work.contacts[row].landing_time
+        if same and later and chatters(work, other) and not same_point(work, row, other):
             return True
     return False
 
 
-def takes_part(work, row):
-    """Whether a pair touches, or has done so a moment ago."""
-    return work.candidates[row].closed != OPEN or work.contacts[row].flights > 0.0
+def touched_recently(work, row):
+    """Return True if a pair is in contact, or has touched after its last long flight."""
+    return work.candidates[row].contact_mode != OPEN or work.contacts[row].short_flights > 0.0
 
 
-def count_flight(work, clock, step, row):
-    """Count how often a pair, which has touched, was apart by far less than the tolerance.
+def count_short_flight(work, clock, step, row):
+    """Count the flights of a pair that has touched again and was apart by far less than the
+    tolerance.
 
-    Where a single step has led from parting to touching again, no end of a step has seen it apart:
-    it has flown a quarter of the way that its rate would have led, as on a parabola.
+    If a single step led from parting to touching again, no end of a step has seen the pair apart: a
+    parabola reaches a quarter of step · rate.
     """
     contact = work.contacts[row]
-    flight = contact.flight
+    flight = contact.flight_gap
     if flight == 0.0:
         flight = 0.25 * step * abs(normal_rate(work, NOW, row))
-    if flight > SHARE_OF_FLIGHT * clock.tolerance:
-        contact.flights = 0.0
+    if flight > FLIGHT_HEIGHT * clock.tolerance:
+        contact.short_flights = 0.0
     elif flight > 0.0:
-        contact.flights += 1.0
-        contact.flown_at = clock.time
-    contact.flight = 0.0
+        contact.short_flights += 1.0
+        contact.landing_time = clock.time
+    contact.flight_gap = 0.0
 
 
-def note_flight(work, clock, row):
-    """Keep how far a pair that is apart has been since it parted; far enough, it hums no more."""
+def track_flight(work, clock, row):
+    """Track the largest gap of a pair since it parted; a long flight ends its chattering."""
     contact = work.contacts[row]
-    flight = max(contact.flight, work.geometry[NOW, row].gap)
-    contact.flight = flight
-    if flight > SHARE_OF_FLIGHT * clock.tolerance:
-        contact.flights = 0.0
+    flight = max(contact.flight_gap, work.geometry[NOW, row].gap)
+    contact.flight_gap = flight
+    if flight > FLIGHT_HEIGHT * clock.tolerance:
+        contact.short_flights = 0.0
 
 
-def part(scene, work, clock, row):
-    """What becomes of a closed pair that has parted; whether it begins to graze."""
-    if not begins(scene, work, clock, row):
+def handle_release(scene, work, clock, row):
+    """Let a closed pair that has parted begin to graze if it can; return True if it does."""
+    if not begins_grazing(scene, work, clock, row):
         return False
+    # All rows of the contact point graze together.
     for other in range(work.tally.candidates):
-        if work.candidates[other].closed == TOUCHES and shares_point(work, row, other):
-            enter(scene, work, other)
+        if work.candidates[other].contact_mode == CLOSED and coincides(work, row, other):
+            start_grazing(scene, work, other)
     return True
 
 
 @apart
-def settle(scene, work, clock, step):
-    """Let pairs begin and cease to graze at the end of a step; whether any has."""
+def update_grazing_pairs(scene, work, clock, step):
+    """Let pairs begin and cease to graze at the end of a step; return True if any has."""
+    # Grazing pairs continue or end; open ones update their flights.
     changed, entered = False, False
     for row in range(work.tally.candidates):
-        mode = work.candidates[row].closed
-        if mode == GRAZES:
-            changed = not go_on(scene, work, row) or changed
+        mode = work.candidates[row].contact_mode
+        if mode == GRAZING:
+            changed = not continues_grazing(scene, work, row) or changed
         elif mode == OPEN:
-            forget_gap(work, row)
-            note_flight(work, clock, row)
+            drop_gap_offset(work, row)
+            track_flight(work, clock, row)
             if work.geometry[NOW, row].gap < 0.0:
-                count_flight(work, clock, step, row)
+                count_short_flight(work, clock, step, row)
+    # Closed pairs that have parted may begin to graze.
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == TOUCHES and work.geometry[NOW, row].gap >= 0.0:
-            entered = part(scene, work, clock, row) or entered
+        if work.candidates[row].contact_mode == CLOSED and work.geometry[NOW, row].gap >= 0.0:
+            entered = handle_release(scene, work, clock, row) or entered
+    # All gaps count as zero from here, so that none is closed by rounding.
     if entered:
-        share_forces(work)
+        equalise_forces(work)
         for row in range(work.tally.candidates):
-            if work.candidates[row].closed == GRAZES:
-                hold_gap(work, row, 0.0)
+            if work.candidates[row].contact_mode == GRAZING:
+                redefine_gap(work, row, 0.0)
     return changed or entered
 
 
-def force_needed(work, row):
-    """T of a pair that grazes at the end of a step; in its first one without what takes the rate
-    away with which the pair has parted."""
+def final_force(work, row):
+    """Return T of a grazing pair at the end of a step [N].
+
+    In its first step without the part that removes the rate with which the pair parted.
+    """
     contact = work.contacts[row]
     after = grazing_force(work, NEW, row)
-    if contact.fresh != 0.0:
+    if contact.newly_grazing != 0.0:
         resistance = contact.grazing_resistance
-        after += resistance / STIFFER * normal_rate(work, NOW, row)
+        after += resistance / GRAZING_STIFFNESS_RATIO * normal_rate(work, NOW, row)
     return after
 
 
-def share_left(work, clock, step, row):
-    """The share of the step at which a pair that grazes ceases to; above 1 where it does not, or
-    where it matters little: its force goes through nothing there, or it ceases to slide.
+def grazing_end_share(work, clock, step, row):
+    """Return the fraction of the step at which a pair ceases to graze.
 
-    T and the speed of sliding go along lines.
+    That is where T passes through zero or the pair ceases to slide; both are interpolated linearly.
+    Above 1 if it does not happen, or matters little.
     """
     contact = work.contacts[row]
     resistance = abs(contact.grazing_resistance)
     if resistance == 0.0:
         return NEVER
-    before, after = contact.grazing_force, force_needed(work, row)
-    # What a newton does to the gap in a step, and later.
-    lever = STIFFER / resistance * (step + memory_of(work, row))
-    if abs(after) * lever < LATE * clock.tolerance:
+    before, after = contact.grazing_force, final_force(work, row)
+    # Displacement of the gap per unit force, in the step and later.
+    lever = GRAZING_STIFFNESS_RATIO / resistance * (step + velocity_lifetime_of(work, row))
+    if abs(after) * lever < LATE_EFFECT * clock.tolerance:
         return NEVER
+    # Zero of T.
     share = before / (before - after) if before * after < 0.0 else NEVER
+    # Zero of the sliding speed, counted against T.
     side = 1.0 if before > 0.0 else -1.0
-    slow = -side * tangential_rate(work, NOW, row)
-    slower = -side * tangential_rate(work, NEW, row)
-    if contact.fresh != 0.0 and -slower * step > LATE * clock.tolerance:
+    start_speed = -side * tangential_rate(work, NOW, row)
+    end_speed = -side * tangential_rate(work, NEW, row)
+    if contact.newly_grazing != 0.0 and -end_speed * step > LATE_EFFECT * clock.tolerance:
         # It may have stuck before, and parted by rounding.
-        slow = max(slow, 0.0)
-    if slow >= 0.0 > slower:
-        share = min(share, slow / (slow - slower))
+        start_speed = max(start_speed, 0.0)
+    if start_speed >= 0.0 > end_speed:
+        share = min(share, start_speed / (start_speed - end_speed))
     return share
 
 
-def leave_early(scene, work, clock, step):
-    """Let pairs cease to graze that do so right behind the start of a step; whether any has."""
+def end_grazing_early(scene, work, clock, step):
+    """Let pairs cease to graze whose grazing ends right after the start of a step; return True if
+    any has."""
     changed = False
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == GRAZES and share_left(work, clock, step, row) < AT_ONCE:
+        if (
+            work.candidates[row].contact_mode == GRAZING
+            and grazing_end_share(work, clock, step, row) < START_FRACTION
+        ):
             contact = work.contacts[row]
-            fresh = contact.fresh != 0.0
-            if fresh or contact.grazing_force * force_needed(work, row) < 0.0:
-                leave(work, row, OPEN, 0.0)
+            # Open where T changes sign, else stick.
+            fresh = contact.newly_grazing != 0.0
+            if fresh or contact.grazing_force * final_force(work, row) < 0.0:
+                end_grazing(work, row, OPEN, 0.0)
             else:
-                leave(work, row, TOUCHES, TOUCHING_GAP)
+                end_grazing(work, row, CLOSED, TOUCHING_GAP)
             changed = True
     return changed
 
 
-def grazing_share(work, clock, step, share):
-    """The share of the step at which the first pair ceases to graze, or the given one before."""
+def first_grazing_end(work, clock, step, share):
+    """Return the fraction of the step at which the first pair ceases to graze, at most
+    ``share``."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == GRAZES:
-            share = min(share, BEHIND * share_left(work, clock, step, row))
+        if work.candidates[row].contact_mode == GRAZING:
+            share = min(share, END_OVERSHOOT * grazing_end_share(work, clock, step, row))
     return share

@@ -1,45 +1,51 @@
-"""How finely the instant of a touch must be known: what follows from a contact hangs on it.
+"""The resolution to which the instant of a touch or release must be located.
 
-A contact that is noticed g too deep gives back a velocity that is off by about ω0 g; one that goes
-on damping until g behind its end, by that force's acceleration times g/speed.
+A contact detected g too deep gives back a velocity that is wrong by about ω0 g. One that goes on
+damping until g past its end is wrong by that force's acceleration times g/speed.
 """
 
 import math
 
-from flocsim.integrators.rhs.stated_error import pressed, pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, memory_of, normal_rate
+from flocsim.integrators.rhs.stated_error import normal_force_at, secant_stiffness
+from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
 SHARE_OF_DEPTH = 0.02
-"""Where bodies bounce, their touch is located to this share of how deep they get, speed/ω0, …"""
+"""Where bodies rebound, their touch is located to this fraction of the depth of the impact,
+speed/ω0."""
 
 SHARE_OF_DAMPED = 0.3
-"""Where they do not, to this share: what they come to rest with may hang on far less than the
-tolerance, and a touch that is noticed deeper than it would get has a force from nowhere."""
+"""Where they do not, to this fraction: their rest may depend on far less than the tolerance, and a
+touch noticed deeper than the impact gets has a force that the bodies never caused."""
 
 MOST_LATER = 100.0
-"""… and so finely that the error of velocity leads to so many times that at most."""
+"""Touches are located so finely that the velocity error leads to at most this multiple of the
+resolution."""
 
 MOST_AFTER_RELEASE = 1e3
-"""As many where a contact ends: a step that has to be cut there costs more than that is worth."""
+"""The same for releases: a step that has to be cut there costs more than a finer value is worth."""
 
 NEARLY = 0.99
-"""Critical damping is told from less in spite of rounding."""
+"""Margin that tells critical damping from less in spite of rounding."""
 
 COARSEST_ROUNDING = 2e-15
-"""Not finer than this share of the places, in which ten neighbouring numbers lie."""
+"""Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
+numbers."""
 
 TINY = 1e-300
 """Keeps a quotient finite."""
 
 
 def bounces(scene, view, speed, frequency):
-    """Whether bodies fly apart again: damping below critical, or none that pulls."""
+    """Return True if bodies rebound: damping is below critical, or it does not pull."""
+    # Force of critical damping, 2 M ω0 v.
     drag = 2.0 * NEARLY * frequency * speed * view.effective_mass
-    return pressed(scene, view, 0.0, speed) < drag or (pressed(scene, view, 0.0, -speed) >= 0.0)
+    return normal_force_at(scene, view, 0.0, speed) < drag or (
+        normal_force_at(scene, view, 0.0, -speed) >= 0.0
+    )
 
 
-def furthest_place(work, state):
-    """The largest coordinate of a body [m]."""
+def largest_coordinate(work, state):
+    """Return the largest coordinate of a body [m]."""
     furthest = 0.0
     for body in range(work.place.shape[1]):
         for axis in range(2):
@@ -47,31 +53,40 @@ def furthest_place(work, state):
     return furthest
 
 
-def above_rounding(work, state, length):
-    """The length [m], not finer than places can be told apart."""
-    return max(length, COARSEST_ROUNDING * furthest_place(work, state))
+def at_least_rounding(work, state, length):
+    """Return a length [m], but not less than what coordinates can resolve."""
+    return max(length, COARSEST_ROUNDING * largest_coordinate(work, state))
 
 
 def touch_resolution(scene, work, state, row, resolution):
-    """The overlap that a new contact may have got to unnoticed [m]."""
+    """Return the overlap that a new contact may have reached before it is noticed [m]."""
     speed = -normal_rate(work, state, row)
     view = contact_view(scene, work, state, row)
-    stiffness = pressed_stiffness(scene, view, resolution)
+    stiffness = secant_stiffness(scene, view, resolution)
     if not (stiffness > 0.0 and speed > 0.0):
         return resolution
+    # ω0 of the contact; speed/ω0 is about the depth of the impact.
     frequency = math.sqrt(stiffness / view.effective_mass)
+    # Inelastic: a fraction of the depth of the impact.
     if not bounces(scene, view, speed, frequency):
-        return above_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
-    later = MOST_LATER * resolution / max(frequency * memory_of(work, row), TINY)
-    return above_rounding(work, state, min(resolution, SHARE_OF_DEPTH * speed / frequency, later))
+        return at_least_rounding(work, state, min(resolution, SHARE_OF_DAMPED * speed / frequency))
+    # Elastic: the velocity error ω0 g displaces the bodies by ω0 g T.
+    by_lifetime = MOST_LATER * resolution / max(frequency * velocity_lifetime_of(work, row), TINY)
+    return at_least_rounding(
+        work, state, min(resolution, SHARE_OF_DEPTH * speed / frequency, by_lifetime)
+    )
 
 
 def release_resolution(scene, work, state, row, resolution):
-    """How far a contact may have opened unnoticed [m], while its damping still pulls."""
+    """Return by how much a contact may have opened before it is noticed [m], while its damping
+    pulls."""
     speed = normal_rate(work, state, row)
     if not speed > 0.0:
         return resolution
     view = contact_view(scene, work, state, row)
-    pull = abs(pressed(scene, view, 0.0, -speed)) / view.effective_mass
-    later = MOST_AFTER_RELEASE * resolution * speed / max(pull * memory_of(work, row), TINY)
-    return above_rounding(work, state, min(resolution, later))
+    # The velocity error is (pull/M) g/speed; it displaces the bodies by that times T.
+    pull = abs(normal_force_at(scene, view, 0.0, -speed)) / view.effective_mass
+    by_lifetime = (
+        MOST_AFTER_RELEASE * resolution * speed / max(pull * velocity_lifetime_of(work, row), TINY)
+    )
+    return at_least_rounding(work, state, min(resolution, by_lifetime))

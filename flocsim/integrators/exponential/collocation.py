@@ -28,23 +28,23 @@ from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.radau.tableau import NODES as RADAU
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
 from flocsim.integrators.rhs.error import (
-    error_size,
-    rounding_size,
+    largest_error,
+    rounding_error,
     step_tolerance,
 )
-from flocsim.integrators.rhs.forces import keep_start, sum_forces, take_stage
+from flocsim.integrators.rhs.forces import adopt_stage, save_start, sum_forces
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.work import (
-    CARRIED,
     CHANGE,
     CHANGED,
     DAMPING,
-    DEVIATION,
     FIRST_STAGE,
     FORCING,
     MOTION,
     NOW,
+    PROPAGATED,
     START,
+    STEP_ERROR,
     STIFFNESS,
 )
 
@@ -83,10 +83,10 @@ TINY = 1e-300
 
 def guess_remainder(work, clock, step, known):
     """R as that of the last step goes on, if ``known``; else none."""
-    staged, remainder = clock.staged_step, work.remainder
+    staged, remainder = clock.stages_step, work.remainder
     scale = begin = 0.0
     if known and staged > 0.0:
-        scale, begin = step / staged, (clock.time - clock.staged_at) / staged
+        scale, begin = step / staged, (clock.time - clock.stages_time) / staged
     for body in range(work.place.shape[1]):
         for axis in range(3):
             third = remainder[MOTION, 3, body, axis]
@@ -129,7 +129,7 @@ def effect_of(scene, work, step, stage, goal):
     largest = 0.0
     one, two, three = MATRIX[stage]
     for body in range(work.place.shape[1]):
-        memory = step + work.errors[body].memory
+        memory = step + work.errors[body].velocity_lifetime
         for axis in range(3):
             mean = one * work.force[FIRST_STAGE, body, axis]
             mean += two * work.force[FIRST_STAGE + 1, body, axis]
@@ -207,12 +207,12 @@ def write_all_at(work, terms, step, share, state):
 
 def finish(scene, work, terms, step):
     """The end of the step, and the tangential displacements there, are NEW; it began at START."""
-    keep_start(work)
+    save_start(work)
     last = FIRST_STAGE + 2
     write_all_at(work, terms, step, 1.0, last)
     locate_state(scene, work, last)
     slip_stages(scene, work, step, 2, MATRIX)
-    take_stage(work, last)
+    adopt_stage(work, last)
 
 
 @apart
@@ -231,26 +231,26 @@ def solve_series(scene, work, clock, step, known):
     expected, before = expected_pace(clock, step), math.inf
     terms = expand(scene, work, clock, step, allowed)
     if terms > 0:
-        clock.staged_step = 0.0
+        clock.stages_step = 0.0
     for _ in range(MOST_ITERATIONS):
         if terms == 0:
             return 0
         change = iterate(scene, work, clock.time, terms, step, ITERATION_SHARE * allowed)
-        goal = max(ITERATION_SHARE * allowed, rounding_size(scene, work, FIRST_STAGE + 2, step))
+        goal = max(ITERATION_SHARE * allowed, rounding_error(scene, work, FIRST_STAGE + 2, step))
         pace = expected if before == math.inf else change / before
         if not (change < math.inf and pace < 1.0):
             break
         terms = amend(work, terms, step, allowed)
         if terms > 0 and change * pace <= goal * (1.0 - pace):
             finish(scene, work, terms, step)
-            clock.staged_step, clock.staged_at = step, clock.time
+            clock.stages_step, clock.stages_time = step, clock.time
             clock.series_step = step
-            clock.pace = 0.0 if before == math.inf else pace
+            clock.convergence_rate = 0.0 if before == math.inf else pace
             if before < math.inf:
-                clock.seen_pace, clock.seen_step = pace, step
+                clock.second_iteration_rate, clock.second_iteration_step = pace, step
             return terms
         before = change
-    clock.seen_pace = 0.0
+    clock.second_iteration_rate = 0.0
     return 0
 
 
@@ -260,8 +260,8 @@ def error_of_radau(scene, work, terms, step):
     series = work.series
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[DEVIATION, body, axis] = 0.0
-            work.velocity[DEVIATION, body, axis] = 0.0
+            work.place[STEP_ERROR, body, axis] = 0.0
+            work.velocity[STEP_ERROR, body, axis] = 0.0
     before, damped = 0.0, step / EIGENVALUES[REAL].real
     one, two = RADAU[0] ** 3, RADAU[1] ** 3
     for k in range(4, terms):
@@ -270,14 +270,14 @@ def error_of_radau(scene, work, terms, step):
         for body in range(work.place.shape[1]):
             for axis in range(3):
                 term = damped * series[MOTION, k, body, axis]
-                work.place[DEVIATION, body, axis] += here * term
-                work.velocity[DEVIATION, body, axis] += before * k / step * term
+                work.place[STEP_ERROR, body, axis] += here * term
+                work.velocity[STEP_ERROR, body, axis] += before * k / step * term
         before = here
-    return error_size(scene, work)
+    return largest_error(scene, work)
 
 
 def estimate(work, step):
-    """What leaving out the second point would change, in DEVIATION."""
+    """What leaving out the second point would change, in STEP_ERROR."""
     remainder = work.remainder
     for body in range(work.place.shape[1]):
         for axis in range(3):
@@ -287,7 +287,7 @@ def estimate(work, step):
             remainder[CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
             remainder[CHANGED, 3, body, axis] = cubic
     begin_change(work)
-    write_change(work, 1, step, 1.0, DEVIATION)
+    write_change(work, 1, step, 1.0, STEP_ERROR)
 
 
 def add_last_term(work, step):
@@ -296,13 +296,13 @@ def add_last_term(work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             term = work.series[MOTION, last, body, axis]
-            work.place[DEVIATION, body, axis] += term
-            work.velocity[DEVIATION, body, axis] += last / step * term
+            work.place[STEP_ERROR, body, axis] += term
+            work.velocity[STEP_ERROR, body, axis] += last / step * term
 
 
 @apart
 def judge_series(scene, work, clock, step):
-    """Estimate the error of a step, in DEVIATION."""
+    """Estimate the error of a step, in STEP_ERROR."""
     longer = clock.longest_series / step
     if longer < math.inf:
         error = error_of_radau(scene, work, work.tally.series_terms, step)
@@ -314,7 +314,7 @@ def judge_series(scene, work, clock, step):
 
 def nothing_swings(clock):
     """Whether the step is so short that nothing swings in it."""
-    return clock.series_turns <= A_SWING
+    return clock.series_norm <= A_SWING
 
 
 def errors_over_ways(work, share):
@@ -327,7 +327,7 @@ def errors_over_ways(work, share):
             force = remainder_at(work, 1.0, body, axis)
             way = force * (work.place[NOW, body, axis] - work.place[START, body, axis])
             along, every = along + way, every + abs(way)
-            before += force * work.place[CARRIED, body, axis]
+            before += force * work.place[PROPAGATED, body, axis]
             after += force * work.place[CHANGE, body, axis]
     if abs(along) <= LEAST_ALONG * every:
         return 0.0, 0.0
@@ -341,8 +341,8 @@ def begin_carrying(work, step, before, after):
     more = after - before
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            series[CHANGED, 0, body, axis] = work.place[CARRIED, body, axis]
-            series[CHANGED, 1, body, axis] = step * work.velocity[CARRIED, body, axis]
+            series[CHANGED, 0, body, axis] = work.place[PROPAGATED, body, axis]
+            series[CHANGED, 1, body, axis] = step * work.velocity[PROPAGATED, body, axis]
             one = remainder[MOTION, 1, body, axis]
             two = 2.0 * remainder[MOTION, 2, body, axis]
             three = 3.0 * remainder[MOTION, 3, body, axis]

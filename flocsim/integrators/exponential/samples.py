@@ -9,15 +9,15 @@ other (events/crossings.py).
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import locate_polygons, turn_body
+from flocsim.geometry.contact.points import locate_polygons, update_rotation
 from flocsim.hooks import SLIP_LIMIT, contact_event, has
-from flocsim.integrators.events.crossings import is_too_deep, margin, margin_rate, touches
+from flocsim.integrators.events.crossings import any_touching, is_too_deep, margin, margin_rate
 from flocsim.integrators.exponential.collocation import NODES
 from flocsim.integrators.exponential.series import shorten, write_at
-from flocsim.integrators.rhs.friction import limit_in, outgrowth, rolled
+from flocsim.integrators.rhs.friction import excess_slip_rate, rolled, slip_limit_at
 from flocsim.integrators.rhs.views import contact_view, lever, normal_rate
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.contacts import OPEN, TOUCHES
+from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import FIRST_STAGE, MOTION, NEW, NOW, TRIAL
 
 A_PART = 1.6
@@ -56,28 +56,31 @@ def write_ways(scene, work, terms):
             size = lever(scene, body, axis)
             for k in range(1, terms):
                 way += size * abs(work.series[MOTION, k, body, axis])
-        work.poses[body].way = way
+        work.poses[body].series_displacement = way
 
 
 def may_meet(work, row):
     """Whether a pair may come to where it switches in the step, or rub otherwise."""
     candidate = work.candidates[row]
-    if candidate.closed == TOUCHES:
+    if candidate.contact_mode == CLOSED:
         return True
     a, b = candidate.vertex_body, candidate.edge_body
-    return margin(work, NOW, row) <= work.poses[a].way + work.poses[b].way
+    return (
+        margin(work, NOW, row)
+        <= work.poses[a].series_displacement + work.poses[b].series_displacement
+    )
 
 
 def look(scene, work, terms, step, share):
     """Put the bodies where they are at a share of the step, in TRIAL."""
     write_at(work, NOW, terms, step, share, TRIAL, 0, work.place.shape[1])
     for body in range(work.place.shape[1]):
-        turn_body(work, TRIAL, body)
+        update_rotation(work, TRIAL, body)
 
 
 def has_switched(work, row, depth):
     """Whether a pair has in TRIAL: one that was apart where it is so deep there [m]."""
-    least = -depth if work.candidates[row].closed == OPEN else 0.0
+    least = -depth if work.candidates[row].contact_mode == OPEN else 0.0
     return margin(work, TRIAL, row) < least
 
 
@@ -85,9 +88,9 @@ def lowest(scene, work, terms, step, low, high, row, depth):
     """Where between two shares of the step a row, the margin of which falls at the first and rises
     at the second, has switched; 2 where it has not."""
     contact = work.contacts[row]
-    rate_low, rate_high = contact.sampled_rate, margin_rate(work, TRIAL, row)
+    rate_low, rate_high = contact.sampled_margin_rate, margin_rate(work, TRIAL, row)
     span = step * (high - low)
-    if min(contact.sampled + 0.5 * span * rate_low,
+    if min(contact.sampled_margin + 0.5 * span * rate_low,
            margin(work, TRIAL, row) - 0.5 * span * rate_high) >= 0.0:  # fmt: skip
         return 2.0
     for _ in range(TRIES):
@@ -109,12 +112,12 @@ def rubs_otherwise(scene, work, row, resolution):
     its law in TRIAL."""
     if has(scene, SLIP_LIMIT):
         work.slip[TRIAL, row] = work.slip[NOW, row] + rolled(scene, work, TRIAL, row)
-        side = work.candidates[row].sliding
+        side = work.candidates[row].slide_direction
         if side == 0:
-            beyond = abs(work.slip[TRIAL, row]) - limit_in(scene, work, TRIAL, row)
+            beyond = abs(work.slip[TRIAL, row]) - slip_limit_at(scene, work, TRIAL, row)
             if beyond > resolution:
                 return True
-        elif outgrowth(scene, work, TRIAL, row, side) < 0.0:
+        elif excess_slip_rate(scene, work, TRIAL, row, side) < 0.0:
             return True
     for which in range(scene.events):
         before = contact_event(scene, contact_view(scene, work, NOW, row), which)
@@ -131,8 +134,8 @@ def first_seen(scene, work, parts, step, resolution, depth):
     write_ways(scene, work, terms)
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
-        contact.sampled = margin(work, NOW, row)
-        contact.sampled_rate = margin_rate(work, NOW, row)
+        contact.sampled_margin = margin(work, NOW, row)
+        contact.sampled_margin_rate = margin_rate(work, NOW, row)
     for part in range(1, parts + 1):
         low, high = (part - 1.0) / parts, part / parts
         look(scene, work, terms, step, high)
@@ -144,16 +147,16 @@ def first_seen(scene, work, parts, step, resolution, depth):
             value, rate = margin(work, TRIAL, row), margin_rate(work, TRIAL, row)
             if has_switched(work, row, depth):
                 return high
-            if work.candidates[row].closed == TOUCHES and rubs_otherwise(
+            if work.candidates[row].contact_mode == CLOSED and rubs_otherwise(
                 scene, work, row, resolution
             ):
                 return high
-            if contact.sampled_rate < 0.0 < rate:
+            if contact.sampled_margin_rate < 0.0 < rate:
                 share = lowest(scene, work, terms, step, low, high, row, depth)
                 if share <= 1.0:
                     return share
                 look(scene, work, terms, step, high)
-            contact.sampled, contact.sampled_rate = value, rate
+            contact.sampled_margin, contact.sampled_margin_rate = value, rate
     return 1.0
 
 
@@ -162,8 +165,8 @@ def first_too_deep(scene, work):
     where none is before the end."""
     for stage in range(2):
         for row in range(work.tally.candidates):
-            touches = work.candidates[row].closed == TOUCHES
-            if touches and is_too_deep(scene, work, FIRST_STAGE + stage, row):
+            any_touching = work.candidates[row].contact_mode == CLOSED
+            if any_touching and is_too_deep(scene, work, FIRST_STAGE + stage, row):
                 return NODES[stage]
     return 1.0
 
@@ -172,7 +175,7 @@ def parts_of_way(scene, work):
     """Into how many parts a step is divided in which bodies come so far past each other: where
     none touch, they may meet, and be apart again at its end."""
     parts, before = 1, -1
-    if touches(work):
+    if any_touching(work):
         return parts
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
@@ -197,7 +200,7 @@ def way_of(work, body, axis):
 def has_parted(work, step, row):
     """Whether a pair is apart, and goes further than it is in a step."""
     way = step * normal_rate(work, NOW, row)
-    return work.candidates[row].closed == OPEN and way > work.geometry[NOW, row].gap
+    return work.candidates[row].contact_mode == OPEN and way > work.geometry[NOW, row].gap
 
 
 def share_to_return(scene, work, step):
@@ -237,12 +240,12 @@ def cut(scene, work, clock, step, resolution, depth):
     that is left."""
     terms = work.tally.series_terms
     share = min(first_too_deep(scene, work), first_return(scene, work, step, depth))
-    parts = max(parts_of(scene, clock.series_turns), parts_of_way(scene, work))
+    parts = max(parts_of(scene, clock.series_norm), parts_of_way(scene, work))
     if share == 1.0 and parts > 1:
         share = first_seen(scene, work, parts, step, resolution, depth)
     if share < 1.0:
         shorten(work, terms, share)
-        clock.staged_step *= share
-        clock.series_step = clock.staged_step
+        clock.stages_step *= share
+        clock.series_step = clock.stages_step
         write_at(work, NOW, terms, share * step, 1.0, NEW, 0, work.place.shape[1])
     return share

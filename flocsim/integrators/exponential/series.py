@@ -91,7 +91,7 @@ def longest_memory(work):
     """How long a body remembers a velocity at most [s]."""
     longest = 0.0
     for body in range(work.place.shape[1]):
-        longest = max(longest, work.errors[body].memory)
+        longest = max(longest, work.errors[body].velocity_lifetime)
     return longest
 
 
@@ -148,7 +148,7 @@ def expand(scene, work, clock, step, goal):
         small = small + 1 if size <= goal else 0
         if small >= 2 and k + 3 >= LEAST_TERMS:
             longer = reach(k + 2, max(size, one), max(two, three), goal)
-            clock.longest_series, clock.series_turns = step * longer, turns_of(work)
+            clock.longest_series, clock.series_norm = step * longer, turns_of(work)
             return k + 3
         if not size < math.inf:
             break

@@ -1,10 +1,31 @@
-"""The one loop around every integrator: lists, error control, switches, budgets, recording."""
+"""The loop that advances every method: lists, error control, switches, budgets and the record.
+
+One pass of `advance` tries one step:
+
+ 1. Renew the candidate lists if half of their motion budget is spent.
+ 2. Choose the step; let the method attempt it. A ratio (error over tolerance) above 1, or a
+    failure (below 0), rejects it.
+ 3. Locate all pairs at its end. If a contact opens, closes, sticks or slides inside the step, the
+    step is ended there (event location), since forces are smooth only while modes are fixed.
+ 4. Accept: NEW becomes NOW, errors are propagated, contact modes are set.
+ 5. Plan the next step, record the state, ask the observer.
+
+Source of the step control: Hairer & Wanner, Solving Ordinary Differential Equations II (1996),
+section IV.8; of event location: Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I
+(1993), section II.6.
+"""
 
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.body_pairs import watches_all
-from flocsim.geometry.contact.candidates import hand_over, list_ahead, outlived, spent, too_wide
+from flocsim.geometry.contact.body_pairs import lists_all_pairs
+from flocsim.geometry.contact.candidates import (
+    is_too_wide,
+    needs_rebuild,
+    rebuild_list_ahead,
+    spent_budget,
+    transfer_slips,
+)
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import (
     CENTRE_FORCE,
@@ -14,69 +35,74 @@ from flocsim.hooks import (
     cut,
     end_within,
     has,
-    leave_out_cycles,
     note_step,
     observe,
+    skip_cycles,
     step_to_switch,
 )
 from flocsim.integrators.events.crossings import (
+    any_overtakes,
+    any_touching,
     changes_sides,
     is_too_deep,
     may_switch,
-    overtakes,
-    passes_within,
-    touches,
+    passes_through_reach,
 )
 from flocsim.integrators.events.first_event import (
-    OTHER_CONTACTS,
-    OTHER_FRICTION,
-    SAME,
-    law_share,
-    leave_at_once,
-    resolutions_of,
+    CONTACTS_CHANGED,
+    FRICTION_CHANGED,
+    UNCHANGED,
+    end_grazing_at_once,
+    first_law_share,
     set_modes,
-    settle_grazes,
+    switch_resolutions,
     switch_share,
+    update_grazing,
 )
-from flocsim.integrators.loop.kicks import kick_end, meet_kick, renew_kicks
+from flocsim.integrators.loop.kicks import kick_end, renew_kicks, snap_to_kick_end
 from flocsim.integrators.loop.step_size import (
     choose_step,
     moves,
     plan,
     reject,
-    room_for_time,
-    shortest_needed,
+    representable_step,
     step_behind_touch,
+    vibration_step,
 )
-from flocsim.integrators.rhs.friction import rolled, rolled_besides, slip_in
-from flocsim.integrators.rhs.stated_error import add_switch_errors, carry_errors, forget_offsets
-from flocsim.integrators.rhs.surface_gap import flag_near, overlooked
+from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
+from flocsim.integrators.rhs.stated_error import (
+    add_switch_errors,
+    propagate_errors,
+    reset_slip_offsets,
+)
+from flocsim.integrators.rhs.surface_gap import flag_near, missed_sharing
 from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
 from flocsim.state.clock import NOTHING_FULL
-from flocsim.state.contacts import TOUCHES
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 
 FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP, NO_ROOM, RECORD_FULL, PAUSED, NOT_FINITE = range(
     1, 10
 )
-"""The values of integrators.base.Status, as plain numbers for the compiled loop."""
+"""The values of integrators.base.Status as plain numbers, for the compiled loop."""
 
 MOST_TRIALS = 12
-"""Steps tried to end at one switch."""
+"""Trials to end a step at one switch; then the step is accepted as it is."""
 
-MOST_STILL = 100
-"""Steps in a row that move nothing: more than pairs that switch one behind the other."""
+MOST_STATIONARY = 100
+"""Steps in a row without motion before a run has stalled. Pairs that switch one directly after
+another need fewer."""
 
 
-def too_deep(scene, work):
-    """Whether any listed pair overlaps past the limit of the contact law."""
+def any_too_deep(scene, work):
+    """Return True if a listed pair overlaps past the limit of the contact law."""
     deep = False
     for row in range(work.tally.candidates):
         deep = deep or is_too_deep(scene, work, NOW, row)
     return deep
 
 
-def take_new_state(work):
+def adopt_new_state(work):
     """Make the new state the current one."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
@@ -84,51 +110,61 @@ def take_new_state(work):
             work.velocity[NOW, body, axis] = work.velocity[NEW, body, axis]
     for row in range(work.tally.candidates):
         work.geometry[NOW, row] = work.geometry[NEW, row]
-        if work.candidates[row].closed == 1:
+        # Open pairs have no displacement; grazing ones keep that with which they parted.
+        if work.candidates[row].contact_mode == 1:
             work.slip[NOW, row] = work.slip[NEW, row]
 
 
 @apart
 def accept(scene, work, clock, counts, step, lists):
-    """Go on from the new state, its pairs flagged anew; what switched (see modes)."""
-    take_new_state(work)
+    """Accept the step: adopt the new state, propagate errors and set the modes of all pairs. Return
+    what has switched (UNCHANGED, FRICTION_CHANGED or CONTACTS_CHANGED)."""
+    adopt_new_state(work)
     clock.time += step
-    meet_kick(scene, work, clock)
+    snap_to_kick_end(scene, work, clock)
     counts.steps += 1
     controlled, across = clock.tolerance < math.inf, clock.across == 1.0
+    # Errors are propagated with the derivatives and modes of this step, hence before modes change.
     if controlled:
-        carry_errors(scene, work, clock, step)
+        propagate_errors(scene, work, clock, step)
     if across:
         note_step(scene, work, clock, step)
     if not lists:
-        return SAME
+        return UNCHANGED
     if controlled and has(scene, CONTACT_FORCE):
+        # Steps across switches locate none, so they have no such errors.
         if not across:
-            _, depth = resolutions_of(work, clock)
+            _, depth = switch_resolutions(work, clock)
             add_switch_errors(scene, work, clock, step, depth)
-        forget_offsets(work)
-    grazes = controlled and not across and settle_grazes(scene, work, clock, step)
-    hand_over(scene, work)
+        reset_slip_offsets(work)
+    # Grazing first: set_modes leaves grazing pairs as they are.
+    grazes = controlled and not across and update_grazing(scene, work, clock, step)
+    # A contact that rolls from one edge to the next hands its tangential displacement on.
+    transfer_slips(scene, work)
     switched = set_modes(scene, work)
     if across:
-        return SAME
-    return OTHER_FRICTION if grazes and switched == SAME else switched
+        return UNCHANGED
+    return FRICTION_CHANGED if grazes and switched == UNCHANGED else switched
 
 
-def plan_flight(work, clock, planned, flew):
-    """Begin a flight with the step that was ``planned`` where the one before has ended, as
-    contacts have switched behind a series: what comes and goes in one is seen, however long it
-    is."""
-    if flew:
-        clock.flying_step = planned
-    if not touches(work):
-        clock.step = max(clock.step, clock.flying_step)
+def plan_flight(work, clock, planned, was_flying):
+    """Restore the step of the last flight after contacts have switched behind a series.
+
+    A series detects every touch inside it, however long it is, so a bounce need not shorten the
+    steps of the flight that follows. ``planned`` [s] is the step planned before the switch,
+    ``was_flying`` is True if the bodies were apart then.
+    """
+    if was_flying:
+        clock.flight_step = planned
+    if not any_touching(work):
+        clock.step = max(clock.step, clock.flight_step)
 
 
 def stands_still(clock, counts, step):
-    """Count the accepted steps in a row that are as good as none; whether they are too many."""
-    counts.still = 0 if moves(clock, step) else counts.still + 1
-    return counts.still > MOST_STILL
+    """Count accepted steps in a row that are too short to move anything; return True if they are
+    too many."""
+    counts.stationary_steps = 0 if moves(clock, step) else counts.stationary_steps + 1
+    return counts.stationary_steps > MOST_STATIONARY
 
 
 def record_row(work, clock, counts, record):
@@ -144,7 +180,7 @@ def record_row(work, clock, counts, record):
 
 
 def pause_reason(counts, record):
-    """The Status that ends the loop before the next step; 0 to go on."""
+    """Return the Status that ends the loop before the next step; 0 to continue."""
     if counts.steps + counts.rejected + counts.located >= counts.max_steps:
         return STEP_BUDGET
     if counts.steps >= counts.pause_at:
@@ -156,11 +192,12 @@ def pause_reason(counts, record):
 
 @apart
 def keep_lists(scene, work, counts, ahead):
-    """Make the candidate lists anew, for steps of ``ahead`` [s], where half their budget is spent,
-    or they are too wide; False without room."""
-    if outlived(scene, work, ahead) or too_wide(scene, work, ahead):
-        if not list_ahead(scene, work, ahead):
+    """Renew the candidate lists for steps of ``ahead`` [s] if half of their motion budget is spent
+    or if they are too wide; return False if an array is full."""
+    if needs_rebuild(scene, work, ahead) or is_too_wide(scene, work, ahead):
+        if not rebuild_list_ahead(scene, work, ahead):
             return False
+        # New rows have no geometry and no mode yet, and cycles are described by rows.
         locate_contacts(scene, work, NOW)
         set_modes(scene, work)
         counts.cycle_modes = 0
@@ -168,70 +205,88 @@ def keep_lists(scene, work, counts, ahead):
 
 
 def went_too_far(scene, work, clock, step):
-    """Locate all pairs at the end of the step; whether what was listed or flagged is not enough, or
-    it is not known where surface forces act."""
-    if spent(scene, work, NEW) > 1.0:
+    """Locate all pairs at the end of the step. Return True if the step must be rejected.
+
+    It must if the bodies left the range of the candidate list, if a vertex crossed an edge, if the
+    stages may have missed a pair through which a surface force acts, or if the deepest of several
+    contacts changed within a step too long to follow that.
+    """
+    if spent_budget(scene, work, NEW) > 1.0:
         return True
     locate_contacts(scene, work, NEW)
+    # Steps across switches see contacts only at their end: a vertex may have tunnelled.
     if clock.across == 1.0 and changes_sides(work):
         return True
+    # Only surface forces depend on pairs that are open.
     if scene.listed_reach <= 0.0 or clock.tolerance == math.inf:
         return False
-    if overlooked(scene, work) or passes_within(scene, work, step, clock.tolerance):
+    if missed_sharing(scene, work) or passes_through_reach(scene, work, step, clock.tolerance):
         return True
-    return overtakes(scene, work, clock, step)
+    return any_overtakes(scene, work, clock, step)
 
 
-def roll_slips(scene, work, step):
-    """Tangential displacements of the closed pairs in NEW, which is located, after a step."""
+def update_slips(scene, work, step):
+    """Update the tangential displacements of the closed pairs in NEW, which is located, after a
+    step."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == TOUCHES:
-            besides = 0.5 * step * rolled_besides(scene, work, NEW, row)
-            stuck = work.slip[NOW, row] + rolled(scene, work, NEW, row) + besides
-            work.slip[NEW, row] = slip_in(scene, work, NEW, row, stuck)
+        if work.candidates[row].contact_mode == CLOSED:
+            # ξ follows from positions; only the part by the change of the gap is integrated
+            # (trapezoid).
+            gap_change_slip = 0.5 * step * slip_rate_of_gap_change(scene, work, NEW, row)
+            sticking_slip = work.slip[NOW, row] + rolled(scene, work, NEW, row) + gap_change_slip
+            work.slip[NEW, row] = slip_in(scene, work, NEW, row, sticking_slip)
 
 
 def ends_early(scene, work, clock, step, ratio, share):
-    """End a step at a share of it, where a pair touches or parts; False where it has to be taken
-    anew: its motion is not known well enough in between, or a law has a kink in it as well."""
-    if law_share(scene, work, clock, step) < 1.0 or not moves(clock, share * step):
+    """End a step at a fraction of it where a pair touches or parts. Return False if the step must
+    be repeated instead, since its interpolation is not accurate enough or a law has a kink in it as
+    well."""
+    # A kink of a law, or the onset of sliding, is located by repeating the step.
+    if first_law_share(scene, work, clock, step) < 1.0 or not moves(clock, share * step):
         return False
     if not end_within(scene, work, step, ratio, share):
         return False
     locate_contacts(scene, work, NEW)
-    roll_slips(scene, work, share * step)
-    # A long step may have run through a body: what came first is seen from a nearer end alone.
-    resolution, depth = resolutions_of(work, clock)
+    update_slips(scene, work, share * step)
+    # A long step may have run through a body: what came first shows only from the nearer end.
+    resolution, depth = switch_resolutions(work, clock)
     return not may_switch(scene, work, share * step, resolution, depth)
 
 
-def look(scene, work, observed, clock, counts, record, lists):
-    """Record and watch the state that has been accepted: a Status, or 0 to go on."""
+def record_and_observe(scene, work, observed, clock, counts, record, lists):
+    """Record the accepted state and show it to the observer. Return a Status, or 0 to continue."""
     if record.shape[0] > 0:
         record_row(work, clock, counts, record)
-    if lists and too_deep(scene, work):
+    if lists and any_too_deep(scene, work):
         return TOO_DEEP
     counts.code = observe(scene, work, observed, clock.time)
     return STOPPED if counts.code != 0 else 0
 
 
 def advance(scene, work, observed, clock, counts, record):
-    """Run until a Status; call again to go on after PAUSED, RECORD_FULL or NO_ROOM.
+    """Advance a run until a Status ends or pauses it.
 
-    ``record`` (k, 1 + 6n) receives every accepted step; one of length 0 records nothing.
+    Call again to continue after PAUSED, RECORD_FULL or NO_ROOM. All state is in the arguments, so a
+    pause changes nothing. ``record`` (k, 1 + 6n) receives every accepted step; one of length 0
+    records nothing. ``observed`` is the observer's own array.
     """
+    # Forces at the outline need lists; so do centre forces if not all pairs are watched.
     lists = has(scene, CONTACT_FORCE) or scene.listed_reach > 0.0
-    lists = lists or (has(scene, CENTRE_FORCE) and not watches_all(work))
+    lists = lists or (has(scene, CENTRE_FORCE) and not lists_all_pairs(work))
+    # The bound of the next trial [s], and the trials spent on the current switch.
     limit, trials = math.inf, 0
     while clock.time < clock.until:
         status = pause_reason(counts, record)
         if status != 0:
             return status
+        # 1. Lists. A repeated trial starts from the same state: its lists are valid.
         if lists and trials == 0 and not keep_lists(scene, work, counts, clock.step):
             return NO_ROOM
+        # 2. Attempt a step.
         choose_method(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
-        step = room_for_time(clock, min(choose_step(scene, work, clock, lists), limit))
+        step = representable_step(clock, min(choose_step(scene, work, clock, lists), limit))
+        # Pairs that may share a surface force are fixed for the step, so that it stays smooth.
         if scene.listed_reach > 0.0:
             flag_near(scene, work, NOW, step)
         ratio = attempt(scene, work, clock, step)
@@ -239,25 +294,29 @@ def advance(scene, work, observed, clock, counts, record):
             return NO_ROOM
         if ratio < 0.0 and clock.tolerance == math.inf:
             return NOT_FINITE
+        # Reject: the error is too large, Newton failed, or the bodies moved out of the lists.
         too_far = lists and 0.0 <= ratio <= 1.0 and went_too_far(scene, work, clock, step)
         if ratio < 0.0 or ratio > 1.0 or too_far:
             limit, trials = math.inf, 0
             if not reject(clock, counts, step, ratio, too_far):
                 return STALLED
             continue
-        if lists and trials < MOST_TRIALS and leave_at_once(scene, work, clock, step):
+        # 3. Events. Grazing that ends right at the start: begin again in the other mode.
+        if lists and trials < MOST_TRIALS and end_grazing_at_once(scene, work, clock, step):
             counts.located += 1
             trials += 1
-            clock.staged_step = 0.0
+            clock.stages_step = 0.0
             continue
+        # A series may span several swings of a contact: cut it at the first switch seen.
         if lists and trials < MOST_TRIALS and work.tally.series_terms > 0:
-            resolution, depth = resolutions_of(work, clock)
-            kept = cut(scene, work, clock, step, resolution, depth)
-            if kept < 1.0:
-                step *= kept
+            resolution, depth = switch_resolutions(work, clock)
+            remaining = cut(scene, work, clock, step, resolution, depth)
+            if remaining < 1.0:
+                step *= remaining
                 trials += 1
                 locate_contacts(scene, work, NEW)
-                roll_slips(scene, work, step)
+                update_slips(scene, work, step)
+        # Locate the first switch. End the step there by interpolation, else by a shorter step.
         share = switch_share(scene, work, observed, clock, step) if lists else math.inf
         if share < 1.0 and trials < MOST_TRIALS:
             trials += 1
@@ -266,23 +325,28 @@ def advance(scene, work, observed, clock, counts, record):
                 counts.located += 1
                 continue
             step *= share
-        flew = work.tally.series_terms > 0 and not touches(work)
+        # 4. Accept.
+        was_flying = work.tally.series_terms > 0 and not any_touching(work)
         planned = clock.step
         switched = accept(scene, work, clock, counts, step, lists)
-        if switched == OTHER_CONTACTS:
+        # A doublet that chatters in equal cycles for ever: skip many of them at once.
+        if switched == CONTACTS_CHANGED:
             until = min(clock.until, kick_end(scene, work))
-            leave_out_cycles(scene, work, clock, counts, until)
+            skip_cycles(scene, work, clock, counts, until)
+        # 5. Plan the next step.
         plan(clock, step, ratio, trials > 0, switched)
-        if switched == OTHER_CONTACTS and work.tally.series_terms > 0:
-            plan_flight(work, clock, planned, flew)
-        if trials > 0 and switched == SAME:
-            # Behind a kink of a law its derivatives may still be those before.
-            clock.seen_pace = 0.0
-        if switched != SAME:
-            clock.step = max(clock.step, shortest_needed(scene, work))
+        if switched == CONTACTS_CHANGED and work.tally.series_terms > 0:
+            plan_flight(work, clock, planned, was_flying)
+        if trials > 0 and switched == UNCHANGED:
+            # After a kink the Jacobian may be that from before it.
+            clock.second_iteration_rate = 0.0
+        if switched != UNCHANGED:
+            # After a switch: long enough to resolve the fastest vibration, short enough for the
+            # impact.
+            clock.step = max(clock.step, vibration_step(scene, work))
             clock.step = min(clock.step, step_behind_touch(scene, work, clock))
         limit, trials = math.inf, 0
-        status = look(scene, work, observed, clock, counts, record, lists)
+        status = record_and_observe(scene, work, observed, clock, counts, record, lists)
         if status != 0:
             return status
         if stands_still(clock, counts, step):

@@ -1,32 +1,45 @@
-"""The size of the next step: from the last one's error, the lists, and what is about to switch."""
+"""The size of the next step: from the last error, the candidate lists, and imminent switches.
+
+The controller is Gustafsson's predictive one (Hairer & Wanner, Solving Ordinary Differential
+Equations II (1996), section IV.8), with p the power of h that the error estimate follows:
+
+    h_new = 0.9 h min( ratio^(−1/p),  h/h_old (ratio_old/ratio²)^(1/p) ),
+
+ratio being error over tolerance. Steps that follow a switch are planned from the contact that has
+closed instead, since the forces are new.
+"""
 
 import math
 
-from flocsim.geometry.contact.candidates import share_ahead, time_within
+from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import first_step, next_step
-from flocsim.integrators.events.first_event import OTHER_CONTACTS, OTHER_FRICTION, resolutions_of
+from flocsim.integrators.events.first_event import (
+    CONTACTS_CHANGED,
+    FRICTION_CHANGED,
+    switch_resolutions,
+)
 from flocsim.integrators.events.resolution import touch_resolution
 from flocsim.integrators.loop.kicks import kick_end
-from flocsim.integrators.rhs.stated_error import pressed_stiffness
-from flocsim.integrators.rhs.views import contact_view, inertia, memory_of, normal_rate
-from flocsim.state.contacts import TOUCHES
+from flocsim.integrators.rhs.stated_error import secant_stiffness
+from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NOW, STIFFNESS
 
 SAFETY = 0.9
-"""Aim that far below the step at which the error would meet the tolerance."""
+"""Fraction of the step at which the error would just meet the tolerance."""
 
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.1, 8.0
 """Bounds of the change from one step to the next."""
 
 LOWEST_ORDER = 0.5
-"""Least power of the step that an error is taken to go with."""
+"""Lower bound of the observed order: behind a switch, errors may hardly fall with the step."""
 
 
-def seen_order(clock, step, ratio, order):
-    """The power of the step that the errors of two rejected trials in a row go with.
+def observed_order(clock, step, ratio, order):
+    """Return the order p of error ∝ h^p from two rejected trials in a row, at most ``order``.
 
-    Behind a switch stiff forces settle, and the error falls far more slowly than the order says
-    (Gustafsson 1994).
+    Behind a switch stiff forces settle, and the error falls far more slowly than the order of the
+    method says (Gustafsson 1994).
     """
     if clock.rejected_step <= step:
         return order
@@ -35,20 +48,23 @@ def seen_order(clock, step, ratio, order):
 
 
 def adaptive_factor(clock, step, ratio, order):
-    """By how much to change the step after one whose error was ``ratio`` times the tolerance.
+    """Return the factor from this step to the next, given the ratio of its error to the tolerance.
 
-    The trend of the last two steps that were taken is carried on, also past rejected ones: towards
-    an attraction that diverges every step has to be shorter than the one before. A step behind a
+    The trend of the last two accepted steps is extrapolated, also past rejected ones: towards an
+    attraction that diverges, every step has to be shorter than the one before. A step behind a
     rejected one does not grow (Gustafsson 1994, as in Hairer & Wanner, Solving Ordinary
     Differential Equations II, IV.8).
     """
     ratio = max(ratio, 1e-12)
     if ratio > 1.0:
-        order = seen_order(clock, step, ratio, order)
+        order = observed_order(clock, step, ratio, order)
+    # Elementary controller: error ∝ h^p.
     factor = SAFETY * ratio ** (-1.0 / order)
     before = clock.previous_step
+    # No growth right after a rejection or a failure (previous_step = 0).
     if ratio <= 1.0 and (before == 0.0 or clock.rejected_step > 0.0):
         factor = min(factor, 1.0)
+    # Predictive controller; the last ratio counts as 0.01 at least.
     if ratio <= 1.0 and 0.0 < before < math.inf:
         trend = max(clock.previous_ratio, 1e-2) / (ratio * ratio)
         factor = min(factor, SAFETY * step / before * trend ** (1.0 / order))
@@ -56,172 +72,196 @@ def adaptive_factor(clock, step, ratio, order):
 
 
 SMALLEST_STEP = 1e-14
-"""A step below this share of the elapsed time, or of 1 ms, moves nothing: the run has stalled."""
+"""A step below this fraction of the elapsed time, or of 1 ms, moves nothing: rounding of the time
+is 2e-16. A run of such steps has stalled."""
 
 LEAST_ADVANCE = 2.3e-16
-"""A step of this share of the time takes it to another number at least: what switches within that
-switches together."""
+"""A step of this fraction of the time is the shortest that changes the time in double precision;
+switches closer together than that count as simultaneous."""
 
 RESOLVED = 0.02
-"""A step of this share of 1/ω0 resolves a vibration."""
+"""A step of this fraction of 1/ω0 resolves a vibration."""
 
 TINY = 1e-300
-"""Stands for no inertia."""
+"""Keeps the quotient by the mass finite where inertia is left out (Overdamped)."""
 
 IMMINENT = 0.05
-"""A switch within this share of the step is run up to by a step of its own."""
+"""A touch expected within this fraction of the step gets a step of its own."""
 
-SHARE_OF_FAILED, RECOVERY = 0.6, 2.0
-"""Behind a step that failed, steps grow to this share of it, and that by so much a step."""
+FRACTION_OF_FAILED, RECOVERY = 0.6, 2.0
+"""After a failed step, the next ones are at most this fraction of it; the bound then grows by
+RECOVERY per step."""
 
-SETTLED_GROWTH = 3.0
-"""The first step behind a switch is at most so many times the one behind the switch before."""
+GROWTH_AFTER_SWITCH = 3.0
+"""The first step after a switch is at most this multiple of the one after the switch before."""
 
-MOST_SWITCHING = 4.0
-"""Steps in a row that may each end at a switch before they grow all the same."""
+LONGEST_SWITCH_STREAK = 4.0
+"""Steps in a row that end at a switch before they may grow all the same."""
 
 
-def imminent_switch(scene, work, clock, step):
-    """The step, or the much shorter one behind which a pair is just about to switch."""
-    resolution, _ = resolutions_of(work, clock)
+def step_to_imminent_touch(scene, work, clock, step):
+    """Return the step, or the much shorter one after which a pair is about to switch."""
+    resolution, _ = switch_resolutions(work, clock)
     for row in range(work.tally.candidates):
         gap = work.geometry[NOW, row].gap
         if 0.0 <= gap < clock.tolerance:
             rate = normal_rate(work, NOW, row)
+            # Linear extrapolation; aim half the resolution past the touch, so that the pair is
+            # closed then.
             if gap * rate < 0.0:
-                behind = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
-                ahead = (abs(gap) + behind) / abs(rate)
+                overshoot = 0.5 * touch_resolution(scene, work, NOW, row, resolution)
+                ahead = (abs(gap) + overshoot) / abs(rate)
                 if ahead < IMMINENT * step:
                     step = ahead
     return step
 
 
-SHORT_OF_IT, LANDING = 0.05, 0.5
-"""A step across switches ends so many tolerances before a pair lands in it; the landing itself
-lasts as long as this share of one takes."""
+LANDING_MARGIN, LANDING_FRACTION = 0.05, 0.5
+"""A step across switches ends LANDING_MARGIN tolerances before a pair lands in it; the step that
+contains the landing lasts LANDING_FRACTION of the time in which the pair moves by one tolerance."""
 
 
 def step_to_landing(work, clock, step):
-    """The step, or that which ends just before the first pair lands in it, or in which it does: by
-    its end alone a step does not tell when in it that was, and would be wrong by half the way.
-    Pairs that come nearer by less than the tolerance may land anywhere in it."""
+    """Return the step, or a shorter one that ends just before the first pair lands, or contains
+    only that.
+
+    Backward Euler knows contacts only at the end of a step, so a landing somewhere inside it is
+    wrong by half the path that the body would have gone on. In a pile of hundreds of bodies these
+    errors made steps of microseconds. Pairs that come nearer by less than the tolerance may land
+    anywhere.
+    """
     tolerance = clock.tolerance
     for row in range(work.tally.candidates):
         gap, speed = work.geometry[NOW, row].gap, -normal_rate(work, NOW, row)
         if gap > 0.0 and speed * step > max(gap, tolerance):
-            way = gap - SHORT_OF_IT * tolerance
-            lands = way <= 0.5 * SHORT_OF_IT * tolerance
-            step = (LANDING * tolerance if lands else way) / speed
+            approach = gap - LANDING_MARGIN * tolerance
+            lands = approach <= 0.5 * LANDING_MARGIN * tolerance
+            step = (LANDING_FRACTION * tolerance if lands else approach) / speed
     return step
 
 
 def choose_step(scene, work, clock, lists):
     step = min(clock.step, clock.largest_step)
+    # Lists: no pair may use up its motion budget.
     if lists:
-        step = min(step, time_within(scene, work, share_ahead(scene, work)))
+        step = min(step, time_to_spend(scene, work, spendable_share(scene, work)))
+        # Contacts: end at an imminent touch, or just before a landing.
         if clock.tolerance < math.inf:
             if clock.across == 0.0:
-                step = imminent_switch(scene, work, clock, step)
+                step = step_to_imminent_touch(scene, work, clock, step)
             else:
                 step = step_to_landing(work, clock, step)
-    left = min(clock.until, kick_end(scene, work)) - clock.time
+    # Stops and thermal kicks end a step exactly.
+    remaining = min(clock.until, kick_end(scene, work)) - clock.time
     # Two even steps at the end instead of a long one and a sliver.
-    if step < left < 2.0 * step and clock.tolerance < math.inf:
-        return 0.5 * left
-    return min(step, left)
+    if step < remaining < 2.0 * step and clock.tolerance < math.inf:
+        return 0.5 * remaining
+    return min(step, remaining)
 
 
-def room_for_time(clock, step):
-    """The step, or the least one behind which the time is another number."""
+def representable_step(clock, step):
+    """Return the step, or the shortest one that changes the time in double precision."""
     if clock.tolerance == math.inf:
         return step
     return max(step, min(LEAST_ADVANCE * clock.time, clock.until - clock.time))
 
 
 def moves(clock, step):
-    """Whether anything can have moved in a step, which ended at the time now."""
+    """Return True if anything can have moved in a step that ended at the present time."""
     if clock.tolerance == math.inf:
         return clock.time - step < clock.time
     return step >= SMALLEST_STEP * max(clock.time, 1e-3)
 
 
 def reject(clock, counts, step, ratio, too_far):
-    """Choose a smaller step; False where there is none."""
+    """Plan a smaller step after a rejected one; return False if it would move nothing."""
     counts.rejected += 1
-    clock.staged_step = 0.0
+    clock.stages_step = 0.0
     failed = ratio < 0.0 or too_far
     if failed:
         clock.previous_step = 0.0
+    # A failure carries no information about the error: quarter the step.
     clock.step = 0.25 * step if failed else next_step(clock, step, ratio)
     clock.rejected_step = 0.0 if failed else step
     clock.rejected_ratio = ratio
-    # What switches late in a step across switches makes its error a jump: it comes again.
+    # Failed steps bound the next ones. So do rejected steps across switches: a contact that
+    # switches late in the step makes the error jump, and would do so again.
     if ratio < 0.0 or (clock.across == 1.0 and not too_far):
-        clock.bearable_step = SHARE_OF_FAILED * step
+        clock.feasible_step = FRACTION_OF_FAILED * step
     return moves(clock, step)
 
 
 def fastest_vibration(scene, work):
-    """ω of the fastest vibration that there is [1/s]; 0 without any."""
+    """Return the angular frequency of the fastest vibration [1/s], 0 if nothing vibrates."""
     stiffest = 0.0
     for body in range(work.poses.shape[0]):
         if scene.bodies[body].free == 1.0:
+            # Diagonal of M⁻¹K: ω² of each coordinate alone.
             for axis in range(3):
                 mass = max(inertia(scene, body, axis), TINY)
                 stiffest = max(stiffest, work.jacobian[STIFFNESS, body, axis, axis] / mass)
     return math.sqrt(stiffest)
 
 
-def shortest_needed(scene, work):
-    """The step behind a switch that resolves it; 0 without any [s]."""
+def vibration_step(scene, work):
+    """Return the step that resolves the fastest vibration [s]; 0 if nothing vibrates."""
     fastest = fastest_vibration(scene, work)
     return RESOLVED / fastest if fastest > 0.0 else 0.0
 
 
 def step_behind_touch(scene, work, clock):
-    """The step that resolves how contacts take up the speed at which they have just touched, as far
-    as that displaces bodies by the tolerance [s]."""
-    pace, speed_of, later = 0.0, 0.0, 0.0
+    """Return the step that resolves how new contacts take up the impact [s]; inf if none has
+    closed.
+
+    It need resolve that only as far as the impact displaces bodies by the tolerance. Without this
+    rule the step was guessed from those before, at the price of two or three rejections per touch.
+    """
+    frequency_squared, top_speed, displacement = 0.0, 0.0, 0.0
+    # Contacts that close now act in parallel: their k/m add up to ω².
     for row in range(work.tally.candidates):
         speed = -normal_rate(work, NOW, row)
-        if work.candidates[row].closed == TOUCHES and speed > 0.0:
+        if work.candidates[row].contact_mode == CLOSED and speed > 0.0:
             view = contact_view(scene, work, NOW, row)
-            stiffness = pressed_stiffness(scene, view, clock.tolerance)
-            pace += stiffness / view.effective_mass
-            speed_of = max(speed_of, speed)
-            later = max(later, speed * memory_of(work, row))
-    if not (pace > 0.0 and later > 0.0):
+            stiffness = secant_stiffness(scene, view, clock.tolerance)
+            frequency_squared += stiffness / view.effective_mass
+            top_speed = max(top_speed, speed)
+            displacement = max(displacement, speed * velocity_lifetime_of(work, row))
+    if not (frequency_squared > 0.0 and displacement > 0.0):
         return math.inf
-    return first_step(work, clock, math.sqrt(pace), speed_of, later)
+    return first_step(work, clock, math.sqrt(frequency_squared), top_speed, displacement)
 
 
 def plan(clock, step, ratio, was_cut, switched):
-    """The size of the step after an accepted one; ``was_cut``, whether to end at a switch."""
-    if switched == OTHER_CONTACTS:
-        # The forces are new, and settle about as fast as behind the last switch.
+    """Plan the size of the step after an accepted one. ``was_cut`` is True if the step was meant to
+    end at a switch, ``switched`` what has switched in it."""
+    if switched == CONTACTS_CHANGED:
+        # The forces are new, and settle about as fast as after the last switch.
         clock.previous_step = math.inf
-        clock.staged_step = 0.0
-        clock.settling += 1.0
-        if clock.settling > MOST_SWITCHING and not was_cut:
-            # A pair on the verge of touching switches step after step: they have to grow, too.
-            clock.step = min(next_step(clock, step, ratio), clock.bearable_step)
-            clock.settled_step = max(clock.settled_step, step)
-        clock.step = min(clock.step, SETTLED_GROWTH * clock.settled_step)
-    elif switched == OTHER_FRICTION:
+        clock.stages_step = 0.0
+        clock.switch_streak += 1.0
+        if clock.switch_streak > LONGEST_SWITCH_STREAK and not was_cut:
+            # A pair on the verge of touching switches step after step; steps have to grow all the
+            # same.
+            clock.step = min(next_step(clock, step, ratio), clock.feasible_step)
+            clock.step_after_switch = max(clock.step_after_switch, step)
+        clock.step = min(clock.step, GROWTH_AFTER_SWITCH * clock.step_after_switch)
+    elif switched == FRICTION_CHANGED:
         clock.previous_step = math.inf
-        clock.staged_step = 0.0
+        clock.stages_step = 0.0
     elif was_cut:
-        # The switch did not come: the step was too long to tell.
+        # The switch did not come: the step was too long to predict it.
         clock.previous_step = math.inf
-        clock.bearable_step = SHARE_OF_FAILED * clock.step
-        clock.step = min(clock.bearable_step, LARGEST_FACTOR * step)
+        clock.feasible_step = FRACTION_OF_FAILED * clock.step
+        clock.step = min(clock.feasible_step, LARGEST_FACTOR * step)
     else:
-        if clock.settling > 0.0:
-            clock.settled_step = step
-            clock.settling = 0.0
+        # The first step without a switch tells how fast forces settle after one.
+        if clock.switch_streak > 0.0:
+            clock.step_after_switch = step
+            clock.switch_streak = 0.0
+        # A step shortened by lists or stops says nothing about the trend of the error.
         cut = step < 0.5 * clock.step
-        clock.step = min(next_step(clock, step, ratio), clock.bearable_step)
-        clock.bearable_step *= RECOVERY
+        clock.step = min(next_step(clock, step, ratio), clock.feasible_step)
+        clock.feasible_step *= RECOVERY
         clock.previous_step = math.inf if cut else step
         clock.previous_ratio = ratio
     clock.rejected_step = 0.0

@@ -25,14 +25,14 @@ a force that is wrong by several times itself where little presses, which decide
 opens. The stages show it: their overlaps lie on no line.
 """
 
-from flocsim.integrators.events.resolution import above_rounding
+from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, NODES, REAL, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.blocks import subtract_product
-from flocsim.integrators.rhs.stated_error import bound_carried, unresolved
+from flocsim.integrators.rhs.stated_error import bound_propagated, unresolved_fraction
 from flocsim.integrators.rhs.views import inertia
-from flocsim.state.contacts import TOUCHES
-from flocsim.state.work import CARRIED, CHANGE, DEVIATION, FIRST_STAGE, FORCING, NOW, STIFFNESS
+from flocsim.state.contacts import CLOSED
+from flocsim.state.work import CHANGE, FIRST_STAGE, FORCING, NOW, PROPAGATED, STEP_ERROR, STIFFNESS
 
 
 def divide(scene, work, full, weight):
@@ -58,10 +58,12 @@ def mix(work, of_change, of_carried):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             change = of_change * work.place[CHANGE, body, axis]
-            work.place[CHANGE, body, axis] = change + of_carried * work.place[CARRIED, body, axis]
+            work.place[CHANGE, body, axis] = (
+                change + of_carried * work.place[PROPAGATED, body, axis]
+            )
             change = of_change * work.velocity[CHANGE, body, axis]
             work.velocity[CHANGE, body, axis] = (
-                change + of_carried * work.velocity[CARRIED, body, axis]
+                change + of_carried * work.velocity[PROPAGATED, body, axis]
             )
 
 
@@ -69,16 +71,16 @@ def add_step(work):
     """Take what has been carried, and the error that the step itself is likely to have made."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            own = work.place[DEVIATION, body, axis]
-            work.place[CARRIED, body, axis] = work.place[CHANGE, body, axis] + own
-            own = work.velocity[DEVIATION, body, axis]
-            work.velocity[CARRIED, body, axis] = work.velocity[CHANGE, body, axis] + own
+            own = work.place[STEP_ERROR, body, axis]
+            work.place[PROPAGATED, body, axis] = work.place[CHANGE, body, axis] + own
+            own = work.velocity[STEP_ERROR, body, axis]
+            work.velocity[PROPAGATED, body, axis] = work.velocity[CHANGE, body, axis] + own
 
 
 def carry_error(scene, work, clock, step):
     """Carry the error over an accepted step; the largest one of a body's outline [m]."""
-    bound_carried(scene, work)
-    full = clock.staged_step
+    bound_propagated(scene, work)
+    full = clock.stages_step
     gamma = full / (EIGENVALUES[REAL].real * step)
     first = (1.0 - 3.0 * gamma) / gamma
     second = (0.5 - 3.0 * gamma + 3.0 * gamma * gamma) / (gamma * gamma)
@@ -91,7 +93,7 @@ def carry_error(scene, work, clock, step):
     mix(work, 1.0, second)
     divide(scene, work, full, 1.0)
     add_step(work)
-    return bound_carried(scene, work)
+    return bound_propagated(scene, work)
 
 
 SHARE_OF_SCATTER = 2.0
@@ -115,21 +117,21 @@ def scatter_of(scene, work, clock, step, row):
     g, span = work.geometry, NODES[1] - NODES[0]
     slope = (g[SECOND_STAGE, row].gap - g[FIRST_STAGE, row].gap) / span
     scatter = g[THIRD_STAGE, row].gap - g[SECOND_STAGE, row].gap - slope * (1.0 - NODES[1])
-    return abs(scatter) * unresolved(scene, work, clock, step, row)
+    return abs(scatter) * unresolved_fraction(scene, work, clock, step, row)
 
 
 def overlap_error(scene, work, clock, row):
     """By how much the overlap of a contact is likely to be wrong [m]."""
-    return SHARE_OF_SCATTER * scatter_of(scene, work, clock, clock.staged_step, row)
+    return SHARE_OF_SCATTER * scatter_of(scene, work, clock, clock.stages_step, row)
 
 
 def doubt_of_release(scene, work, clock, step):
     """By how much it is in doubt whether contacts that may be relieved in a step still press, over
     what is allowed; it goes with the square of the step."""
     largest, g = 0.0, work.geometry
-    least = ABOVE * above_rounding(work, NOW, 0.0)
+    least = ABOVE * at_least_rounding(work, NOW, 0.0)
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == TOUCHES:
+        if work.candidates[row].contact_mode == CLOSED:
             before, after = -g[NOW, row].gap, -g[THIRD_STAGE, row].gap
             scatter = scatter_of(scene, work, clock, step, row)
             if after - SHARE_OF_SCATTER * scatter < before and before > 0.0:

@@ -5,7 +5,7 @@ import math
 
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.forces import keep_start
+from flocsim.integrators.rhs.forces import save_start
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import DAMPING, FIRST_STAGE, NEW, NOW, START, STIFFNESS, TRIAL
 
@@ -134,11 +134,11 @@ def is_soft(work, step):
     """Whether no pair of features acts, and drag takes little of a velocity in a step."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed + candidate.near > 0:
+        if candidate.contact_mode + candidate.surface_active > 0:
             return False
     shortest = math.inf
     for body in range(work.poses.shape[0]):
-        shortest = min(shortest, work.errors[body].relaxation)
+        shortest = min(shortest, work.errors[body].relaxation_time)
     return shortest >= SOFT * step
 
 
@@ -161,14 +161,14 @@ def carry_on(work, begin, scale):
 
 def guess_stages(scene, work, clock, step):
     """The stages' velocities to start from, and where this step starts."""
-    staged = clock.staged_step
+    staged = clock.stages_step
     if staged < 0.0:
         go_on_as_before(work, -step / staged)
     elif staged > 0.0 and step <= LONGEST_GUESS * staged:
-        carry_on(work, (clock.time - clock.staged_at) / staged, step / staged)
+        carry_on(work, (clock.time - clock.stages_time) / staged, step / staged)
     elif is_soft(work, step):
         keep_accelerations(scene, work, step)
     else:
         keep_velocities(work)
-    keep_start(work)
-    clock.staged_step, clock.staged_at = step, clock.time
+    save_start(work)
+    clock.stages_step, clock.stages_time = step, clock.time

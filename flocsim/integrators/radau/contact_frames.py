@@ -29,16 +29,16 @@ stiff, and drag, which is the same whatever way a pair lies, would be taken alon
 
 def acts(work, row):
     candidate = work.candidates[row]
-    return candidate.closed + candidate.near > 0
+    return candidate.contact_mode + candidate.surface_active > 0
 
 
 def leads(scene, work, row):
     """Whether a pair acts on its bodies strongly enough to tell how they turn."""
     candidate = work.candidates[row]
     geometry = work.geometry[NOW, row]
-    if candidate.closed != OPEN:
+    if candidate.contact_mode != OPEN:
         return True
-    if candidate.near == 0 or geometry.share <= LEADING_SHARE:
+    if candidate.surface_active == 0 or geometry.force_share <= LEADING_SHARE:
         return False
     a, b = candidate.vertex_body, candidate.edge_body
     size = min(scene.bodies[a].bounding_radius, scene.bodies[b].bounding_radius)

@@ -10,7 +10,7 @@ from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.views import inertia
-from flocsim.state.work import CHANGE, DEVIATION, FIRST_STAGE, NOW, STIFFNESS
+from flocsim.state.work import CHANGE, FIRST_STAGE, NOW, STEP_ERROR, STIFFNESS
 
 
 def estimated_rate(of, body, axis, step):
@@ -36,7 +36,7 @@ def write_error_load(scene, work, step):
 
 
 def estimate_error(scene, work, step):
-    """Make DEVIATION what a step is likely to be wrong by, as it is behind the next one as well:
+    """Make STEP_ERROR what a step is likely to be wrong by, as it is behind the next one as well:
     what contacts take up at once of an error leads to nothing."""
     write_error_load(scene, work, step)
     solve_for_free(scene, work)
@@ -51,5 +51,5 @@ def estimate_error(scene, work, step):
     divide(scene, work, step, 0.0)
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[DEVIATION, body, axis] = work.place[CHANGE, body, axis]
-            work.velocity[DEVIATION, body, axis] = work.velocity[CHANGE, body, axis]
+            work.place[STEP_ERROR, body, axis] = work.place[CHANGE, body, axis]
+            work.velocity[STEP_ERROR, body, axis] = work.velocity[CHANGE, body, axis]

@@ -7,10 +7,10 @@ shut instead of open, the load drives it open, and the pair is apart.
 
 from flocsim.integrators.radau.systems import solve_for_free
 from flocsim.integrators.radau.tableau import REAL
-from flocsim.integrators.rhs.friction import STIFFER
+from flocsim.integrators.rhs.friction import GRAZING_STIFFNESS_RATIO
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
-from flocsim.integrators.rhs.views import memory_of, normal_rate
-from flocsim.state.contacts import GRAZES, OPEN
+from flocsim.integrators.rhs.views import normal_rate, velocity_lifetime_of
+from flocsim.state.contacts import GRAZING, OPEN
 from flocsim.state.work import NOW
 
 LEAST_RESPONSE = 1e-3
@@ -26,7 +26,7 @@ be this share of the tolerance, or it does not begin to graze."""
 def any_grazes(work):
     """Whether a pair grazes."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == GRAZES:
+        if work.candidates[row].contact_mode == GRAZING:
             return True
     return False
 
@@ -62,7 +62,7 @@ def can_begin(work, clock, row, found, sliding):
     and can take its speed away without moving the bodies much."""
     if found * work.contacts[row].grazing_force <= 0.0:
         return False
-    way = abs(sliding * normal_rate(work, NOW, row)) * memory_of(work, row)
+    way = abs(sliding * normal_rate(work, NOW, row)) * velocity_lifetime_of(work, row)
     return way <= SHARE_OF_START * clock.tolerance * abs(found)
 
 
@@ -72,14 +72,14 @@ def hold_gaps(scene, work, clock):
     opened = False
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == GRAZES:
+        if candidate.contact_mode == GRAZING:
             contact = work.contacts[row]
             found, sliding = response(scene, work, row)
             weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
-            fresh = contact.fresh != 0.0
+            fresh = contact.newly_grazing != 0.0
             if weak or (fresh and not can_begin(work, clock, row, found, sliding)):
-                candidate.closed, opened = OPEN, True
+                candidate.contact_mode, opened = OPEN, True
                 work.slip[NOW, row] = 0.0
             else:
-                contact.grazing_resistance = STIFFER / found
+                contact.grazing_resistance = GRAZING_STIFFNESS_RATIO / found
     return opened

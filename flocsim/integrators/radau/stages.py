@@ -8,17 +8,23 @@ real and one complex system of 3n equations.
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.integrators.events.resolution import above_rounding
+from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import follow_contacts
 from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.error import rounding_size, step_tolerance
-from flocsim.integrators.rhs.forces import locate_touching, sum_forces, take_stage
-from flocsim.integrators.rhs.friction import STIFFER, grazing_force, rolled, rolled_besides, slip_in
-from flocsim.integrators.rhs.surface_gap import length_at, locate_sharing
-from flocsim.integrators.rhs.views import along_normal, lever, memory_of
-from flocsim.state.contacts import GRAZES, TOUCHES
+from flocsim.integrators.rhs.error import rounding_error, step_tolerance
+from flocsim.integrators.rhs.forces import adopt_stage, locate_for_forces, sum_forces
+from flocsim.integrators.rhs.friction import (
+    GRAZING_STIFFNESS_RATIO,
+    grazing_force,
+    rolled,
+    slip_in,
+    slip_rate_of_gap_change,
+)
+from flocsim.integrators.rhs.surface_gap import locate_sharing, smoothing_length
+from flocsim.integrators.rhs.views import lever, normal_component, velocity_lifetime_of
+from flocsim.state.contacts import CLOSED, GRAZING
 from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
 MOST_ITERATIONS = 10
@@ -74,9 +80,9 @@ def slip_stages(scene, work, step, first, matrix):
     located."""
     slip = work.slip
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == TOUCHES:
+        if work.candidates[row].contact_mode == CLOSED:
             for stage in range(first, 3):
-                besides = rolled_besides(scene, work, FIRST_STAGE + stage, row)
+                besides = slip_rate_of_gap_change(scene, work, FIRST_STAGE + stage, row)
                 work.slip_rate[FIRST_STAGE + stage, row] = besides
             for stage in range(first, 3):
                 one, two, three = matrix[stage]
@@ -91,7 +97,7 @@ def slip_stages(scene, work, step, first, matrix):
 def locate_state(scene, work, state):
     """Geometry of NOW, or of a stage, of the pairs through which forces act there."""
     if state == NOW or scene.listed_reach <= 0.0:
-        locate_touching(scene, work, state)
+        locate_for_forces(scene, work, state)
     else:
         locate_sharing(scene, work, state)
 
@@ -112,26 +118,29 @@ def change_of_forces(scene, work, step, stage, goal):
     """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
     the forces of those that graze, over what may be wrong of them, in terms of the goal for places
     [m]."""
-    largest, least, state = 0.0, above_rounding(work, NOW, 0.0), FIRST_STAGE + stage
+    largest, least, state = 0.0, at_least_rounding(work, NOW, 0.0), FIRST_STAGE + stage
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         geometry = work.geometry[state, row]
-        if candidate.closed == TOUCHES:
-            change = step * abs(along_normal(work, row, work.velocity, CHANGE))
+        if candidate.contact_mode == CLOSED:
+            change = step * abs(normal_component(work, row, work.velocity, CHANGE))
             overlap = abs(geometry.gap)
             allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
-        elif candidate.closed == GRAZES:
-            resistance, memory = work.contacts[row].grazing_resistance, memory_of(work, row)
-            change = abs(resistance * along_normal(work, row, work.velocity, CHANGE))
+        elif candidate.contact_mode == GRAZING:
+            resistance, memory = (
+                work.contacts[row].grazing_resistance,
+                velocity_lifetime_of(work, row),
+            )
+            change = abs(resistance * normal_component(work, row, work.velocity, CHANGE))
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
-            lever = STIFFER / max(abs(resistance), TINY) * (step + memory)
+            lever = GRAZING_STIFFNESS_RATIO / max(abs(resistance), TINY) * (step + memory)
             allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
-        elif candidate.near == 1 and geometry.share > 0.0:
-            change = step * abs(along_normal(work, row, work.velocity, CHANGE))
-            length = length_at(scene, geometry.gap)
+        elif candidate.surface_active == 1 and geometry.force_share > 0.0:
+            change = step * abs(normal_component(work, row, work.velocity, CHANGE))
+            length = smoothing_length(scene, geometry.gap)
             allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
     return largest
@@ -143,7 +152,7 @@ def correct_stages(scene, work, step, goal):
     for stage in range(3):
         write_changes(scene, work, stage)
         for body in range(work.place.shape[1]):
-            memory = step + work.errors[body].memory
+            memory = step + work.errors[body].velocity_lifetime
             for axis in range(3):
                 change = work.velocity[CHANGE, body, axis]
                 if not abs(change) < math.inf:
@@ -170,15 +179,17 @@ def finish_stages(scene, work, step):
     place_stages(work, step)
     locate_state(scene, work, THIRD_STAGE)
     slip_stages(scene, work, step, 2, MATRIX)
-    take_stage(work, THIRD_STAGE)
+    adopt_stage(work, THIRD_STAGE)
 
 
 def expected_pace(clock, step):
     """What to expect of the second iteration before it is made."""
-    if clock.seen_pace == 0.0:
+    if clock.second_iteration_rate == 0.0:
         return FIRST_PACE
-    longer = max(step / clock.seen_step, 1.0)
-    return min(max(DOUBTED_PACE * clock.seen_pace * longer * longer, LEAST_PACE), FIRST_PACE)
+    longer = max(step / clock.second_iteration_step, 1.0)
+    return min(
+        max(DOUBTED_PACE * clock.second_iteration_rate * longer * longer, LEAST_PACE), FIRST_PACE
+    )
 
 
 @apart
@@ -192,19 +203,19 @@ def solve_stages(scene, work, clock, step):
     before, earlier = math.inf, math.inf
     for _ in range(MOST_ITERATIONS):
         change = newton_step(scene, work, clock.time, step, share * allowed)
-        goal = max(share * allowed, rounding_size(scene, work, THIRD_STAGE, step))
+        goal = max(share * allowed, rounding_error(scene, work, THIRD_STAGE, step))
         pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
         first = before == math.inf
         if first:
             pace = expected
         if pace < 1.0 and change * pace <= goal * (1.0 - pace):
             finish_stages(scene, work, step)
-            clock.pace = 0.0 if first else pace
+            clock.convergence_rate = 0.0 if first else pace
             if not first:
-                clock.seen_pace, clock.seen_step = pace, step
+                clock.second_iteration_rate, clock.second_iteration_step = pace, step
             return True
         if not change < math.inf or (earlier < math.inf and pace > 1.0):
             break
         before, earlier = change, before
-    clock.seen_pace = 0.0
+    clock.second_iteration_rate = 0.0
     return False

@@ -1,35 +1,35 @@
-"""The derivatives as blocks of 3 × 3: one for each body, two for each pair that is watched.
+"""Blocks of 3 × 3 of the Jacobian: one for each body, two for each watched pair of bodies.
 
-Blocks 0 to n of ``Work.jacobian`` are those on the diagonal; n to 2 n are the parts of them that no
-other free body has a share in (forces of the fluid, of walls), the only ones that can change the
-momentum of bodies that act on each other; then two for each row of ``Work.pairs``.
+Of n bodies, blocks 0 to n of ``Work.jacobian`` are on the diagonal. Blocks n to 2n are the parts of
+these that involve no other free body (drag, walls): the only ones that can change the momentum of a
+cluster. Then come two off-diagonal blocks for each row of ``Work.pairs``.
 """
 
 from flocsim.state.work import CHANGE
 
 
 def block_count(work):
-    """How many blocks there are."""
+    """Return the number of blocks in use."""
     return 2 * work.poses.shape[0] + 2 * work.tally.pairs
 
 
 def own_block(work, body):
-    """The block of a body's forces in which no other free body has a share."""
+    """Return the block of those forces on a body that involve no other free body."""
     return work.poses.shape[0] + body
 
 
 def upper_block(work, pair):
-    """The block of the earlier body's force, by the coordinates of the later one."""
+    """Return the block of the earlier body's force by the coordinates of the later one."""
     return 2 * work.poses.shape[0] + 2 * pair
 
 
 def lower_block(work, pair):
-    """The block of the later body's force, by the coordinates of the earlier one."""
+    """Return the block of the later body's force by the coordinates of the earlier one."""
     return 2 * work.poses.shape[0] + 2 * pair + 1
 
 
-def subtract(work, which, weight, block, body, other):
-    """Subtract from a body's load a block, times a weight, times the other body's CHANGE."""
+def subtract_block_product(work, which, weight, block, body, other):
+    """Subtract weight · block · CHANGE of the other body from a body's load."""
     jacobian = work.jacobian
     for i in range(3):
         load = work.loads[0, 3 * body + i]
@@ -39,13 +39,16 @@ def subtract(work, which, weight, block, body, other):
 
 
 def subtract_product(work, which, weight):
-    """Subtract a matrix, times a weight, times the places in CHANGE from the loads; every row in
-    the order of its columns."""
+    """Subtract weight · matrix · CHANGE (places) from the loads.
+
+    Blocks are visited so that every row sums its columns in order: sparse and dense give equal
+    rounding.
+    """
     for pair in range(work.tally.pairs):
         later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
-        subtract(work, which, weight, lower_block(work, pair), later, earlier)
+        subtract_block_product(work, which, weight, lower_block(work, pair), later, earlier)
     for body in range(work.poses.shape[0]):
-        subtract(work, which, weight, body, body, body)
+        subtract_block_product(work, which, weight, body, body, body)
     for pair in range(work.tally.pairs):
         later, earlier = work.pairs[pair].later, work.pairs[pair].earlier
-        subtract(work, which, weight, upper_block(work, pair), earlier, later)
+        subtract_block_product(work, which, weight, upper_block(work, pair), earlier, later)

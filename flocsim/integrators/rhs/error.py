@@ -1,7 +1,13 @@
-"""How large an error is: in metres, at any point of an outline, and in what a velocity leads to.
+"""The size of an error: in metres at any point of an outline, including what a velocity error leads
+to.
 
-A velocity error e displaces a body by e·T until drag, or the next encounter, has wiped it out:
-1/T = damping rate + speed against the other bodies / size + 1 / time that is left to run.
+A velocity error e displaces a body by e T, where the velocity lifetime T ends by drag, by the next
+encounter, or with the run:
+
+    1/T = damping/mass + speed relative to the other bodies/size + 1/(time left to run).
+
+The error of a step is the largest |Δx| + R |Δθ| + T (|Δv| + R |Δω|) over bodies, R being the
+bounding radius.
 """
 
 import math
@@ -9,29 +15,30 @@ import math
 from flocsim.geometry.contact.points import least_listed_gap, length_of
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.work import DAMPING, DEVIATION, NEW, NOW
+from flocsim.state.work import DAMPING, NEW, NOW, STEP_ERROR
 
 ROUNDING = 1e-15
-"""A few units in the last place of a number."""
+"""Relative rounding of a coordinate: a few units in the last place."""
 
 TINY = 1e-300
 """Keeps the reciprocal of a rate finite."""
 
-FREE_SHARE = 0.01
-"""Share of the tolerance that is allowed while no gap is below it: free motion is cheap to follow,
-and what it runs into hangs on nanometres."""
+FREE_MOTION_FRACTION = 0.01
+"""Fraction of the tolerance allowed while no gap is below it. Free motion is cheap to follow, and
+the outcome of the encounter that it leads to depends on nanometres."""
 
 
 def mean_velocity(work, axis):
-    """Mean of one component over all bodies [m/s]."""
+    """Return the mean of one velocity component over all bodies [m/s]."""
     total = 0.0
     for body in range(work.place.shape[1]):
         total += work.velocity[NOW, body, axis]
     return total / work.place.shape[1]
 
 
-def turnover_rate(scene, work, body, mean_x, mean_y):
-    """Speed of a body's outline against the mean of all bodies, over its size [1/s]."""
+def encounter_rate(scene, work, body, mean_x, mean_y):
+    """Return the speed of a body's outline relative to the mean of all bodies, over its size
+    [1/s]."""
     vx = work.velocity[NOW, body, X] - mean_x
     vy = work.velocity[NOW, body, Y] - mean_y
     return length_of(vx, vy) / scene.bodies[body].bounding_radius + abs(
@@ -39,61 +46,70 @@ def turnover_rate(scene, work, body, mean_x, mean_y):
     )
 
 
-def remember_velocities(scene, work, remaining):
-    """Write every body's memory [s]; DAMPING holds the body forces' part alone."""
+def set_velocity_lifetimes(scene, work, remaining):
+    """Set every body's velocity lifetime and relaxation time [s]. DAMPING must hold body forces
+    only."""
     mean_x, mean_y = mean_velocity(work, X), mean_velocity(work, Y)
     for body in range(scene.bodies.shape[0]):
         errors = work.errors[body]
-        slowest, relaxation = math.inf, 0.0
-        turnover = turnover_rate(scene, work, body, mean_x, mean_y)
+        slowest, relaxation_time = math.inf, 0.0
+        turnover = encounter_rate(scene, work, body, mean_x, mean_y)
+        # The component with the lowest rate lasts longest.
         for axis in range(3):
             mass = inertia(scene, body, axis)
             damping = max(work.jacobian[DAMPING, body, axis, axis], 0.0)
-            relaxation = max(relaxation, mass / max(damping, TINY))
+            relaxation_time = max(relaxation_time, mass / max(damping, TINY))
             rate = mass * (turnover + 1.0 / remaining) + damping
             slowest = min(slowest, rate / max(mass, TINY))
-        errors.memory = 1.0 / slowest
-        errors.relaxation = relaxation
+        errors.velocity_lifetime = 1.0 / slowest
+        errors.relaxation_time = relaxation_time
 
 
 def end_of_run(clock):
-    """When a run ends [s]."""
+    """Return the end of the run, not of a window of it [s]."""
     return max(clock.until, clock.horizon)
 
 
 def step_tolerance(work, clock):
-    """What the error of the next step may be [m]."""
+    """Return the error that the next step may have [m]."""
+    # No contact, and none that the error could cause: free motion.
     if least_listed_gap(work) > clock.tolerance:
-        return FREE_SHARE * clock.tolerance
+        return FREE_MOTION_FRACTION * clock.tolerance
     return clock.tolerance
 
 
 def error_ratio(scene, work, clock, step):
-    """The error of the step over what is allowed, −1 where it or the new state is no number."""
-    error = error_size(scene, work)
+    """Return the error of the step over its tolerance, −1 if it or the new state is not finite.
+
+    The error is read from STEP_ERROR, a displacement and velocity per body, and its size is written
+    to ``clock.step_error`` [m]. An error below rounding counts as allowed.
+    """
+    error = largest_error(scene, work)
     clock.step_error = error
     if not error < math.inf:
         return -1.0
-    return error / max(step_tolerance(work, clock), rounding_size(scene, work, NEW, step))
+    # An error below rounding cannot be reduced by a smaller step.
+    return error / max(step_tolerance(work, clock), rounding_error(scene, work, NEW, step))
 
 
 def body_error(scene, work, body):
-    """The error of one body, from DEVIATION: displacement of its outline, now and later [m]; both
-    parts of it are written down."""
+    """Return the error of one body [m], from STEP_ERROR; its two parts are stored in
+    ``work.errors``."""
     errors = work.errors[body]
     size = scene.bodies[body].bounding_radius
-    place = length_of(work.place[DEVIATION, body, X], work.place[DEVIATION, body, Y]) + size * abs(
-        work.place[DEVIATION, body, ANGLE]
-    )
+    # Displacement and velocity of the outline, rotation included.
+    place = length_of(
+        work.place[STEP_ERROR, body, X], work.place[STEP_ERROR, body, Y]
+    ) + size * abs(work.place[STEP_ERROR, body, ANGLE])
     speed = length_of(
-        work.velocity[DEVIATION, body, X], work.velocity[DEVIATION, body, Y]
-    ) + size * abs(work.velocity[DEVIATION, body, ANGLE])
-    errors.step_place, errors.step_speed = place, speed
-    return place + speed * errors.memory
+        work.velocity[STEP_ERROR, body, X], work.velocity[STEP_ERROR, body, Y]
+    ) + size * abs(work.velocity[STEP_ERROR, body, ANGLE])
+    errors.step_displacement, errors.step_velocity = place, speed
+    return place + speed * errors.velocity_lifetime
 
 
-def error_size(scene, work):
-    """The largest error of a body; inf where it, or the new state, is no number."""
+def largest_error(scene, work):
+    """Return the largest error of a body [m]; inf if it or the new state is not finite."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
         error = body_error(scene, work, body)
@@ -103,14 +119,16 @@ def error_size(scene, work):
     return largest
 
 
-def rounding_size(scene, work, state, step):
-    """What rounding alone does to a step that ends in a state [m]."""
+def rounding_error(scene, work, state, step):
+    """Return the error by rounding alone of a step that ends in a state [m]."""
     largest = 0.0
     for body in range(scene.bodies.shape[0]):
-        memory = work.errors[body].memory
+        velocity_lifetime = work.errors[body].velocity_lifetime
         for axis in range(3):
             place = abs(work.place[state, body, axis])
             speed = abs(work.velocity[state, body, axis])
-            size = place * (1.0 + memory / step) + speed * (step + memory)
+            # Rounding of a position counts itself, and as a velocity error when divided by the
+            # step.
+            size = place * (1.0 + velocity_lifetime / step) + speed * (step + velocity_lifetime)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest

@@ -1,56 +1,65 @@
-"""Tangential displacements and forces: how far bodies roll and slide over each other, how far a
-contact can hold, and what it does where next to nothing presses on it.
+"""Tangential displacements and forces: rolling, sticking, sliding and grazing of a contact.
 
-The rate v_t of the tangential displacement is the rate of a sum of lengths: of the foot along its
-edge, of the normal's turn about an end of it, and of what the vertex's disk rolls off,
+Rolling. The tangential displacement ξ of a sticking contact is the time integral of v_t, the
+tangential velocity. v_t is the rate of a sum of lengths: the path of the foot along its edge, the
+arc by which the normal turns about an end of the edge, and the arc that the vertex's disk rolls
+off,
 
     dξ = ± ds + D (dφ − dθ_b) + r (dθ_b − dθ_a),
 
-s the foot's place on the edge, φ the direction of the normal, D = r_a + r_b + gap, and
-r = r_a + gap/2 the radius at which the disk of the vertex rolls. On the edge's inside the normal
-turns with the edge, and at its end the foot stays, so that one formula serves both. Between two
-states the displacement is therefore known from where the bodies are, whatever a method makes of the
-motion in between: a doublet that turns as one has none, however long its steps. What is left to be
-summed over a step is next to nothing: D and r change with the gap, by its change times the turn.
+s being the foot's position on the edge, φ the direction of the normal, D = r_a + r_b + gap, and r =
+r_a + gap/2 the radius at which the disk of the vertex rolls. Inside the edge the normal turns with
+the edge, and at an end the foot stays, so one formula serves both. Between two states ξ therefore
+follows from positions, as the gap does: a doublet that turns rigidly accumulates none, however long
+its steps. (ξ as a sum of velocities drifted by the tolerance in each step, and two contacts of a
+doublet wedged each other.) Only a small part must be integrated in time: D and r change with the
+gap.
 
-While a contact sticks, ξ is the time integral of v_t. It slides in a direction s = ±1 where |ξ| has
-reached what the contact can hold, L (µ k_n Δ/k_t for Coulomb friction), and would outgrow it:
+Sliding. A contact slides in the direction s = ±1 once |ξ| has reached the limit L that friction
+bears (µ k_n Δ/k_t for Coulomb friction) and would exceed it:
 
-    ξ = s L,  as long as  s v_t > dL/dt.
+    ξ = s L   as long as   s v_t > dL/dt.
 
-Both are smooth inside a step, whose flags are frozen (Candidate.sliding); the driver ends it where
-one has to change. ξ itself never jumps: it is the solution of dξ/dt = v_t under |ξ| ≤ L, which
-cutting ξ at the ends of steps comes near to only as fast as steps get short.
+Modes are frozen within a step (Candidate.slide_direction), so forces stay smooth; the driver ends the step
+where a mode has to change. ξ never jumps: it solves dξ/dt = v_t under |ξ| ≤ L. Clipping ξ at the
+end of each step would converge to that only with the first power of the step.
 
-Grazing is what a contact does that closes under its load and opens under its own tangential force.
+Grazing. Without a Coulomb limit the tangential force acts however small the overlap is. If the load
+on a contact has nearly vanished, that force alone may lift the bodies apart; the contact opens, the
+force is gone, the load closes it again, and so on: a sliding mode in the sense of Filippov (1988),
+whose cycle gets as short as it is resolved. In its limit the bodies neither part nor overlap,
 
-The tangential force of the contact law acts wherever bodies overlap, however little. Where the load
-on a contact has all but gone, that force alone may lift the bodies apart; apart, it is gone, the
-load closes the contact again, and so on without end: a sliding mode in the sense of Filippov, whose
-cycle is as short as it is resolved finely. In its limit the bodies neither part nor overlap,
+    d(gap)/dt = 0,   N = 0,   0 ≤ T/T_closed ≤ 1,
 
-    d(gap)/dt = 0,  N = 0,  and a tangential force T of between nothing and that of the closed law
+with a tangential force T that is an unknown of the step. Here T is the force of a stiff dashpot,
 
-is what it takes for that. T is an unknown of the step; here it is the force of a dashpot across,
-T = T₀ − K d(gap)/dt, so stiff that the gap changes by a small share of the tolerance alone. The
-bodies slide against each other meanwhile. Such a pair opens for good where T has come to nothing;
-where it ceases to slide it sticks again, T being taken over by its spring.
+    T = T₀ − K d(gap)/dt,
+
+so stiff that the gap changes by a small fraction of the tolerance only. The pair opens when T
+passes through zero; when it ceases to slide it sticks again and its spring takes T over.
 """
 
 import math
 
-from flocsim.geometry.contact.points import row_radii
+from flocsim.geometry.contact.points import contact_radii
 from flocsim.hooks import SLIP_LIMIT, has, slip_limit
-from flocsim.integrators.rhs.views import contact_view, normal_rate, pressed_view, tangential_rate
+from flocsim.integrators.rhs.views import (
+    contact_view,
+    normal_rate,
+    tangential_rate,
+    view_without_slip,
+)
 from flocsim.state.bodies import ANGLE
 from flocsim.state.work import NEW, NOW
 
-FULL = 1.0 - 1e-9
-"""A displacement is at its limit from this share of it on."""
+AT_LIMIT = 1.0 - 1e-9
+"""A displacement counts as at its limit from this fraction of it on: rounding must not make it
+stick."""
 
 
 def turn_of_normal(work, state, row):
-    """The angle by which the normal of a pair has turned since now, within half a turn [rad]."""
+    """Return the angle by which the normal of a pair has turned from now to a state, within ±π
+    [rad]."""
     g = work.geometry
     ox, oy = g[NOW, row].normal_x, g[NOW, row].normal_y
     nx, ny = g[state, row].normal_x, g[state, row].normal_y
@@ -58,136 +67,160 @@ def turn_of_normal(work, state, row):
 
 
 def rolled(scene, work, state, row):
-    """How far the tangential displacement of a pair has grown from now to a state, at the gap of
-    now [m]; both are located."""
+    """Return the growth of ξ from now to a state at the present gap [m]; both states are located.
+
+    D and r are those of now; see slip_rate_of_gap_change for the rest.
+    """
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    radius_a, radius_b = row_radii(scene, work, row)
+    radius_a, radius_b = contact_radii(scene, work, row)
     gap = g[NOW, row].gap
     turn_a = work.place[state, a, ANGLE] - work.place[NOW, a, ANGLE]
     turn_b = work.place[state, b, ANGLE] - work.place[NOW, b, ANGLE]
-    inside = NOW if g[NOW, row].turning == 0.0 else state
-    along = g[inside, row].side * (g[state, row].foot - g[NOW, row].foot)
-    about = turn_of_normal(work, state, row) - turn_b
+    # The tangent's orientation along the edge is that of a state whose foot lies inside it: now or
+    # then.
+    side_state = NOW if g[NOW, row].turning == 0.0 else state
+    foot_path = g[side_state, row].side * (g[state, row].foot - g[NOW, row].foot)
+    normal_turn = turn_of_normal(work, state, row) - turn_b
     rolling = (radius_a + 0.5 * gap) * (turn_b - turn_a)
-    return along + (radius_a + radius_b + gap) * about + rolling
+    return foot_path + (radius_a + radius_b + gap) * normal_turn + rolling
 
 
-def rolled_besides(scene, work, state, row):
-    """How fast it grows besides, in a state, as the gap is another one than now [m/s]."""
+def slip_rate_of_gap_change(scene, work, state, row):
+    """Return the remaining rate of ξ in a state, due to the change of the gap since now [m/s]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g, spin_b = work.geometry, work.velocity[state, b, ANGLE]
-    radius_a, radius_b = row_radii(scene, work, row)
-    gap, apart = g[state, row].gap, g[state, row].gap - g[NOW, row].gap
-    relative = spin_b - work.velocity[state, a, ANGLE]
-    about = 0.0
+    radius_a, radius_b = contact_radii(scene, work, row)
+    gap, gap_change = g[state, row].gap, g[state, row].gap - g[NOW, row].gap
+    relative_spin = spin_b - work.velocity[state, a, ANGLE]
+    # (D − D_now) (dφ/dt − ω_b) + (r − r_now) (ω_b − ω_a), with D − D_now = gap change and r − r_now
+    # half of it.
+    normal_turn = 0.0
     if g[state, row].turning != 0.0:
-        rolling = (radius_a + 0.5 * gap) * relative
-        about = (tangential_rate(work, state, row) - rolling) / (radius_a + radius_b + gap)
-    return apart * (about + 0.5 * relative)
+        # The normal turns against the edge only at an end, where the foot rests and v_t is turning
+        # plus rolling.
+        rolling = (radius_a + 0.5 * gap) * relative_spin
+        normal_turn = (tangential_rate(work, state, row) - rolling) / (radius_a + radius_b + gap)
+    return gap_change * (normal_turn + 0.5 * relative_spin)
 
 
-def limit_in(scene, work, state, row):
-    """How far a contact's displacement can go in a state [m]."""
+def slip_limit_at(scene, work, state, row):
+    """Return the largest |ξ| that friction bears in a state [m]."""
     return slip_limit(scene, contact_view(scene, work, state, row))
 
 
 def limit_slope(scene, work, state, row):
-    """By how much that grows with the overlap [m/m]."""
+    """Return the derivative of that limit with respect to the overlap [-], by a difference."""
     view = contact_view(scene, work, state, row)
-    by = 1e-6 * abs(view.overlap) + 1e-15
-    more = slip_limit(scene, pressed_view(view, view.overlap + by, view.overlap_rate))
-    now = slip_limit(scene, pressed_view(view, view.overlap, view.overlap_rate))
-    return (more - now) / by if more > now else 0.0
+    # The step is far above rounding of the limit, and far below any overlap that matters.
+    increment = 1e-6 * abs(view.overlap) + 1e-15
+    more = slip_limit(scene, view_without_slip(view, view.overlap + increment, view.overlap_rate))
+    now = slip_limit(scene, view_without_slip(view, view.overlap, view.overlap_rate))
+    return (more - now) / increment if more > now else 0.0
 
 
-def outgrowth(scene, work, state, row, side):
-    """How fast a displacement at its limit, in a direction, would outgrow it [m/s]."""
+def excess_slip_rate(scene, work, state, row, side):
+    """Return s v_t − dL/dt [m/s]: positive while a contact at its limit goes on sliding in
+    direction s."""
     growth = -normal_rate(work, state, row) * limit_slope(scene, work, state, row)
     return side * tangential_rate(work, state, row) - growth
 
 
-def slip_in(scene, work, state, row, stuck):
-    """The displacement of a closed pair in a state; ``stuck``: what it is if it sticks [m]."""
-    side = work.candidates[row].sliding
+def slip_in(scene, work, state, row, sticking_slip):
+    """Return ξ of a closed pair in a state [m]: ``sticking_slip`` if it sticks, else its limit."""
+    side = work.candidates[row].slide_direction
     if side == 0:
-        return stuck
-    return side * limit_in(scene, work, state, row)
+        return sticking_slip
+    return side * slip_limit_at(scene, work, state, row)
 
 
-def side_of(scene, work, row):
-    """In which direction a closed pair slides from now on, 0 where it sticks; its displacement is
-    brought to its limit."""
-    limit, side = limit_in(scene, work, NOW, row), work.candidates[row].sliding
+def sliding_direction(scene, work, row):
+    """Return the direction ±1 in which a closed pair slides from now on, 0 if it sticks.
+
+    ξ is set to its limit where it has reached that.
+    """
+    limit, side = slip_limit_at(scene, work, NOW, row), work.candidates[row].slide_direction
+    # A sticking pair below its limit stays in that mode.
     if side == 0:
         slip = work.slip[NOW, row]
-        if abs(slip) < FULL * limit:
+        if abs(slip) < AT_LIMIT * limit:
             return 0
         rate = tangential_rate(work, NOW, row)
         side = 1 if slip > 0.0 or (slip == 0.0 and rate > 0.0) else -1
     work.slip[NOW, row] = side * limit
-    return side if outgrowth(scene, work, NOW, row, side) > 0.0 else 0
+    return side if excess_slip_rate(scene, work, NOW, row, side) > 0.0 else 0
 
 
 def set_sliding(scene, work):
-    """Flag all closed pairs that slide, now; whether any flag has changed."""
+    """Set the sliding mode of all closed pairs; return True if any has changed."""
     changed = False
     if has(scene, SLIP_LIMIT):
         for row in range(work.tally.candidates):
             candidate = work.candidates[row]
-            side = side_of(scene, work, row) if candidate.closed == 1 else 0
-            changed = changed or candidate.sliding != side
-            candidate.sliding = side
+            side = sliding_direction(scene, work, row) if candidate.contact_mode == 1 else 0
+            changed = changed or candidate.slide_direction != side
+            candidate.slide_direction = side
     return changed
 
 
 def limit_slips(scene, work):
-    """Cut the displacements of the closed pairs in NEW to what they can hold there, for methods
-    whose steps do not end where a contact begins to slide."""
+    """Clip the displacements of closed pairs in NEW to their limits.
+
+    This is for methods whose steps do not end where a contact begins to slide.
+    """
     if not has(scene, SLIP_LIMIT):
         return
     for row in range(work.tally.candidates):
-        if work.candidates[row].closed == 1:
-            limit = limit_in(scene, work, NEW, row)
+        if work.candidates[row].contact_mode == 1:
+            limit = slip_limit_at(scene, work, NEW, row)
             work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
 
 
-def beyond(scene, work, row, step):
-    """(how far a pair is beyond where it ought to have begun or ceased to slide [m], the share of
-    the step at which it should have); 0 at the first place where nothing is wrong."""
-    side = work.candidates[row].sliding
+def slip_transition(scene, work, row, step):
+    """Return the violation of a pair's stick or slide mode at the end of a step, and where it
+    began.
+
+    The violation is a length [m]: how far ξ exceeds its limit, or how far the contact has slid
+    backwards. The second value is the fraction of the step; (0, 1) if the mode still holds.
+    """
+    side = work.candidates[row].slide_direction
+    # Sticking: |ξ| must stay below its limit.
     if side == 0:
-        before = limit_in(scene, work, NOW, row) - abs(work.slip[NOW, row])
-        after = limit_in(scene, work, NEW, row) - abs(work.slip[NEW, row])
+        before = slip_limit_at(scene, work, NOW, row) - abs(work.slip[NOW, row])
+        after = slip_limit_at(scene, work, NEW, row) - abs(work.slip[NEW, row])
         if after >= 0.0:
             return 0.0, 1.0
-        return -after, root(scene, work, row, step, before, after)
-    before = outgrowth(scene, work, NOW, row, side)
-    after = outgrowth(scene, work, NEW, row, side)
+        return -after, limit_crossing(scene, work, row, step, before, after)
+    # Sliding: the excess rate must stay positive; it is interpolated linearly.
+    before = excess_slip_rate(scene, work, NOW, row, side)
+    after = excess_slip_rate(scene, work, NEW, row, side)
     if after >= 0.0:
         return 0.0, 1.0
     share = max(before, 0.0) / (max(before, 0.0) - after)
     return -0.5 * after * step * (1.0 - share), share
 
 
-def root(scene, work, row, step, before, after):
-    """Where in the step the room that a sticking pair has left, ``before`` and ``after``, is used
-    up, by the cubic through its values and rates at both ends."""
+def limit_crossing(scene, work, row, step, before, after):
+    """Return the fraction of the step at which a sticking pair reaches its limit.
+
+    ``before`` and ``after`` are the margins L − |ξ| at both ends [m], after < 0. The margin is
+    interpolated by the cubic through values and rates there, and its root bisected.
+    """
     side = 1.0 if work.slip[NEW, row] > 0.0 else -1.0
-    fall = step * outgrowth(scene, work, NOW, row, side)
-    end = step * outgrowth(scene, work, NEW, row, side)
+    start_rate = step * excess_slip_rate(scene, work, NOW, row, side)
+    end_rate = step * excess_slip_rate(scene, work, NEW, row, side)
     before = max(before, 0.0)
     low, high = 0.0, 1.0
     for _ in range(40):
         share = 0.5 * (low + high)
         rest = 1.0 - share
-        # Hermite: values before and after, slopes −fall and −end.
+        # Hermite basis: values before and after, slopes −start_rate and −end_rate.
         value = (
             rest * rest * (1.0 + 2.0 * share) * before + share * share * (3.0 - 2.0 * share) * after
         )
-        value += share * rest * (share * end - rest * fall)
+        value += share * rest * (share * end_rate - rest * start_rate)
         if value > 0.0:
             low = share
         else:
@@ -195,13 +228,13 @@ def root(scene, work, row, step, before, after):
     return high
 
 
-STIFFER = 1e5
-"""The gap of a pair that grazes is held so many times as stiffly as by inertia, drag and the other
-contacts in a step."""
+GRAZING_STIFFNESS_RATIO = 1e5
+"""K of a grazing pair over the resistance of the step's own system (inertia, drag, other contacts)
+to its gap. With 1e5 the gap changes by 1e-5 of what it would without being held."""
 
 
 def grazing_force(work, state, row):
-    """T of a pair that grazes, in a state [N]."""
+    """Return T = T₀ − K d(gap)/dt of a grazing pair in a state [N]."""
     contact = work.contacts[row]
     force = contact.grazing_force
     if state == NOW:
@@ -210,7 +243,7 @@ def grazing_force(work, state, row):
 
 
 def normal_mobility(scene, work, row):
-    """Acceleration of the gap for every newton along the normal of a pair [1/kg]."""
+    """Return the acceleration of the gap per unit normal force on a pair alone [1/kg]."""
     candidate = work.candidates[row]
     total, g = 0.0, work.geometry
     a, b = candidate.vertex_body, candidate.edge_body
@@ -223,8 +256,11 @@ def normal_mobility(scene, work, row):
     return total
 
 
-def coupling(scene, work, row):
-    """Acceleration of the gap for every newton along the tangent of a pair [1/kg]."""
+def tangential_coupling(scene, work, row):
+    """Return the acceleration of the gap per unit tangential force on a pair alone [1/kg].
+
+    It is not zero where the contact point lies beside the line of the centroids.
+    """
     candidate = work.candidates[row]
     total, g = 0.0, work.geometry
     a, b = candidate.vertex_body, candidate.edge_body

@@ -1,8 +1,9 @@
-"""What two bodies do to each other by how they are turned: from an energy, by differences.
+"""Forces and torques of two bodies from an energy that depends on their orientations.
 
-The energy U is one of the distance d of the centroids and of both angles from the line between
-them, α_i and α_j. On j act −∂U/∂d along that line, and (∂U/∂α_i + ∂U/∂α_j)/d across it, as that
-line turns where j moves aside; torques are −∂U/∂α.
+The energy U(d, α_i, α_j) depends on the distance d of the centroids and on both angles, measured
+from the line between them. The force on j is −∂U/∂d along that line and (∂U/∂α_i + ∂U/∂α_j)/d
+across it, as the line turns if j moves sideways; torques are −∂U/∂α. Derivatives are central
+differences, of second order in the step.
 """
 
 import math
@@ -14,11 +15,12 @@ from flocsim.state.bodies import ANGLE
 from flocsim.state.views import OrientedView
 from flocsim.state.work import NOW
 
-TURN = 1e-4
-"""Angle by which bodies are turned for a difference [rad]: its square is what differences leave."""
+ANGLE_DIFFERENCE = 1e-4
+"""Difference step of angles [rad]; the error of a central difference is of the order of its
+square."""
 
-SHARE, LEAST = 1e-4, 1e-12
-"""How far they are moved: a share of the gap, and this [m] at least."""
+DISTANCE_DIFFERENCE, LEAST_DIFFERENCE = 1e-4, 1e-12
+"""Difference step of the distance: a fraction of the gap, and a lower bound [m]."""
 
 
 def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
@@ -31,40 +33,48 @@ def oriented_view(scene, time, j, i, distance, angle_i, angle_j):
 
 
 def oriented_from(scene, time, j, i, x, y, angle_j, angle_i):
-    """The OrientedView of two bodies, j being seen from i at x, y [m]."""
+    """Return the OrientedView of two bodies, j being seen from i at x, y [m]."""
     bearing = math.atan2(y, x)
     one, other = angle_i - bearing, angle_j - bearing
     return oriented_view(scene, time, j, i, length_of(x, y), one, other)
 
 
 def oriented_now(scene, work, time, j, i):
-    """The same in the state NOW."""
+    """Return the OrientedView of two bodies in the state NOW."""
     x, y = separation(scene, work, NOW, j, i)
     angle_j, angle_i = work.place[NOW, j, ANGLE], work.place[NOW, i, ANGLE]
     return oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
 
 
 def energy_at(scene, time, j, i, distance, angle_i, angle_j):
-    """U [J]."""
+    """Return U [J]."""
     return oriented_energy(scene, oriented_view(scene, time, j, i, distance, angle_i, angle_j))
 
 
-def between_oriented(scene, time, j, i, x, y, angle_j, angle_i):
-    """(fx, fy, torque on j, torque on i) on body j, the later one, which is seen from i at x, y
-    [m]; i feels the reverse of fx, fy [N, N, N m, N m]. Nothing where centroids are at one place.
+def oriented_forces_at(scene, time, j, i, x, y, angle_j, angle_i):
+    """Return (fx, fy, torque on j, torque on i) [N, N, N m, N m] on the later body j, seen from i
+    at x, y.
+
+    i feels the reverse of fx, fy. All are 0 if the centroids coincide.
     """
     view = oriented_from(scene, time, j, i, x, y, angle_j, angle_i)
     distance, one, other = view.centre_distance, view.angle_i, view.angle_j
     if distance == 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    by = SHARE * abs(view.gap) + LEAST
+    by = DISTANCE_DIFFERENCE * abs(view.gap) + LEAST_DIFFERENCE
+    # −∂U/∂d, −∂U/∂α_i and −∂U/∂α_j.
     rise = energy_at(scene, time, j, i, distance + by, one, other)
     rise -= energy_at(scene, time, j, i, distance - by, one, other)
-    of_i = energy_at(scene, time, j, i, distance, one + TURN, other)
-    of_i -= energy_at(scene, time, j, i, distance, one - TURN, other)
-    of_j = energy_at(scene, time, j, i, distance, one, other + TURN)
-    of_j -= energy_at(scene, time, j, i, distance, one, other - TURN)
-    along, torque_i, torque_j = -0.5 * rise / by, -0.5 * of_i / TURN, -0.5 * of_j / TURN
+    of_i = energy_at(scene, time, j, i, distance, one + ANGLE_DIFFERENCE, other)
+    of_i -= energy_at(scene, time, j, i, distance, one - ANGLE_DIFFERENCE, other)
+    of_j = energy_at(scene, time, j, i, distance, one, other + ANGLE_DIFFERENCE)
+    of_j -= energy_at(scene, time, j, i, distance, one, other - ANGLE_DIFFERENCE)
+    along, torque_i, torque_j = (
+        -0.5 * rise / by,
+        -0.5 * of_i / ANGLE_DIFFERENCE,
+        -0.5 * of_j / ANGLE_DIFFERENCE,
+    )
+    # Balance of torques about i.
     across = -(torque_i + torque_j) / distance
     nx, ny = x / distance, y / distance
     return along * nx - across * ny, along * ny + across * nx, torque_j, torque_i

@@ -1,8 +1,15 @@
-"""Where the smaller one of two outlines is looked at: nodes along its pieces, from feet of the
-other one's pieces on (flocsim.geometry.shapes.pieces says how they are spaced).
+"""Quadrature nodes on the smaller of two outlines, graded towards the feet of the other one's
+pieces.
 
-Which nodes there are changes little by little with where the bodies are: jumps of a force cost
-steps. So panels end wherever the gap has a bend, and lose it again where it no longer counts.
+A foot is a point of a piece from where the gap grows both ways. From each foot on, the parameter of
+the piece is graded as
+
+    s = s_foot + scale · 2 t/(1 − t²),
+
+which resolves a pressure that falls with a power of the gap (flocsim.geometry.shapes.pieces), and
+Gauss's rule is applied in t, in panels. Panels end wherever the gap has a kink, as the nearest
+piece of the other outline changes. Nodes must vary continuously with the bodies' positions: jumps
+of the force cost steps.
 """
 
 import math
@@ -14,36 +21,36 @@ from flocsim.geometry.shapes.pieces import (
     distance_to,
     ends_of,
     foot_of,
-    from_core,
-    parameter_before,
     piece_at,
+    ray_parameter,
+    vector_from_core,
 )
 from flocsim.state.outlines import (
     MOST_FEET,
 )
 
-SAME = 1e-3
-"""Of the gap: pieces of the other outline that are as near as that are both the nearest, and feet
-that are as near to each other are one."""
+SAME_FOOT = 1e-3
+"""Fraction of the gap below which two pieces count as equally near, or two feet as one."""
 
-MOST_HALVES = 40
-"""How often a way along a piece is halved: far below any length that counts."""
+MOST_BISECTIONS = 40
+"""Bisections along a piece: down to far below any length that matters."""
 
 MOST_PANELS = 4
-"""Of one side of a foot."""
+"""Panels on one side of a foot."""
 
-BENDS = 30.0
-"""Panels end at bends of the gap up to so many times the gap at their foot."""
+BEND_RANGE = 30.0
+"""Panels end at kinks of the gap up to this multiple of the gap at their foot; those further out do
+not matter."""
 
 LEAST_WIDTH = 1e-3
-"""Of t: no panel is narrower."""
+"""Least width of a panel, in t."""
 
 LEAST_GROWTH = 1e-6
-"""Of the gap: what grows by less is flat."""
+"""A gap that grows by less than this fraction of itself counts as constant."""
 
 
 def gap_from(scene, work, x, y):
-    """How far the other outline, as far as it is around, is from a point [m]."""
+    """Return the distance of a point from the listed pieces of the other outline [m]."""
     near, gap = work.near, math.inf
     for j in range(near.around[0]):
         gap = min(gap, distance_to(x, y, piece_at(scene.pieces, near.around[1 + j])))
@@ -51,31 +58,30 @@ def gap_from(scene, work, x, y):
 
 
 def find_feet(scene, work, piece, inset, lens):
-    """Write the feet of a piece to ``work.feet``, in their order; how many there are. They are the
-    places, ends among them, from where the gap within the lens grows either way."""
+    """Write the feet of a piece to ``work.feet``, in order; return their number."""
     near, count = work.near, 0
     first, last = ends_of(piece)
     for j in range(near.around[0]):
         other = piece_at(scene.pieces, near.around[1 + j])
+        # The closest point of the piece to each other piece, or its end.
         parameter = min(max(foot_of(piece, other), first), last)
         x, y, _, _, metres = at_parameter(piece, parameter)
         gap = distance_to(x, y, other)
-        # Only where the other is what lies nearest there.
-        same = SAME * (gap + inset)
-        if gap < lens and gap <= gap_from(scene, work, x, y) + same:
-            count = add_foot(work.feet, count, parameter, same / metres)
+        # It is a foot only where that other piece is the nearest.
+        tolerance = SAME_FOOT * (gap + inset)
+        if gap < lens and gap <= gap_from(scene, work, x, y) + tolerance:
+            count = add_foot(work.feet, count, parameter, tolerance / metres)
     return count
 
 
-def add_foot(feet, count, parameter, same):
-    """Put a foot among those found so far, in their order, unless one is as near as ``same``; how
-    many there are then."""
+def add_foot(feet, count, parameter, tolerance):
+    """Insert a foot in order unless one exists within ``tolerance``; return the new number."""
     place = count
     while place > 0 and feet[place - 1] > parameter:
         place -= 1
-    if place > 0 and parameter - feet[place - 1] <= same:
+    if place > 0 and parameter - feet[place - 1] <= tolerance:
         return count
-    if (place < count and feet[place] - parameter <= same) or count == MOST_FEET:
+    if (place < count and feet[place] - parameter <= tolerance) or count == MOST_FEET:
         return count
     for k in range(count, place, -1):
         feet[k] = feet[k - 1]
@@ -83,62 +89,71 @@ def add_foot(feet, count, parameter, same):
     return count + 1
 
 
-def way_to_gap(scene, work, piece, foot, way, wanted):
-    """How far along a piece from a foot, in its parameter and ``way`` at most, the gap has grown to
-    the one that is wanted [m]: continuous in where the bodies are, as the quadrature is then."""
-    x, y, _, _, _ = at_parameter(piece, foot + way)
+def parameter_to_gap(scene, work, piece, foot, extent, target):
+    """Return how far along a piece from a foot the gap has grown to ``target`` [m], at most
+    ``extent``.
+
+    In units of the piece's parameter. Continuous in the bodies' positions, as the quadrature must
+    be.
+    """
+    x, y, _, _, _ = at_parameter(piece, foot + extent)
     beyond = gap_from(scene, work, x, y)
-    if beyond <= wanted:
-        return way
-    for _ in range(MOST_HALVES):
-        x, y, _, _, _ = at_parameter(piece, foot + 0.5 * way)
+    if beyond <= target:
+        return extent
+    # Halve the range until its middle is near enough, then interpolate linearly in its outer half.
+    for _ in range(MOST_BISECTIONS):
+        x, y, _, _, _ = at_parameter(piece, foot + 0.5 * extent)
         gap = gap_from(scene, work, x, y)
-        if gap <= wanted:
-            return 0.5 * way * (1.0 + (wanted - gap) / (beyond - gap))
+        if gap <= target:
+            return 0.5 * extent * (1.0 + (target - gap) / (beyond - gap))
         beyond = gap
-        way *= 0.5
-    return way
+        extent *= 0.5
+    return extent
 
 
 @loops_apart
 def write_nodes(nodes, rules, count, piece, foot, scale, low, high, order):
-    """Write the nodes of a panel behind so many others: t from ``low`` to ``high``, where a piece
-    goes on from a foot by 2 t/(1 − t²) times a scale in its parameter."""
-    # In loops over few rows each, so that several nodes are taken at once.
+    """Append the nodes of a panel, t in [low, high], on a piece graded from a foot; see the
+    module."""
+    # Loops over few arrays each are vectorised by LLVM.
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for k in range(order):
+        # Gauss's node and weight in t; ds/dt = 2 scale (1 + t²)/(1 − t²)².
         t = middle + half * rules[order, 0, k]
-        shrunk = 1.0 / (1.0 - t * t)
-        part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * shrunk * shrunk
+        factor = 1.0 / (1.0 - t * t)
+        part = 2.0 * half * rules[order, 1, k] * abs(scale) * (1.0 + t * t) * factor * factor
         nodes.weight[count + k] = part
-        nodes.attraction[count + k] = foot + 2.0 * scale * t * shrunk
-    if piece.bend == 0.0:
+        nodes.attraction[count + k] = foot + 2.0 * scale * t * factor
+    # Segment: the parameter is arc length.
+    if piece.arc_radius == 0.0:
         for k in range(order):
             parameter = nodes.attraction[count + k]
-            nodes.x[count + k] = piece.x + parameter * piece.way_x
-            nodes.y[count + k] = piece.y + parameter * piece.way_y
+            nodes.x[count + k] = piece.x + parameter * piece.direction_x
+            nodes.y[count + k] = piece.y + parameter * piece.direction_y
         for k in range(order):
-            nodes.normal_x[count + k] = piece.way_y
-            nodes.normal_y[count + k] = -piece.way_x
+            nodes.normal_x[count + k] = piece.direction_y
+            nodes.normal_y[count + k] = -piece.direction_x
     else:
         for k in range(order):
             parameter = nodes.attraction[count + k]
-            shrunk = 1.0 / (1.0 + parameter * parameter)
-            c, s = (1.0 - parameter * parameter) * shrunk, 2.0 * parameter * shrunk
-            nodes.normal_x[count + k] = c * piece.way_x - s * piece.way_y
-            nodes.normal_y[count + k] = c * piece.way_y + s * piece.way_x
-            nodes.weight[count + k] *= 2.0 * piece.bend * shrunk
+            factor = 1.0 / (1.0 + parameter * parameter)
+            c, s = (1.0 - parameter * parameter) * factor, 2.0 * parameter * factor
+            nodes.normal_x[count + k] = c * piece.direction_x - s * piece.direction_y
+            nodes.normal_y[count + k] = c * piece.direction_y + s * piece.direction_x
+            nodes.weight[count + k] *= 2.0 * piece.arc_radius * factor
         for k in range(order):
-            nodes.x[count + k] = piece.x + piece.bend * nodes.normal_x[count + k]
-            nodes.y[count + k] = piece.y + piece.bend * nodes.normal_y[count + k]
+            nodes.x[count + k] = piece.x + piece.arc_radius * nodes.normal_x[count + k]
+            nodes.y[count + k] = piece.y + piece.arc_radius * nodes.normal_y[count + k]
     for k in range(order):
         nodes.gap[count + k], nodes.attraction[count + k] = math.inf, 0.0
 
 
-def order_of(width, nearness):
-    """How many nodes of Gauss's rule a panel of so much t takes: what it is taken of has its poles
-    near ±i, from where the error is below 1e-7 of the whole; ``nearness``: the least gap anywhere
-    over that where the panel begins, with which its share in the whole falls."""
+def gauss_order(width, nearness):
+    """Return the number of Gauss nodes for a panel of this width in t, for an error below 1e-7.
+
+    The integrand has its poles near t = ±i. ``nearness`` is the least gap anywhere over that at the
+    panel's beginning: the smaller it is, the less the panel counts.
+    """
     if nearness < 0.2:
         return 8 if nearness > 0.03 and width > 0.3 else 4
     if width > 0.6:
@@ -148,50 +163,56 @@ def order_of(width, nearness):
     return 6 if width > 0.1 else 4
 
 
-def t_after(share):
-    """t where a piece has gone on from a foot by so many times its scale: 2 t/(1 − t²) of it."""
+def graded_parameter(share):
+    """Return t for which 2 t/(1 − t²) equals ``share``."""
     return share / (1.0 + math.sqrt(1.0 + share * share))
 
 
-def growth_at(scene, work, piece, foot):
-    """(gap, its slope along a piece [-], that of the slope [1/m], metres for a unit of the
-    parameter) at a foot."""
+def gap_expansion(scene, work, piece, foot):
+    """Return (gap [m], first derivative [-], second derivative [1/m], metres per unit of parameter)
+    at a foot."""
     x, y, nx, ny, metres = at_parameter(piece, foot)
-    near, gap, slope, rise = work.near, math.inf, 0.0, 0.0
+    near, gap, slope, second_derivative = work.near, math.inf, 0.0, 0.0
     for j in range(near.around[0]):
         other = piece_at(scene.pieces, near.around[1 + j])
-        dx, dy, end = from_core(x, y, other)
+        dx, dy, end = vector_from_core(x, y, other)
         distance = math.sqrt(dx * dx + dy * dy)
-        if distance - other.inward < gap:
-            gap = distance - other.inward
+        if distance - other.core_depth < gap:
+            gap = distance - other.core_depth
+            # First and second derivative of the distance along the piece, which may be an arc
+            # itself.
             away = (nx * dx + ny * dy) / distance
             slope = (nx * dy - ny * dx) / distance
-            rise = -away / piece.bend if piece.bend > 0.0 else 0.0
-            rise += away * away / distance if end else 0.0
-    return gap, slope, rise, metres
+            second_derivative = -away / piece.arc_radius if piece.arc_radius > 0.0 else 0.0
+            second_derivative += away * away / distance if end else 0.0
+    return gap, slope, second_derivative, metres
 
 
-def put_side(scene, work, count, piece, foot, growth, end, inset, lens, least):
-    """Put the nodes of a piece from a foot, with its growth_at, to an end after so many others; how
-    many there are then. ``least``: gap and inset where the bodies are nearest [m]."""
-    reach = way_to_gap(scene, work, piece, foot, end - foot, lens)
-    gap, slope, rise, metres = growth
-    parted, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
-    # Where the gap, as it grows there, has become twice as large; and as it has grown by then.
-    whole = abs(reach) * metres
-    root = slope + math.sqrt(slope * slope + 2.0 * max(rise, 0.0) * parted)
-    way = min(2.0 * parted / max(root, parted / whole), whole)
-    x, y, _, _, _ = at_parameter(piece, foot + math.copysign(way / metres, reach))
-    grown = (gap_from(scene, work, x, y) - gap) / parted
-    scale = way / math.sqrt(max(grown, LEAST_GROWTH))
-    last = t_after(whole / scale)
+def write_side(scene, work, count, piece, foot, growth, end, inset, lens, least):
+    """Append the nodes of a piece from a foot to an end; return the new count.
+
+    ``growth`` is gap_expansion at the foot, ``least`` the least gap plus inset of the two bodies
+    [m].
+    """
+    reach = parameter_to_gap(scene, work, piece, foot, end - foot, lens)
+    gap, slope, second_derivative, metres = growth
+    parted_gap, slope = gap + inset, max(slope if end > foot else -slope, 0.0)
+    # Scale: where the quadratic expansion doubles the gap, corrected by the gap found there.
+    full_length = abs(reach) * metres
+    root = slope + math.sqrt(slope * slope + 2.0 * max(second_derivative, 0.0) * parted_gap)
+    extent = min(2.0 * parted_gap / max(root, parted_gap / full_length), full_length)
+    x, y, _, _, _ = at_parameter(piece, foot + math.copysign(extent / metres, reach))
+    relative_growth = (gap_from(scene, work, x, y) - gap) / parted_gap
+    scale = extent / math.sqrt(max(relative_growth, LEAST_GROWTH))
+    # Panels from kink to kink, the last one to the lens.
+    last = graded_parameter(full_length / scale)
     scale, low = math.copysign(scale / metres, reach), 0.0
-    bends = min(BENDS * parted, lens)
+    bends = min(BEND_RANGE * parted_gap, lens)
     for panel in range(1, MOST_PANELS + 1):
         high = last
         if panel < MOST_PANELS:
             high = next_bend(scene, work, piece, foot, scale, low, last, bends)
-        order = order_of(high - low, least / parted)
+        order = gauss_order(high - low, least / parted_gap)
         write_nodes(work.nodes, work.rules, count, piece, foot, scale, low, high, order)
         count, low = count + order, high
         if high == last:
@@ -200,33 +221,39 @@ def put_side(scene, work, count, piece, foot, growth, end, inset, lens, least):
 
 
 def next_bend(scene, work, piece, foot, scale, low, last, gap):
-    """The first t behind ``low`` at which what of the other outline is nearest, up to a gap [m],
-    goes over from one of its pieces into the next: the gap bends there; ``last`` where it does not
-    before."""
+    """Return the first t beyond ``low`` at which the nearest piece of the other outline changes, up
+    to a gap [m]: the gap has a kink there. Return ``last`` if there is none before."""
     near, bend, count = work.near, last, work.near.around[0]
     for j in range(count):
         other = piece_at(scene.pieces, near.around[1 + j])
-        if other.bend > 0.0:
+        # At the normals through both ends of an arc.
+        if other.arc_radius > 0.0:
             for end in arc_ends(other):
-                met = parameter_before(piece, other.x, other.y, end, other.bend + gap)
-                bend = earlier(met, foot, scale, low, bend)
+                bend_parameter = ray_parameter(piece, other.x, other.y, end, other.arc_radius + gap)
+                bend = earlier_bend(bend_parameter, foot, scale, low, bend)
         else:
-            # Where two faces meet in a reflex corner, on the bisector of their normals.
-            behind = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
-            x, y = other.x + other.half * other.way_x, other.y + other.half * other.way_y
-            dx = behind.x - behind.half * behind.way_x - x
-            dy = behind.y - behind.half * behind.way_y - y
-            if behind.bend == 0.0 and dx * dx + dy * dy < 1e-12 * other.half * other.half:
-                nx, ny = other.way_y + behind.way_y, -other.way_x - behind.way_x
+            # Where two faces meet in a reflex corner: on the bisector of their normals.
+            next_piece = piece_at(scene.pieces, near.around[1 + (j + 1) % count])
+            x, y = (
+                other.x + other.half * other.direction_x,
+                other.y + other.half * other.direction_y,
+            )
+            dx = next_piece.x - next_piece.half * next_piece.direction_x - x
+            dy = next_piece.y - next_piece.half * next_piece.direction_y - y
+            if next_piece.arc_radius == 0.0 and dx * dx + dy * dy < 1e-12 * other.half * other.half:
+                nx, ny = (
+                    other.direction_y + next_piece.direction_y,
+                    -other.direction_x - next_piece.direction_x,
+                )
                 length = math.sqrt(nx * nx + ny * ny)
-                met = parameter_before(piece, x, y, (nx / length, ny / length), gap)
-                bend = earlier(met, foot, scale, low, bend)
+                bend_parameter = ray_parameter(piece, x, y, (nx / length, ny / length), gap)
+                bend = earlier_bend(bend_parameter, foot, scale, low, bend)
     return bend
 
 
-def earlier(met, foot, scale, low, bend):
-    """t at a parameter, or another one where that is earlier, or this one not behind ``low``."""
-    if met == math.inf:
+def earlier_bend(bend_parameter, foot, scale, low, bend):
+    """Return t at a parameter if it lies beyond ``low`` and before ``bend``, else ``bend``."""
+    if bend_parameter == math.inf:
         return bend
-    t = t_after((met - foot) / scale)
+    t = graded_parameter((bend_parameter - foot) / scale)
     return t if low + LEAST_WIDTH < t < bend else bend

@@ -1,19 +1,25 @@
-"""Forces between outlines: the pressure of the laws summed over the one in the field of the other.
+"""Forces between outlines: the pressure of the laws integrated over one outline in the other's
+field.
 
-A body at rest in the field of another has the energy ∫ Ψ dA, and the force −∮ Ψ n ds, torque alike:
-what a law gives is −Ψ, the pressure between two plates at that gap. Of the two bodies the smaller
-one is gone along. All is in the frame of the other.
+A body at rest in the field of another has the energy E = ∫ Ψ dA, hence the force
+
+    F = −∮ Ψ n ds,   τ = −∮ Ψ (r × n) ds,
+
+and a law gives −Ψ, the pressure between two plates at a given gap. The integral runs over the
+outline of the smaller body, in the frame of the other; the other body feels the reverse. The
+attraction is evaluated within a lens around each point (geometry.contact.attraction), so pieces
+that are farther apart are never listed.
 """
 
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.attraction import add_arc, add_segment, find_plates
+from flocsim.geometry.contact.attraction import add_arc, add_segment, convert_to_plate_gaps
 from flocsim.geometry.contact.points import length_of, separation
 from flocsim.geometry.shapes.pieces import (
     Pose,
     are_within,
-    between_cores,
+    closest_points,
     ends_of,
     may_be_within,
     piece_at,
@@ -21,8 +27,8 @@ from flocsim.geometry.shapes.pieces import (
 )
 from flocsim.hooks import ORIENTED_ENERGY, OUTLINE_PRESSURE, has, hook, outline_pressure
 from flocsim.integrators.rhs.charge_sum import sum_charges
-from flocsim.integrators.rhs.orientation import between_oriented
-from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, growth_at, put_side
+from flocsim.integrators.rhs.orientation import oriented_forces_at
+from flocsim.integrators.rhs.outline_nodes import MOST_PANELS, find_feet, gap_expansion, write_side
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import ANGLE
 from flocsim.state.outlines import (
@@ -33,38 +39,39 @@ from flocsim.state.views import OutlineView
 from flocsim.state.work import NOW
 
 LENS = 300.0
-"""Attraction counts up to so many times √(gap · least gap that is asked for): what is further comes
-to less than 1e-6 of the attraction of touching outlines, as it fades and is made up for
-(attraction.py). A narrower lens takes less time a sum, and more steps."""
+"""The attraction is evaluated up to LENS · √(gap · d_min). What lies beyond is less than 1e-6 of
+the attraction at touch, as the integrand fades out and is compensated for it (attraction.py). A
+narrower lens takes less time per sum, but more steps."""
 
 SKIN, MOST_SKIN = 1.0, 4.0
-"""Pieces are listed to so much further than they count, so that lists last, and anew where it is
-more than the latter."""
+"""Pieces are listed up to (1 + SKIN) times the lens, so that lists last, and anew if they reach
+further than (1 + MOST_SKIN) times as far as needed."""
 
-UNMOVED = Pose(0.0, 0.0, 1.0, 0.0)
-"""Of the body in whose frame all is."""
+AT_ORIGIN = Pose(0.0, 0.0, 1.0, 0.0)
+"""Pose of the body in whose frame the sum is evaluated."""
 
-AT_ONCE = 8
-"""Nodes that a processor takes at once at most."""
+VECTOR_WIDTH = 8
+"""Nodes that a processor evaluates in one vector at most."""
 
 
-def list_near(scene, work, a, b, pose, reach):
-    """List the pieces of two bodies that are nearer to each other than ``reach``."""
+def list_near_pieces(scene, work, a, b, pose, reach):
+    """List the pieces of two bodies that are nearer to each other than ``reach`` [m]."""
     near, listed = work.near, work.listed
+    # First against the other body's bounding circle, then piece against piece.
     list_within(scene.pieces, near.first, scene.first_piece[a], scene.first_piece[a + 1],
                 pose, 0.0, 0.0, scene.bodies[b].bounding_radius + reach)  # fmt: skip
     list_within(scene.pieces, near.second, scene.first_piece[b], scene.first_piece[b + 1],
-                UNMOVED, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
-    keep_paired(scene.pieces, near.first, pose, near.second, UNMOVED, reach)
-    keep_paired(scene.pieces, near.second, UNMOVED, near.first, pose, reach)
+                AT_ORIGIN, pose.x, pose.y, scene.bodies[a].bounding_radius + reach)  # fmt: skip
+    keep_close_pieces(scene.pieces, near.first, pose, near.second, AT_ORIGIN, reach)
+    keep_close_pieces(scene.pieces, near.second, AT_ORIGIN, near.first, pose, reach)
     listed.first_body, listed.second_body, listed.reach = a, b, reach
     listed.x, listed.y = pose.x, pose.y
     listed.cosine, listed.sine = pose.cosine, pose.sine
 
 
 def list_within(pieces, rows, first, last, pose, x, y, reach):
-    """List the pieces from ``first`` on, of a body in a Pose, that may be within a reach of a
-    point [m]."""
+    """List those of the pieces ``first`` to ``last`` of a body in a Pose that may be within
+    ``reach`` of a point [m]."""
     count = 0
     for row in range(first, last):
         piece = placed(pieces, row, pose)
@@ -75,8 +82,9 @@ def list_within(pieces, rows, first, last, pose, x, y, reach):
     rows[0] = count
 
 
-def keep_paired(pieces, rows, pose, others, other_pose, reach):
-    """Keep of some pieces those that are within a reach of one of others [m]."""
+def keep_close_pieces(pieces, rows, pose, others, other_pose, reach):
+    """Keep those listed pieces that are within ``reach`` of a piece of another list [m]."""
+    # Compact the list in place.
     count = 0
     for i in range(1, rows[0] + 1):
         one = placed(pieces, rows[i], pose)
@@ -88,33 +96,34 @@ def keep_paired(pieces, rows, pose, others, other_pose, reach):
     rows[0] = count
 
 
-def slack_of(scene, work, a, b, pose):
-    """How near to each other pieces have to be so that they are listed, as bodies lie by now [m];
-    below 0 where none are."""
+def listed_distance(scene, work, a, b, pose):
+    """Return up to which distance pieces are certainly listed, as bodies have moved by now [m];
+    below 0 if none are."""
     listed = work.listed
     if listed.first_body != a or listed.second_body != b:
         return -1.0
-    way = length_of(pose.x - listed.x, pose.y - listed.y)
+    # Both translation and rotation of the first body use the listed distance up.
+    displacement = length_of(pose.x - listed.x, pose.y - listed.y)
     c, s = pose.cosine - listed.cosine, pose.sine - listed.sine
-    return listed.reach - way - scene.bodies[a].bounding_radius * length_of(c, s)
+    return listed.reach - displacement - scene.bodies[a].bounding_radius * length_of(c, s)
 
 
-def gap_listed(scene, work, pose):
-    """The least gap of the pieces that are listed [m]; inf where none are."""
+def least_piece_gap(scene, work, pose):
+    """Return the least gap of the listed pieces [m]; inf if none are."""
     near, least = work.near, math.inf
     for i in range(near.first[0]):
         one = placed(scene.pieces, near.first[1 + i], pose)
         for j in range(near.second[0]):
             other = piece_at(scene.pieces, near.second[1 + j])
             if may_be_within(one, other, least):
-                squared, _, _, _, _ = between_cores(one, other)
-                least = min(least, math.sqrt(squared) - one.inward - other.inward)
+                squared, _, _, _, _ = closest_points(one, other)
+                least = min(least, math.sqrt(squared) - one.core_depth - other.core_depth)
     return least
 
 
-def look_around_piece(scene, work, piece, lens):
+def list_around_piece(scene, work, piece, lens):
     """List the pieces of the other body that may be within ``lens`` of one, and add them to those
-    that have been so far; how many they are."""
+    seen so far; return their number."""
     near, count = work.near, 0
     for j in range(near.second[0]):
         row = near.second[1 + j]
@@ -127,7 +136,7 @@ def look_around_piece(scene, work, piece, lens):
 
 
 def add_row(rows, row):
-    """Add a row to some unless it is among them."""
+    """Add a row to a list unless it is there."""
     for k in range(1, rows[0] + 1):
         if rows[k] == row:
             return
@@ -135,36 +144,36 @@ def add_row(rows, row):
     rows[rows[0]] = row
 
 
-def look_from(scene, work, count, inset, lens):
-    """Look from so many nodes at the pieces that are around any: how far they are, and at which gap
-    plates attract each other as they do."""
+def evaluate_nodes(scene, work, count, inset, lens):
+    """Evaluate, at the first ``count`` nodes, their gap and the gap at which plates attract as
+    strongly."""
     near = work.near
     for j in range(near.seen[0]):
         piece = piece_at(scene.pieces, near.seen[1 + j])
-        if piece.bend > 0.0:
+        if piece.arc_radius > 0.0:
             add_arc(work.nodes, count, piece, inset, lens)
         else:
             add_segment(work.nodes, count, piece, inset, lens)
-    find_plates(work.nodes, count, inset, lens)
+    convert_to_plate_gaps(work.nodes, count, inset, lens)
 
 
-def add_nodes(scene, work, total, count, numbers):
-    """(fx, fy, torque about the origin) of so many nodes, added to a total."""
-    inset, lens, view = numbers
+def sum_nodes(scene, work, total, count, setup):
+    """Add (fx, fy, torque about the origin) of the first ``count`` nodes to a total."""
+    inset, lens, view = setup
     fx, fy, torque = total
     nodes = work.nodes
-    # Several are looked from at once: as if there were some more, of no weight.
-    whole = -(-count // AT_ONCE) * AT_ONCE
+    # Pad to whole vectors with copies of the last node, which the sum skips.
+    whole = -(-count // VECTOR_WIDTH) * VECTOR_WIDTH
     for k in range(count, whole):
         nodes.x[k], nodes.y[k] = nodes.x[count - 1], nodes.y[count - 1]
         nodes.gap[k], nodes.attraction[k] = nodes.gap[count - 1], nodes.attraction[count - 1]
-    look_from(scene, work, whole, inset, lens)
+    evaluate_nodes(scene, work, whole, inset, lens)
     for k in range(count):
         gap = nodes.gap[k]
         if gap < lens:
             parted, plates = gap + inset, nodes.plate_gap[k]
-            # The more an outline bends away, the more of what attracts is near: of circles the
-            # share of a depth is that of plates within 1 % up to a gap of a third of it.
+            # The more an outline curves away, the nearer is all that attracts. For circles this gap
+            # gives the fraction lost to a finite depth within 1 %, up to a gap of a third of it.
             point = OutlineView(
                 view.time, gap, parted, plates, parted * parted / plates, view.depth, view.radius_i,
                 view.radius_j, view.reduced_radius, view.effective_mass,
@@ -177,51 +186,59 @@ def add_nodes(scene, work, total, count, numbers):
 
 
 def radii_of(scene, a, b):
-    """The equivalent radii of two bodies [m]."""
+    """Return the equivalent radii of two bodies [m]."""
     return scene.bodies[a].equivalent_radius, scene.bodies[b].equivalent_radius
 
 
-def acts_along(scene):
-    """Whether anything acts along outlines, or by how bodies are turned."""
+def has_outline_forces(scene):
+    """Return True if the scene has forces along outlines or forces that depend on orientation."""
     return outline_reach(scene) > 0.0 or has(scene, ORIENTED_ENERGY)
 
 
 def outline_reach(scene):
-    """The gap of outlines up to which anything acts along them [m]; below 0 where nothing does."""
+    """Return the gap up to which forces act along outlines [m]; below 0 if none do."""
     return max(scene.outlines[0], scene.layer[2])
 
 
 def depth_of(scene, a, b):
-    """The depth along which two bodies act on each other [m]."""
+    """Return the depth over which two bodies act on each other [m]: given, or 4/3 of the smaller
+    radius."""
     if scene.outlines[2] > 0.0:
         return scene.outlines[2]
     radius_a, radius_b = radii_of(scene, a, b)
     return 4.0 / 3.0 * min(radius_a, radius_b)
 
 
-def lens_at(scene, least):
-    """How far counts around a point of one outline, as near as both are somewhere [m]; 0 where they
-    are too far from each other."""
+def lens_radius(scene, least):
+    """Return the radius around a point of one outline that counts, for a least gap [m]; 0 out of
+    reach."""
     reach, floor, _, steady = scene.outlines
     if not least < reach:
         return 0.0
+    # Attraction counts up to LENS · √(gap · d_min) within its reach, other pressures up to theirs.
     return max(min(LENS * math.sqrt(max(least, floor) * floor), reach), steady)
 
 
-def look_around(scene, work, time, a, b, pose):
-    """(inset, lens, OutlineView of the two) of body a in a Pose, the pieces within the lens being
-    listed; a lens of 0 where nothing acts along the outlines."""
+def prepare_sum(scene, work, time, a, b, pose):
+    """Return (inset, lens, OutlineView) of body a in a Pose; list the pieces within the lens.
+
+    ``lens`` is 0 if nothing acts. ``inset`` [m] is how far outlines nearer than d_min are moved
+    apart.
+    """
     reach, floor, _, _ = scene.outlines
-    slack = slack_of(scene, work, a, b, pose)
-    least = gap_listed(scene, work, pose) if slack > 0.0 else math.inf
-    lens = lens_at(scene, least)
+    # Lists are a superset of what counts, so when they were made does not affect the sum.
+    listed_to = listed_distance(scene, work, a, b, pose)
+    least = least_piece_gap(scene, work, pose) if listed_to > 0.0 else math.inf
+    lens = lens_radius(scene, least)
     needed = max(lens, min(least, reach))
-    if needed > slack or (1.0 + MOST_SKIN) * needed < slack:
-        list_near(scene, work, a, b, pose, (1.0 + SKIN) * reach)
-        least = gap_listed(scene, work, pose)
-        lens = lens_at(scene, least)
+    # Outside the lists, or far within them: list anew, first wide enough to find the least gap,
+    # then just the lens.
+    if needed > listed_to or (1.0 + MOST_SKIN) * needed < listed_to:
+        list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * reach)
+        least = least_piece_gap(scene, work, pose)
+        lens = lens_radius(scene, least)
         if lens > 0.0:
-            list_near(scene, work, a, b, pose, (1.0 + SKIN) * lens)
+            list_near_pieces(scene, work, a, b, pose, (1.0 + SKIN) * lens)
     radius_a, radius_b = radii_of(scene, a, b)
     view = OutlineView(
         time, least, least, least, least, depth_of(scene, a, b), radius_a, radius_b,
@@ -230,101 +247,116 @@ def look_around(scene, work, time, a, b, pose):
     return max(0.0, floor - least), lens, view
 
 
-def apart_for_sure(scene, a, b, pose):
-    """Whether two bodies are too far from each other for anything to act along outlines."""
+def out_of_reach(scene, a, b, pose):
+    """Return True if two bodies are certainly too far apart for forces along outlines."""
     bound = scene.bodies[a].bounding_radius + scene.bodies[b].bounding_radius
     return length_of(pose.x, pose.y) - bound > scene.outlines[0]
 
 
 @apart
-def sum_along(scene, work, time, a, b, x, y, cosine, sine):
-    """(fx, fy, torque about b's centroid) on body a [N, N, N m], in the frame of b, where a lies at
-    x, y [m] turned by an angle of that cosine and sine."""
+def sum_pressure(scene, work, time, a, b, x, y, cosine, sine):
+    """Return (fx, fy, torque about b's centroid) on body a [N, N, N m], in the frame of b.
+
+    In this frame a lies at x, y [m], turned by the angle of the given cosine and sine.
+    """
     pose, total = Pose(x, y, cosine, sine), (0.0, 0.0, 0.0)
-    if apart_for_sure(scene, a, b, pose):
+    if out_of_reach(scene, a, b, pose):
         return total
-    numbers = look_around(scene, work, time, a, b, pose)
-    inset, lens, view = numbers
+    setup = prepare_sum(scene, work, time, a, b, pose)
+    inset, lens, view = setup
     if lens == 0.0:
         return total
     count, least, work.near.seen[0] = 0, view.gap + inset, 0
     for i in range(work.near.first[0]):
         piece = placed(scene.pieces, work.near.first[1 + i], pose)
-        if look_around_piece(scene, work, piece, lens) == 0:
+        if list_around_piece(scene, work, piece, lens) == 0:
             continue
         feet = find_feet(scene, work, piece, inset, lens)
         first, last = ends_of(piece)
+        # Both sides of each foot, up to halfway to the next.
         for k in range(feet):
             foot = work.feet[k]
-            growth = growth_at(scene, work, piece, foot)
+            growth = gap_expansion(scene, work, piece, foot)
             low = first if k == 0 else 0.5 * (work.feet[k - 1] + foot)
             high = last if k == feet - 1 else 0.5 * (work.feet[k + 1] + foot)
             if low < foot:
-                count = put_side(scene, work, count, piece, foot, growth, low, inset, lens, least)
+                count = write_side(scene, work, count, piece, foot, growth, low, inset, lens, least)
             if foot < high:
-                count = put_side(scene, work, count, piece, foot, growth, high, inset, lens, least)
+                count = write_side(
+                    scene, work, count, piece, foot, growth, high, inset, lens, least
+                )
+            # Work in batches of at most MOST_NODES.
             if count > MOST_NODES - 2 * MOST_PANELS * MOST_ORDER:
-                total = add_nodes(scene, work, total, count, numbers)
+                total = sum_nodes(scene, work, total, count, setup)
                 count = 0
-    fx, fy, torque = add_nodes(scene, work, total, count, numbers)
+    fx, fy, torque = sum_nodes(scene, work, total, count, setup)
     return view.depth * fx, view.depth * fy, view.depth * torque
 
 
-def between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b):
-    """(fx, fy, torque on a, torque on b) of the forces on body a [N, N, N m], each torque about its
-    own centroid, a being seen from b at x, y [m]; b feels the reverse of fx, fy. ``a``: the later
-    one of the two."""
+def outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b):
+    """Return (fx, fy, torque on a, torque on b) of forces along outlines and oriented forces [N, N
+    m].
+
+    Body a, the later one, is seen from b at x, y [m]; b feels the reverse of fx, fy. Each torque is
+    about the body's own centroid.
+    """
     fx, fy, torque_a, torque_b = 0.0, 0.0, 0.0, 0.0
     if outline_reach(scene) > 0.0:
-        fx, fy, torque_a, torque_b = between_sized(scene, work, time, a, b, x, y, angle_a, angle_b)
+        fx, fy, torque_a, torque_b = size_ordered_forces(
+            scene, work, time, a, b, x, y, angle_a, angle_b
+        )
     if has(scene, ORIENTED_ENERGY):
-        more = between_oriented(scene, time, a, b, x, y, angle_a, angle_b)
+        more = oriented_forces_at(scene, time, a, b, x, y, angle_a, angle_b)
         return fx + more[0], fy + more[1], torque_a + more[2], torque_b + more[3]
     return fx, fy, torque_a, torque_b
 
 
-def between_sized(scene, work, time, a, b, x, y, angle_a, angle_b):
-    """The same of forces along outlines alone."""
+def size_ordered_forces(scene, work, time, a, b, x, y, angle_a, angle_b):
+    """Return the same for forces along outlines alone: the integral runs over the smaller body."""
     # The smaller one is gone along.
     if scene.bodies[a].bounding_radius > scene.bodies[b].bounding_radius:
-        fx, fy, torque_b, torque_a = between_in_order(
+        fx, fy, torque_b, torque_a = forces_in_frame(
             scene, work, time, b, a, -x, -y, angle_b, angle_a
         )
         return -fx, -fy, torque_a, torque_b
-    return between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b)
+    return forces_in_frame(scene, work, time, a, b, x, y, angle_a, angle_b)
 
 
-def between_in_order(scene, work, time, a, b, x, y, angle_a, angle_b):
+def forces_in_frame(scene, work, time, a, b, x, y, angle_a, angle_b):
+    # Into the frame of b.
     c, s = math.cos(angle_b), math.sin(angle_b)
     turn = angle_a - angle_b
     seen_x, seen_y = c * x + s * y, c * y - s * x
     cosine, sine = math.cos(turn), math.sin(turn)
     across, up, torque = 0.0, 0.0, 0.0
+    # Pressures and charges may act together.
     if has(scene, OUTLINE_PRESSURE):
-        across, up, torque = sum_along(scene, work, time, a, b, seen_x, seen_y, cosine, sine)
+        across, up, torque = sum_pressure(scene, work, time, a, b, seen_x, seen_y, cosine, sine)
     if scene.layer[2] > 0.0:
         fx, fy, turning = sum_charges(scene, work, a, b, seen_x, seen_y, cosine, sine)
         depth = depth_of(scene, a, b)
         across, up, torque = across + depth * fx, up + depth * fy, torque + depth * turning
+    # The torque about a's own centroid, and back into the scene's frame.
     own = torque - (seen_x * up - seen_y * across)
     return c * across - s * up, s * across + c * up, own, -torque
 
 
 @hook
-def outlines_apart(scene, work, time, a, b, way):
-    """What pushes two bodies apart along the line of centres [N], a being moved out along it from
-    where it is now by a way [m]."""
+def outline_repulsion(scene, work, time, a, b, displacement):
+    """Return the repulsion of two bodies along the line of centres [N], with a moved out along it
+    by ``displacement`` [m]."""
     x, y = separation(scene, work, NOW, a, b)
     distance = length_of(x, y)
     nx, ny = (x / distance, y / distance) if distance > 0.0 else (0.0, 1.0)
     angle_a, angle_b = work.place[NOW, a, ANGLE], work.place[NOW, b, ANGLE]
-    x, y = x + way * nx, y + way * ny
-    fx, fy, _, _ = between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)
+    # Move a out, keeping its orientation.
+    x, y = x + displacement * nx, y + displacement * ny
+    fx, fy, _, _ = outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b)
     return fx * nx + fy * ny
 
 
-def outlines_in(scene, work, time, state, a, b):
-    """The same of two bodies in a state."""
+def outline_forces_in(scene, work, time, state, a, b):
+    """Return outline_forces_at of two bodies in a state."""
     x, y = separation(scene, work, state, a, b)
     angle_a, angle_b = work.place[state, a, ANGLE], work.place[state, b, ANGLE]
-    return between_outlines(scene, work, time, a, b, x, y, angle_a, angle_b)
+    return outline_forces_at(scene, work, time, a, b, x, y, angle_a, angle_b)

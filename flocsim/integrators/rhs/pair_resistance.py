@@ -1,11 +1,15 @@
-"""What two bodies' motion and a flow's strain put on both through the water between them.
+"""Hydrodynamic resistance of two bodies: lubrication and the pull of a strained flow.
 
-The resistance is a sum of squares (hydrodynamics/pair.py), each of a sum of the velocities of
-both bodies: three of common motion, at the distance of the centres, and three of relative motion,
-at a gap between that of the outlines and that of spheres of the same drag. So it is positive
-whatever the shapes. All are along and across the line of centres: the normal of the nearest points
-jumps from one arm of a floc to the next while the gap is still wide, at 16 times the steps. Body 1
-of the tables is the earlier one of a pair.
+The resistance matrix is a sum of squares, R = Σ_k q_k q_kᵀ (hydrodynamics/pair.py), each q_k·v a
+linear combination of the velocities of both bodies: three of common motion, tabulated by the
+distance of the centres, and three of relative motion, tabulated by a gap between that of the
+outlines and that of spheres of the same drag. So R is positive for any shapes. The force on both is
+
+    F = Σ_k q_k (load_k − q_k·v),
+
+load_k being what the strain rate of the flow adds. Directions are along and across the line of
+centres: the normal at the nearest points jumps from one arm of a floc to the next while the gap is
+still wide, which took 16 times the steps. Body 1 of the tables is the earlier one of a pair.
 """
 
 import math
@@ -16,7 +20,7 @@ from flocsim.hooks import hook
 from flocsim.hydrodynamics.pair import COLUMNS, NEAREST, NODES_A_UNIT
 from flocsim.hydrodynamics.two_spheres import fading
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
-from flocsim.integrators.rhs.surface_gap import soften
+from flocsim.integrators.rhs.surface_gap import evaluate_smooth_gap
 from flocsim.integrators.rhs.views import add_force, centre_line
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import DAMPING, NOW, SQUARES, STIFFNESS
@@ -28,23 +32,27 @@ from flocsim.state.work import DAMPING, NOW, SQUARES, STIFFNESS
 """Columns of ``Scene.pair_table``."""
 
 LOAD = 6
-"""Column of ``Work.squares`` behind those of the velocities (v_n, v_t, spin) of both bodies, along
-and across the line of centres."""
+"""Column of ``Work.squares`` behind those of the velocities (v_n, v_t, spin) of both bodies."""
 
-COMMON, RELATIVE, PULL = 0, 3, SQUARES
-"""First rows of ``Work.squares`` of the two parts, and the row of what a strain pulls with."""
+COMMON, RELATIVE, TENSION = 0, 3, SQUARES
+"""First rows of ``Work.squares`` for common and for relative motion, and the row of the tension
+that a strain exerts."""
 
-LEAN, LEAN_FALLS, LEAN_MOST = 1.5, 0.9, 0.8
-"""By what a relative gap lies from that of the outlines towards that of the spheres, how that falls
-with the gap, and by how many mean radii the two may differ in it: fitted to rigid multiblobs of 160
-pairs of real flocs at .25 to 3 mean radii (benchmarks/accuracy/water_pairs.py)."""
+BLEND, BLEND_DECAY, BLEND_LIMIT = 1.5, 0.9, 0.8
+"""Position of the effective gap of relative motion between that of the outlines and that of the
+spheres: strength, decay with the gap, and largest difference in mean radii.
+
+Fitted to rigid multiblobs of 160 pairs of real flocs at .25 to 3 mean radii
+(benchmarks/accuracy/water_pairs.py).
+"""
 
 SPHERE_DRAG, SPHERE_TURN = 6.0 * math.pi, 8.0 * math.pi
-"""Of a sphere in slow flow, over µ r and µ r³."""
+"""Stokes drag of a sphere over µ r, and of its rotation over µ r³."""
 
 
 def interval_of(scene, gap):
-    """(interval, share of it) of the tables at a gap [m]; at an end where they do not reach."""
+    """Return (interval, fraction of it) of the tables at a gap [m], the ends where they do not
+    reach."""
     place = math.log(gap / (scene.water.mean_radius * NEAREST)) * NODES_A_UNIT
     last = scene.pair_table.shape[0] - 1
     interval = int(min(max(place, 0.0), last))
@@ -52,29 +60,29 @@ def interval_of(scene, gap):
 
 
 def column(scene, interval, share, which):
-    """The value of a column there."""
+    """Return the value of a column of the tables there: a cubic per interval."""
     c = scene.pair_table
     found = c[interval, which, 3] * share + c[interval, which, 2]
     return (found * share + c[interval, which, 1]) * share + c[interval, which, 0]
 
 
 def column_slope(scene, interval, share, which, gap):
-    """Its derivative by the gap there."""
+    """Return the derivative of a column by the gap there."""
     c = scene.pair_table
     found = 3.0 * c[interval, which, 3] * share + 2.0 * c[interval, which, 2]
     return (found * share + c[interval, which, 1]) * NODES_A_UNIT / gap
 
 
 def write_row(work, row, one, two, load):
-    """Write a square: entries (v_n, v_t, spin) of body 1 and of body 2, and its load."""
+    """Write one q: entries (v_n, v_t, spin) of body 1 and of body 2, and its load."""
     s = work.squares
     s[row, 0], s[row, 1], s[row, 2] = one
     s[row, 3], s[row, 4], s[row, 5] = two
     s[row, LOAD] = load
 
 
-def value_in(work, row, motion):
-    """A row times velocities (6,)."""
+def row_times(work, row, motion):
+    """Return q·v of a row and velocities (6,)."""
     s = work.squares
     return (
         s[row, 0] * motion[0] + s[row, 1] * motion[1] + s[row, 2] * motion[2]
@@ -83,7 +91,7 @@ def value_in(work, row, motion):
 
 
 def motion_in(work, state, one, two, nx, ny):
-    """(v_n, v_t, spin) of both bodies in a state."""
+    """Return (v_n, v_t, spin) of both bodies in a state."""
     x, y = work.velocity[state, one, X], work.velocity[state, one, Y]
     x_2, y_2 = work.velocity[state, two, X], work.velocity[state, two, Y]
     return (
@@ -92,8 +100,8 @@ def motion_in(work, state, one, two, nx, ny):
     )  # fmt: skip
 
 
-def against_flow(scene, work, state, one, two, nx, ny, motion):
-    """The same against the flow at each body."""
+def relative_to_flow(scene, work, state, one, two, nx, ny, motion):
+    """Return the same relative to the flow at each body."""
     u, v, spin = flow_in(scene, work, state, one)
     u_2, v_2, _ = flow_in(scene, work, state, two)
     return (
@@ -103,7 +111,7 @@ def against_flow(scene, work, state, one, two, nx, ny, motion):
 
 
 def flow_in(scene, work, state, body):
-    """(u_x, u_y, spin) of the flow at a body."""
+    """Return (u_x, u_y, spin) of the flow at a body."""
     f = scene.water
     x, y = work.place[state, body, X], work.place[state, body, Y]
     u = f.flow_x + f.flow_x_by_x * x + f.flow_x_by_y * y
@@ -112,7 +120,7 @@ def flow_in(scene, work, state, body):
 
 
 def strain_along(scene, nx, ny):
-    """(E_nn, E_nt) of the flow [1/s], t being n turned counter-clockwise."""
+    """Return (E_nn, E_nt) of the flow [1/s], t being n turned counter-clockwise."""
     f = scene.water
     e_xx = 0.5 * (f.flow_x_by_x - f.flow_y_by_y)
     e_xy = 0.5 * (f.flow_x_by_y + f.flow_y_by_x)
@@ -121,7 +129,7 @@ def strain_along(scene, nx, ny):
 
 
 def write_common(scene, work, place, e_nn, e_nt):
-    """The squares of common motion against the flow."""
+    """Write the rows of common motion, which is relative to the flow."""
     interval, share = place
     first = column(scene, interval, share, N_1)
     other = column(scene, interval, share, N_2)
@@ -137,28 +145,29 @@ def write_common(scene, work, place, e_nn, e_nt):
 
 
 def write_relative(scene, work, place, arm, arm_2):
-    """The squares of relative motion: of the gap's rate, and of sliding where its middle is."""
+    """Write the rows of relative motion: the rate of the gap, and sliding at its middle."""
     interval, share = place
-    opens = column(scene, interval, share, GAP)
-    slides = column(scene, interval, share, SLIDE)
+    opening_root = column(scene, interval, share, GAP)
+    sliding_root = column(scene, interval, share, SLIDE)
     mixed = column(scene, interval, share, MIXED)
-    turns = column(scene, interval, share, TURN)
-    write_row(work, RELATIVE, (-opens, 0.0, 0.0), (opens, 0.0, 0.0), 0.0)
-    one, two = -slides * arm - mixed, -slides * arm_2 + mixed
-    write_row(work, RELATIVE + 1, (0.0, -slides, one), (0.0, slides, two), 0.0)
-    write_row(work, RELATIVE + 2, (0.0, 0.0, -turns), (0.0, 0.0, turns), 0.0)
+    turning_root = column(scene, interval, share, TURN)
+    write_row(work, RELATIVE, (-opening_root, 0.0, 0.0), (opening_root, 0.0, 0.0), 0.0)
+    one, two = -sliding_root * arm - mixed, -sliding_root * arm_2 + mixed
+    write_row(work, RELATIVE + 1, (0.0, -sliding_root, one), (0.0, sliding_root, two), 0.0)
+    write_row(work, RELATIVE + 2, (0.0, 0.0, -turning_root), (0.0, 0.0, turning_root), 0.0)
 
 
 def water_radius(scene, body):
-    """Of the sphere that has the body's drag [m]."""
+    """Return the radius of the sphere that has the body's drag [m]."""
     return scene.water.first_radius if body == 0 else scene.water.second_radius
 
 
 def relative_gap(scene, work, state, between):
-    """(the gap of two spheres that move against each other as the bodies do [m], how fast it grows
-    with the gap of the outlines), ``between`` being that of the spheres of their drag.
+    """Return the gap of two spheres with the same relative resistance as the bodies [m], and its
+    derivative by the gap of the outlines.
 
-    Far outlines are of no account, and at touch theirs is the gap.
+    ``between`` is the gap of the spheres of their drag. Far apart the outlines do not matter; at
+    touch their gap is the gap.
     """
     spheres = max(between, 0.0)
     if scene.water.near_cut == 0.0:
@@ -167,50 +176,58 @@ def relative_gap(scene, work, state, between):
         return spheres, 0.0
     if scene.surface_reach > 0.0:
         # Forces between the two outlines have asked for it just now.
-        found = work.tally.soft_gap
+        found = work.tally.smooth_gap
     else:
-        found, _ = soften(scene, work, state, 0, work.tally.candidates)
+        found, _ = evaluate_smooth_gap(scene, work, state, 0, work.tally.candidates)
+    # Fade from the outlines' gap to the spheres'.
     near, _ = fading(found, scene.water.near_cut)
     outlines, mean = max(found, 0.0), scene.water.mean_radius
-    lean = LEAN_MOST * math.tanh((between - found) / (LEAN_MOST * mean))
-    factor = math.exp(LEAN * mean / (mean + LEAN_FALLS * outlines) * lean)
+    difference = BLEND_LIMIT * math.tanh((between - found) / (BLEND_LIMIT * mean))
+    factor = math.exp(BLEND * mean / (mean + BLEND_DECAY * outlines) * difference)
     return near * outlines * factor + (1.0 - near) * spheres, near * factor
 
 
 @apart
 def write_squares(scene, work, state, one, two):
-    """Write the resistance of two bodies to ``work.squares``: (the share of it that counts, by how
-    much relative resistance along the gap of the outlines grows with that gap [N s/m²], the
-    direction from 1 to 2)."""
+    """Write the resistance of two bodies to ``work.squares``.
+
+    Return (fraction that counts, derivative of the relative resistance along the gap by the gap of
+    the outlines [N s/m²], direction n_x, n_y from 1 to 2).
+    """
     nx, ny, distance = centre_line(scene, work, state, two, one)
     radius = water_radius(scene, one)
     sizes = radius + water_radius(scene, two)
     far, _ = fading(distance - sizes, scene.water.cut)
     if far == 0.0:
         return 0.0, 0.0, nx, ny
+    # Common motion, at the gap of the spheres.
     floor, slope = scene.water.floor, 0.0
     gap = max(distance - sizes, floor)
     e_nn, e_nt = strain_along(scene, nx, ny)
     write_common(scene, work, interval_of(scene, gap), e_nn, e_nt)
+    # Relative motion, at the gap between outlines and spheres; sliding acts in the middle of the
+    # gap.
     arm = distance * (radius + 0.5 * gap) / (sizes + gap)
-    found, grows = relative_gap(scene, work, state, distance - sizes)
+    found, sensitivity = relative_gap(scene, work, state, distance - sizes)
     gap = max(found, floor)
     place = interval_of(scene, gap)
     write_relative(scene, work, place, arm, distance - arm)
+    # Below ``floor`` the resistance is constant.
     if found > floor:
         interval, share = place
         size = column(scene, interval, share, GAP)
-        slope = 2.0 * far * grows * size * column_slope(scene, interval, share, GAP, gap)
-    t_n, t_t, t_s = pull_at(scene, place, distance / (sizes + found))
+        slope = 2.0 * far * sensitivity * size * column_slope(scene, interval, share, GAP, gap)
+    # Tension by the strain, on bodies that are held together.
+    t_n, t_t, t_s = strain_tension(scene, place, distance / (sizes + found))
     t_n, t_t, t_s = t_n * e_nn, t_t * e_nt, t_s * e_nt
     one_pull, two_pull = (-t_n, -t_t, -arm * t_t - t_s), (t_n, t_t, (arm - distance) * t_t + t_s)
-    write_row(work, PULL, one_pull, two_pull, 0.0)
+    write_row(work, TENSION, one_pull, two_pull, 0.0)
     return far, slope, nx, ny
 
 
-def pull_at(scene, place, size):
-    """What a strain of 1/s pulls at the two with while they are held together, times ``size``:
-    tension, shear [N s] and torque [N m s]."""
+def strain_tension(scene, place, size):
+    """Return the tension, shear [N s] and torque [N m s] per unit strain rate on two bodies held
+    together, times ``size``."""
     interval, share = place
     return (
         size * column(scene, interval, share, T_N), size * column(scene, interval, share, T_T),
@@ -218,16 +235,17 @@ def pull_at(scene, place, size):
     )  # fmt: skip
 
 
-def own_drag(scene, body):
-    """(of velocities, of the spin) Stokes drag of the sphere of its drag [N s/m, N m s]."""
+def sphere_drag(scene, body):
+    """Return the Stokes drag of the sphere of a body's drag, for velocity and spin [N s/m, N m
+    s]."""
     radius, viscosity = water_radius(scene, body), scene.water.viscosity
     return SPHERE_DRAG * viscosity * radius, SPHERE_TURN * viscosity * radius**3
 
 
 @hook
 def add_pair_resistance(scene, work, state):
-    """Add what the water between two bodies puts on them in a state, which is located, beside their
-    Stokes drag."""
+    """Add to the forces of a located state what the water between two bodies exerts beyond Stokes
+    drag."""
     if scene.water.cut == 0.0:
         return
     s = work.squares
@@ -237,19 +255,22 @@ def add_pair_resistance(scene, work, state):
         if far == 0.0:
             continue
         motion = motion_in(work, state, one, two, nx, ny)
-        against = against_flow(scene, work, state, one, two, nx, ny, motion)
-        (drag, turn), (drag_2, turn_2) = own_drag(scene, one), own_drag(scene, two)
+        against = relative_to_flow(scene, work, state, one, two, nx, ny, motion)
+        (drag, turn), (drag_2, turn_2) = sphere_drag(scene, one), sphere_drag(scene, two)
+        # The tables hold the whole resistance: take each body's own Stokes drag off.
         n, t, spin = drag * against[0], drag * against[1], turn * against[2]
         n_2, t_2, spin_2 = drag_2 * against[3], drag_2 * against[4], turn_2 * against[5]
         for row in range(SQUARES + 1):
+            # Tension counts as it is.
             size = 1.0
             if row < RELATIVE:
-                size = s[row, LOAD] - value_in(work, row, against)
-            elif row < PULL:
-                size = -value_in(work, row, motion)
+                size = s[row, LOAD] - row_times(work, row, against)
+            elif row < TENSION:
+                size = -row_times(work, row, motion)
             n, t, spin = n + size * s[row, 0], t + size * s[row, 1], spin + size * s[row, 2]
             n_2, t_2 = n_2 + size * s[row, 3], t_2 + size * s[row, 4]
             spin_2 += size * s[row, 5]
+        # Back to x and y.
         x, y, x_2, y_2 = n * nx - t * ny, n * ny + t * nx, n_2 * nx - t_2 * ny, n_2 * ny + t_2 * nx
         add_force(work, state, one, far * x, far * y, far * spin)
         add_force(work, state, two, far * x_2, far * y_2, far * spin_2)
@@ -257,8 +278,11 @@ def add_pair_resistance(scene, work, state):
 
 @hook
 def add_pair_damping(scene, work):
-    """Its derivatives now: by the velocities all of them, by the places that of the resistance
-    along the gap of the outlines, which grows without bounds."""
+    """Add the derivatives of that resistance to the Jacobian.
+
+    By velocities all of them; by positions only that of the resistance along the gap, which
+    diverges as the gap closes.
+    """
     if scene.water.cut == 0.0:
         return
     s, jacobian = work.squares, work.jacobian
@@ -268,25 +292,26 @@ def add_pair_damping(scene, work):
         if far == 0.0:
             continue
         blocks = (one, upper_block(work, pair), lower_block(work, pair), two)
-        opening = slope * value_in(work, RELATIVE, motion_in(work, NOW, one, two, nx, ny))
+        opening = slope * row_times(work, RELATIVE, motion_in(work, NOW, one, two, nx, ny))
+        # Rows along x and y; R = Σ q qᵀ, less each body's own drag.
         for row in range(SQUARES):
             for first in (0, 3):
                 n, t = s[row, first], s[row, first + 1]
                 s[row, first], s[row, first + 1] = n * nx - t * ny, n * ny + t * nx
             add_square(work, DAMPING, blocks, row, far)
         for body in (one, two):
-            drag, turn = own_drag(scene, body)
+            drag, turn = sphere_drag(scene, body)
             jacobian[DAMPING, body, 0, 0] -= far * drag
             jacobian[DAMPING, body, 1, 1] -= far * drag
             jacobian[DAMPING, body, 2, 2] -= far * turn
         size = s[RELATIVE, 3] * s[RELATIVE, 3] + s[RELATIVE, 4] * s[RELATIVE, 4]
         if opening != 0.0 and size > 0.0:
-            # Resistance to the rate of the gap grows as it closes.
+            # The resistance to the rate of the gap grows as the gap closes.
             add_square(work, STIFFNESS, blocks, RELATIVE, opening / (size * math.sqrt(size)))
 
 
 def add_square(work, kind, blocks, row, weight):
-    """Add a square, its entries along x and y, to the blocks of both bodies."""
+    """Add weight · q qᵀ of a row, with entries along x and y, to the blocks of both bodies."""
     s = work.squares
     for half in range(4):
         for i in range(3):
@@ -296,15 +321,15 @@ def add_square(work, kind, blocks, row, weight):
 
 
 def nothing_between(scene, work, state):
-    """Nothing acts between bodies through the water."""
+    """Add nothing: no water acts between the bodies."""
 
 
 def nothing_to_damp(scene, work):
-    """The same of its derivatives."""
+    """Add nothing, likewise."""
 
 
 LEFT_OUT: dict[Callable, Callable] = {
     add_pair_resistance: nothing_between,
     add_pair_damping: nothing_to_damp,
 }
-"""{hook: function} of a scene without, so that nothing of it is compiled."""
+"""{hook: function} for a scene without such water; nothing of it is compiled then."""

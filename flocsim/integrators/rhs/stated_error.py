@@ -1,22 +1,26 @@
-"""The error that a run states: what the errors of its steps and of its switches have led to by now.
+"""The stated error of a run: the accumulated effect of the errors of its steps and switches.
 
-A step's error of place stays, one of velocity goes on moving a body until drag has used it up:
+Sums. A displacement error of a step stays; a velocity error moves the body until drag has used it
+up after a relaxation time τ:
 
-    dE_x/dt = E_v,  dE_v/dt = −E_v/τ,
+    dE_x/dt = E_v,   dE_v/dt = −E_v/τ.
 
-with what every step adds to both. A switch adds to E_v: a touch that is noticed g too deep, or a
-parting g too late, at the speed v, leaves out (or adds) the contact's force for a time g/v.
-A contact that may be open, because it overlaps by no more than its gap may be wrong by, leaves the
-force in doubt for all of the step; where a step leaves its vibration out, the load decides.
-One that grazes (events/grazes.py) has a tangential force that it may have lost by the law, where it
-parts again and again: all of it counts as an error, and the load that it lifts.
+Each step adds its estimate to both. A switch adds to E_v: a touch detected g too deep, or a parting
+detected g too late, at speed v, omits (or adds) the contact's force for a time g/v. A contact whose
+overlap is within the uncertainty of its gap may in fact be open; its force is uncertain for the
+whole step, and if the step does not resolve its vibration, the load decides. A grazing contact
+(events/grazes.py) has a tangential force that the law would take away whenever it parts: all of it
+counts as an error, and so does the load that it lifts.
 
-These sums know nothing of what contacts take up, nor that errors cancel. A method that has the
-forces' derivatives carries the error on as a vector, too (radau/carried_error.py), and the smaller
-of both is stated. OF_VECTOR, OF_SWITCHES, and a method's ``estimate_share`` of
-what it estimates for its steps, were found on random runs that make a nudge grow less than tenfold
-(benchmarks/accuracy/stated_error.py); what amplifies it more, as a doublet that tips over one way
-or the other, is told by a nudged companion alone.
+Vector. The sums know neither that contacts absorb errors nor that errors cancel. A method with the
+forces' derivatives also propagates the error as a vector δ,
+
+    M δv̇ = −D δv − K δx + FORCING,   δẋ = δv
+
+(radau/carried_error.py), and the smaller of both is stated. SWITCH_AMPLIFICATION, VECTOR_SAFETY and
+a method's ``estimate_share`` were calibrated on random runs that amplify a perturbation less than
+tenfold (benchmarks/accuracy/stated_error.py). A run that amplifies it more, such as a doublet that
+tips over one way or the other, is detected only by a perturbed companion run (amplification.py).
 """
 
 import math
@@ -25,368 +29,426 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.candidates import slip_error
 from flocsim.geometry.contact.points import length_of
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, hook
-from flocsim.integrators.rhs.friction import coupling, grazing_force, normal_mobility
+from flocsim.integrators.rhs.friction import grazing_force, normal_mobility, tangential_coupling
 from flocsim.integrators.rhs.views import (
-    along_normal,
     contact_view,
     lever,
-    memory_of,
+    normal_component,
     normal_rate,
-    pressed_view,
+    velocity_lifetime_of,
+    view_without_slip,
 )
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.contacts import GRAZES, OPEN, TOUCHES
-from flocsim.state.work import CARRIED, CHANGE, DEVIATION, FORCING, NOW
+from flocsim.state.contacts import CLOSED, GRAZING, OPEN
+from flocsim.state.work import CHANGE, FORCING, NOW, PROPAGATED, STEP_ERROR
 
-OF_SWITCHES = 1.5
-"""By how much motion may have made the errors of switches grow."""
+SWITCH_AMPLIFICATION = 1.5
+"""Factor by which motion may have amplified the errors of switches."""
 
-OF_VECTOR = 13.0
-"""By how much the error may be larger than the vector of it that is carried along, …"""
+VECTOR_SAFETY = 13.0
+"""Safety factor on the size of the propagated vector: the true error may be larger by this."""
 
-OF_LOST = 2.5
-"""By how much motion may have made that grow which pairs that graze have lost: a
-carried error does not know that contacts end sooner or later by it, …"""
+GRAZING_AMPLIFICATION = 2.5
+"""Factor by which motion may have amplified the error due to grazing: the propagated error does not
+know that contacts end sooner or later because of it."""
 
-OF_BOUNDS = OF_LOST / OF_VECTOR
-"""… and has it by this share, for it is a bound, and no estimate that the vector has to cover."""
+GRAZING_IN_VECTOR = GRAZING_AMPLIFICATION / VECTOR_SAFETY
+"""Fraction of that error that enters the propagated vector. It is a bound already, so VECTOR_SAFETY
+must not multiply it."""
 
-LEAST, OF_SUMS = 0.006, 0.15 / OF_VECTOR
-"""… which, for its parts may cancel by chance, counts as this share of the tolerance at least, and
-as that of the sum of what switches have added: a dozen grazes kick it to and fro."""
+LEAST_VECTOR, SWITCH_FLOOR = 0.006, 0.15 / VECTOR_SAFETY
+"""Lower bounds of the vector's size, since its parts may cancel by chance: LEAST_VECTOR tolerances,
+and SWITCH_FLOOR of the sum of switching errors (a dozen grazes push it to and fro)."""
 
-DOUBT = 2.0
-"""A contact that overlaps by less than so many times what its gap may be wrong by may be open."""
+UNCERTAIN_OVERLAP = 2.0
+"""A contact may be open if its overlap is below this multiple of its gap's error."""
 
-UNRESOLVED = 50.0
-"""A step of so many times 1/ω0 leaves a contact's vibration out; a shorter one in part."""
+UNRESOLVED_PHASE = 50.0
+"""ω0 h from which a step leaves a contact's vibration out; shorter steps do so partly."""
 
-LONG = 1e6
-"""A relaxation so many times as long as a step counts as none."""
+LONG_RELAXATION = 1e6
+"""A relaxation time of more than this number of steps counts as infinite."""
 
 
-def carry_body(work, body, step):
-    """Carry the sums of a body's errors over a step."""
+def propagate_sums(work, body, step):
+    """Propagate the sums of a body's errors over a step: E_x += E_v τ (1 − e^(−h/τ)), E_v *=
+    e^(−h/τ)."""
     errors = work.errors[body]
-    lasting = errors.relaxation
-    left = math.exp(-step / lasting) if step < LONG * lasting else 0.0
-    way = step if lasting > LONG * step else lasting * (1.0 - left)
-    errors.place += errors.speed * way
-    errors.speed *= left
-    errors.switch_place += errors.switch_speed * way
-    errors.switch_speed *= left
-    errors.doubt_place += errors.doubt_speed * way
-    errors.doubt_speed *= left
+    relaxation = errors.relaxation_time
+    decay = math.exp(-step / relaxation) if step < LONG_RELAXATION * relaxation else 0.0
+    effective_time = step if relaxation > LONG_RELAXATION * step else relaxation * (1.0 - decay)
+    errors.displacement += errors.velocity * effective_time
+    errors.velocity *= decay
+    errors.switch_displacement += errors.switch_velocity * effective_time
+    errors.switch_velocity *= decay
+    errors.uncertain_displacement += errors.uncertain_velocity * effective_time
+    errors.uncertain_velocity *= decay
 
 
-def rate_of_growth(scene, work):
-    """By how much the velocity of the error changes over a step, along its place and over that
-    [1/s]: CHANGE is what CARRIED has become; above 0 where forces drive bodies apart, or together,
-    the more, the farther they are off. 0 where tangential displacements are wrong, too: the error
-    does not follow from what it was, then."""
+def error_growth_rate(scene, work):
+    """Return the rate at which the propagated error grew in velocity over a step, per unit of its
+    displacement [1/s]: e·Δė/e², CHANGE being what PROPAGATED has become.
+
+    It is positive where forces drive bodies apart, or together, the more the further they are off.
+    It is 0 if tangential displacements are in error, too, as growth then does not follow from the
+    positions.
+    """
     pushed = size = 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
             if work.velocity[FORCING, body, axis] != 0.0:
                 return 0.0
+            # Angles count as displacements of the outline.
             square = lever(scene, body, axis) ** 2
-            now, later = work.place[CARRIED, body, axis], work.place[CHANGE, body, axis]
+            now, later = work.place[PROPAGATED, body, axis], work.place[CHANGE, body, axis]
             more = work.velocity[CHANGE, body, axis]
-            more -= work.velocity[CARRIED, body, axis]
+            more -= work.velocity[PROPAGATED, body, axis]
             pushed += 0.5 * square * (now + later) * more
             size += square * 0.25 * (now + later) ** 2
     return pushed / size if pushed > 0.0 and size > 0.0 else 0.0
 
 
-def grow_sums(scene, work, step):
-    """Make the sums of errors grow as the vector of them does in a step in which nothing swings:
-    they know nothing else of an attraction that gets steeper."""
-    rate = min(rate_of_growth(scene, work), 1.0 / step)
+def amplify_sums(scene, work, step):
+    """Amplify the sums of errors as the vector grows in a step in which nothing vibrates.
+
+    Without it the sums miss the growth of errors by an attraction that gets steeper.
+    """
+    rate = min(error_growth_rate(scene, work), 1.0 / step)
     for body in range(work.poses.shape[0]):
         errors = work.errors[body]
-        errors.speed += rate * errors.place
-        errors.switch_speed += rate * errors.switch_place
-        errors.doubt_speed += rate * errors.doubt_place
+        errors.velocity += rate * errors.displacement
+        errors.switch_velocity += rate * errors.switch_displacement
+        errors.uncertain_velocity += rate * errors.uncertain_displacement
 
 
 @hook
-def carry_vector(scene, work, clock, step):
-    """Carry the error as a vector, too, where the method has the forces' derivatives; how large it
-    is in the place of an outline [m], inf where it has not."""
+def propagate_vector(scene, work, clock, step):
+    """Propagate the error as a vector if the method has the forces' derivatives. Return the largest
+    displacement of an outline [m], inf without such a vector."""
     return math.inf
 
 
 @apart
-def carry_errors(scene, work, clock, step):
-    """Carry every body's errors over a step that has been accepted, and add the step's own."""
+def propagate_errors(scene, work, clock, step):
+    """Propagate every body's errors over an accepted step, and add the step's own."""
     known = False
-    # All counts that is estimated where features come to share in a surface force inside of steps,
-    # and of steps across switches, of which nothing is carried on with motion.
+    # Estimates count in full for steps across switches, which have no propagated vector, and for
+    # surface forces, whose fractions may change inside a step.
     across = clock.across == 1.0
     share = 1.0 if scene.surface_reach > 0.0 else clock.estimate_share
     weight = 1.0 / share if across else 1.0
+    # Sums: propagate, then add the estimate of this step (in full across switches: 1/share undoes
+    # share).
     for body in range(work.poses.shape[0]):
         errors = work.errors[body]
-        carry_body(work, body, step)
-        errors.place += weight * errors.step_place
-        errors.speed += weight * errors.step_speed
-        known = known or errors.step_place + errors.step_speed > 0.0
+        propagate_sums(work, body, step)
+        errors.displacement += weight * errors.step_displacement
+        errors.velocity += weight * errors.step_velocity
+        known = known or errors.step_displacement + errors.step_velocity > 0.0
+    # The stated error by sums is that of the worst body, as contacts hand errors on.
     largest = 0.0
     for body in range(work.poses.shape[0]):
         errors = work.errors[body]
+        # A method that estimates no error per body gives one number for all.
         if not known:
-            errors.place += clock.step_error
-        stated = share * errors.place
-        stated += OF_SWITCHES * (errors.switch_place + errors.doubt_place)
+            errors.displacement += clock.step_error
+        stated = share * errors.displacement
+        stated += SWITCH_AMPLIFICATION * (
+            errors.switch_displacement + errors.uncertain_displacement
+        )
         largest = max(largest, stated)
         if across:
             for axis in range(3):
-                work.place[CARRIED, body, axis] += work.place[DEVIATION, body, axis]
-                work.velocity[CARRIED, body, axis] += work.velocity[DEVIATION, body, axis]
-    vector = math.inf if across else carry_vector(scene, work, clock, step)
+                work.place[PROPAGATED, body, axis] += work.place[STEP_ERROR, body, axis]
+                work.velocity[PROPAGATED, body, axis] += work.velocity[STEP_ERROR, body, axis]
+    # State the vector instead where it is smaller, with its safety factor and lower bounds.
+    vector = math.inf if across else propagate_vector(scene, work, clock, step)
     clock.error = 0.0
     for body in range(work.poses.shape[0]):
         errors = work.errors[body]
         stated = largest
         if vector < math.inf:
             least = max(
-                LEAST * clock.tolerance,
-                OF_SUMS * errors.switch_place,
+                LEAST_VECTOR * clock.tolerance,
+                SWITCH_FLOOR * errors.switch_displacement,
             )
-            own = max(carried_size(scene, work, body), least)
-            stated = min(stated, OF_VECTOR * own)
+            own = max(propagated_size(scene, work, body), least)
+            stated = min(stated, VECTOR_SAFETY * own)
         errors.stated = stated
         clock.error = max(clock.error, stated)
 
 
 @hook
 def overlap_error(scene, work, clock, row):
-    """By how much a method may have the overlap of a contact wrong beside its motion [m]."""
+    """Return the error of a contact's overlap apart from that of the motion [m], if the method has
+    any."""
     return 0.0
 
 
-def carried_size(scene, work, body):
-    """How large a body's carried error is in the place of its outline [m]."""
-    turn = scene.bodies[body].bounding_radius * abs(work.place[CARRIED, body, ANGLE])
-    return length_of(work.place[CARRIED, body, X], work.place[CARRIED, body, Y]) + turn
+def propagated_size(scene, work, body):
+    """Return the displacement of a body's outline by its propagated error [m]."""
+    turn = scene.bodies[body].bounding_radius * abs(work.place[PROPAGATED, body, ANGLE])
+    return length_of(work.place[PROPAGATED, body, X], work.place[PROPAGATED, body, Y]) + turn
 
 
-def certain_sum(work, body):
-    """By how much the place of a body may be wrong, by the sums of its errors, if no contact has
-    opened that may have [m]."""
+def certain_bound(work, body):
+    """Return the bound of a body's displacement error by steps and switches alone [m]."""
     errors = work.errors[body]
-    return errors.place + OF_SWITCHES * errors.switch_place
+    return errors.displacement + SWITCH_AMPLIFICATION * errors.switch_displacement
 
 
-def sum_of_place(work, body):
-    """By how much the place of a body may be wrong, by the sums of its errors [m]."""
-    return certain_sum(work, body) + OF_SWITCHES * work.errors[body].doubt_place
+def displacement_bound(work, body):
+    """Return the bound of a body's displacement error by all its sums, uncertain contacts included
+    [m]."""
+    return (
+        certain_bound(work, body) + SWITCH_AMPLIFICATION * work.errors[body].uncertain_displacement
+    )
 
 
-def hand_on(work, body, size):
-    """Count as its own error of a body what others have handed on to it; ``size`` [m]: of its
-    carried error."""
-    more = size - sum_of_place(work, body)
+def take_over_excess(work, body, size):
+    """Add to a body's own error whatever its propagated error ``size`` [m] exceeds its bound by: an
+    error that other bodies have handed on."""
+    more = size - displacement_bound(work, body)
     if more > 0.0:
-        work.errors[body].place += more
+        work.errors[body].displacement += more
 
 
-def shorten(scene, work):
-    """Shorten the carried error of every cluster to what its places can be wrong by: each by its
-    own sums, or by those of any other one, as bodies that hold each other hand their errors on.
-    Doubts count for their own bodies alone: what they come to is no error until it happens.
+def scale_down_clusters(scene, work):
+    """Scale the propagated error of every cluster of contacting bodies down to its bound.
 
-    All of it by one factor, for it must not give the cluster a momentum that no step and no switch
-    has given it, and velocities too: those of vibrations are what their places make them.
+    The bound of a body is its own, or the largest certain one in its cluster, as bodies in contact
+    hand errors on. Uncertain contacts count for their own bodies only. One factor scales
+    displacements and velocities of the whole cluster: anything else would give it a momentum that
+    no error has caused, and velocities of vibrations belong to their displacements.
     """
     for body in range(work.poses.shape[0]):
-        work.clusters[body].shortened, work.clusters[body].most_place = 1.0, 0.0
+        work.clusters[body].scale, work.clusters[body].largest_displacement = 1.0, 0.0
+    # The largest certain bound in each cluster.
     for body in range(work.poses.shape[0]):
         leader = work.cluster[body]
-        most = max(work.clusters[leader].most_place, certain_sum(work, body))
-        work.clusters[leader].most_place = most
+        bound = max(work.clusters[leader].largest_displacement, certain_bound(work, body))
+        work.clusters[leader].largest_displacement = bound
+    # The smallest factor that its bodies need.
     for body in range(work.poses.shape[0]):
-        leader, size = work.cluster[body], carried_size(scene, work, body)
-        most = max(work.clusters[leader].most_place, sum_of_place(work, body))
-        if size > most:
-            work.clusters[leader].shortened = min(work.clusters[leader].shortened, most / size)
+        leader, size = work.cluster[body], propagated_size(scene, work, body)
+        bound = max(work.clusters[leader].largest_displacement, displacement_bound(work, body))
+        if size > bound:
+            work.clusters[leader].scale = min(work.clusters[leader].scale, bound / size)
+    # Scale displacements, velocities, and offsets of tangential displacements.
     for body in range(work.poses.shape[0]):
-        share = work.clusters[work.cluster[body]].shortened
+        share = work.clusters[work.cluster[body]].scale
         if share < 1.0:
             for axis in range(3):
-                work.place[CARRIED, body, axis] *= share
-                work.velocity[CARRIED, body, axis] *= share
+                work.place[PROPAGATED, body, axis] *= share
+                work.velocity[PROPAGATED, body, axis] *= share
     for row in range(work.tally.candidates):
-        share = work.clusters[work.cluster[work.candidates[row].vertex_body]].shortened
+        share = work.clusters[work.cluster[work.candidates[row].vertex_body]].scale
         if share < 1.0:
             work.contacts[row].slip_offset *= share
 
 
-def bound_carried(scene, work):
-    """Keep the vector of every cluster within the sums of its parts, which a mode that switches
-    again and again would make it leave; the largest one of place [m]."""
+def bound_propagated(scene, work):
+    """Keep the propagated vector within the sums; return its largest displacement of an outline
+    [m].
+
+    A contact mode that switches again and again would otherwise pump the vector up.
+    """
     largest = 0.0
-    shorten(scene, work)
+    scale_down_clusters(scene, work)
     for body in range(work.poses.shape[0]):
-        size = carried_size(scene, work, body)
-        hand_on(work, body, size)
+        size = propagated_size(scene, work, body)
+        take_over_excess(work, body, size)
         largest = max(largest, size)
     return largest
 
 
-def add_impulse(scene, work, body, impulse, switched):
-    """Add what an impulse at its outline [N s] does to a body's velocity to the errors of pairs
-    that have ``switched``, or of those that may have."""
+def add_impulse_error(scene, work, body, impulse, switched):
+    """Add the velocity error at the outline due to an impulse [N s] to the sums of switches, if a
+    pair has ``switched``, else to those of uncertain contacts."""
     errors = work.errors[body]
     if scene.bodies[body].free == 1.0:
         size = scene.bodies[body].bounding_radius
+        # Largest velocity of an outline point per unit impulse at the outline.
         share = 1.0 / scene.bodies[body].mass + size * size / scene.bodies[body].inertia
         if switched:
-            errors.switch_speed += impulse * share
+            errors.switch_velocity += impulse * share
         else:
-            errors.doubt_speed += impulse * share
+            errors.uncertain_velocity += impulse * share
 
 
-def kick(scene, work, body, x, y, turn):
-    """Add an impulse [N s, N s, N m s] to a body's carried error."""
+def add_propagated_impulse(scene, work, body, x, y, turn):
+    """Add an impulse [N s, N s, N m s] to a body's propagated error."""
     if scene.bodies[body].free == 1.0:
         inertia = scene.bodies
-        work.velocity[CARRIED, body, X] += x / inertia[body].mass
-        work.velocity[CARRIED, body, Y] += y / inertia[body].mass
-        work.velocity[CARRIED, body, ANGLE] += turn / inertia[body].inertia
+        work.velocity[PROPAGATED, body, X] += x / inertia[body].mass
+        work.velocity[PROPAGATED, body, Y] += y / inertia[body].mass
+        work.velocity[PROPAGATED, body, ANGLE] += turn / inertia[body].inertia
 
 
-def kick_pair(scene, work, row, normal, tangential):
-    """Add the impulses of a contact [N s] to the carried errors of its bodies."""
+def add_pair_impulse(scene, work, row, normal, tangential):
+    """Add the impulses of a contact [N s] to the propagated errors of its bodies."""
     candidate = work.candidates[row]
     g = work.geometry
     nx, ny = g[NOW, row].normal_x, g[NOW, row].normal_y
     x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
     turn = g[NOW, row].vertex_arm_n * normal + g[NOW, row].vertex_arm_t * tangential
-    back = g[NOW, row].edge_arm_n * normal + g[NOW, row].edge_arm_t * tangential
-    kick(scene, work, candidate.vertex_body, x, y, turn)
-    kick(scene, work, candidate.edge_body, -x, -y, -back)
+    edge_torque = g[NOW, row].edge_arm_n * normal + g[NOW, row].edge_arm_t * tangential
+    add_propagated_impulse(scene, work, candidate.vertex_body, x, y, turn)
+    add_propagated_impulse(scene, work, candidate.edge_body, -x, -y, -edge_torque)
 
 
 def is_closed(work, row):
-    """Whether a pair is flagged as one that touches."""
-    return work.candidates[row].closed == TOUCHES
+    """Return True if a pair is flagged as touching with the whole contact law."""
+    return work.candidates[row].contact_mode == CLOSED
 
 
 def has_switched(work, row):
-    """Whether a pair touches, or no longer does, other than it is flagged."""
-    closed = TOUCHES if work.geometry[NOW, row].gap < 0.0 else OPEN
-    return closed != work.candidates[row].closed
+    """Return True if the gap of a pair says otherwise than its flag."""
+    closed = CLOSED if work.geometry[NOW, row].gap < 0.0 else OPEN
+    return closed != work.candidates[row].contact_mode
 
 
-def doubtful_time(work, row, step, doubt, resolved):
-    """For how much of a step it is in doubt whether a pair touched [s].
+def uncertain_time(work, row, step, overlap_uncertainty, resolved):
+    """Return the time within a step for which it is uncertain whether a pair touched [s].
 
-    How finely its touch was located says nothing of that later on: a contact that rests in a hair's
-    breadth of overlap, as the second one of two that an attraction presses, bears what it bears.
+    How finely its touch was located does not matter later on: a contact that rests in a tiny
+    overlap, such as the second of two that an attraction presses, bears what it bears.
     """
     gap = work.geometry[NOW, row].gap
+    # It switched: detected too late by (|gap| + its error)/speed.
     if has_switched(work, row):
         speed = abs(normal_rate(work, NOW, row))
-        return min((abs(gap) + doubt) / speed, step) if speed > 0.0 else step
-    deepest = max(doubt, DOUBT * abs(along_normal(work, row, work.place, DEVIATION)) * resolved)
+        return min((abs(gap) + overlap_uncertainty) / speed, step) if speed > 0.0 else step
+    # It did not: uncertain all along if the overlap is within its error.
+    deepest = max(
+        overlap_uncertainty,
+        UNCERTAIN_OVERLAP * abs(normal_component(work, row, work.place, STEP_ERROR)) * resolved,
+    )
     return step if -deepest < gap < 0.0 else 0.0
 
 
-def pressed(scene, view, overlap, overlap_rate):
-    """The normal force of a contact with such an overlap [N]; 0 without a contact law."""
+def normal_force_at(scene, view, overlap, overlap_rate):
+    """Return the normal force of a contact at an overlap [m] and rate [m/s], 0 without a contact
+    law [N]."""
     if not has(scene, CONTACT_FORCE):
         return 0.0
-    force, _ = contact_force(scene, pressed_view(view, overlap, overlap_rate))
+    force, _ = contact_force(scene, view_without_slip(view, overlap, overlap_rate))
     return force
 
 
-def pressed_stiffness(scene, view, overlap):
-    """The normal force of a contact pressed so far, over that [N/m]."""
-    return pressed(scene, view, overlap, 0.0) / overlap
+def secant_stiffness(scene, view, overlap):
+    """Return the normal force of a static contact over its overlap [N/m]."""
+    return normal_force_at(scene, view, overlap, 0.0) / overlap
 
 
-def unresolved(scene, work, clock, step, row):
-    """The share of a step in which a contact only holds what presses on it: 1 where the step leaves
-    its vibration out, so that the load decides whether it is there."""
+def unresolved_fraction(scene, work, clock, step, row):
+    """Return min(1, (ω0 h/UNRESOLVED_PHASE)²): 1 if a step leaves the contact's vibration out.
+
+    Such a contact only balances its load, which then decides whether it touches.
+    """
+    # A series resolves every vibration.
     if work.tally.series_terms > 0:
         return 0.0
     view = contact_view(scene, work, NOW, row)
-    stiffness = pressed_stiffness(scene, view, clock.tolerance)
+    stiffness = secant_stiffness(scene, view, clock.tolerance)
     if not stiffness > 0.0:
         return 0.0
-    turns = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED
-    return min(1.0, turns * turns)
+    phase = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED_PHASE
+    return min(1.0, phase * phase)
 
 
-def signed_time(work, row, step, depth, doubt):
-    """The same, above 0 where the force has acted for too long, as the carried error has it."""
-    gap, wrong = work.geometry[NOW, row].gap, along_normal(work, row, work.place, CARRIED)
+def signed_excess_time(work, row, step, depth, overlap_uncertainty):
+    """Return the time for which the force of a pair acted too long, by the propagated error [s].
+
+    The signed counterpart of uncertain_time: negative if the force acted for too short.
+    """
+    gap, gap_error = (
+        work.geometry[NOW, row].gap,
+        normal_component(work, row, work.place, PROPAGATED),
+    )
     if has_switched(work, row):
         rate = normal_rate(work, NOW, row)
-        late = (gap - wrong) / rate if rate != 0.0 else 0.0
+        # The true switch was (gap − its propagated error)/rate ago.
+        delay = (gap - gap_error) / rate if rate != 0.0 else 0.0
         if rate != 0.0:
-            late += math.copysign(doubt / rate, late)
-        late = min(max(late, -step), step)
-        return -late if gap < 0.0 else late
-    return step if -max(depth, doubt, DOUBT * abs(wrong)) < gap < 0.0 else 0.0
+            delay += math.copysign(overlap_uncertainty / rate, delay)
+        delay = min(max(delay, -step), step)
+        return -delay if gap < 0.0 else delay
+    return (
+        step
+        if -max(depth, overlap_uncertainty, UNCERTAIN_OVERLAP * abs(gap_error)) < gap < 0.0
+        else 0.0
+    )
 
 
 def lifted_load(scene, work, row, tangential):
-    """The load [N] that a tangential force lifts, and which presses where that is not there."""
-    return tangential * coupling(scene, work, row) / normal_mobility(scene, work, row)
+    """Return the load [N] that a tangential force lifts, and that presses where the force is
+    absent."""
+    return tangential * tangential_coupling(scene, work, row) / normal_mobility(scene, work, row)
 
 
-def doubted(scene, work, row, tangential):
-    """What the carried error is to know of a tangential force [N] that may not have been there, its
-    load having pressed instead, or of an impulse [N s]: along the normal and the tangent, so that
-    it enlarges the error. What different contacts and times have lost must not cancel."""
-    normal, memory = -lifted_load(scene, work, row, tangential), memory_of(work, row)
-    apart = along_normal(work, row, work.place, CARRIED)
-    apart += memory * along_normal(work, row, work.velocity, CARRIED)
-    along = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
-    share = -OF_BOUNDS if normal * apart + tangential * along < 0.0 else OF_BOUNDS
+def grazing_error_source(scene, work, row, tangential):
+    """Return the source (normal, tangential) of the propagated error by a grazing pair [N].
+
+    Its tangential force may not have existed, its load pressing instead. The sign is chosen so that
+    the error grows: the losses of different contacts and times must not cancel. An impulse [N s]
+    may be given instead of a force.
+    """
+    normal, memory = -lifted_load(scene, work, row, tangential), velocity_lifetime_of(work, row)
+    # Work of the source on the present error, velocities included over their lifetime.
+    opening = normal_component(work, row, work.place, PROPAGATED)
+    opening += memory * normal_component(work, row, work.velocity, PROPAGATED)
+    slipping = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
+    share = (
+        -GRAZING_IN_VECTOR if normal * opening + tangential * slipping < 0.0 else GRAZING_IN_VECTOR
+    )
     return share * normal, share * tangential
 
 
-def doubt_tangential(scene, work, row, step):
-    """Count as an error all that the tangential force of a pair that grazes has done in a step: by
-    the law the pair loses it whenever it parts, and is pressed by what it has lifted instead."""
+def add_grazing_uncertainty(scene, work, row, step):
+    """Count all that the tangential force of a grazing pair did in a step as an error: by the law
+    the pair loses it whenever it parts, and what it lifted presses instead."""
     candidate = work.candidates[row]
     force = grazing_force(work, NOW, row)
     impulse = step * length_of(lifted_load(scene, work, row, force), force)
-    impulse *= OF_LOST / OF_SWITCHES
-    add_impulse(scene, work, candidate.vertex_body, impulse, True)
-    add_impulse(scene, work, candidate.edge_body, impulse, True)
+    impulse *= GRAZING_AMPLIFICATION / SWITCH_AMPLIFICATION
+    add_impulse_error(scene, work, candidate.vertex_body, impulse, True)
+    add_impulse_error(scene, work, candidate.edge_body, impulse, True)
 
 
-def forget_offsets(work):
-    """Of pairs that are open, or slide, no displacement knows of the error that there is already:
-    ξ counts from where they will stick. By the law one that grazes has lost it."""
+def reset_slip_offsets(work):
+    """Set the offset of ξ for pairs that are open or slide: ξ counts anew from where they stick,
+    and so knows nothing of the present error. A grazing pair has lost its ξ by the law."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.sliding != 0 or not is_closed(work, row):
-            grazes = candidate.closed == GRAZES
-            lost = OF_BOUNDS * work.slip[NOW, row] if grazes else 0.0
+        if candidate.slide_direction != 0 or not is_closed(work, row):
+            grazes = candidate.contact_mode == GRAZING
+            lost = GRAZING_IN_VECTOR * work.slip[NOW, row] if grazes else 0.0
             work.contacts[row].slip_offset = lost - slip_error(work, row, work.place)
 
 
 def add_switch_errors(scene, work, clock, step, depth):
-    """Add the errors of pairs that have touched or parted, before they are flagged anew, and of
-    those closed by so little that they may be open; ``depth`` [m]: to which switches are told."""
+    """Add the errors of pairs that have touched or parted in a step, and of those closed by so
+    little that they may be open. Modes are still those of the step; ``depth`` [m] is the resolution
+    of switches."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.closed == GRAZES:
-            doubt_tangential(scene, work, row, step)
+        if candidate.contact_mode == GRAZING:
+            add_grazing_uncertainty(scene, work, row, step)
             continue
-        doubt = overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        resolved = 1.0 - unresolved(scene, work, clock, clock.staged_step, row)
-        late = doubtful_time(work, row, step, doubt, resolved)
-        signed = signed_time(work, row, step, depth, doubt)
-        if late > 0.0 or signed != 0.0:
+        # Times for which the contact force is uncertain: without sign for the sums, signed for the
+        # vector.
+        overlap_uncertainty = (
+            overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
+        )
+        resolved = 1.0 - unresolved_fraction(scene, work, clock, clock.stages_step, row)
+        delay = uncertain_time(work, row, step, overlap_uncertainty, resolved)
+        signed = signed_excess_time(work, row, step, depth, overlap_uncertainty)
+        if delay > 0.0 or signed != 0.0:
+            # Their impulses.
             normal, tangential = contact_force(scene, contact_view(scene, work, NOW, row))
-            impulse = late * length_of(normal, tangential)
+            impulse = delay * length_of(normal, tangential)
             switched = has_switched(work, row)
-            add_impulse(scene, work, candidate.vertex_body, impulse, switched)
-            add_impulse(scene, work, candidate.edge_body, impulse, switched)
-            kick_pair(scene, work, row, signed * normal, signed * tangential)
+            add_impulse_error(scene, work, candidate.vertex_body, impulse, switched)
+            add_impulse_error(scene, work, candidate.edge_body, impulse, switched)
+            add_pair_impulse(scene, work, row, signed * normal, signed * tangential)

@@ -1,9 +1,18 @@
-"""What kernels are shown: views of bodies, pairs and contacts, made from the arrays."""
+"""Views: what force kernels are given of a body, a pair or a contact, read from the arrays.
+
+Also the kinematics of a contact (rates of gap and slip) and how a force on a pair is added to both
+bodies. Along the normal n and the tangent t of a contact a pair of forces N, T acts as
+
+    F_a = N n + T t,   τ_a = N a_n + T a_t,      F_b = −F_a,   τ_b = −(N b_n + T b_t),
+
+a_n, a_t being the moments of unit forces (VertexAtEdge.vertex_arm_n, …). The rates of the gap and
+of the slip are the transposed relations, n·(v_a − v_b) + ω_a a_n − ω_b b_n and likewise for t.
+"""
 
 import math
 
 from flocsim.constants import CENTRE_SOFTENING
-from flocsim.geometry.contact.points import length_of, row_radii, separation
+from flocsim.geometry.contact.points import contact_radii, length_of, separation
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.views import BodyView, ContactView, PairView, PlainBodyView, moved_contact
@@ -29,7 +38,7 @@ def body_view(scene, work, time, state, body):
 
 
 def plain_body_view(scene, work, time, state, body):
-    """The same without the numbers of its shape."""
+    """Return the BodyView without the numbers of its shape."""
     place, velocity, own, kick = work.place, work.velocity, scene.bodies[body], work.kicks[body]
     return PlainBodyView(
         time,
@@ -42,7 +51,8 @@ def plain_body_view(scene, work, time, state, body):
 
 
 def effective_mass(scene, a, b):
-    """M = m_a m_b/(m_a + m_b) [kg]; the mass of the free one where the other is fixed."""
+    """Return M = m_a m_b/(m_a + m_b) [kg]; the mass of the free body if the other is fixed."""
+    # A fixed body has infinite mass.
     if scene.bodies[a].free == 0.0:
         return scene.bodies[b].mass
     if scene.bodies[b].free == 0.0:
@@ -52,37 +62,43 @@ def effective_mass(scene, a, b):
 
 
 def smaller_radius(scene, a, b):
-    """Equivalent radius of the smaller of two bodies [m]."""
+    """Return the equivalent radius of the smaller of two bodies [m]."""
     return min(scene.bodies[a].equivalent_radius, scene.bodies[b].equivalent_radius)
 
 
 def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
     radius_a = scene.bodies[a].equivalent_radius
     radius_b = scene.bodies[b].equivalent_radius
+    # r* = r_a r_b/(r_a + r_b).
     return PairView(
         time, gap, gap_rate, centre_distance, radius_a, radius_b,
         radius_a * radius_b / (radius_a + radius_b), effective_mass(scene, a, b),
     )  # fmt: skip
 
 
-def along_normal(work, row, of, state):
-    """n · (what the vertex's body has − what the edge's has) at a pair's contact point, in the
-    direction of now, ``of`` a state's places, a change of the gap [m], or velocities, its rate
-    [m/s]."""
+def normal_component(work, row, vectors, state):
+    """Return the relative displacement or velocity of a pair's contact point along its present
+    normal.
+
+    ``vectors`` is an array like work.place (result [m]) or work.velocity (result [m/s]), read at
+    ``state``; the value is that of the vertex's body minus that of the edge's.
+    """
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    change = g[NOW, row].normal_x * (of[state, a, X] - of[state, b, X])
-    change += g[NOW, row].normal_y * (of[state, a, Y] - of[state, b, Y])
-    change += g[NOW, row].vertex_arm_n * of[state, a, ANGLE]
-    return change - g[NOW, row].edge_arm_n * of[state, b, ANGLE]
+    change = g[NOW, row].normal_x * (vectors[state, a, X] - vectors[state, b, X])
+    change += g[NOW, row].normal_y * (vectors[state, a, Y] - vectors[state, b, Y])
+    change += g[NOW, row].vertex_arm_n * vectors[state, a, ANGLE]
+    return change - g[NOW, row].edge_arm_n * vectors[state, b, ANGLE]
 
 
 def normal_rate(work, state, row):
-    """n · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
+    """Return the rate of the gap of a pair in a state [m/s]: n · (v_a − v_b) at the contact
+    point."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
+    # Translation along n, then rotation with the arms of the contact point.
     rate = g[state, row].normal_x * (work.velocity[state, a, X] - work.velocity[state, b, X])
     rate += g[state, row].normal_y * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
     return (
@@ -93,10 +109,12 @@ def normal_rate(work, state, row):
 
 
 def tangential_rate(work, state, row):
-    """t · (velocity of the vertex's body − velocity of the edge's) at a pair's contact point."""
+    """Return the tangential velocity v_t of a pair in a state [m/s]: t · (v_a − v_b) at the contact
+    point."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
+    # t = (−n_y, n_x).
     rate = g[state, row].normal_x * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
     rate -= g[state, row].normal_y * (work.velocity[state, a, X] - work.velocity[state, b, X])
     return (
@@ -106,17 +124,19 @@ def tangential_rate(work, state, row):
     )
 
 
-def memory_of(work, row):
-    """How long a velocity of either body of a pair is remembered [s]."""
+def velocity_lifetime_of(work, row):
+    """Return the longer velocity lifetime of a pair's two bodies [s]
+    (BodyErrors.velocity_lifetime)."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    return max(work.errors[a].memory, work.errors[b].memory)
+    return max(work.errors[a].velocity_lifetime, work.errors[b].velocity_lifetime)
 
 
 def contact_view(scene, work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    radius_a, radius_b = row_radii(scene, work, row)
+    radius_a, radius_b = contact_radii(scene, work, row)
+    # The law takes overlap and its rate, positive in compression: minus gap and its rate.
     return ContactView(
         -work.geometry[state, row].gap, -normal_rate(work, state, row),
         work.slip[state, row], tangential_rate(work, state, row), effective_mass(scene, a, b),
@@ -124,19 +144,21 @@ def contact_view(scene, work, state, row):
     )  # fmt: skip
 
 
-def pressed_view(view, overlap, overlap_rate):
-    """The ContactView of the same contact pressed so far and so fast, without any slip."""
+def view_without_slip(view, overlap, overlap_rate):
+    """Return the ContactView of the same contact with another overlap [m] and rate [m/s], without
+    slip."""
     return moved_contact(view, overlap, overlap_rate, 0.0, 0.0)
 
 
 @hook
 def inertia(scene, body, axis):
-    """Mass [kg], or moment of inertia [kg m²] for axis 2."""
+    """Return the mass [kg], or the moment of inertia [kg m²] for axis 2."""
     return scene.bodies[body].inertia if axis == 2 else scene.bodies[body].mass
 
 
 def lever(scene, body, axis):
-    """How far the outline moves for a unit of a coordinate: 1, or the bounding radius [m/rad]."""
+    """Return how far the outline moves per unit of a coordinate: 1, or the bounding radius
+    [m/rad]."""
     return scene.bodies[body].bounding_radius if axis == 2 else 1.0
 
 
@@ -146,11 +168,13 @@ def add_force(work, state, body, fx, fy, torque):
     work.force[state, body, ANGLE] += torque
 
 
-def push_pair(work, state, row, normal, tangential):
-    """Add a force (along n and t) on the vertex's body, its reverse on the edge's."""
+def add_pair_force(work, state, row, normal, tangential):
+    """Add a force (N along n, T along t) [N] to the vertex's body of a pair, its reverse to the
+    edge's."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
+    # f = N n + T t; arms give the moments of n and t.
     fx = normal * g[state, row].normal_x - tangential * g[state, row].normal_y
     fy = normal * g[state, row].normal_y + tangential * g[state, row].normal_x
     torque_a = normal * g[state, row].vertex_arm_n + tangential * g[state, row].vertex_arm_t
@@ -160,26 +184,34 @@ def push_pair(work, state, row, normal, tangential):
 
 
 def centre_line(scene, work, state, a, b):
-    """(n_x, n_y, d_c): unit vector from body b's centroid to body a's, and their distance."""
+    """Return (n_x, n_y, d_c): the unit vector from body b's centroid to body a's, and their
+    distance [m]."""
     dx, dy = separation(scene, work, state, a, b)
     distance = length_of(dx, dy)
+    # Nested bodies may be concentric; any direction will do.
     if distance == 0.0:
         return 0.0, 1.0, 0.0
     return dx / distance, dy / distance, distance
 
 
 def soft_centre_line(scene, work, state, a, b):
-    """The same of d = √(d_c² + ε²), whose gradient (n_x, n_y) fades out towards d_c = 0."""
+    """Return the gradient (n_x, n_y) and the value of d = √(d_c² + ε²) [m].
+
+    The gradient fades out towards d_c = 0, where the unit vector would jump; ε is CENTRE_SOFTENING
+    of the sum of equivalent radii.
+    """
     dx, dy = separation(scene, work, state, a, b)
     reach = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
+    # ε is a fixed fraction of the pair's size.
     softening = CENTRE_SOFTENING * reach
     distance = math.sqrt(dx * dx + dy * dy + softening * softening)
     return dx / distance, dy / distance, distance
 
 
 def centre_view(scene, work, time, state, a, b):
-    """The PairView of two bodies, their gap being that of the equivalent spheres."""
+    """Return the PairView of two bodies whose gap is that of the equivalent spheres."""
     nx, ny, distance = soft_centre_line(scene, work, state, a, b)
+    # Rate of the softened distance: its gradient times the relative velocity.
     rate = nx * (work.velocity[state, a, X] - work.velocity[state, b, X])
     rate += ny * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
     gap = distance - scene.bodies[a].equivalent_radius - scene.bodies[b].equivalent_radius

@@ -26,18 +26,18 @@ from flocsim.bonds.certificate import (
     doublet_pose,
     is_certain,
     is_certain_in_kicks,
+    pose_change,
     radii_of,
-    way_between,
 )
-from flocsim.bonds.rest import REST_TURNS, STILL, kind_at_rest, swings
+from flocsim.bonds.rest import REST_TURNS, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.compiler.composer import compose
 from flocsim.errors import UsageError
-from flocsim.forces.body_forces import thermal_in
+from flocsim.forces.body_forces import thermal_forces
 from flocsim.forces.drag import follows_shape
 from flocsim.forces.settling import free_mobilities, least_mobility, terminal_motion
 from flocsim.geometry.contact.near_pairs import list_polygons
-from flocsim.geometry.contact.points import locate_polygons, turn_body
-from flocsim.integrators.rhs.surface_gap import RANGE, gap_of, measure_of
+from flocsim.geometry.contact.points import locate_polygons, update_rotation
+from flocsim.integrators.rhs.surface_gap import SHARE_CUTOFF, gap_from_scaled, scaled_gap
 from flocsim.state.work import NEW, NOW, put_motion, with_room, work_of
 from flocsim.swarms.together.clusters import Neighbours, placed_together
 
@@ -55,11 +55,11 @@ def list_pair(scene, work, pair, gap):
     work.tally.candidates = 0
     cut = 0.0
     if scene.surface_reach > 0.0:
-        cut = gap_of(scene, measure_of(scene, max(gap, 0.0)) + RANGE)
+        cut = gap_from_scaled(scene, scaled_gap(scene, max(gap, 0.0)) + SHARE_CUTOFF)
     if not list_polygons(scene, work, pair, cut):
         return False
-    turn_body(work, NOW, work.pairs[pair].later)
-    turn_body(work, NOW, work.pairs[pair].earlier)
+    update_rotation(work, NOW, work.pairs[pair].later)
+    update_rotation(work, NOW, work.pairs[pair].earlier)
     for row in range(work.tally.candidates):
         locate_polygons(scene, work, NOW, row)
     return True
@@ -74,8 +74,8 @@ def kind_of(scene, work, time, elapsed, bond, load):
         return CERTIFICATE
     i, j = bond.i, bond.j
     now, before = doublet_pose(scene, work, NOW, i, j), doublet_pose(scene, work, NEW, i, j)
-    moved = way_between(scene, i, j, now, before)
-    if not moved < STILL * load.drift * elapsed or swings(scene, work, i, j, load):
+    moved = pose_change(scene, i, j, now, before)
+    if not moved < STABLE_POSE * load.drift * elapsed or is_swinging(scene, work, i, j, load):
         return NO_BOND
     rested = elapsed * load.drift / (REST_TURNS * radii_of(scene, bond))
     return kind_at_rest(scene, work, time, bond, load, rested)
@@ -130,7 +130,7 @@ class BondGauge:
         self.work = self.work_for(64, 1)
         self.settling, self.resistance, self.aslant = alone(swarm)
         self.shear = math.hypot(*swarm.fluid.gradient)
-        self.kicks = max((each.energy for each in thermal_in(swarm.forces)), default=0.0)
+        self.kicks = max((each.energy for each in thermal_forces(swarm.forces)), default=0.0)
 
     def work_for(self, capacity: int, pairs: int) -> Any:
         """Work arrays with room for so many features and pairs."""
@@ -214,7 +214,7 @@ class BondGauge:
         drift[several] += slip[order[ends[several] - 1]]
         fastest = np.zeros(count)
         np.maximum.at(fastest, labels, np.hypot(*self.settling.T))
-        return load, np.maximum(drift, STILL * fastest), 2.0 * extent
+        return load, np.maximum(drift, STABLE_POSE * fastest), 2.0 * extent
 
 
 def alone(swarm: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

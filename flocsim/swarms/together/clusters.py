@@ -56,7 +56,9 @@ def measure_gaps(scene, work, within):
     for pair in range(work.tally.pairs):
         a, b = work.pairs[pair].later, work.pairs[pair].earlier
         work.budget[pair] = gap_between(scene, work, a, b)
-        work.along[pair, 0], work.along[pair, 1] = separation(scene, work, NOW, a, b)
+        work.outline_forces[pair, 0], work.outline_forces[pair, 1] = separation(
+            scene, work, NOW, a, b
+        )
     return True
 
 
@@ -95,7 +97,7 @@ class Gauge:
         near = np.flatnonzero(gaps < within if within > 0.0 else gaps <= 0.0)
         listed = self.work.pairs[near]
         pairs = np.column_stack([listed["later"], listed["earlier"]])
-        return Neighbours(pairs, gaps[near], self.work.along[near, :2])
+        return Neighbours(pairs, gaps[near], self.work.outline_forces[near, :2])
 
 
 def walk_together(pairs, vectors, first, other, way, labels, places, queue):

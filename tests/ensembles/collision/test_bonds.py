@@ -7,7 +7,7 @@ import pytest
 
 from flocsim import Sphere, SpheroPolygon
 from flocsim.bonds.certificate import (
-    CALM,
+    CALM_SPEED,
     CERTIFICATE,
     HOOK,
     NO_BOND,
@@ -18,12 +18,12 @@ from flocsim.bonds.certificate import (
     energy_of,
     is_held,
 )
-from flocsim.bonds.rest import FAR_LONGER, HANGING, NEST, STILL
+from flocsim.bonds.rest import HANGING_COSINE, NESTED_DISTANCE, NESTED_REST_TIMES, STABLE_POSE
 from flocsim.ensembles.collision import outcomes
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import BOUND, bond_of, load_on, start_rest, watch_pair
 from flocsim.forces import VanDerWaals
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.io.results.schema import BONDS
@@ -61,7 +61,7 @@ class Doublet:
     def place(self, *places):
         """Put the bodies somewhere, at rest."""
         self.work.place[NOW], self.work.velocity[NOW] = places, 0.0
-        assert list_candidates(self.scene, self.work)
+        assert rebuild_list(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
 
@@ -111,9 +111,9 @@ def test_attraction_that_outweighs_three_times_the_load_is_a_certificate(tmp_pat
 
 def test_bodies_that_part_quickly_have_no_certificate(tmp_path):
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 10.0)))
-    doublet.move(vy=-1.1 * CALM * doublet.drift)
+    doublet.move(vy=-1.1 * CALM_SPEED * doublet.drift)
     assert doublet.bond() == NO_BOND
-    doublet.move(vy=-0.9 * CALM * doublet.drift)
+    doublet.move(vy=-0.9 * CALM_SPEED * doublet.drift)
     assert doublet.bond() == CERTIFICATE
 
 
@@ -221,7 +221,7 @@ def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
     rest = doublet.observed[outcomes.REST_TIME]
     start_rest(doublet.scene, doublet.work, doublet.observed, 0.0)
     (still, low), way = doublet.work.place[NOW].copy(), doublet.drift * rest
-    doublet.place(still, low + [1.1 * STILL * way, 0.0, 0.0])
+    doublet.place(still, low + [1.1 * STABLE_POSE * way, 0.0, 0.0])
     assert doublet.bond(1.1 * rest) == NO_BOND
     assert doublet.bond(2.0 * rest) == NO_BOND
     assert doublet.bond(2.2 * rest) == REST
@@ -230,7 +230,7 @@ def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):
 def test_a_doublet_that_lies_askew_does_not_rest_for_good(tmp_path):
     """The load is at its worst where the faster body hangs straight below."""
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, 0.5)))
-    way = math.acos(HANGING)
+    way = math.acos(HANGING_COSINE)
     reach = sum(RADII) - 1e-9
     for turn, expected in ((1.1 * way, NO_BOND), (0.9 * way, REST), (math.pi, NO_BOND)):
         place = (reach * math.sin(turn), -reach * math.cos(turn), 0.0)
@@ -244,9 +244,9 @@ def test_a_nest_is_bound_after_ten_rest_times(tmp_path):
     doublet = nested(tmp_path, overrides, radius=23.4e-6)
     reach = sum(shape.equivalent_radius for shape in doublet.shapes)
     for x, turns, expected in (
-        (0.98 * NEST * reach, 0.99 * FAR_LONGER, False),
-        (0.98 * NEST * reach, 1.01 * FAR_LONGER, True),
-        (1.1 * NEST * reach, 1.01 * FAR_LONGER, False),
+        (0.98 * NESTED_DISTANCE * reach, 0.99 * NESTED_REST_TIMES, False),
+        (0.98 * NESTED_DISTANCE * reach, 1.01 * NESTED_REST_TIMES, True),
+        (1.1 * NESTED_DISTANCE * reach, 1.01 * NESTED_REST_TIMES, False),
     ):
         # Away from the slit.
         doublet.place((0.0, 0.0, 0.0), (-x, 0.0, 0.0))

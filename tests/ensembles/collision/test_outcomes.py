@@ -23,7 +23,7 @@ from flocsim.ensembles.collision.outcomes import (
 )
 from flocsim.ensembles.study import Study
 from flocsim.errors import UsageError
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.geometry.contact.points import least_listed_gap, locate_contacts
 from flocsim.integrators.base import Status
@@ -216,7 +216,7 @@ def test_a_doublet_that_swings_as_a_rigid_body_does_not_rest(study):
     work.place[NOW, 1, Y] = -reach
     work.velocity[NOW, 1, X] = spin * reach
     scene = encounter.system.scene(jit=False)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     observed[outcomes.LOAD] = 1.0  # more than any attraction
     known, later = (scene, work, observed), 2.0 * observed[outcomes.REST_TIME]
@@ -308,7 +308,7 @@ class Falling:
         place[1] = *(np.array([x, y]) + self.origin), 0.0
         velocity[1] = vx, vy - self.fall, spin
         self.work.budget[:] = -1.0
-        assert list_candidates(self.scene, self.work)
+        assert rebuild_list(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
         self.observed[outcomes.COLLIDED] = float(collided)
         return watch_pair(self.scene, self.work, self.observed, 0.0)

@@ -24,7 +24,7 @@ from flocsim.ensembles.collision.outcomes import (
 )
 from flocsim.errors import UsageError
 from flocsim.forces import DoubleLayer, StokesDrag, VanDerWaals
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.rhs.climb import BARRIER
@@ -66,7 +66,7 @@ class Pair:
             self.work.velocity[NOW, 1, :2] = xx * x + xy * y, yx * x + yy * y
             if self.encounter.meeting == "settling":
                 self.work.velocity[NOW, 1, :2] = self.encounter.drift
-        assert list_candidates(self.scene, self.work)
+        assert rebuild_list(self.scene, self.work)
         locate_contacts(self.scene, self.work, NOW)
         set_modes(self.scene, self.work)
         return self

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from flocsim.ensembles.collision.outcomes import OBSERVER
-from flocsim.forces.body_forces import key_of
+from flocsim.forces.body_forces import random_key
 from flocsim.run import Run
 from flocsim.state.work import NOW, motion_of
 from tests.helpers.small_study import small_study
@@ -40,7 +40,7 @@ def end_of(study, replicate, share, until=0.0015):
 
 def test_a_replicate_has_a_key_of_its_own_at_every_condition(study):
     keys = [study.draw(0, 1, 0.5, replicate).encounter.scene.key for replicate in (0, 1, 2, 0)]
-    assert keys == [key_of(study.config.seed, replicate) for replicate in (0, 1, 2, 0)]
+    assert keys == [random_key(study.config.seed, replicate) for replicate in (0, 1, 2, 0)]
     encounter = study.draw(0, 1, 0.5, 2).encounter
     assert encounter.system.scene().key == encounter.scene.key
     assert encounter.settling[0][0] is study.encounter(0, 1, [0.0] * 4).settling[0][0]

@@ -5,7 +5,7 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.forces import CentreForce, Contact
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.state.work import ALL_PAIRS, work_of
 from flocsim.system import System
 
@@ -25,7 +25,7 @@ def listed(bodies):
     system = System(bodies, [Contact()])
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion(), capacity=4096)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     return scene, work
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from flocsim.body import Fluid, scene_of
 from flocsim.geometry.contact.candidates import (
-    list_candidates,
-    spent,
+    rebuild_list,
+    spent_budget,
 )
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.state.work import NOW, work_of
@@ -39,7 +39,9 @@ def spend_budget(scene, work, wanted):
     for _ in range(40):
         share = 0.5 * (within + beyond)
         work.place[NOW] = start + share * steps
-        within, beyond = (share, beyond) if spent(scene, work, NOW) <= 1.0 else (within, share)
+        within, beyond = (
+            (share, beyond) if spent_budget(scene, work, NOW) <= 1.0 else (within, share)
+        )
     work.place[NOW] = start + within * steps
 
 
@@ -52,7 +54,7 @@ def pairs_now(plain, work):
 def assert_nothing_missed(plain, wanted):
     """After any motion within the budget all overlapping pairs are in the list."""
     scene, work = arrays(plain)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     spend_budget(scene, work, wanted)
     every = pairs_now(plain, work)
     overlapping = set(every.select(every.overlap > 0.0).pair_keys())
@@ -103,7 +105,7 @@ def test_two_long_bars_that_cross_are_listed_at_their_middle():
     stub = make_body([[-50e-6, 0.0], [0.0, 0.0], [50e-6, 1e-7]], 1e-6, surface_density=2.0)
     plain = Scene((bar, stub), np.array([[0, 0, 0], [0, 51.5e-6, np.pi / 2]]), np.zeros((2, 3)))
     scene, work = arrays(plain)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     assert any(a == 1 and b == 0 for a, _, b, _ in keys_of(scene, work))
     assert work.geometry["gap"][NOW, : work.tally.candidates].min() < 0.0
@@ -120,7 +122,7 @@ def test_the_closest_pair_within_reach_is_listed_while_the_budget_lasts(reach, s
     middle = plain.positions[:, :2].mean(axis=0)
     away = plain.positions[:, :2] - middle
     work.place[NOW, :, :2] += apart * away / np.hypot(*away.T)[:, None]
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     spend_budget(scene, work, wanted)
     locate_contacts(scene, work, NOW)
     every, listed = pairs_now(plain, work), keys_of(scene, work)
@@ -142,7 +144,7 @@ def test_spheres_are_one_pair_and_a_sphere_has_no_edge():
     square = make_body([[0, 0], [4e-6, 0], [4e-6, 4e-6], [0, 4e-6]], 1e-6, surface_density=2.0)
     places = np.array([[0.0, 0.0, 0.0], [3.2e-6, 0.0, 0.0], [0.0, 4.9e-6, 0.0]])
     scene, work = arrays(Scene((ball, ball, square), places, np.zeros((3, 3))))
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     keys = keys_of(scene, work)
     assert keys.count((1, 0, 0, 0)) == 1
     assert {key[:2] for key in keys if 2 in key[::2]} == {(0, 0), (1, 0)}

@@ -41,7 +41,7 @@ def single_layer(shape, elements):
     ends = np.roll(points, -1, axis=0)
     # Pieces do not follow each other: an element joins two neighbours of a piece only.
     for a, b in zip(points, ends, strict=True):
-        if math.hypot(*(b - a)) < 1.5 * charges.DEEP / elements:
+        if math.hypot(*(b - a)) < 1.5 * charges.CHARGE_DEPTH / elements:
             places.append(0.5 * (a + b))
             lengths.append(math.hypot(*(b - a)))
     places, lengths = np.array(places), np.array(lengths)

@@ -5,7 +5,7 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.body import Fluid, scene_of
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.state.work import NOW, work_of
 
@@ -15,7 +15,7 @@ def arrays(*bodies):
     scene = scene_of(bodies, Fluid(), [])
     position = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, position, np.zeros((len(bodies), 3)))
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     return scene, work
 
 

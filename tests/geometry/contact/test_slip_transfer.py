@@ -5,10 +5,10 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.body import Fluid, scene_of
-from flocsim.geometry.contact.candidates import hand_over, list_candidates, spent
+from flocsim.geometry.contact.candidates import rebuild_list, spent_budget, transfer_slips
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.rhs.forces import rate_slips
+from flocsim.integrators.rhs.forces import write_slip_rates
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import NOW, work_of
 
@@ -29,7 +29,7 @@ def resting_on(slab_body, body, x, height, speed):
     position = np.array([[*slab_body.position, 0.0], [x, height, body.angle]])
     velocity = np.array([[0.0, 0.0, 0.0], [speed, 0.0, 0.0]])
     work = work_of(scene, position, velocity)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     return scene, work
 
@@ -43,20 +43,20 @@ def pull(work):
     return total
 
 
-def slide(scene, work, length, passing_on=hand_over, steps=400):
+def slide(scene, work, length, passing_on=transfer_slips, steps=400):
     """Carry body 1 along x, its contacts with it; the pull after every step."""
     step = length / steps / work.velocity[NOW, 1, X]
     pulls = []
     for _ in range(steps):
         set_modes(scene, work)
-        rate_slips(work, NOW)
-        closed = work.candidates["closed"] == 1
+        write_slip_rates(work, NOW)
+        closed = work.candidates["contact_mode"] == 1
         work.slip[NOW, closed] += step * work.slip_rate[NOW, closed]
         work.place[NOW, 1, X] += length / steps
         locate_contacts(scene, work, NOW)
         passing_on(scene, work)
-        if spent(scene, work, NOW) > 0.5:
-            assert list_candidates(scene, work)
+        if spent_budget(scene, work, NOW) > 0.5:
+            assert rebuild_list(scene, work)
             locate_contacts(scene, work, NOW)
         pulls.append(pull(work))
     return np.array(pulls)
@@ -99,7 +99,7 @@ def test_the_displacement_vanishes_with_the_last_pair():
     assert pull(work) != 0.0
     work.place[NOW, 1, Y] += 2.0 * OVERLAP
     locate_contacts(scene, work, NOW)
-    hand_over(scene, work)
+    transfer_slips(scene, work)
     assert not work.slip[NOW].any()
     work.place[NOW, 1, Y] -= 2.0 * OVERLAP
     locate_contacts(scene, work, NOW)
@@ -123,7 +123,7 @@ def test_elastic_energy_never_grows_and_spheres_have_no_heir(seed):
     work.place[NOW, 1] += rng.normal(size=3) * [1e-7, 3e-8, 1e-2]
     locate_contacts(scene, work, NOW)
     energy = np.sum(work.slip[NOW] ** 2)
-    hand_over(scene, work)
+    transfer_slips(scene, work)
     assert np.sum(work.slip[NOW] ** 2) <= energy * (1.0 + 1e-12)
     opened = work.geometry[NOW, :rows]["gap"] >= 0.0
     assert not work.slip[NOW, :rows][opened].any()
@@ -134,6 +134,6 @@ def test_listing_anew_keeps_every_displacement():
     slide(scene, work, 1e-7, steps=10)
     before = pull(work)
     for _ in range(3):
-        assert list_candidates(scene, work)
+        assert rebuild_list(scene, work)
         locate_contacts(scene, work, NOW)
         assert pull(work) == before

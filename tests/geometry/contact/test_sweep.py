@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flocsim.geometry.contact.body_pairs import come_near, near_pairs
+from flocsim.geometry.contact.body_pairs import near_pairs, paths_meet
 from flocsim.state.bodies import Disc
 from flocsim.state.contacts import BodyPair
 
@@ -38,7 +38,7 @@ def found(discs, box, order=None):
 @pytest.mark.parametrize("seed", range(12))
 def test_the_sweep_finds_what_a_look_at_all_pairs_finds(seed, box):
     discs = random_discs(np.random.default_rng(seed), 40, box)
-    expected = [(a, b) for a in range(40) for b in range(a) if come_near(discs, a, b, *box)]
+    expected = [(a, b) for a in range(40) for b in range(a) if paths_meet(discs, a, b, *box)]
     assert expected
     assert found(discs, box) == expected
 
@@ -53,7 +53,7 @@ def test_ways_are_met_in_between(seed):
     least = np.hypot(*(places[0] - places[1]).T).min()
     for reach in (0.9 * least, 1.1 * least):
         discs["reach"] = 0.5 * reach
-        assert come_near(discs, 0, 1, *BOXES[0]) == (reach > least)
+        assert paths_meet(discs, 0, 1, *BOXES[0]) == (reach > least)
 
 
 def test_a_box_shifted_by_any_vector_has_the_same_pairs():

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from flocsim import Body, Sphere
 from flocsim.forces import Contact, Gravity, StokesDrag
-from flocsim.integrators.rhs.error import FREE_SHARE
+from flocsim.integrators.rhs.error import FREE_MOTION_FRACTION
 from flocsim.state.work import NOW
 from flocsim.swarms.placement import floor
 from tests.helpers.one_step import Stage, from_anywhere, from_before
@@ -116,7 +116,7 @@ def test_the_estimate_is_that_of_the_step():
         ratio = stage.step(step)
         exact = before[0] + before[1] * lasts * -math.expm1(-share)
         off = abs(stage.position[1, 0] - exact)
-        allowed = 1e-9 * FREE_SHARE  # nothing touches
+        allowed = 1e-9 * FREE_MOTION_FRACTION  # nothing touches
         assert 0.5 * off < allowed * ratio < 6.0 * off
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from flocsim import Body, Fluid, Sphere
 from flocsim.body import scene_of
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.crossings import NEVER, first_switch, interpolate
 from flocsim.integrators.events.first_event import set_modes
@@ -30,7 +30,7 @@ def stepped(bodies, change, velocities):
     scene = scene_of(bodies, Fluid())
     start = np.array([[*body.position, body.angle] for body in bodies])
     work = work_of(scene, start, velocities[0], capacity=4096)
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     set_modes(scene, work)
     work.place[NEW], work.velocity[NEW] = start + change, velocities[1]

@@ -7,8 +7,8 @@ import pytest
 from flocsim import Body, Fluid, SpheroPolygon, System
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators import Implicit, Status
-from flocsim.integrators.events.crossings import overtakes
-from flocsim.state.contacts import TOUCHES
+from flocsim.integrators.events.crossings import any_overtakes
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 from tests.helpers.fast_scene import flagged
 
@@ -55,10 +55,10 @@ def between(gaps, step, closed=True):
     for state, values in zip((NOW, NEW), gaps, strict=True):
         for row, value in zip((touching[0], touching[-1]), values, strict=True):
             work.geometry[state, row].gap = value
-    assert len(touching) > 1 and (work.candidates[touching]["closed"] == TOUCHES).all()
+    assert len(touching) > 1 and (work.candidates[touching]["contact_mode"] == CLOSED).all()
     clock = Implicit(1e-9).fresh_clock()
     clock.across = 0.0 if closed else 1.0
-    return overtakes(scene, work, clock, step)
+    return any_overtakes(scene, work, clock, step)
 
 
 def test_only_a_long_step_between_far_states_is_in_doubt():

@@ -9,15 +9,15 @@ import pytest
 from flocsim import Body, Sphere, System
 from flocsim.compiler.composer import compose
 from flocsim.forces import BodyForce, StokesDrag
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.hooks import attempt
 from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import set_modes
-from flocsim.integrators.loop.driver import take_new_state
-from flocsim.integrators.rhs.stated_error import carry_vector
+from flocsim.integrators.loop.driver import adopt_new_state
+from flocsim.integrators.rhs.stated_error import propagate_vector
 from flocsim.state.bodies import ANGLE, X
-from flocsim.state.work import CARRIED, DAMPING, DEVIATION, NEW, NOW, motion_of, work_of
+from flocsim.state.work import DAMPING, NEW, NOW, PROPAGATED, STEP_ERROR, motion_of, work_of
 from tests.helpers.trial_scenes import Trap
 
 R = 5e-6
@@ -36,7 +36,7 @@ class Linked:
         self.work = work_of(self.scene, *system.motion())
         self.clock = system.integrator.fresh_clock()
         self.clock.until = 1.0
-        self.call(list_candidates)
+        self.call(rebuild_list)
         self.call(locate_contacts, NOW)
         self.call(set_modes)
 
@@ -131,22 +131,22 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
     scene, clock = Linked(system), Implicit().fresh_clock()
     scene.clock, work, nudge = clock, scene.work, 1e-13
     scene.clock.until = 1.0
-    work.place[CARRIED, 0, X], work.errors[0].place = nudge, 10.0 * nudge
+    work.place[PROPAGATED, 0, X], work.errors[0].displacement = nudge, 10.0 * nudge
     time, end = 0.0, 0.99875e-3
     while time < end:
         x, speed = work.place[NOW, 0, X], work.velocity[NOW, 0, X]
         step = min(0.15 * x / max(-speed, 1e-2), end - time)
         assert scene.step(step) >= 0.0
         assert scene.terms > 0
-        scene.linked(take_new_state)(work)
+        scene.linked(adopt_new_state)(work)
         scene.clock.time = time = time + step
-        work.place[DEVIATION] = work.velocity[DEVIATION] = 0.0
+        work.place[STEP_ERROR] = work.velocity[STEP_ERROR] = 0.0
         sums = work.errors[0]
         sums.place += step * sums.speed
-        scene.call(carry_vector, scene.clock, step)
+        scene.call(propagate_vector, scene.clock, step)
     place = pulled(1e-5, time)
     true = pulled(1e-5 + nudge, time) - place
     assert work.place[NOW, 0, X] == pytest.approx(place, rel=1e-3)
     assert true > 30.0 * nudge
-    assert work.place[CARRIED, 0, X] == pytest.approx(true, rel=0.2)
-    assert work.errors[0].place > 5.0 * true
+    assert work.place[PROPAGATED, 0, X] == pytest.approx(true, rel=0.2)
+    assert work.errors[0].displacement > 5.0 * true

@@ -8,7 +8,7 @@ import pytest
 
 from flocsim import Body, Fluid, Sphere, System
 from flocsim.forces import Contact, Gravity, StokesDrag, Thermal
-from flocsim.forces.body_forces import key_of
+from flocsim.forces.body_forces import random_key
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.loop.kicks import mean_noise
 from tests.reference.kicks import increment
@@ -59,7 +59,7 @@ def lone(method, kick=1e-3, seed=(3, 4), tolerance=None):
 def wanted_path(kicks, kick, seed=(3, 4), body=0):
     """Places (kicks + 1, 3) where a free sphere without inertia is at every kick."""
     size = np.sqrt(2.0 * KT / np.array([ZETA, ZETA, 8.0 * math.pi * 0.89e-3 * RADIUS**3]))
-    steps = [increment(kick, 0, place, body, key_of(*seed)) for place in range(kicks)]
+    steps = [increment(kick, 0, place, body, random_key(*seed)) for place in range(kicks)]
     return np.vstack([np.zeros(3), np.cumsum(size * steps, axis=0)])
 
 
@@ -91,7 +91,7 @@ def test_velocities_follow_their_recursion(method):
     found = run.at(np.arange(1, 9) * kick).velocity[:, 0, :2]
     speed, wanted = np.zeros(2), []
     for place in range(8):
-        force = math.sqrt(2.0 * KT * ZETA) * increment(kick, 0, place, 0, key_of(9))[:2] / kick
+        force = math.sqrt(2.0 * KT * ZETA) * increment(kick, 0, place, 0, random_key(9))[:2] / kick
         speed = math.exp(-1.0) * speed + (1.0 - math.exp(-1.0)) * force / ZETA
         wanted.append(speed)
     np.testing.assert_allclose(found, wanted, rtol=1e-2, atol=1e-3 * np.abs(wanted).max())
@@ -149,7 +149,7 @@ def test_kicks_go_by_seed_replicate_and_body():
     assert len(ends) == 5
     one, other = pair(2e-5).run(1e-3, jit=False).position[-1] - [[0, 0, 0], [2.2e-5, 0, 0]]
     assert not np.isclose(one, other).any()
-    assert key_of(3, 4) == key_of(3, 4) != key_of(4, 3)
+    assert random_key(3, 4) == random_key(3, 4) != random_key(4, 3)
 
 
 def test_without_temperature_nothing_is_drawn():

@@ -14,7 +14,7 @@ from flocsim.errors import RangeError, ShapeError, UsageError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.check import samples_of
 from flocsim.geometry.contact.charges import layer_energy
-from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.outline_sum import outline_forces_at
 from flocsim.state.work import work_of
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import (
@@ -135,7 +135,7 @@ def test_three_bodies_have_a_field_each():
     system = System(bodies, [layer(depth=1.0)])
     scene, found = system.scene(), []
     work = work_of(scene, *system.motion())
-    entry = compose(between_outlines, system.compiled_calls)
+    entry = compose(outline_forces_at, system.compiled_calls)
     for a, b in ((1, 0), (2, 1)):
         x = bodies[a].position[0] - bodies[b].position[0]
         found.append(entry(scene, work, 0.0, a, b, x, 0.0, 0.0, 0.0)[0])

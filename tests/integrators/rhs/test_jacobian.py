@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flocsim import Body
-from flocsim.integrators.rhs.forces import locate_and_rate, sum_forces
+from flocsim.integrators.rhs.forces import locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.integrators.rhs.views import tangential_rate
 from flocsim.state.work import DAMPING, FIRST_STAGE, NOW, STIFFNESS, motion_of, put_motion
@@ -33,7 +33,7 @@ ALL = {gap: tuple(name for name in FORCES if not name.endswith(gap)) for gap in 
 
 def forces_in_first(scene, work):
     """Forces in state FIRST_STAGE by the flags that are there."""
-    locate_and_rate(scene, work, FIRST_STAGE)
+    locate_with_slip_rates(scene, work, FIRST_STAGE)
     sum_forces(scene, work, 0.0, FIRST_STAGE)
 
 
@@ -67,7 +67,9 @@ class Differences:
         work.velocity[NOW] = 0.0
         work.velocity[NOW, body, axis] = 1.0
         rows = range(work.tally.candidates)
-        rates = [tangential_rate(work, NOW, row) * work.candidates[row].closed for row in rows]
+        rates = [
+            tangential_rate(work, NOW, row) * work.candidates[row].contact_mode for row in rows
+        ]
         work.velocity[NOW] = kept
         return np.array(rates)
 

@@ -11,7 +11,7 @@ from flocsim.errors import UsageError
 from flocsim.fields import quantity
 from flocsim.forces import OrientedForce, StokesDrag
 from flocsim.integrators import DormandPrince54
-from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.outline_sum import outline_forces_at
 from flocsim.state.work import work_of
 from flocsim.swarms.swarm import Swarm
 
@@ -49,7 +49,7 @@ def loads(x, y, angle_j, angle_i=0.0, shape=None):
     system = system_of(x, y, angle_j, angle_i, shape)
     scene = system.scene(jit=False)
     work = work_of(scene, *system.motion())
-    return np.array(between_outlines(scene, work, 0.0, 1, 0, x, y, angle_j, angle_i))
+    return np.array(outline_forces_at(scene, work, 0.0, 1, 0, x, y, angle_j, angle_i))
 
 
 def energy(x, y, angle_j, angle_i):

@@ -10,10 +10,10 @@ from flocsim.compiler.composer import compose
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.geometry.shapes.pieces import Pose, at_parameter, ends_of, placed
 from flocsim.integrators.rhs.outline_sum import (
-    add_nodes,
-    look_around,
-    look_around_piece,
-    sum_along,
+    list_around_piece,
+    prepare_sum,
+    sum_nodes,
+    sum_pressure,
 )
 from tests.helpers.tiers import rest_slow
 from tests.integrators.rhs.test_outline_sum import SIZE, Pair, at_gap, rough
@@ -41,18 +41,18 @@ def between(scene, work, piece, low, high, numbers):
         nodes.normal_x[k], nodes.normal_y[k] = nx, ny
         nodes.weight[k] = half * work.rules[8, 1, k] * metres
         nodes.gap[k], nodes.attraction[k] = math.inf, 0.0
-    return add_nodes(scene, work, (0.0, 0.0, 0.0), 8, numbers)
+    return sum_nodes(scene, work, (0.0, 0.0, 0.0), 8, numbers)
 
 
 def halved(scene, work, a, b, x, y, cosine, sine, parts, error):
     """(fx, fy) of sum_along by halving: it knows of no feet. ``parts``: scratch."""
     pose = Pose(x, y, cosine, sine)
-    numbers = look_around(scene, work, 0.0, a, b, pose)
+    numbers = prepare_sum(scene, work, 0.0, a, b, pose)
     depth = numbers[2].depth
     fx, fy = 0.0, 0.0
     for i in range(work.near.first[0]):
         piece = placed(scene.pieces, work.near.first[1 + i], pose)
-        if look_around_piece(scene, work, piece, numbers[1]) == 0:
+        if list_around_piece(scene, work, piece, numbers[1]) == 0:
             continue
         first, last = ends_of(piece)
         for k in range(PARTS):
@@ -79,7 +79,7 @@ def halved(scene, work, a, b, x, y, cosine, sine, parts, error):
 
 def summed(pair, x, y, angle):
     """(fx, fy) of the sum that runs have, the later body being gone along."""
-    entry = compose(sum_along, pair.system.compiled_calls)
+    entry = compose(sum_pressure, pair.system.compiled_calls)
     where = float(x), float(y), math.cos(angle), math.sin(angle)
     return np.array(entry(pair.scene, pair.work, 0.0, 1, 0, *where)[:2])
 

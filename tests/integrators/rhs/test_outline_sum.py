@@ -16,7 +16,7 @@ from flocsim.geometry.shapes.outline import core_gap
 from flocsim.geometry.shapes.pieces import outline_pieces
 from flocsim.integrators.rhs.forces import add_outline_forces
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.integrators.rhs.outline_sum import between_outlines
+from flocsim.integrators.rhs.outline_sum import outline_forces_at
 from flocsim.state.work import NOW, STIFFNESS, work_of
 from flocsim.swarms.swarm import Swarm
 from tests.helpers.matrices import whole_matrix
@@ -64,7 +64,7 @@ class Pair:
 
     def loads(self, x, y, angle, turn=0.0):
         """(fx, fy, torque on the later, on the earlier)."""
-        entry = compose(between_outlines, self.system.compiled_calls)
+        entry = compose(outline_forces_at, self.system.compiled_calls)
         found = entry(self.scene, self.work, 0.0, 1, 0, float(x), float(y), float(angle), turn)
         return np.array(found)
 

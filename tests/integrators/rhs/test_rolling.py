@@ -7,9 +7,9 @@ import pytest
 
 from flocsim import Body, Sphere, SpheroPolygon
 from flocsim.body import Fluid, scene_of
-from flocsim.geometry.contact.candidates import list_candidates
+from flocsim.geometry.contact.candidates import rebuild_list
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.integrators.rhs.friction import rolled, rolled_besides
+from flocsim.integrators.rhs.friction import rolled, slip_rate_of_gap_change
 from flocsim.state.work import FIRST_STAGE, NOW, work_of
 
 LATER = FIRST_STAGE
@@ -24,7 +24,7 @@ def placed(shapes, places):
     bodies = [Body(shape, density=2650.0) for shape in shapes]
     scene = scene_of(bodies, Fluid(), [])
     work = work_of(scene, np.array(places, dtype=float), np.zeros((2, 3)))
-    assert list_candidates(scene, work)
+    assert rebuild_list(scene, work)
     locate_contacts(scene, work, NOW)
     return scene, work
 
@@ -34,7 +34,7 @@ def gone(scene, work, places):
     work.place[LATER] = places
     locate_contacts(scene, work, LATER)
     rows = range(work.tally.candidates)
-    besides = [0.5 * rolled_besides(scene, work, LATER, row) for row in rows]
+    besides = [0.5 * slip_rate_of_gap_change(scene, work, LATER, row) for row in rows]
     return np.array([rolled(scene, work, LATER, row) for row in rows]) + besides
 
 

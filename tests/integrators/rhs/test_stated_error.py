@@ -14,7 +14,7 @@ from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.state.bodies import Y
-from flocsim.state.work import CARRIED, DAMPING, work_of
+from flocsim.state.work import DAMPING, PROPAGATED, work_of
 from tests.helpers.tiers import rest_slow
 
 RATE = 2e3
@@ -44,7 +44,7 @@ def at_start(forces):
 def stepped(scene, work, step):
     """The clock behind a step of this length [s], whose matrices are factorised."""
     clock = Implicit(1e-9).fresh_clock()
-    clock.staged_step = step
+    clock.stages_step = step
     gather_clusters(scene, work)
     assert factorise_systems(scene, work, step)
     return clock
@@ -54,12 +54,12 @@ def carried(forces, place, speed, until, steps):
     """(x, vx) of an error that starts as such, carried on with no error of the steps' own."""
     scene, work = at_start(forces)
     # No sum stands in the way.
-    work.errors[0].place = work.errors[0].speed = 1.0
-    work.place[CARRIED, 0, 0], work.velocity[CARRIED, 0, 0] = place, speed
+    work.errors[0].displacement = work.errors[0].velocity = 1.0
+    work.place[PROPAGATED, 0, 0], work.velocity[PROPAGATED, 0, 0] = place, speed
     clock = stepped(scene, work, until / steps)
     for _ in range(steps):
         carry_error(scene, work, clock, until / steps)
-    return np.array([work.place[CARRIED, 0, 0], work.velocity[CARRIED, 0, 0]])
+    return np.array([work.place[PROPAGATED, 0, 0], work.velocity[PROPAGATED, 0, 0]])
 
 
 @pytest.mark.parametrize(("steps", "precision"), [(5, 0.1), (50, 2e-3)])
@@ -135,8 +135,8 @@ def test_what_a_contact_takes_up_is_no_longer_stated():
     run.to_end()
     exact = attrs.evolve(system, integrator=Implicit(1e-13)).run(2e-4, jit=False)
     errors = run.work.errors
-    sums = system.integrator.estimate_share * errors["place"]
-    sums += stated_error.OF_SWITCHES * errors["switch_place"]
+    sums = system.integrator.estimate_share * errors["displacement"]
+    sums += stated_error.SWITCH_AMPLIFICATION * errors["switch_displacement"]
     true = end_distance(bodies, run.motion()[1][-1], exact.position[-1])
-    assert abs(run.work.place[CARRIED, 1, Y]) < 0.05 * sums.max()
+    assert abs(run.work.place[PROPAGATED, 1, Y]) < 0.05 * sums.max()
     assert true <= run.error <= sums.max()

@@ -13,8 +13,8 @@ from flocsim.forces import Contact, DoubleLayer, Gravity, StokesDrag, VanDerWaal
 from flocsim.geometry.contact.near_pairs import gap_between
 from flocsim.integrators import Implicit
 from flocsim.integrators.rhs.surface_gap import (
-    length_at,
-    soften,
+    evaluate_smooth_gap,
+    smoothing_length,
 )
 from flocsim.integrators.rhs.views import pair_view
 from flocsim.state.work import NOW
@@ -68,15 +68,15 @@ class Pair:
     def gaps(self):
         """(g̃, gaps of all pairs that have a share) where the forces were last asked for."""
         end = int(self.work.tally.candidates)
-        near = self.work.candidates[:end]["near"] == 1
-        return soften(self.scene, self.work, NOW, 0, end)[0], self.work.geometry[NOW, :end]["gap"][
-            near
-        ]
+        near = self.work.candidates[:end]["surface_active"] == 1
+        return evaluate_smooth_gap(self.scene, self.work, NOW, 0, end)[0], self.work.geometry[
+            NOW, :end
+        ]["gap"][near]
 
     def closest(self):
         """Vertex and edge that have the largest share in g̃."""
         end = int(self.work.tally.candidates)
-        row = np.argmax(self.work.geometry[NOW, :end]["share"])
+        row = np.argmax(self.work.geometry[NOW, :end]["force_share"])
         return self.work.candidates[row].tolist()[:4]
 
     def strength(self, gap):
@@ -106,7 +106,7 @@ def test_the_smooth_gap_and_its_force_are_close_to_those_of_the_least(force):
         least, room = gaps.min(), 1e-15
         assert least == pytest.approx(gap_between(pair.scene, pair.work, 1, 0), abs=room)
         several += len(gaps) > 1
-        lowest = least - length_at(pair.scene, least) * math.log(len(gaps))
+        lowest = least - smoothing_length(pair.scene, least) * math.log(len(gaps))
         assert lowest - room <= soft <= least + room
         worst = max(worst, abs(pair.strength(soft) / pair.strength(least) - 1.0))
     assert several >= 8
