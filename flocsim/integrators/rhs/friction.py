@@ -20,9 +20,9 @@ bears (µ k_n Δ/k_t for Coulomb friction) and would exceed it:
 
     ξ = s L   as long as   s v_t > dL/dt.
 
-Modes are frozen within a step (Candidate.slide_direction), so forces stay smooth; the driver ends the step
-where a mode has to change. ξ never jumps: it solves dξ/dt = v_t under |ξ| ≤ L. Clipping ξ at the
-end of each step would converge to that only with the first power of the step.
+Modes are frozen within a step (Candidate.slide_direction), so forces stay smooth; the driver ends
+the step where a mode has to change. ξ never jumps: it solves dξ/dt = v_t under |ξ| ≤ L. Clipping ξ
+at the end of each step would converge to that only with the first power of the step.
 
 Grazing. Without a Coulomb limit the tangential force acts however small the overlap is. If the load
 on a contact has nearly vanished, that force alone may lift the bodies apart; the contact opens, the
