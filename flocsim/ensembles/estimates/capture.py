@@ -52,7 +52,7 @@ from flocsim.ensembles.study import KernelStudy
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import student_quantile, wilson
 from flocsim.io.results.events import AGGREGATED, WITHOUT_OUTCOME, Events, kinds_of
-from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel, fractal_in
+from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import NOT_APPLICABLE
 
 Rows = Mapping[str, np.ndarray] | np.ndarray
@@ -287,5 +287,4 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         if scene.sizes is None and i == j:
             radii[i] = float(np.mean(study.pairings[place].radii))
     water = resistance_of_pairs(study.config.forces) is not None
-    fractal = fractal_in(repr(study.config.bodies.density))
-    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water, fractal)
+    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water)

@@ -47,9 +47,18 @@ ENDED = {
 """What further runs of a replicate say, in columns of their own."""
 
 
-def ended(run: str, words: str) -> dict[str, tuple[str, str, str]]:
-    """Return the columns of a further run."""
-    return {f"{run}_{name}": ("u1", "1", f"{text}, {words}") for name, text in ENDED.items()}
+def formed(
+    texts: Mapping[str, str], forms: Mapping[str, str], kind: str = "f8"
+) -> dict[str, tuple[str, str, str]]:
+    """Return {name: (kind, unit, long name)} of columns without a unit.
+
+    Each of ``forms``, {form of the name: form of the long name}, is filled with each of ``texts``.
+    """
+    return {
+        form.format(name): (kind, "1", words.format(text))
+        for name, text in texts.items()
+        for form, words in forms.items()
+    }
 
 
 REPLICATES = {  # name: (dtype, units, long name)
@@ -62,8 +71,8 @@ REPLICATES = {  # name: (dtype, units, long name)
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
-    **ended("checked", "when run again at a tighter tolerance"),
-    **ended("third", "in the third run, at a tolerance tighter still"),
+    **formed(ENDED, {"checked_{}": "{}, when run again at a tighter tolerance"}, "u1"),
+    **formed(ENDED, {"third_{}": "{}, in the third run, at a tolerance tighter still"}, "u1"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
@@ -76,13 +85,10 @@ REPLICATES = {  # name: (dtype, units, long name)
     "failure": ("u1", "1", "reason of an undecided or failed outcome"),
     "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
     "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
-} | {
-    f"{name}_{body}": ("f8", "1", f"{text} of body {body}, as run")
-    for name, text in SHAPE_MEASURES.items()
-    for body in "ij"
+    **formed(SHAPE_MEASURES, {f"{{}}_{body}": f"{{}} of body {body}, as run" for body in "ij"}),
+    **formed(ENDED, {"closer_{}": "{}, both outlines cut closer"}, "u1"),
+    **formed(ENDED, {"wider_{}": "{}, both outlines cut wider"}, "u1"),
 }
-for end in BAND_ENDS:
-    REPLICATES |= ended(end, f"both outlines cut {end}")
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
 
@@ -113,62 +119,47 @@ PROBABILITIES = {
     "pr_bond": "Pr[bond | aggregation]",
 }
 CHANGES = {
-    "n_checked": "replicates run again that count in {} in either run",
-    "n_gained": "of these, raised {} when run again",
-    "n_lost": "of these, lowered {} when run again",
+    "n_checked_{}": "replicates run again that count in {} in either run",
+    "n_gained_{}": "of these, raised {} when run again",
+    "n_lost_{}": "of these, lowered {} when run again",
 }
 """What is counted for every probability, beside `COUNTS`."""
 BOUNDS = {
-    "": "",
-    "_low": ", lower 95 % bound",
-    "_high": ", upper 95 % bound",
-    "_numerical": ", numerical error: 95 % bound of its change, run exactly",
+    "{}": "{}",
+    "{}_low": "{}, lower 95 % bound",
+    "{}_high": "{}, upper 95 % bound",
+    "{}_numerical": "{}, numerical error: 95 % bound of its change, run exactly",
 }
-TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
-    name + suffix: ("f8", "1", text + bound)
-    for name, text in PROBABILITIES.items()
-    for suffix, bound in BOUNDS.items()
-}
-TABLE |= {
-    f"{count}_{name}": ("i8", "1", words.format(text))
-    for name, text in PROBABILITIES.items()
-    for count, words in CHANGES.items()
+TABLE = {
+    **formed(COUNTS, {"{}": "{}"}, "i8"),
+    **formed(PROBABILITIES, BOUNDS),
+    **formed(PROBABILITIES, CHANGES, "i8"),
 }
 POOLED_PROBABILITIES = (
     "pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a", "pr_sticks", "pr_hangs",
 )  # fmt: skip
+COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
 POOLED = {
-    name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
-    for name in POOLED_PROBABILITIES
-    for suffix, bound in BOUNDS.items()
-} | {
-    f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
-    for name in POOLED_PROBABILITIES
+    **formed({k: f"{v}, all displacements pooled" for k, v in COMPARED.items()}, BOUNDS),
+    **formed(COMPARED, {"n_effective_{}": "independent events that {} is worth"}),
 }
-NUMERICS = {
-    f"{name}_change{end}": (
-        "f8", "1", f"by how much {text} would change, run exactly: {word} 95 % bound"
-    )
-    for name, text in PROBABILITIES.items()
-    for end, word in (("_low", "lower"), ("_high", "upper"))
-}  # fmt: skip
+CHANGE = "by how much {} would change, "
+NUMERICS = formed(PROBABILITIES, {
+    "{}_change_low": CHANGE + "run exactly: lower 95 % bound",
+    "{}_change_high": CHANGE + "run exactly: upper 95 % bound",
+})  # fmt: skip
 """The numerical error as a signed change of every probability of `PROBABILITIES`."""
-OUTLINES = {
-    f"{name}_{end}": ("f8", "1", f"by how much {text} would change, {words}")
-    for name, text in PROBABILITIES.items()
-    for end, words in {
-        **{end: f"all outlines cut {end}" for end in BAND_ENDS},
-        "shape_low": "outlines cut within their bands: lower 95 % bound",
-        "shape_high": "outlines cut within their bands: upper 95 % bound",
-    }.items()
-}  # fmt: skip
+OUTLINES = formed(PROBABILITIES, {
+    "{}_closer": CHANGE + "all outlines cut closer",
+    "{}_wider": CHANGE + "all outlines cut wider",
+    "{}_shape_low": CHANGE + "outlines cut within their bands: lower 95 % bound",
+    "{}_shape_high": CHANGE + "outlines cut within their bands: upper 95 % bound",
+})  # fmt: skip
 """The error by the shape: what the ends of the outlines' bands make of every probability."""
 PER_APPROACH = "pr_a_per_approach"
 """Of all approaches that were decided, misses among them: what efficiencies are sums of."""
 
-COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES} | {
-    PER_APPROACH: "Pr[aggregation | decided approach]"
-}
+COMPARED[PER_APPROACH] = "Pr[aggregation | decided approach]"
 """{name: meaning} of the probabilities that are compared."""
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),
