@@ -15,7 +15,6 @@ from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.geometry.shapes.shape import Sphere
 from tests.helpers.small_study import load_text, problem_lines, write_star_library
 
 RATIOS = (3.0, 5.0, 8.0, 13.0, 20.0)
@@ -143,13 +142,6 @@ def test_the_identity_knows_how_flocs_are_drawn(folder):
     write_star_library(folder / "other.h5", ratios=(*RATIOS[:-1], 21.0))
     others = {"shapes": {"vertices": [1], "file": "other.h5"}}
     assert differences(first, identity_of(Study(load_text(folder, STUDY, others))))
-
-
-def test_the_sphere_of_a_floc_has_its_size(folder):
-    study = Study(load_text(folder, STUDY, SPHERES))
-    encounter = study.draw(0, 1, 0.0, 0).encounter
-    assert all(isinstance(shape, Sphere) for shape in encounter.shapes)
-    assert encounter.shapes[1].radius in [floc.size for floc in study.flocs]
 
 
 def test_the_file_and_all_that_reads_it(folder, monkeypatch):
