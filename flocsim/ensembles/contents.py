@@ -19,11 +19,11 @@ import numpy as np
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io.groups import UNREADABLE, Group
+from flocsim.io.groups import UNREADABLE, FileFormat
 from flocsim.io.hdf5 import Unfit, open_hdf5
-from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.labelled import Column, Labelled, Tables, with_unit
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import table_along
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -31,6 +31,9 @@ Facts = list[tuple[str, str]]
 Figures = Mapping[str, Callable[..., Any]]
 """{name: function that returns a matplotlib Figure}, the first line of whose docstring is its
 help."""
+
+Row = Callable[[tuple[int, ...]], Sequence[str]]
+"""Gives the cells of a table at a place along its axes."""
 
 SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history",
               "warnings", "modules")  # fmt: skip
@@ -62,22 +65,6 @@ class Example:
     reason: str = ""
 
 
-@attrs.frozen(eq=False)
-class Joined:
-    """What a sweep joins of its parts: ``groups`` of results; how many places the last ``axes``
-    have; coordinates that may differ from part to part, ``own``; the rows of `info`, heads first,
-    and lines below; the figures."""
-
-    groups: Mapping[str, Group]
-    rows: Callable[[Any], list[tuple[str, ...]]]
-    figures: Callable[[], Figures]
-    asked: Callable[[Any], dict]
-    """(results) → the axes and the number of replicates, as StudyKind.asked has them."""
-    axes: Mapping[str, int] = attrs.Factory(dict)
-    own: Sequence[str] = ()
-    below: Callable[[Any], list[str]] = lambda swept: []
-
-
 def later(module: str, name: str) -> Any:
     """Return a function of a module of flocsim that is loaded when it is called, as a static
     method: what shows a file has no need of the engine."""
@@ -91,15 +78,18 @@ def later(module: str, name: str) -> Any:
 class Contents:
     """What the commands ask of a kind of file; ``found`` is what `read` gives.
 
-    A subclass gives ``title``, what such a file holds in words, `read` and `summary`. All else has
-    a default, and an ability that is None is refused in one line.
+    A subclass gives ``title``, what such a file holds in words, its ``file`` (or `read`), and
+    `summary`. All else has a default, and an ability that is None is refused in one line.
     """
 
     title: str
+    file: FileFormat
     compared: Mapping[str, str] = {}
     """{name: words} of what can be compared."""
-    joined: Joined | None = None
-    """What sweeps join; None where they cannot be run."""
+    swept: Sequence[str] = ()
+    """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
+    swept_table: Any = None
+    """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -112,7 +102,7 @@ class Contents:
     def read(self, path: Any) -> Any:
         """Return what a file holds; FileError for one that is absent, damaged, or of another
         kind."""
-        raise NotImplementedError
+        return self.file.read(path)
 
     def summary(self, found: Any) -> Summary:
         """Return what a file says of itself; ValueError where that cannot be read."""
@@ -267,11 +257,6 @@ def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
     return facts
 
 
-def in_words(value: object) -> str:
-    """A coordinate as text."""
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
 def open_any(
     path: str | os.PathLike, folder: str | os.PathLike | None = None, own: Collection[str] = ()
 ) -> Any:
@@ -344,20 +329,19 @@ class Differences(Tables):
         quantity = self.known(quantity)
         unit, text = self.quantities[quantity]
         arrays = self.arrays[quantity]
-        heads = [f"{name} [{each.about['units']}]" if each.about["units"] != "1" else name
-                 for name, each in self.axes.items()]  # fmt: skip
         numerics = "change_low" in arrays
-        rows = [[*heads, "n", "first", "second", "difference [95 %]" + " numerics" * numerics]]
-        lengths = [len(each.values) for each in self.axes.values()]
-        for place in np.ndindex(*lengths):
+
+        def row(place: tuple[int, ...]) -> Sequence[str]:
             at = {name: float(values[place]) for name, values in arrays.items()}
-            keys = (in_words(each.values.tolist()[k])
-                    for each, k in zip(self.axes.values(), place, strict=True))  # fmt: skip
-            numbers = f"{at['n_first']:.0f}/{at['n_second']:.0f}"
             values = (f"{at[name]:{self.digits}}" for name in ("first", "second"))
-            rows.append([*(visible(key, "") for key in keys), numbers, *values, self.interval(at)])
-        title = f"{text}{'' if unit == '1' else f' [{unit}]'}, second minus first: {self.how}"
-        return "\n".join([*self.changes, title, "", *aligned(rows)])
+            return f"{at['n_first']:.0f}/{at['n_second']:.0f}", *values, self.interval(at)
+
+        axes = {with_unit(k, each.about["units"]): each.values for k, each in self.axes.items()}
+        heads = "n", "first", "second", "difference [95 %]" + " numerics" * numerics
+        both = f"the {self.pairs} {self.noun} that both have, paired"
+        how = both if self.paired else "independent samples"
+        title = f"{with_unit(text, unit)}, second minus first: {how}"
+        return "\n".join([*self.changes, title, "", table_along(axes, heads, row)])
 
     def interval(self, at: Mapping[str, float]) -> str:
         """Return "+0.030 [+0.010, +0.050] -0.004 +0.010 *": a difference, what numerics may change
@@ -371,17 +355,6 @@ class Differences(Tables):
         numerics = "".join(f" {at[name]:{form}}" for name in ("change_low", "change_high")
                            if name in at)  # fmt: skip
         return f"{at['difference']:{form}} [{low:{form}}, {high:{form}}]{numerics}{star}"
-
-    @property
-    def how(self) -> str:
-        """How they were compared, in words."""
-        both = f"the {self.pairs} {self.noun} that both have, paired"
-        return both if self.paired else "independent samples"
-
-    def __repr__(self) -> str:
-        how = f"{self.pairs} pairs" if self.paired else "independent"
-        shape = " × ".join(str(len(each.values)) for each in self.axes.values())
-        return f"{type(self).__name__}({shape} places, {how})"
 
 
 def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:

@@ -15,14 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.config import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
 from flocsim.ensembles.contents import (
     Contents,
     Figures,
-    Joined,
     Summary,
-    in_words,
     open_any,
     stored_in,
     studies,
@@ -39,10 +36,10 @@ from flocsim.io.files import Rule, make_folder
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import check_outputs
 from flocsim.io.results.run_group import SOURCE
-from flocsim.io.results.schema import GROUPS
+from flocsim.io.results.schema import AXES
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.seals import held
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import in_words, table_along
 
 Facts = dict[str, Any]
 
@@ -104,9 +101,13 @@ def unlike(results: Any, identity: Facts, asked: Facts, ends_early: bool = False
         return "it is of another kind"
     if lines := differences(stored_in(results), identity):
         return lines[0]
-    has = kind.asked(results)
-    for name in (*ORDER, "replicates"):
-        there, here = has[name], asked[name]
+    # What was asked for, as far as the axes of the results say it; types of swarms are all alike.
+    axes = results.labelled(kind.swept[0]).axes
+    has = {k: axes[v].values.tolist() for k, v in zip(ORDER, AXES, strict=True) if v in axes}
+    alone = axes.get("replicate")
+    has["replicates"] = results.count if alone is None else len(alone.values)
+    for name, there in has.items():
+        here = asked[name]
         if there != here and not (ends_early and name == "replicates" and there < here):
             return f"{name} are {listed(there)} in the file, {listed(here)} now"
     return ""
@@ -184,10 +185,11 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     """
     lasts = [key.rpartition(".")[2] for key in over]
     lengths = [len(values) for values in over.values()]
+    groups = (group for each in kinds_joined() for group in each.file.groups.values())
+    taken = {axis for group in groups for axis in group.index}
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        taken = [*GROUPS.values(), *(g for each in kinds_joined() for g in each.groups.values())]
-        clash = lasts.count(last) > 1 or any(last in group.index for group in taken)
+        clash = lasts.count(last) > 1 or last in taken
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))
         found = [value_of(configs[stride * place], key) for place in range(lengths[axis])]
@@ -225,7 +227,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in kind.groups:
+    for group in kind.swept:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):
@@ -235,33 +237,30 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
             return Column((*swept, *columns[0].axes), values.reshape(shape), columns[0].about)
 
         columns = {name: stacked("columns", name) for name in labelled[0].columns}
-        # Sizes may follow from what is swept, as from the limits of measured flocs.
-        axes = labelled[0].axes | {name: stacked("axes", name) for name in kind.own}
+        # Sizes, which are no axes, may follow from what is swept, as from limits of measured flocs.
+        axes = {
+            name: each if each.axes == (name,) else stacked("axes", name)
+            for name, each in labelled[0].axes.items()
+        }
         found[group] = Labelled(coordinates | axes, columns)
     return found
 
 
-def kinds_joined() -> list[Joined]:
-    """Return what is joined of each kind that sweeps can run."""
-    return [each.joined for each in studies() if each.joined is not None]
+def kinds_joined() -> list[Contents]:
+    """Return the kinds of studies that sweeps can run."""
+    return [each for each in studies() if each.swept]
 
 
-def joined_of(results: Any) -> Joined | None:
-    """Return what is joined of results; None for those of a kind that sweeps cannot run."""
+def joined_of(results: Any) -> Contents | None:
+    """Return the kind of results; None for one that sweeps cannot run."""
     name = getattr(results, "format", "")
-    found: Joined | None = contents_of(name).joined if name in STUDIES else None
-    return found
+    return next((each for each in kinds_joined() if each.file.name == name), None)
 
 
 def read_joined(path: str | os.PathLike) -> SweepResults:
     """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
     or version."""
-    return read_sweep(path, [(each.groups, each.axes) for each in kinds_joined()])
-
-
-def joined_in(found: SweepResults) -> Joined:
-    """Return what was joined in a file."""
-    return next(each for each in kinds_joined() if each.groups.keys() == found.groups.keys())
+    return read_sweep(path, [(each.file, each.swept) for each in kinds_joined()])
 
 
 class SweepFiles(Contents):
@@ -281,12 +280,19 @@ class SweepFiles(Contents):
 
     def table(self, found: SweepResults) -> str:
         """Return numbers at every value."""
-        kind = joined_in(found)
-        return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
+        kind = next(each for each in kinds_joined() if {*each.swept} == found.groups.keys())
+        table = found.labelled(kind.swept[0])
+        axes = {
+            name: table.axes[name].values for name in table.shared_axes
+            if name not in ("replicate", "time")
+        }  # fmt: skip
+        return table_along(axes, *kind.swept_table(table))
 
     def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""
-        return joined_in(found).figures()
+        from flocsim.io.plots.curves import SWEEP_FIGURES
+
+        return SWEEP_FIGURES.get(next(iter(found.groups)), {})
 
 
 CONTENTS = SweepFiles()

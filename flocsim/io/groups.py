@@ -158,7 +158,7 @@ class Group:
         return values
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Stored(Tables):
     """What a file of one ``kind`` holds, or is to hold: ``groups`` {group: {name: values}},
     coordinates among them; ``run``, the scalars of the group ``run``; the ``attributes`` of the

@@ -11,7 +11,8 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, TextIO
 
 from flocsim.compiler import units
@@ -43,6 +44,29 @@ def aligned(rows: Sequence[Sequence[str]], left: int = 0, gap: str = "  ") -> li
     sides = "<" * left + ">" * (len(widths) - left)
     forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
     return [gap.join(map(format, row, forms)).rstrip() for row in rows]
+
+
+def in_words(value: object) -> str:
+    """Return a coordinate as text that steers no terminal."""
+    return f"{value:g}" if isinstance(value, float) else visible(str(value), "")
+
+
+def table_along(
+    axes: Mapping[str, Sequence], heads: Sequence[str],
+    row: Callable[[tuple[int, ...]], Sequence[str]],
+    places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
+) -> str:  # fmt: skip
+    """Return a table as text, with a row for every place along some axes, or for these ``places``.
+
+    ``axes`` {name: values}: the coordinates, with which each row begins; ``row``: the cells that
+    follow at a place, which has an index along each of the axes; ``left`` as in `aligned`.
+    """
+    rows = [[*axes, *heads]]
+    every = product(*(range(len(each)) for each in axes.values()))
+    for place in every if places is None else places:
+        keys = [in_words(values[k]) for values, k in zip(axes.values(), place, strict=True)]
+        rows.append([*keys, *row(place)])
+    return "\n".join(aligned(rows, left))
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -120,7 +120,7 @@ def test_without_an_output_results_are_in_memory(tmp_path, monkeypatch):
     assert first.table() == second.table() and first.count == 3
     assert first.replicates["outcome"].shape == (1, 1, 2, 3)
     assert second.replicate(1).row["outcome"]
-    assert "in memory" in repr(first)
+    assert "in memory" in str(first.path)
     study.with_({"output.file": "named.h5"}).run()
     study.run(mode="resume")
     assert {path.name for path in tmp_path.iterdir()} == {"named.h5", "study.h5"}

@@ -56,7 +56,7 @@ def test_the_joined_file_has_the_key_as_a_dimension(swept):
     opened = flocsim.open(path)
     assert opened.to_xarray().equals(xarray.open_dataset(path, group="probabilities"))
     assert opened.to_pandas("pooled").index.names == ["hamaker", "type", "vertices"]
-    assert repr(opened).endswith(f"all.h5': {HAMAKER}: 2 values)")
+    assert repr(opened) == "SweepResults(probabilities, pooled)"
 
 
 def test_files_in_the_way_are_left_alone(swept, tmp_path, capsys):

@@ -282,10 +282,6 @@ class StudyResults(Tables):
             "and the kind of machine that it was made with"
         )
 
-    def __repr__(self) -> str:
-        shape = " × ".join(map(str, self.results.shape))
-        return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
-
 
 def open_results(
     path: str | os.PathLike, allowed: Allowed | None = None, sources: Sources | None = None

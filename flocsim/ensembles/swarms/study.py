@@ -38,7 +38,7 @@ from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import ENDS, GONE, SWARMS, WALL
+from flocsim.io.results.swarm_file import ENDS, GONE, ROW, SWARMS, WALL
 from flocsim.io.terminal import duration
 from flocsim.plausibility import settled
 from flocsim.swarms.islands import run_islands
@@ -91,7 +91,7 @@ class SwarmStudy(StudyKind):
     scenes: ClassVar[Sequence[type]] = (SwarmScene,)
     format: ClassVar[str] = SWARMS.name
     code: ClassVar[Sequence[str]] = (*PHYSICS, "swarms", "ensembles/swarms/study.py")
-    row: ClassVar[np.dtype] = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
+    row: ClassVar[np.dtype] = ROW
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
     check = staticmethod(require_contact)

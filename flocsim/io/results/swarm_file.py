@@ -117,6 +117,8 @@ ENDS = {
     "windows": ("i8", "1", "common times"),
 }
 """Columns (replicate,)."""
+ROW = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
+"""How a replicate ended."""
 
 SCALES = {
     "replicate": ("i8", "1", "number of the replicate"),
@@ -168,10 +170,6 @@ class SwarmResults(Stored):
     as in GROUPS, ``run`` scalars."""
 
     exported = ("counts", "clusters", "events")
-
-    def __repr__(self) -> str:
-        shape = self.groups["snapshots"]["cluster"].shape
-        return f"SwarmResults({shape[0]} replicates × {shape[1]} times × {shape[2]} bodies)"
 
 
 SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS, view=SwarmResults)
