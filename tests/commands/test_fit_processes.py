@@ -118,22 +118,6 @@ def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):
 
 
 @pytest.mark.slow
-def test_an_overlay_without_its_picture_is_told(folder, monkeypatch, capsys):
-    original = fit_pictures.find_flocs
-
-    def run(task):
-        found = original(task)
-        if "b.png" in str(task[0]):
-            task[0].unlink()
-        return found
-
-    monkeypatch.setattr(fit_pictures, "find_flocs", run)
-    assert fit(1, "--overlay", "over.png") == 70
-    assert sorted(path.name for path in folder.glob("over*")) == ["over-a.png", "over-c.png"]
-    assert len(ids()) == 3 and "b.png: no such picture" in capsys.readouterr().err
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=[needs_fork, pytest.mark.slow])])
 def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, jobs):
     strange = os.fsencode(folder / "frames") + b"/caf\xe9.png"

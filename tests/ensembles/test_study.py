@@ -9,7 +9,6 @@ from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
-from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import OUTCOMES, REPLICATES
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import framed
@@ -183,4 +182,4 @@ pool = 3
 
 def stored(shape):
     """A fit of a library with all rings of a shape."""
-    return StoredFit(shape.vertices, shape.radius, 1.0, table_of(shape.parts))
+    return StoredFit(shape.parts, 1.0)

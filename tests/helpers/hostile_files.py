@@ -17,7 +17,6 @@ from PIL import Image
 from flocsim import Sphere
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.sweep import joined
-from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import POOLED
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
 from flocsim.io.seals import seal
@@ -96,8 +95,7 @@ def valid_compounds(folder):
     fits = {}
     for make in (framed, beads, cross):
         shape = make(1e-6)
-        table = table_of(shape.parts)
-        fits[len(shape.vertices)] = StoredFit(shape.vertices, shape.radius, 1.0, table)
+        fits[len(shape.vertices)] = StoredFit(shape.parts, 1.0)
     entry = ShapeEntry("a floc", "flocs.png", 1e-6, (0.0, 0.0), 100, 8.0, 1.0, fits)
     write_library(folder / "valid-compounds.h5", [entry])
     return read_sealed(folder / "valid-compounds.h5")

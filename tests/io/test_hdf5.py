@@ -143,7 +143,7 @@ INSTEAD = {
 @pytest.mark.parametrize("kind", INSTEAD)
 @pytest.mark.parametrize(
     ("fixture", "name"),
-    [("results", "replicates/d_c_max"), ("library", "fits/4/radius")],
+    [("results", "replicates/d_c_max"), ("library", "fits/4/point_radius")],
 )  # fmt: skip
 def test_what_stands_instead_of_values_is_refused(request, fixture, name, kind):
     path = request.getfixturevalue(fixture)
