@@ -377,11 +377,10 @@ def bodies_part(bodies: Sequence[Body], drawn: Drawn) -> Arrays:
         "first_point": np.cumsum(counts) - counts,
         "point_count": counts,
         "points": np.concatenate([each.place for each in tables]),
-        "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
-        "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
-        "point_radius": np.concatenate([each.radius for each in tables]),
+        **{f"point_{name}": np.concatenate([getattr(each, name) for each in tables])
+           for name in ("part", "ring", "radius")},
         "box": np.array(drawn.box),
-    }
+    }  # fmt: skip
 
 
 def moment_part(
