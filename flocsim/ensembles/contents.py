@@ -10,7 +10,7 @@ import contextlib
 import importlib
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -44,11 +44,9 @@ MOST_FAILURES = 10
 
 @attrs.frozen
 class Summary:
-    """What a file says of itself: ``facts`` and ``origin``, where it came from; warnings, and what
-    failed, a line each."""
+    """What a file says of itself: facts; warnings, and what failed, a line each."""
 
     facts: Facts
-    origin: Facts = attrs.Factory(list)
     warnings: list[str] = attrs.Factory(list)
     failed: list[str] = attrs.Factory(list)
 
@@ -194,20 +192,15 @@ def studies() -> list[Contents]:
     return [contents_of(name) for name in STUDIES]
 
 
-def summary_of(path: object, kind: Contents, found: Any) -> Summary:
-    """What a file says of itself; FileError where that cannot be read."""
-    try:
-        return kind.summary(found)
-    except UNREADABLE as error:
-        raise FileError(f"{path} has no readable {kind.title}: {error}") from error
-
-
 def text_of(path: object, kind: Contents, found: Any) -> str:
     """Return what `flocsim info` prints of a file, and its page shows."""
-    said, mark = summary_of(path, kind, found), kind.mark(found)
+    try:
+        said, mark = kind.summary(found), kind.mark(found)
+    except UNREADABLE as error:
+        raise FileError(f"{path} has no readable {kind.title}: {error}") from error
     title = f"{kind.title}; {mark}" if mark else kind.title
     lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]
-    lines += fact_lines(said.facts + said.origin)
+    lines += fact_lines(said.facts)
     if said.warnings:
         lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
     if said.failed:
@@ -236,6 +229,19 @@ def unfinished_text(found: Any) -> str:
     shown = reasons.most_common(MOST_FAILURES)
     lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
     return "\n".join([*lines, "", f"{found.progress}:", kind.table(found.results)])
+
+
+def study_summary(
+    facts: Facts, run: Mapping[str, Any], note_words: Callable[[dict], str],
+    apart: Collection[str] = (), more: Iterable[str] = (),
+) -> Summary:  # fmt: skip
+    """Return the Summary of a study: facts, and what the group ``run`` says but ``apart``.
+
+    ``note_words`` tells of a failed replicate; ``more``: warnings besides the stored ones.
+    """
+    warnings, failed = stored(run, "warnings"), stored(run, "failed")
+    return Summary(facts + origin(run, apart), [*map(str, warnings), *more],
+                   list(map(note_words, failed)))  # fmt: skip
 
 
 def fact_lines(facts: Facts) -> list[str]:
@@ -279,12 +285,13 @@ MEANINGS = {
     "difference": "second minus first",
     "difference_low": "difference, lower 95 % bound",
     "difference_high": "difference, upper 95 % bound",
-    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
-    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
     "n_first": "how many count in the first file",
     "n_second": "how many count in the second file",
+    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
+    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
 }
-"""The arrays of a comparison of one quantity; changes by numerics only where they are known."""
+"""The arrays of a comparison of one quantity; changes by numerics, last, only where they are
+known."""
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -398,11 +405,10 @@ def compare(first: Any, second: Any) -> Differences:
     They are paired where both have drawn the same replicates, one by one: studies of one seed.
     UsageError where they have nothing in common, or are of two kinds.
     """
-    formats = {getattr(each, "format", "") for each in (first, second)}
-    for name in formats & STUDIES.keys() if len(formats) == 1 else ():
-        if (difference := contents_of(name).compare) is not None:
-            found: Differences = difference(first, second)
-            return found
+    name, other = (getattr(each, "format", "") for each in (first, second))
+    if name == other and name in STUDIES and contents_of(name).compare is not None:
+        found: Differences = contents_of(name).compare(first, second)
+        return found
     words = " and ".join(type(each).__name__ for each in (first, second))
     able = ", or ".join(f"two {each.title}" for each in studies() if each.compare)
     raise UsageError(f"{able} can be compared: found {words}")

@@ -16,12 +16,13 @@ from flocsim.ensembles.contents import (
     Facts,
     Row,
     Summary,
-    origin,
+    study_summary,
 )
 from flocsim.ensembles.kind import OldResults, places_in
 from flocsim.errors import FileError
 from flocsim.io.groups import FileFormat, Group, Schema, Stored, declared
 from flocsim.io.labelled import Labelled, with_unit
+from flocsim.io.results.run_group import describe_note
 from flocsim.io.results.schema import AXES, COORDINATES
 from flocsim.io.terminal import in_words, table_along
 
@@ -100,7 +101,7 @@ class OneTable(Contents):
 
     def summary(self, found: Stored) -> Summary:
         """Return what a results file says of itself."""
-        return Summary(facts_of(found), origin(found.run))
+        return study_summary(facts_of(found), found.run, describe_note)
 
     def running(self, found: Any) -> Facts:
         """Return facts of a study that has not ended."""

@@ -174,8 +174,6 @@ def lead(
     line = f"{study.title}, on {ranks} rank{'s' * (ranks > 1)}"
     line += f"; {existing} of them exist already" if existing else ""
     progress.say(f"{line}; {source_line(study.source)}")
-    if study.remark:
-        progress.say(study.remark)
     comm.broadcast(remaining)
     if remaining:
         compile_in_turn(study, comm)

@@ -43,7 +43,6 @@ from flocsim.io.terminal import in_words, table_along
 
 Facts = dict[str, Any]
 
-MOST_PARTS = 10_000
 FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
 NO_PHYSICS = ("output", "stop")
 """Keys, and tables, that cannot be swept: they are dimensions already, or no physics."""
@@ -71,7 +70,7 @@ def sweep(
         refuse_other_sweep(read_joined(output), swept)
         rule = held(output)
     check_outputs([output], rule, [study.path], ways)
-    make_folder(parts_folder(output))
+    make_folder(next(iter(parts)).parent)
     # A part that is whole already is taken as it is; any other is run as a study of its own.
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):
@@ -113,10 +112,9 @@ def unlike(results: Any, identity: Facts, asked: Facts, ends_early: bool = False
     return ""
 
 
-def listed(values):
-    return ", ".join(
-        f"{v:g}" if isinstance(v, float) else f"{v}" for v in np.ravel(values).tolist()
-    )
+def listed(values: Any) -> str:
+    """Return one value, or several, as text."""
+    return ", ".join(map(in_words, np.ravel(values).tolist()))
 
 
 def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None:
@@ -131,22 +129,15 @@ def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None
         )
 
 
-def parts_folder(output: Path) -> Path:
-    """Return the folder of the results of the single values."""
-    return output.with_name(f"{output.stem}.parts")
-
-
 def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Path, Study]:
     """Return {its results file: Study} of every value; UsageError for keys that cannot be swept."""
     values = {key: list(each) for key, each in over.items()}
     if not values or not all(values.values()):
         raise UsageError("a sweep needs at least one key and one value: --over KEY=VALUE,VALUE")
-    if int(np.prod([len(each) for each in values.values()], dtype=object)) > MOST_PARTS:
-        raise UsageError(f"a sweep has at most {MOST_PARTS} values")
     for key in values:
         if key in FIXED or key.split(".")[0] in NO_PHYSICS:
             raise UsageError(f"{key} cannot be swept: it is a dimension already, or not physics")
-    folder = parts_folder(output)
+    folder = output.with_name(f"{output.stem}.parts")
     return {
         folder / f"{number:04d}.h5": study.with_(dict(zip(values, point, strict=True)))
         for number, point in enumerate(itertools.product(*values.values()))
@@ -271,12 +262,10 @@ class SweepFiles(Contents):
 
     def summary(self, found: SweepResults) -> Summary:
         """Return the swept keys, by the names of their dimensions, and their values."""
-        facts: list[tuple[str, str]] = []
-        for name, each in found.swept.items():
-            unit = "" if each.unit == "1" else f" {each.unit}"
-            values = ", ".join(map(in_words, each.values))
-            facts.append((f"{each.key} (as {name})", f"{values}{unit}"))
-        return Summary(facts)
+        return Summary([
+            (f"{each.key} (as {name})", f"{listed(each.values)} {each.unit}".removesuffix(" 1"))
+            for name, each in found.swept.items()
+        ])  # fmt: skip
 
     def table(self, found: SweepResults) -> str:
         """Return numbers at every value."""

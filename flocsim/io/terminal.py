@@ -52,7 +52,7 @@ def in_words(value: object) -> str:
 
 
 def table_along(
-    axes: Mapping[str, Sequence], heads: Sequence[str],
+    axes: Mapping[str, Any], heads: Sequence[str],
     row: Callable[[tuple[int, ...]], Sequence[str]],
     places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
 ) -> str:  # fmt: skip

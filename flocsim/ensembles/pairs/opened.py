@@ -65,14 +65,10 @@ def chosen(value: Any, known: Sequence, option: str, default: int) -> int:
     return known.index(value)
 
 
-def with_one_count(config: Config, vertex_count: int) -> Config:
-    """The config with one number of vertices: the flocs need no fits at the others."""
-    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
-
-
 def one_count_study(config: Config, vertex_count: int) -> Study:
-    """Return the Study of `with_one_count`."""
-    return study_of(with_one_count(config, vertex_count))
+    """Return a Study with one number of vertices: the flocs need no fits at the others."""
+    shapes = attrs.evolve(config.shapes, vertices=(vertex_count,))
+    return study_of(attrs.evolve(config, shapes=shapes))
 
 
 def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: bool = False) -> Run:
@@ -235,9 +231,12 @@ class StudyResults(Tables):
                 f"replicate must be a whole number from 0 to {self.count - 1}, found {replicate!r}"
             )
         place = place_of(self.config, type, vertices, delta)
-        study, row = self.study_with(place[1]), self.row(int(replicate), place)
-        found = replicate_of(int(replicate), place, study)
-        assert found.row is not None, "a replicate of a study"
+        n, share = self.vertices.tolist().index(place[1]), self.delta.tolist().index(place[2])
+        found = replicate_of(int(replicate), place, self.study_with(place[1]))
+        assert self.results.replicates is not None and found.row is not None, "rows of a study"
+        stored = {name: self.results.replicates[name] for name in REPEATED}
+        at = place[0], n, share, int(replicate)
+        row = row_in_words({name: column[at] for name, column in stored.items()})
         for name in REPEATED:
             if found.row[name] != row[name]:
                 self.refuse(f"{name} is {row[name]} in the file, {found.row[name]} now")
@@ -251,16 +250,6 @@ class StudyResults(Tables):
         second for each type. UsageError where that is not known.
         """
         return water_facts(self.config)
-
-    def row(self, replicate: int, place: Place) -> dict[str, Any]:
-        """Return REPEATED of the stored row of a replicate, in words."""
-        name = self.config.scene.names[place[0]]
-        at = (
-            list(self.types).index(name), self.vertices.tolist().index(place[1]),
-            self.delta.tolist().index(place[2]), replicate,
-        )  # fmt: skip
-        assert self.results.replicates is not None
-        return row_in_words({each: self.results.replicates[each][at] for each in REPEATED})
 
     def study_with(self, vertices: int) -> Study:
         """The study of the file with bodies of so many vertices, ready to run replicates again.

@@ -16,7 +16,7 @@ from flocsim.ensembles.contents import (
     Row,
     Summary,
     later,
-    origin,
+    study_summary,
 )
 from flocsim.io.labelled import Labelled
 from flocsim.io.results import run_group, schema
@@ -92,8 +92,8 @@ def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
 
     def row(place: tuple[int, ...]) -> Sequence[str]:
         counts = (str(each[place]) for each in (columns["n_total"], *ends.values()))
-        pr_a = (columns[name][place] for name in ("pr_a", "pr_a_low", "pr_a_high"))
-        return *counts, report.with_spread(*pr_a, report.share, report.share)
+        pr_a, low, high = (columns[name][place] for name in ("pr_a", "pr_a_low", "pr_a_high"))
+        return *counts, report.with_spread(pr_a, low, high, report.share, report.share)
 
     return ("n", *ends, "Pr[A] 95 %"), row
 
@@ -125,12 +125,10 @@ class PairFiles(Contents):
         checked = report.checked_line(results) or "unknown: no replicate was run again"
         facts.append(("numerical error", checked))
         facts += [("", line) for line in report.change_lines(results)]
-        warnings = [str(line) for line in stored(run, "warnings")]
-        warnings += filter(None, [report.undecided_line(results)])
-        failed = [run_group.describe_note(note) for note in stored(run, "failed")]
         facts += settling(run) + thermal(run)
         facts += [("touched", line) for line in report.touch_lines(results)]
-        return Summary(facts, origin(run, SAID_APART), warnings, failed)
+        more = filter(None, [report.undecided_line(results)])
+        return study_summary(facts, run, run_group.describe_note, SAID_APART, more)
 
     def table(self, results: schema.Results) -> str:
         """Return the rates; or the efficiencies, if there are any, and the counts and

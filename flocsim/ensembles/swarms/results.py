@@ -3,7 +3,6 @@ commands show of a file and of two.
 """
 
 import io
-import json
 import warnings
 import zipfile
 from collections.abc import Container, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.contents import (
+    MEANINGS,
     Contents,
     Differences,
     Facts,
@@ -24,7 +24,7 @@ from flocsim.ensembles.contents import (
     changes_between,
     common,
     later,
-    origin,
+    study_summary,
 )
 from flocsim.ensembles.kind import Condition, OldResults
 from flocsim.errors import FileError, FlocsimError, UsageError
@@ -84,7 +84,7 @@ def results_from(
     """
     begun = 0 if old is None else len(old.scales["replicate"])
     # Arrays by column, for a place along the first axes: all of the old ones have no such axis.
-    saved: dict[tuple[int, ...], dict[str, np.ndarray]] = {}
+    saved: dict[tuple, dict[str, np.ndarray]] = {}
     if old is not None:
         saved[()] = {name: each for group in old.groups.values() for name, each in group.items()}
     for k, parts in enumerate(swarms.values(), begun):
@@ -100,7 +100,7 @@ def results_from(
     def most(name: str, axis: int) -> int:
         return max(each[name].shape[axis] for each in saved.values() if name in each)
 
-    lengths = {
+    lengths: dict[Any, int] = {
         "replicate": begun + len(swarms), "time": times, "class": 1 + len(asked["bounds"]),
         "body": most("r_eq", -1), "component": 3, "point": most("points", -2), "axis": 2,
     }  # fmt: skip
@@ -117,7 +117,7 @@ def results_from(
             blank = 0 if group == "bodies" else -1 if name == "cluster" else np.nan
             values = np.full([lengths[axis] for axis in column.axes], blank, column.type)
             for place, each in there.items():
-                values[(*place, *map(slice, each.shape))] = each
+                values[place + tuple(map(slice, each.shape))] = each
             groups[group][name] = values
     groups["events"] = swarm_file.events_of(groups["snapshots"]["cluster"])
     groups["ends"] = {name: rows[name] for name in swarm_file.ENDS}
@@ -151,6 +151,11 @@ def facts_of(results: SwarmResults) -> Facts:
         ("steps", f"{ends['steps'].sum()} of islands, {ends['body_steps'].sum()} of bodies, "
          f"{ends['rejected'].sum()} rejected"),
     ]  # fmt: skip
+
+
+def note_words(note: dict) -> str:
+    """Return a swarm that ended early in words."""
+    return f"swarm {note['replicate']}: {note['why']}"
 
 
 def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
@@ -207,11 +212,7 @@ def mean_differences(
     low, high = (np.where(spread, end, np.where(difference == 0.0, 0.0, np.nan))
                  for end in (low, high))  # fmt: skip
     counts = [np.isfinite(each).sum(axis=0) for each in (first, second)]
-    return {
-        "first": means[0], "second": means[1], "difference": difference,
-        "difference_low": low, "difference_high": high,
-        "n_first": counts[0], "n_second": counts[1],
-    }  # fmt: skip
+    return dict(zip(MEANINGS, (*means, difference, low, high, *counts), strict=False))
 
 
 class SwarmFiles(Contents):
@@ -271,10 +272,8 @@ class SwarmFiles(Contents):
         missed = int(np.count_nonzero(finished == 0))
         if not missed:
             return 0, ""
-        notes = json.loads(found.run.get("failed", "[]"))
-        first = (
-            f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
-        )
+        notes = stored(found.run, "failed")
+        first = note_words(notes[0]) if notes else "see `flocsim info`"
         line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
         return (
             (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
@@ -282,11 +281,7 @@ class SwarmFiles(Contents):
 
     def summary(self, results: SwarmResults) -> Summary:
         """Return what a results file of swarms says of its study."""
-        failed = [
-            f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")
-        ]
-        warnings = [str(line) for line in stored(results.run, "warnings")]
-        return Summary(facts_of(results), origin(results.run), warnings, failed)
+        return study_summary(facts_of(results), results.run, note_words)
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""

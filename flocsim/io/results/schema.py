@@ -182,11 +182,10 @@ FLAGS: dict[str, tuple[tuple[int, ...], tuple[str, ...]]] = {
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
     "bond": BOND_CODES,
 }
+AGAIN_CODES = (*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")
 for run in FURTHER_RUNS:
-    FLAGS[f"{run}_outcome"] = (
-        (*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")
-    )  # fmt: skip
-    FLAGS |= {f"{run}_inside": INSIDE_CODES, f"{run}_bond": BOND_CODES}
+    FLAGS[f"{run}_outcome"], FLAGS[f"{run}_inside"] = AGAIN_CODES, INSIDE_CODES
+    FLAGS[f"{run}_bond"] = BOND_CODES
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
@@ -231,7 +230,7 @@ def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Datas
 
 SIZES = declared(RADII, AXES[:1])
 ROWS = declared(REPLICATES, (*AXES, "replicate"), FLAGS)
-for name in ("steps", "rejected", "failure"):
+for name in ("steps", "rejected"):
     ROWS[name] = attrs.evolve(ROWS[name], low=0)
 for name in ("floc_i", "floc_j"):
     ROWS[name] = attrs.evolve(ROWS[name], low=-1)
