@@ -4,9 +4,6 @@ import itertools
 import math
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from typing import Any
-
-import attrs
 
 from flocsim.commands import add_settings
 from flocsim.ensembles.collision.draw import TIGHTER, exact_method
@@ -62,14 +59,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_settings(parser)
 
 
-def of_extremes(config: Config) -> Config:
-    """Return the config with its smallest and its largest pair, its least and its largest N."""
+def extremes_of(config: Config) -> tuple[list[int], list[int]]:
+    """Return the places of the smallest and the largest pair, and the least and the largest N.
+
+    Of size classes, and of rates, all places.
+    """
     given, vertices = config.scene.given, config.shapes.vertices
-    order = sorted(range(len(given)), key=lambda k: sum(given[k][1]))
-    scene: Any = config.scene
-    scene = scene.only(sorted({order[0], order[-1]}) if order else [])
-    shapes = attrs.evolve(config.shapes, vertices=tuple(sorted({min(vertices), max(vertices)})))
-    return attrs.evolve(config, scene=scene, shapes=shapes)
+    places = [*range(len(config.scene.names))]
+    if given and not config.is_kernel:
+        places = sorted(places, key=lambda place: sum(given[place][1]))
+        places = sorted({places[0], places[-1]})
+    return places, sorted({min(vertices), max(vertices)})
 
 
 def verdict_on(found: Comparison, method: Integrator) -> tuple[str, str]:
@@ -108,7 +108,6 @@ def run(args: Namespace) -> int:
     """Run all cases and print the table; 0 where all are right or within their stated error."""
     config = load_config(args.config, settings_in(args.settings))
     check_study(config)
-    config = of_extremes(config)
     # The tolerances of the study and of its second runs; the reference is a hundred times tighter.
     method = config.integrator.method
     methods = [method, *filter(None, [exact_method(method)])]
@@ -121,9 +120,7 @@ def run(args: Namespace) -> int:
     )
     verdicts: Counter[str] = Counter()
     deltas, bench = config.scene.delta, Bench(study_of(config), exact)
-    places = itertools.product(
-        range(len(config.scene.names)), config.shapes.vertices, range(args.count)
-    )
+    places = itertools.product(*extremes_of(config), range(args.count))
     for turn, (condition, n, _) in enumerate(places):
         # Other displacements and other random numbers each time, as far as there are any.
         task = (condition, n, deltas[turn % len(deltas)]), turn % config.replicates
