@@ -36,8 +36,8 @@ SAMPLE_CONTACTS = tuple(
 
 
 def sample_gaps(reach):
-    """Gaps [m] in contact, nearly so, and apart, within a reach."""
-    return [min(gap, 0.5 * reach) for gap in (-1e-9, 1e-10, 1e-7)]
+    """Gaps [m] in contact, just touching, nearly so, and apart, within a reach."""
+    return [min(gap, 0.5 * reach) for gap in (-1e-9, -1e-12, 0.0, 1e-12, 1e-10, 1e-7)]
 
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:

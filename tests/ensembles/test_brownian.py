@@ -96,11 +96,6 @@ def folder(tmp_path, monkeypatch):
         ({"scene": 'rest_time = "3 s"'}, "scene.rest_time: applies only with meeting"),
         ({"scene": 'rate = "3 1/s"'}, "only with meeting = 'shear' or 'extension'"),
         ({"scene": 'receiver = "fixed"'}, "applies only with meeting = 'settling': remove"),
-        (
-            {"scene": "release = 1.1",
-             "shapes": 'source = "library"\nfile = "synthetic"\nvertices = [16]\nradius = "50 nm"'},
-            "scene.release = 1.1 (r_i + r_j) lets outlines touch that reach 1.6",
-        ),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_one_line(tmp_path, changes, words):

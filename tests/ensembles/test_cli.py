@@ -139,7 +139,7 @@ def test_a_spheroradius_that_fills_the_smallest_body(folder, capsys):
     write_small(folder, vertices="[1, 4]\nradius = 4.7e-6")
     code, line = failure(capsys, "small.toml")
     assert code == 2
-    assert "leaves no room for a core in the smallest body, of r_eq = 4.62e-06 m" in line
+    assert "leaves no room for a core in a body of r_eq = 4.62e-06 m" in line
 
 
 @pytest.mark.parametrize("ranks", [None, pytest.param(2, marks=pytest.mark.slow)])

@@ -80,11 +80,6 @@ def test_the_depth_is_that_of_the_damped_spring(share):
     assert found == pytest.approx(max(motion.y[0]), rel=1e-4)
 
 
-def test_critical_damping_stops_at_an_e_th():
-    damping = 2.0 * math.sqrt(20.0 * 3e-9)
-    assert depth(0.2, 3e-9, 20.0, damping) == pytest.approx(0.2 * math.sqrt(3e-9 / 20.0) / math.e)
-
-
 def test_a_value_is_rounded_up():
     assert [rounded_up(x) for x in (38.0, 37.01, 0.0991, 2751.0)] == [38.0, 38.0, 0.1, 2800.0]
 
