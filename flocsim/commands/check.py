@@ -23,7 +23,6 @@ from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.arguments import whole
 from flocsim.io.results.schema import AGGREGATED, CLASSES, OUTCOMES
-from flocsim.io.terminal import tell
 
 COUNT = 2
 """Replicates of each combination of ends, by default."""
@@ -113,7 +112,7 @@ def run(args: Namespace) -> int:
     methods = [method, *filter(None, [exact_method(method)])]
     tightest = methods[-1].tolerance
     exact = Implicit(max(TIGHTER * (tightest if math.isfinite(tightest) else 1e-9), TIGHTEST))
-    tell(
+    print(
         "runs at the extremes of sizes, N and tolerance, compared with Implicit at "
         f"{exact.tolerance:.0e} m\nerror: largest of any point of an outline, at the time when the "
         f"first of the two is decided\n\n{table_line(COLUMNS)}"
@@ -128,12 +127,12 @@ def run(args: Namespace) -> int:
             found = bench.compare(task, each)
             verdict, why = verdict_on(found, each)
             verdicts[verdict] += 1
-            tell(table_line(COLUMNS, [
+            print(table_line(COLUMNS, [
                 config.scene.names[condition], n, type(each).__name__, setting_of(each),
                 f"{task[0][2]:.3g}", task[1], found.steps or "-", number(1e3 * found.cpu, ".2f"),
                 number(found.error), number(found.stated), f"  {verdict}{': ' * bool(why)}{why}",
             ]))  # fmt: skip
-    tell(
+    print(
         f"\n{verdicts[RIGHT]} {RIGHT} (within the tolerance), {verdicts[STATED]} {STATED}, "
         f"{verdicts[WRONG]} {WRONG}"
     )

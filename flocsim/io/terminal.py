@@ -100,8 +100,9 @@ class PlainStream:
         self.problem = None if stream else OSError(errno.EBADF, "it is closed")
         self.stream = stream or open(os.devnull, "w")  # noqa: SIM115 (as long as the process)
         if hasattr(stream, "reconfigure"):
-            # A letter that a terminal does not know must not end a command.
-            stream.reconfigure(errors="replace")
+            # A letter that a terminal does not know must not end a command, and a line that goes
+            # into a pipe or a file is to be seen when it is printed.
+            stream.reconfigure(errors="replace", line_buffering=True)
 
     def write(self, text: str) -> int:
         """Write a text; a carriage return begins the line anew, as `Progress` does."""
@@ -154,18 +155,6 @@ def output_problem() -> str:
     return f"standard output could not be written: {problem.strerror or problem}"
 
 
-def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
-
-    What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
-    """
-    stream = sys.stdout if stream is None else stream
-    try:
-        print(text, end=end, file=stream, flush=True)
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
 class Progress:
     """How far a long work is: whole lines, or on a terminal one line that renews itself."""
 
@@ -181,11 +170,11 @@ class Progress:
     def say(self, text: str) -> None:
         """Print a line, unless quiet."""
         if not self.quiet:
-            tell(text, self.stream)
+            print(text, file=self.stream, flush=True)
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, quiet or not."""
-        tell(f"flocsim: {visible(text, keep='')}", sys.stderr)
+        print(f"flocsim: {visible(text, keep='')}", file=sys.stderr, flush=True)
 
     def start(self, todo: int) -> None:
         """Begin with so much of the total to do."""
@@ -206,11 +195,11 @@ class Progress:
         if self.tty:
             self.renew(text)
         else:
-            tell(text, self.stream)
+            print(text, file=self.stream, flush=True)
 
     def renew(self, text: str, end: str = "") -> None:
         """Write a line over the last one of a terminal."""
-        tell(f"\r{text[:WIDTH]:<{WIDTH}}", self.stream, end)
+        print(f"\r{text[:WIDTH]:<{WIDTH}}", end=end, file=self.stream, flush=True)
 
     def finish(self) -> float:
         """End the line that renews itself; return the seconds since the start."""

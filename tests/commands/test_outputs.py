@@ -112,7 +112,7 @@ def test_inputs_of_a_trajectory_are_never_its_output(folder, capsys):
     words = ["trajectory", "small.toml", *ONE, "--overwrite"]
     for name in ("lib.h5", "small.toml", "spring_of_mine.py"):
         assert "which is an input" in refused(folder, capsys, *words, "--save", name)
-    line = refused(folder, capsys, *words, "-o", "a.png", "b.png", "--distance", "./a.png")
+    line = refused(folder, capsys, *words, "-o", "a.png", "--distance", "./a.png")
     assert "./a.png and a.png are the same file, but two outputs" in line
 
 

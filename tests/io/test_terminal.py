@@ -7,7 +7,7 @@ import os
 import pytest
 
 from flocsim.io import terminal
-from flocsim.io.terminal import Progress, duration, markdown_table, tell
+from flocsim.io.terminal import Progress, duration, markdown_table
 
 
 class Terminal(io.StringIO):
@@ -133,8 +133,7 @@ def test_letters_that_steer_a_terminal_are_written_out(monkeypatch, text, shown)
     with terminal.plain_streams():
         print(text)
         print(text, file=terminal.sys.stderr)
-        tell(text)
-    assert streams[0].getvalue() == 2 * (shown + "\n")
+    assert streams[0].getvalue() == shown + "\n"
     assert streams[1].getvalue() == shown + "\n"
     assert terminal.sys.stdout is streams[0]
 
@@ -184,7 +183,7 @@ def test_a_closed_stream_takes_what_it_is_given(monkeypatch, name):
     streams = in_memory(monkeypatch)
     monkeypatch.setattr(terminal.sys, name, None)
     with terminal.plain_streams():
-        tell("hello")
+        print("hello")
         Progress(3, False).warn("careful")
         assert bool(terminal.output_problem()) == (name == "stdout")
     shown = "".join(each.getvalue() for each in streams)
