@@ -129,16 +129,6 @@ def test_before_they_meet_both_only_settle(study):
     assert times[1] < 1e-4
 
 
-def test_a_finer_tolerance_finds_the_same_collision(tmp_path):
-    coarse, fine = (
-        small_study(tmp_path, {"integrator": {"tolerance": tolerance}}).run(0, 16, 0.0, 0)
-        for tolerance in ("1 nm", "0.01 nm")
-    )
-    assert coarse["d_c_collision"] == pytest.approx(fine["d_c_collision"], abs=2e-9)
-    assert coarse["t_collision"] == pytest.approx(fine["t_collision"], rel=1e-3)
-    assert coarse["steps"] < fine["steps"]
-
-
 def test_contacts_that_never_pull_come_to_an_end(tmp_path):
     """Resting contacts hang at the kink of such a law, where steps could end for ever."""
     study = small_study(tmp_path, {"forces": {"contact": {"tension": False}}})

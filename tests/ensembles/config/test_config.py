@@ -103,12 +103,6 @@ def test_objects_made_in_python_are_checked_too(make):
         make()
 
 
-def test_the_zone_is_the_outer_root_unless_a_distance_is_given():
-    assert ZoneConfig().root == "outer"
-    assert ZoneConfig(distance=5e-6).root is None
-    assert ZoneConfig(centre=45e-6).root is None
-
-
 def test_tang2014_has_the_papers_zone_and_weights(tmp_path):
     config = load_preset(tmp_path, "tang2014")
     assert zone_number(config) == pytest.approx(0.086541, rel=1e-4)

@@ -30,12 +30,6 @@ def test_one_mechanism_may_be_a_word(tmp_path):
     assert kernel_config(tmp_path, meeting='"settling"').scene.meeting == ("settling",)
 
 
-def test_nine_classes_make_45_pairs(tmp_path):
-    sizes = str([f"{k} um" for k in range(2, 11)])
-    config = kernel_config(tmp_path, sizes=sizes, meeting='"shear"', scene='rate = "1 1/s"')
-    assert len(config.scene.names) == 45
-
-
 def test_replicates_are_4096_where_nothing_is_said(tmp_path):
     path = tmp_path / "kernel.toml"
     path.write_text(kernel_text(scrambles=8).replace("replicates = 32\n", ""), "utf-8")

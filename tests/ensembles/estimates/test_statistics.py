@@ -275,14 +275,6 @@ def test_a_study_ends_at_the_first_look_that_is_narrow_enough(tmp_path):
     assert np.max(half_widths(tabulate(*codes))) > 0.12
 
 
-@pytest.mark.slow
-def test_it_is_the_beginning_of_the_study_without_a_rule(tmp_path):
-    ended = run(small_config(tmp_path, SPHERES | {"stop": RULE}))
-    whole = run(small_config(tmp_path, SPHERES))
-    for name, values in ended.replicates.items():
-        np.testing.assert_array_equal(values, whole.replicates[name][..., : ended.count])
-
-
 def test_the_study_goes_on_where_the_rule_is_made_stricter(tmp_path):
     config = small_config(tmp_path, SPHERES | {"stop": RULE})
     run_to_file(config, Communicator(), tmp_path / "r.h5", NEW)
