@@ -12,12 +12,12 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
-from flocsim.io.json_text import matches, read_json
+from flocsim.io.json_text import read_json
 
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
 """What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
-SESSION = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
+SESSION_FORM = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
 DEFAULTS: dict[str, Any] = {
@@ -37,11 +37,6 @@ def stored(run: Mapping[str, Any], name: str) -> Any:
         return read_json(run[name], type(default)) if name in run else default
     except ValueError as error:
         raise ValueError(f"run/{name} cannot be read: {error}") from error
-
-
-def is_session(description: dict) -> bool:
-    """Return True if a description, whoever wrote it, can be that of a session of a journal."""
-    return matches(description, SESSION)
 
 
 def describe_note(note: dict) -> str:
