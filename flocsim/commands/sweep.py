@@ -10,7 +10,6 @@ from types import FrameType
 from typing import Any
 
 from flocsim.commands import add_overwrite, add_settings
-from flocsim.ensembles.cli import continuing
 from flocsim.ensembles.config.loader import parse_setting, settings_in
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.errors import UsageError
@@ -62,14 +61,13 @@ def run(args: Namespace) -> int:
     except (KeyboardInterrupt, StopRequested) as error:
         # The process of a part may have been stopped alone, and has said by what.
         who = str(error).partition(":")[0] or "stopped by SIGINT"
-        print(f"flocsim: {who}: what was finished is kept\n{continuing()}", file=sys.stderr)
+        print(f"flocsim: {who}: what was finished is kept; continue with --resume", file=sys.stderr)
         return STOPPED
 
 
 def run_study(args: Namespace) -> int:
     """Do what the arguments ask for; return the exit code."""
     from flocsim.ensembles.script_study import Study, settings_of
-    from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.sweep import planned, sweep
 
     pairs = [values_of(text) for text in args.over]
@@ -86,8 +84,7 @@ def run_study(args: Namespace) -> int:
             print(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
     mode = "resume" if args.resume else "new"
-    sweep(study, over, output, jobs=args.jobs, mode=mode, overwrite=args.overwrite, tell=print,
-          ways=WAYS)  # fmt: skip
+    sweep(study, over, output, jobs=args.jobs, mode=mode, overwrite=args.overwrite, tell=print)
     print(output)
     return 0
 

@@ -25,11 +25,9 @@ from flocsim.ensembles.contents import (
     studies,
 )
 from flocsim.ensembles.kind import ORDER, flocs_of, study_of
-from flocsim.ensembles.script_study import WAYS, Study
-from flocsim.ensembles.storage.identity import (
-    differences,
-    identity_of,
-)
+from flocsim.ensembles.script_study import Study
+from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.ensembles.storage.resume import WAYS
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import Rule, make_folder
@@ -51,15 +49,15 @@ NO_PHYSICS = ("output", "stop")
 def sweep(
     study: Study, over: Mapping[str, Sequence], output: str | os.PathLike, *, jobs: int = 1,
     mode: str = "new", overwrite: bool = False, quiet: bool = True,
-    tell: Callable[[str], object] = lambda line: None, ways: str = WAYS,
+    tell: Callable[[str], object] = lambda line: None,
 ) -> SweepResults:  # fmt: skip
     """Run a Study at every value of some keys, and join the results in the file ``output``.
 
     ``over``: {dotted key: values}; several keys make a grid. ``mode`` "resume" goes on with what is
     there, extends it, or takes it as it is, as Study.run does with each part; ``tell`` is given a
-    line for each; ``ways``: what to say where a file is in the way. All values have the study's
-    seed: what differs between them is paired. UsageError for a key that is none, a value that does
-    not fit, a file in the way, and for a part that is, or becomes, another than when it began.
+    line for each. All values have the study's seed: what differs between them is paired. UsageError
+    for a key that is none, a value that does not fit, a file in the way, and for a part that is, or
+    becomes, another than when it began.
     """
     output = Path(output)
     parts = planned(study, over, output)
@@ -67,9 +65,14 @@ def sweep(
     wanted = wanted_of(parts)
     rule: Rule = overwrite
     if mode == "resume" and output.exists():
-        refuse_other_sweep(read_joined(output), swept)
+        for name, each in read_joined(output).swept.items():
+            if name not in swept or not set(each.values) <= set(swept[name].values):
+                raise UsageError(
+                    f"{output} has other values of {each.key}: ask for these too, or name another "
+                    "file"
+                )
         rule = held(output)
-    check_outputs([output], rule, [study.path], ways)
+    check_outputs([output], rule, [study.path], WAYS)
     make_folder(next(iter(parts)).parent)
     # A part that is whole already is taken as it is; any other is run as a study of its own.
     found = []
@@ -115,18 +118,6 @@ def unlike(results: Any, identity: Facts, asked: Facts, ends_early: bool = False
 def listed(values: Any) -> str:
     """Return one value, or several, as text."""
     return ", ".join(map(in_words, np.ravel(values).tolist()))
-
-
-def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None:
-    """UsageError where a joined file has values that a new one in its place would not have."""
-    lost = [
-        each.key for name, each in before.swept.items()
-        if name not in swept or not set(each.values) <= set(swept[name].values)
-    ]  # fmt: skip
-    if lost:
-        raise UsageError(
-            f"{before.path} has other values of {lost[0]}: ask for these too, or name another file"
-        )
 
 
 def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Path, Study]:

@@ -6,7 +6,6 @@ of each collision type, which settle fastest.
 """
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -19,6 +18,7 @@ from flocsim.ensembles.collision.equivalent import kinds, sphere_pairs
 from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.ensembles.config.schema import PRESETS, Config
+from flocsim.ensembles.config.sources import RUN
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
 from flocsim.forces import Contact, ContactForce, Force, PairForce
@@ -38,11 +38,9 @@ PARTS = 16
 
 
 def inputs_of(config: Config, path: str) -> list[str]:
-    """Return the files of a study: the config at ``path``, its library, its own classes."""
+    """Return the files of a study: the config at ``path``, its library, the user's modules."""
     library = [str(config.shapes.file)] if config.shapes.file else []
-    # A class of the user's own is read from the file of a module that is loaded.
-    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
-    return [path, *library, *(file for file in files if isinstance(file, str))]
+    return [path, *library, *(str(file) for file, _ in RUN.values())]
 
 
 def check_study(config: Config) -> None:
