@@ -6,9 +6,8 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.commands import trajectory
-from flocsim.io.seals import seal
 from tests.helpers.rounding import to_rounding
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 from tests.helpers.small_study import write_small
 from tests.helpers.tiers import rest_slow
 

@@ -19,12 +19,11 @@ from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.sweep import joined
 from flocsim.io.results.schema import POOLED
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
-from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from flocsim.io.trajectory import write_trajectory
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 from tests.helpers.small_rates import mixed, some_kernel
 from tests.helpers.small_study import VALID, write_star_library
 from tests.helpers.swarm_study import make_swarm_results

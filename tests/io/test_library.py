@@ -13,7 +13,6 @@ from flocsim.geometry.shapes.cores import scaled_parts
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.images.pictures import segment
 from flocsim.io.images.regions import mask_measures, with_holes
-from flocsim.io.seals import seal
 from flocsim.io.shape_library import (
     StoredFit,
     make_entry,
@@ -21,7 +20,7 @@ from flocsim.io.shape_library import (
     write_library,
 )
 from tests.helpers.compound_shapes import beads
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 
 PIXEL = 0.95e-6
 

@@ -10,10 +10,9 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.hdf5 import open_hdf5
-from flocsim.io.seals import seal
 from flocsim.io.trajectory import DATASETS, TRAJECTORY, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError, visible
-from flocsim.io import seals
 from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import provenance
 from flocsim.io.results.schema import OUTCOMES, REPLICATES, TABLE
+from flocsim.io.seals import HDF5_SIGNATURE
 from tests.helpers.results_files import same_data, write_results
+from tests.helpers.sealed import seal
 from tests.helpers.synthetic_results import FAILURES, make_results
 
 SMALL = {"types": ("I", "16.41/4.95 µm"), "vertices": (1, 8), "delta": (0.0, 0.7), "count": 5}
@@ -110,8 +111,8 @@ def test_unwritable_places_are_told(tmp_path, place):
     [
         (b"", "not an HDF5 file"),
         (b"type,vertices\nI,4\n", "not an HDF5 file"),
-        (seals.HDF5_SIGNATURE, "checksum"),
-        (seals.seal(seals.HDF5_SIGNATURE + b"junk"), "no readable results"),
+        (HDF5_SIGNATURE, "checksum"),
+        (seal(HDF5_SIGNATURE + b"junk"), "no readable results"),
     ],
 )
 def test_files_of_another_kind_are_refused(tmp_path, content, finding):
@@ -129,7 +130,7 @@ def test_foreign_hdf5_is_refused(tmp_path):
         file["x"] = 1.0
     with pytest.raises(FileError, match="not from flocsim"):
         read_results(path)
-    path.write_bytes(seals.seal(path.read_bytes()))
+    path.write_bytes(seal(path.read_bytes()))
     with pytest.raises(FileError, match="holds a file of another kind: name a file with results"):
         read_results(path)
 
