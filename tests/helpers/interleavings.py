@@ -282,7 +282,7 @@ def wait_until(holds, seconds):
     """Wait until something holds, for so many seconds at most."""
     until = time.monotonic() + seconds
     while not holds() and time.monotonic() < until:
-        time.sleep(0.003)
+        time.sleep(0.01)
 
 
 def forget_modules():
@@ -311,6 +311,10 @@ def state_of(pid):
 
 def group(number):
     """The processes of a group that have not ended."""
+    try:
+        os.killpg(number, 0)
+    except ProcessLookupError:
+        return []
     states = {int(name): state_of(name) for name in os.listdir("/proc") if name.isdigit()}
     return [pid for pid, (state, of) in states.items() if of == number and state != "Z"]
 
