@@ -7,7 +7,7 @@ import pytest
 
 from flocsim.__main__ import main
 from flocsim.body import Body
-from flocsim.constants import VACUUM_PERMITTIVITY
+from flocsim.ensembles.collision.start import attraction_ratio
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.config.pair_scene import TYPES, PairScene
 from flocsim.ensembles.config.schema import (
@@ -37,10 +37,7 @@ def force_of(config, name):
 
 def zone_number(config):
     """S = H_A κ/(24π ε0 ε_r φ²); there are roots up to 4/e²."""
-    hamaker = force_of(config, "van_der_waals").hamaker
-    layer = force_of(config, "double_layer")
-    charge = VACUUM_PERMITTIVITY * layer.permittivity * layer.potential**2
-    return hamaker / layer.debye_length / (24.0 * math.pi * charge)
+    return attraction_ratio(force_of(config, "van_der_waals"), force_of(config, "double_layer"))
 
 
 def test_conditions_are_named_by_type_or_by_radii():

@@ -73,8 +73,3 @@ def test_two_bodies_may_meet_in_a_flow(tmp_path):
     path.write_text('preset = "si"\n[scene]\nmeeting = "shear"\nrate = "3 1/s"\n', "utf-8")
     scene = load_config(path).scene
     assert (scene.meeting, scene.rate) == ("shear", 3.0)
-    path.write_text(
-        'preset = "si"\n[scene]\nmeeting = "shear"\nrate = "3 1/s"\nreceiver = "fixed"\n', "utf-8"
-    )
-    with pytest.raises(ConfigError, match="receiver"):
-        load_config(path)

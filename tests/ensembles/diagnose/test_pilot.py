@@ -38,11 +38,6 @@ def test_conditions_take_turns_and_no_replicate_comes_twice(tmp_path, replicates
         assert set(places) == set(study.conditions) and set(places.values()) == {1}
 
 
-def test_a_sample_ends_with_the_study(tmp_path):
-    study = small_study(tmp_path, {"shapes": {"vertices": [1]}})
-    assert len(set(sample_of(study.config, study.conditions))) == study.size == 12
-
-
 def test_times_are_scaled_to_the_study(tmp_path):
     """The least number of replicates is run; a study of ten times as many takes as much more."""
     found = [

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.equivalent import sphere_pairs
-from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.contents import info_of
 from flocsim.ensembles.diagnose.dry_run import dry_run
 from flocsim.ensembles.diagnose.preflight import (
@@ -145,12 +144,6 @@ def test_the_command_refuses_before_it_runs(tmp_path, monkeypatch, capsys):
         said = capsys.readouterr()
         assert said.out == "" and "forces.contact.k_n 90 N/m or more" in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
-
-
-def test_si_and_the_examples_are_not_refused(tmp_path):
-    path = tmp_path / "si.toml"
-    path.write_text('preset = "si"\n[scene]\ntypes = ["I", "II", "III"]\n', "utf-8")
-    check_study(load_config(path))
 
 
 USUAL = {

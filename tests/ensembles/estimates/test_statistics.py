@@ -12,7 +12,6 @@ from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.statistics import (
     CODES,
     borders,
-    probabilities,
     stop_rule,
 )
 from flocsim.ensembles.parallel.communicator import Communicator
@@ -172,18 +171,6 @@ def test_no_events_give_nan_not_zero():
     table = tabulate(np.full((1, 5), 4), *[np.full((1, 5), NOT_APPLICABLE)] * 2)
     for name in [name for name in table if name.startswith("pr_")]:
         assert np.isnan(table[name]).all(), name
-
-
-def test_counts_of_two_halves_pool_to_the_whole():
-    codes = draw_codes(np.random.default_rng(2), (2, 3, 2, 50))
-    whole = tabulate(*codes)
-    halves = (slice(17), slice(17, None))
-    parts = [tabulate(*(each[..., k] for each in codes)) for k in halves]
-    counts = [name for name in whole if name.startswith("n_")]
-    pooled = {name: parts[0][name] + parts[1][name] for name in counts}
-    pooled |= probabilities(pooled)
-    for name in pooled:
-        np.testing.assert_array_equal(whole[name], pooled[name])
 
 
 def test_swapping_inside_and_outside_mirrors_the_table():
