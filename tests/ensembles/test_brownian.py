@@ -190,17 +190,8 @@ def test_a_pair_that_a_secondary_minimum_holds_never_touches(folder, capsys):
 
 @pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
-    words = [
-        "trajectory",
-        "study.toml",
-        "--type",
-        "0.5um-0.5um",
-        "--vertices",
-        "1",
-        "--replicate",
-        "1",
-    ]
-    assert main([*words, "-o", "a.png"]) == 0
+    words = "trajectory study.toml --type 0.5um-0.5um --vertices 1 --replicate 1 -o a.png"
+    assert main(words.split()) == 0
     row = Study(load_config("study.toml")).run(0, 1, 0.0, 1)
     assert OUTCOMES[row["outcome"]] in capsys.readouterr().out
 
