@@ -198,17 +198,21 @@ def text_of(path: object, kind: Contents, found: Any) -> str:
         said, mark = kind.summary(found), kind.mark(found)
     except UNREADABLE as error:
         raise FileError(f"{path} has no readable {kind.title}: {error}") from error
-    title = f"{kind.title}; {mark}" if mark else kind.title
-    lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]
-    lines += fact_lines(said.facts)
-    if said.warnings:
-        lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
-    if said.failed:
-        lines += ["", *(f"failed: {visible(line, '')}" for line in said.failed[:MOST_FAILURES])]
+    head = f"{path}: {kind.title}; {mark}" if mark else f"{path}: {kind.title}"
+    return page_of(head, kind.source(found), said, kind.table(found))
+
+
+def page_of(head: str, source: str, said: Summary, table: str) -> str:
+    """Return all of these as lines; what a file says is shown, and steers no terminal."""
+    width = max(len(name) for name, _ in said.facts)
+    lines = [head, *filter(None, [source]), ""]
+    lines += [f"{name:<{width}}  {value}" for name, value in said.facts]
+    for word, notes in (("warning", said.warnings), ("failed", said.failed[:MOST_FAILURES])):
+        lines += ["", *(f"{word}: {each}" for each in notes)] if notes else []
     if len(said.failed) > MOST_FAILURES:
         lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
-    table = kind.table(found)
-    return "\n".join([*lines, *(["", table] if table else [])])
+    lines += ["", *table.split("\n")] if table else []
+    return "\n".join(visible(line, "") for line in lines)
 
 
 def info_of(path: str | os.PathLike) -> str:
@@ -224,11 +228,9 @@ def unfinished_text(found: Any) -> str:
     if found.unread:
         facts.append(("damaged", f"{found.unread} records, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)
-    lines = [f"{found.path}: {found.progress}", *filter(None, [str(last.get("source", ""))]), ""]
-    lines += fact_lines(facts)
-    shown = reasons.most_common(MOST_FAILURES)
-    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
-    return "\n".join([*lines, "", f"{found.progress}:", kind.table(found.results)])
+    failed = [f"{count} times {why}" for why, count in reasons.most_common(MOST_FAILURES)]
+    said, source = Summary(facts, [], failed), str(last.get("source", ""))
+    return page_of(f"{found.path}: {found.progress}", source, said, kind.table(found.results))
 
 
 def study_summary(
@@ -242,12 +244,6 @@ def study_summary(
     warnings, failed = stored(run, "warnings"), stored(run, "failed")
     return Summary(facts + origin(run, apart), [*map(str, warnings), *more],
                    list(map(note_words, failed)))  # fmt: skip
-
-
-def fact_lines(facts: Facts) -> list[str]:
-    """[(name, value)] as aligned lines; what a file says is shown, and steers no terminal."""
-    width = max(len(name) for name, _ in facts)
-    return [f"{visible(name, ''):<{width}}  {visible(value, '')}" for name, value in facts]
 
 
 def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:

@@ -33,7 +33,7 @@ from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import FORMAT, first_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
-from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
+from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS
 from flocsim.run import Run
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
@@ -130,14 +130,10 @@ class StudyResults(Tables):
     exported: Sequence[str] = ("probabilities", "replicates")
     format = FORMAT
 
-    def __init__(
-        self, results: Results, source: str | os.PathLike, allowed: Allowed,
-        sources: Sources | None = None,
-    ) -> None:  # fmt: skip
-        self.results, self.source = results, source
-        self.folder = allowed.folder or Path(source).parent
-        self.allowed, self.sources = allowed, sources or Sources()
-        self.path = Path(source)
+    def __init__(self, path: str | os.PathLike, allowed: Allowed | None = None) -> None:
+        self.results = results = read_results(path)
+        self.path, self.allowed = Path(path), allowed or Allowed()
+        self.folder = self.allowed.folder or self.path.parent
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
@@ -166,10 +162,9 @@ class StudyResults(Tables):
         text = str(self.run.get("config", ""))
         if not text:
             raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
-        if self.sources.config is None:
-            self.sources.config, self.sources.allowed = text, self.allowed
+        sources = Sources(text, allowed=self.allowed)
         try:
-            return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+            return load_config(self.folder / "study.toml", self.stored("overrides"), sources)
         except ConfigError as error:
             line, *more = str(error).split("\n")
             further = f" (and {len(more)} more)" if more else ""
@@ -272,18 +267,10 @@ class StudyResults(Tables):
         )
 
 
-def open_results(
-    path: str | os.PathLike, allowed: Allowed | None = None, sources: Sources | None = None
-) -> StudyResults:
-    """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
-    modules and libraries."""
-    return StudyResults(read_results(path), path, allowed or Allowed(), sources)
-
-
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     """Return the first replicate of each class that the file has, of its flocs with the most
     vertices."""
-    opened, found = open_results(path, allowed), []
+    opened, found = StudyResults(path, allowed), []
     first = first_of_each(opened.results)
     for outcome in filter(first.__contains__, CLASSES):
         t, v, d, k = first[outcome]

@@ -112,7 +112,7 @@ class PairFiles(Contents):
     facts = later("ensembles.pairs.study", "facts")
     stop_rule = later("ensembles.estimates.statistics", "stop_rule")
     dry_run = later("ensembles.diagnose.dry_run", "dry_run")
-    opened = later("ensembles.pairs.opened", "open_results")
+    opened = later("ensembles.pairs.opened", "StudyResults")
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
     verdict = staticmethod(report.verdict)

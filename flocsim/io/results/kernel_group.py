@@ -43,8 +43,7 @@ FLIPS = {
 BESIDES = {
     "beta2_reference": ("f8", "m2 s-1", "rectilinear kernel of the equivalent spheres, in a plane"),
     "beta3_reference": ("f8", "m3 s-1", "rectilinear kernel of the equivalent spheres"),
-    "speed": ("f8", "m s-1", "at which the pair settles against each other; in a flow rate times "
-              "r_i + r_j"),
+    "speed": ("f8", "m s-1", "relative settling speed of the pair; in a flow rate times r_i + r_j"),
     "checked": ("f8", "1", "points that were run again at a tighter tolerance"),
     "undecided": ("f8", "1", "share of the sampled flux whose encounters are undecided or failed"),
     "edge": ("f8", "1", "share of what aggregates that came from the outermost tenth of the "

@@ -4,7 +4,6 @@ The file itself is read and written by `flocsim.io.results.file`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
@@ -92,6 +91,18 @@ REPLICATES = {  # name: (dtype, units, long name)
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
 
+BONDS = ("certificate", "hook", "rest")
+"""Kinds of bond, from code 1 on: no later load can open it; the contacts carry the load, as statics
+shows; the pair has kept its pose under its load, without such a proof."""
+LAST_AXES = {"class": CLASSES, "bond": BONDS}
+"""The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
+
+
+def last_axis(name: str) -> tuple[str, ...]:
+    """The last axis of an array of `TABLE`, where it has one more than the conditions; or none."""
+    return tuple(axis for axis in LAST_AXES if axis in name)
+
+
 COUNTS = {
     "n_total": "replicates",
     "n_missed": "replicates whose bodies parted without touching",
@@ -135,9 +146,8 @@ TABLE = {
     **formed(PROBABILITIES, BOUNDS),
     **formed(PROBABILITIES, CHANGES, "i8"),
 }
-POOLED_PROBABILITIES = (
-    "pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a", "pr_sticks", "pr_hangs",
-)  # fmt: skip
+POOLED_PROBABILITIES = tuple(name for name in PROBABILITIES if not last_axis(name))
+"""Those that are one number for each condition."""
 COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
 POOLED = {
     **formed({k: f"{v}, all displacements pooled" for k, v in COMPARED.items()}, BOUNDS),
@@ -167,11 +177,6 @@ DIFFERENCES = {
     "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
     "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
 }
-BONDS = ("certificate", "hook", "rest")
-"""Kinds of bond, from code 1 on: no later load can open it; the contacts carry the load, as statics
-shows; the pair has kept its pose under its load, without such a proof."""
-LAST_AXES = {"class": CLASSES, "bond": BONDS}
-"""The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
 EVENTS = ("inside", "aggregated")
 """Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
 INSIDE_CODES = (0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")
@@ -193,7 +198,7 @@ COORDINATES = {
     "class": (
         "text",
         "1",
-        "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
+        "A, C: aggregated; B, D: departed; A, B: inside the zone; C, D: not",
     ),
     "bond": (
         "text",
@@ -213,11 +218,6 @@ RADII = {
     "r_j": ("f8", "m", "equivalent radius of body j; of measured flocs the median"),
 }
 """Numbers that stand for each collision type, along the axis `type`."""
-
-
-def last_axis(name: str) -> tuple[str, ...]:
-    """The last axis of an array of `TABLE`, where it has one more than the conditions; or none."""
-    return tuple(axis for axis in LAST_AXES if axis in name)
 
 
 def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Dataset]:
@@ -330,13 +330,9 @@ class Results:
                 name: np.broadcast_to(np.zeros((), each.type), shape)
                 for name, each in columns.items()
             }
-        return declared.labelled({**self.axes, **self.radii, **values})
-
-    @property
-    def axes(self) -> dict[str, Any]:
-        """{axis: its values} of all groups."""
-        own = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
-        return {**own, "replicate": np.arange(self.count), **WORDS}
+        axes = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
+        axes |= {"replicate": np.arange(self.count), **WORDS, **self.radii}
+        return declared.labelled({**axes, **values})
 
     @property
     def shape(self) -> tuple[int, int, int]:
