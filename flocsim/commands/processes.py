@@ -8,7 +8,7 @@ import functools
 import multiprocessing
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
@@ -56,7 +56,7 @@ def attempt(function, task):
         return Lost(f"internal error, please report it: {type(error).__name__}: {error}")
 
 
-def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Iterator[Any]:
+def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Generator[Any, None, None]:
     """Yield the results of tasks in order, from a pool that is made anew when a process dies.
 
     Nothing tells which task a dead process was at: the first one without a result is tried again in

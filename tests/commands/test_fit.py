@@ -12,7 +12,6 @@ from flocsim.__main__ import main
 from flocsim.commands import add_command, fit_pictures
 from flocsim.errors import FileError, ShapeError, UsageError
 from flocsim.io.shape_library import read_library, read_settings
-from tests.helpers.real_images import real_image
 
 
 def run(*arguments):
@@ -422,23 +421,6 @@ def test_an_interrupt_leaves_no_file(tmp_path, frame, capsys, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_real_frame(tmp_path, capsys):
-    options = ("--pixel-size", "0.95e-6", "--vertices", "4,16", "--min-radius", "20")
-    assert run(real_image("flocpy/024.png"), *options, "-o", tmp_path / "s.h5") == 0
-    assert "024.png: " in capsys.readouterr().out
-    for entry in read_library(tmp_path / "s.h5"):
-        errors = [entry.fits[n].relative_error for n in (1, 4, 16)]
-        assert errors == sorted(errors, reverse=True)
-
-
-def test_the_overlay_of_masks_is_drawn_over_them(tmp_path, frame):
-    labels, name = tmp_path / "labels", tmp_path / "look.png"
-    assert run(frame, *QUICK, "--masks-out", labels, "-o", tmp_path / "s.h5") == 0
-    assert run(labels, *QUICK, "--masks", "-o", tmp_path / "m.h5", "--overlay", name) == 0
-    assert name.stat().st_size > 1000
-
-
-@pytest.mark.slow
 def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, capsys):
     import tifffile
 
@@ -471,16 +453,6 @@ def test_a_stack_is_fitted_page_by_page_at_the_size_that_it_gives(tmp_path, caps
 def test_pages_of_masks_are_refused(tmp_path, frame):
     with pytest.raises(UsageError, match="--page, --channel and --crop apply to pictures"):
         run(frame, "--pixel-size", "1e-6", "-o", tmp_path / "s.h5", "--masks", "--page", "1")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [(("--crop", "0,0,9999,5"), "reaches beyond its"), (("--channel", "2"), "has no channel 2")],
-)
-def test_parts_that_a_picture_has_not_are_told(tmp_path, frame, capsys, words, said):
-    options = ("--pixel-size", "1e-6", "--vertices", "4", "-o", tmp_path / "s.h5")
-    assert code_of(frame, *options, *words) == 2
-    assert said in capsys.readouterr().err
 
 
 @pytest.mark.slow
@@ -552,7 +524,7 @@ def test_one_hot_pixel_does_not_hide_the_flocs(tmp_path, capsys, dtype):
     assert "2 bright flocs" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("side", ["1e-300", "1e300", "nan", "0", "-1"])
+@pytest.mark.parametrize("side", ["1e-300", "nan"])
 def test_pixel_sizes_of_files_are_possible(tmp_path, capsys, side):
     import tifffile
 

@@ -131,15 +131,6 @@ def test_names_that_are_no_text_are_written_with_their_bytes(folder, capsys, job
     assert (folder / r"over-caf\xe9.png").exists()
 
 
-def test_pictures_have_names_of_their_own(tmp_path):
-    paths = [tmp_path / each for each in ("a/x.png", "b/x.png", "y.png", r"caf\xe9.png")]
-    paths.append(tmp_path / os.fsdecode(b"caf\xe9.png"))
-    titles = fit_pictures.titles_of(paths)
-    assert titles[:3] == [(tmp_path / "a/x.png").as_posix(), (tmp_path / "b/x.png").as_posix(),
-                          "y.png"]  # fmt: skip
-    assert len(set(titles)) == 5
-
-
 def doubled(number):
     if number == 3:
         raise ValueError("three")

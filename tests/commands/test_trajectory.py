@@ -86,15 +86,6 @@ def test_the_motion_is_that_of_the_ensembles_replicate(folder, capsys):
         ]
 
 
-@pytest.mark.slow
-def test_the_same_command_makes_the_same_picture(folder, capsys):
-    for name in ("a.png", "b.png"):
-        assert call(capsys, "small.toml", "--vertices", 1, "-o", name)[0] == 0
-    assert (folder / "a.png").read_bytes() == (folder / "b.png").read_bytes()
-    assert call(capsys, "small.toml", "--vertices", 1, "-o", "c.png", "--frames", 3)[0] == 0
-    assert (folder / "a.png").read_bytes() != (folder / "c.png").read_bytes()
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     rest_slow(
@@ -154,12 +145,3 @@ def test_an_animation_is_a_gif(folder, capsys):
     code, output, errors = call(capsys, "small.toml", "--animation", "a.mp4")
     assert (code, output) == (2, [])
     assert errors == ["flocsim: a.mp4: its name must end in .gif"]
-
-
-def test_numbers_of_the_line_are_finite_and_in_order(folder, capsys):
-    _, output, _ = call(capsys, "small.toml", "--vertices", 1)
-    words = output[0].split()
-    touch = float(words[words.index("at") + 1])
-    end = float(words[len(words) - 1 - words[::-1].index("at") + 1])
-    assert np.isfinite([touch, end]).all()
-    assert 0.0 < touch <= end

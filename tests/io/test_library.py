@@ -75,12 +75,6 @@ def test_shapes_are_in_metres_around_the_centroid_of_the_floc(entries):
         assert np.hypot(*shape.centroid) < 0.5 * PIXEL
 
 
-def test_the_same_entries_give_the_same_bytes(tmp_path, entries):
-    for name in ("a.h5", "b.h5"):
-        write_library(tmp_path / name, entries)
-    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
-
-
 def changed(path, change):
     """The library with its HDF5 content changed and sealed anew."""
     import io

@@ -101,14 +101,6 @@ def test_what_runs_is_said_and_a_line_on_a_terminal_stays_one(clock):
     assert bar.getvalue().startswith(f"\r 50%  500 of 1000 snapshots, 60 s left; {going}")
 
 
-def test_other_things_than_replicates_are_counted(clock):
-    stream = io.StringIO()
-    report = Progress(4, False, stream, "flocs")
-    clock[0] = 6.0
-    report.report(3)
-    assert stream.getvalue() == " 25%  1 of 4 flocs, 18 s left\n"
-
-
 def in_memory(monkeypatch):
     """Standard output and error as text in memory; pytest puts its own back between fixtures."""
     out, err = io.StringIO(), io.StringIO()
