@@ -61,7 +61,7 @@ def test_forces_and_an_animation(folder, monkeypatch, capsys):
 
 @pytest.mark.slow
 def test_set_changes_the_scene(folder, capsys):
-    words = ["small.toml", "--vertices", 4, "--replicate", 1]
+    words = ["small.toml", "--vertices", 4, "--replicate", 1, "--overwrite"]
     lines = [call(capsys, *words, *more)[1][0] for more in ([], ["--set", "zone.root=inner"])]
     assert lines[0].split(";")[1] == lines[1].split(";")[1]  # the same touch
     assert [line.split(";")[0][-1] for line in lines] == ["B", "D"]
