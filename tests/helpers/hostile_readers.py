@@ -54,7 +54,7 @@ def read_library_file(path):
     entries = read_library(path)
     for entry in entries:
         for fit in entry.fits.values():
-            assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
+            assert np.isfinite(fit.table.place).all() and np.isfinite(fit.table.radius).all()
             assert math.isfinite(fit.shape.area)
         assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
     info_of(path)
