@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.cores import PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.outline import swept_geometry
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import shape_of_parts
@@ -23,7 +23,7 @@ from flocsim.io.hdf5 import File
 from flocsim.io.labelled import Labelled, Tables
 
 TRAJECTORY = FileFormat(
-    "flocsim trajectory", 3, "trajectory", {}, attribute="kind", remedy="write it again"
+    "flocsim trajectory", 3, "trajectory", {}, oldest=2, attribute="kind", remedy="write it again"
 )
 """Its arrays are those of `motion_group`, without a group."""
 
@@ -304,5 +304,9 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
 
 def stored_shape(file: File, body: int) -> Shape:
     """Return the shape of one body of an open file; ValueError where it is none."""
+    points = f"vertices_{body}"
+    if f"part_{body}" not in file:  # version 2, of a body without holes or parts
+        radius = float(file.node(points).attributes["radius"])
+        return shape_of_parts((Part((file.read(points),), radius),))
     columns = (file.read(f"{name}_{body}") for name in ("vertices", *POINTS))
     return shape_of_parts(parts_in(PointTable(*columns)))

@@ -85,6 +85,27 @@ def changed(path, change):
     path.write_bytes(seal(content.getvalue()))
 
 
+def as_version_1(file):
+    """Store fits as version 1 did: with one radius, without parts, measures or population."""
+    for group in file["fits"].values():
+        group["radius"] = group["point_radius"][:, 0]
+        for name in ("part", "ring", "point_radius"):
+            del group[name]
+    del file["measures"], file["population"]
+    file.attrs["schema_version"] = 1
+
+
+def test_libraries_of_version_1_are_read(tmp_path, entries):
+    path = tmp_path / "s.h5"
+    write_library(path, entries, {})
+    changed(path, as_version_1)
+    for found, wanted in zip(read_library(path), entries, strict=True):
+        assert found.floc_id == wanted.floc_id and found.measures.perimeter > 0.0
+        for count, fit in found.fits.items():
+            np.testing.assert_array_equal(fit.table.place, wanted.fits[count].table.place)
+            np.testing.assert_array_equal(fit.table.radius, wanted.fits[count].table.radius)
+
+
 def cut_vertices(file):
     values = file["fits/6/vertices"][()]
     del file["fits/6/vertices"]
@@ -98,7 +119,7 @@ def put_nan(file):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda file: file.attrs.__setitem__("schema_version", 2),
+        lambda file: file.attrs.__setitem__("schema_version", 0),
         lambda file: file.__delitem__("flocs/centroid"),
         lambda file: file.__delitem__("fits"),
         lambda file: file.create_group("fits/many"),

@@ -99,6 +99,29 @@ def test_holes_and_parts_come_back(tmp_path):
         assert [part.radius for part in other.parts] == [part.radius for part in one.parts]
 
 
+def changed(path, change):
+    """Change the HDF5 content of a file and seal it anew."""
+    image = io.BytesIO(read_sealed(path))
+    with h5py.File(image, "r+") as file:
+        change(file)
+    path.write_bytes(seal(image.getvalue()))
+
+
+def as_version_2(file):
+    """Store the first body as version 2 did one without holes or parts: with one radius."""
+    file["vertices_0"].attrs["radius"] = file["point_radius_0"][0]
+    for name in ("part_0", "ring_0", "point_radius_0"):
+        del file[name]
+    file.attrs["schema_version"] = 2
+
+
+def test_trajectories_of_version_2_are_read(tmp_path):
+    write_trajectory(tmp_path / "m.h5", *motion(), SHAPES, {})
+    changed(tmp_path / "m.h5", as_version_2)
+    for one, other in zip(SHAPES, read_trajectory(tmp_path / "m.h5").shapes, strict=True):
+        assert (other.area, other.radius) == pytest.approx((one.area, one.radius), rel=1e-12)
+
+
 def other_ring(file):
     file["ring_0"][5] = 3
 
@@ -112,9 +135,6 @@ def one_short(file):
 @pytest.mark.parametrize("change", [other_ring, one_short])
 def test_rings_that_cannot_be_are_refused(tmp_path, change):
     write_trajectory(tmp_path / "m.h5", *motion(), (framed(1e-6), beads(1e-6)), {})
-    image = io.BytesIO(read_sealed(tmp_path / "m.h5"))
-    with h5py.File(image, "r+") as file:
-        change(file)
-    (tmp_path / "m.h5").write_bytes(seal(image.getvalue()))
+    changed(tmp_path / "m.h5", change)
     with pytest.raises(FileError, match="has no readable trajectory"):
         read_trajectory(tmp_path / "m.h5")
