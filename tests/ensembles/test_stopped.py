@@ -4,12 +4,12 @@ import signal
 import subprocess
 import time
 
-import h5py
 import pytest
 
 from tests.ensembles.test_matrix import PAIRS
 from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
+from tests.helpers.results_files import same_data
 from tests.helpers.small_study import BESIDE_PYTHON, mpirun
 from tests.helpers.swarm_study import SWARM
 
@@ -29,19 +29,6 @@ RUNS = {
 """{name: (config, words of the command, the signal that stops it)}."""
 
 JOURNALS = {"sweep": "new.parts/0000.h5.journal"}
-
-
-def rows(path):
-    """{dataset: its values as text} of a file, but for where it came from."""
-    found = {}
-
-    def take(name, node):
-        if isinstance(node, h5py.Dataset) and not name.startswith("run/"):
-            found[name] = repr(node[()].tolist())
-
-    with h5py.File(path) as file:
-        file.visititems(take)
-    return found
 
 
 def stopped(command, journal, number):
@@ -77,7 +64,7 @@ def test_a_stopped_job_goes_on_with_resume(tmp_path, monkeypatch, name):
     for more in (["new.h5", "--resume"], ["whole.h5"]):
         done = [*start, "-o", *more]
         subprocess.run(done, check=True, stdout=subprocess.DEVNULL, timeout=600)
-    assert rows(tmp_path / "new.h5") == rows(tmp_path / "whole.h5")
+    assert same_data(tmp_path / "new.h5", tmp_path / "whole.h5") == []
 
 
 def test_a_sweep_under_a_launcher_is_refused_before_it_begins(tmp_path):
