@@ -78,7 +78,7 @@ class Interruption:
 
     ``held``: the process has yet to join the other ranks of its job, who would wait for it for
     ever if it went now; ``leave(code)`` ends it, and under MPI them; ``speaks``: it may say so.
-    ``kept()`` says what has been saved, "" where nothing can be continued.
+    ``kept()`` says what has been saved, ``command`` is the command line that continues the run.
     """
 
     def __init__(self) -> None:
@@ -88,6 +88,7 @@ class Interruption:
         self.speaks = True
         self.held = False
         self.kept: Callable[[], str] = str
+        self.command = ""
         self.leave: Callable[[int], Any] = os._exit
 
     @property
@@ -100,9 +101,10 @@ class Interruption:
         return signal.Signals(self.signal).name if self.signal else "no signal"
 
     def farewell(self) -> str:
-        """Return why the run stops, what is saved, and how it goes on."""
+        """Return why the run stops, what is saved and, as the last line, how it goes on."""
         who, kept = self.name if self.requested else "a signal to another rank", self.kept()
-        return f"flocsim: stopped by {who}" + (f": {kept}; continue with --resume" if kept else "")
+        line = f"flocsim: stopped by {who}" + (f": {kept}" if kept else "")
+        return f"{line}\n{self.command}" if self.command else line
 
     def note(self, number: int) -> None:
         """A signal has come: remember it, or end at once where it is the second."""

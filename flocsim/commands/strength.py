@@ -10,6 +10,7 @@ from typing import Any
 from flocsim.commands import add_allowed, add_overwrite, allowed_by
 from flocsim.commands.processes import Lost, attempt, workers
 from flocsim.commands.sweep import interrupt
+from flocsim.ensembles.cli import continuing
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.arguments import whole
 from flocsim.io.outputs import check_outputs
@@ -102,7 +103,7 @@ def run(args: Namespace) -> int:
             write()
             kept = f"{len(tested)} tested doublets are in {output}"
         who = str(error) or "stopped by SIGINT"
-        print(f"flocsim: {who}: {kept}; continue with --resume", file=sys.stderr)
+        print(f"flocsim: {who}: {kept}\n{continuing()}", file=sys.stderr)
         return STOPPED
     found = write(complete=True)
     say(f"{table_of(found)}\n{source_line(found.about)}\n{output}")

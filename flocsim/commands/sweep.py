@@ -10,6 +10,7 @@ from types import FrameType
 from typing import Any
 
 from flocsim.commands import add_overwrite, add_settings
+from flocsim.ensembles.cli import continuing
 from flocsim.ensembles.config.loader import parse_setting, settings_in
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.errors import UsageError
@@ -61,7 +62,7 @@ def run(args: Namespace) -> int:
     except (KeyboardInterrupt, StopRequested) as error:
         # The process of a part may have been stopped alone, and has said by what.
         who = str(error).partition(":")[0] or "stopped by SIGINT"
-        print(f"flocsim: {who}: what was finished is kept; continue with --resume", file=sys.stderr)
+        print(f"flocsim: {who}: what was finished is kept\n{continuing()}", file=sys.stderr)
         return STOPPED
 
 

@@ -3,8 +3,13 @@
 import argparse
 import contextlib
 import io
+import os
+import re
+import shlex
+import shutil
 import sys
 import traceback
+from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import units
@@ -210,16 +215,39 @@ def run(arguments: argparse.Namespace) -> int:
     comm = Communicator()
     try:
         comm = find_communicator()
+        ranks = comm.size
         if arguments.jobs > 1 and comm.size == 1 and not arguments.dry_run:
-            comm = start_processes(arguments.jobs, guarded)
+            comm, ranks = start_processes(arguments.jobs, guarded), 0
     except FlocsimError as error:
         return end_all(comm, str(error), error.exit_code)
     plain_warnings(silent=comm.rank > 0)
-    if not arguments.dry_run:
-        INTERRUPTION.kept = lambda: "nothing more was finished"
+    INTERRUPTION.kept = lambda: "nothing more was finished"
+    if arguments.parent is None and not arguments.dry_run:  # a parent says how it goes on
+        INTERRUPTION.command = continuing(ranks)
     if arguments.quiet:
         units.show_by(units.silent)
     return guarded(comm, arguments)
+
+
+ANEW = re.compile("--(resu|rest|overw)[a-z]*")
+"""Options, also cut short, that a command which continues a run does not have or has at its end."""
+
+
+def continuing(ranks: int = 1) -> str:
+    """Return the command line that continues this run, with the launcher where it has ``ranks``."""
+    words = [*(word for word in sys.argv[1:] if not ANEW.fullmatch(word)), "--resume"]
+    program = [on_path(sys.argv[0])]
+    if sys.modules["__main__"].__spec__ is not None:  # python -m flocsim, or flocsim.ensemble
+        program = [sys.orig_argv[0], "-m", "flocsim"]
+    launcher = Path(sys.executable).with_name("mpirun")
+    launch = [on_path(launcher) if launcher.exists() else "mpirun", "-n", str(ranks)]
+    return shlex.join([*(launch if ranks > 1 else []), *program, *words])
+
+
+def on_path(program: str | os.PathLike) -> str:
+    """Return a program's name where the shell finds it by that, its path otherwise."""
+    path = Path(program).absolute()
+    return path.name if shutil.which(path.name) == str(path) else os.fspath(program)
 
 
 @contextlib.contextmanager

@@ -25,7 +25,7 @@ from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
-from flocsim.process import INTERRUPTED, WITHHELD
+from flocsim.process import INTERRUPTED, STOPPED, WITHHELD
 from flocsim.trajectories.trajectory import Trajectory
 
 SAVING = 30.0
@@ -90,6 +90,7 @@ def error_of(code: int, said: Sequence[str]) -> FlocsimError:
     """Return the error that an exit code stands for, with the last line that was printed."""
     last = next((line for line in reversed(said) if line.strip()), "without output")
     last = last.removeprefix("flocsim: ")
+    last += '; continue with mode="resume"' if code == STOPPED else ""
     kinds = {kind.exit_code: kind for kind in (UsageError, FileError, StopRequested)}
     return kinds.get(code, FlocsimError)(last if code > 0 else f"the run was killed: {last}")
 

@@ -5,7 +5,8 @@ saved of unfinished ones). SQLite has no checksums of its pages, so every record
 
 One process writes, rank 0's, and any number may read meanwhile (SQLite's write-ahead log, WAL).
 SQLite's own lock lasts for one transaction only; so the writer locks a second file, NAME.lock, as
-long as it has the journal open.
+long as it has the journal open. The same file says how many records were acknowledged, by which
+the loss of a -wal file is recognised.
 """
 
 import contextlib
@@ -36,6 +37,12 @@ SCHEMA = (
     "CREATE TABLE part(id INTEGER PRIMARY KEY, identity TEXT, session INTEGER, condition TEXT, "
     "first INTEGER, name TEXT, about TEXT, data BLOB, digest BLOB, UNIQUE(condition, first, name))",
 )
+
+LAST = (
+    "SELECT coalesce(max(last), 0) FROM (SELECT max(id) AS last FROM session "
+    "UNION SELECT max(id) FROM rows UNION SELECT max(id) FROM part)"
+)
+"""The id of the last record: all tables count on together."""
 
 SYNC_SECONDS = 5.0
 """Time between two syncs to the disk [s]: what a power cut may cost. A kill costs nothing."""
@@ -88,7 +95,9 @@ def connect(database: str) -> sqlite3.Connection:
     )
     db.row_factory = sqlite3.Row
     db.text_factory = lambda text: text.decode("utf-8", "replace")  # of a damaged record
-    db.execute("PRAGMA cell_size_check=ON")  # damaged pages are noticed
+    # The file may be anyone's: no code in its schema is run, and damaged pages are noticed.
+    db.execute("PRAGMA trusted_schema=OFF")
+    db.execute("PRAGMA cell_size_check=ON")
     return db
 
 
@@ -157,10 +166,10 @@ class Journal(JournalReader):
     """A journal that this process alone writes.
 
     ``is_damaged`` says that a file that is there is no journal, or not whole: it can only be put
-    aside.
+    aside. ``lost`` is how many records were acknowledged and are not there.
     """
 
-    synced, is_damaged = 0.0, False
+    lost, last, synced, is_damaged = 0, 0, 0.0, False
 
     def __init__(self, path: Path) -> None:
         """Open and lock the journal at ``path``, or start one; FileError if impossible."""
@@ -193,7 +202,10 @@ class Journal(JournalReader):
         except sqlite3.DatabaseError:
             self.is_damaged = True
         super().__init__(self.path, db)
-        self.synced = time.monotonic()
+        self.stat, self.synced = os.stat(self.path), time.monotonic()
+        if not self.is_damaged:
+            (self.last,) = self.db.execute(LAST).fetchone()
+            self.lost = max(self.lock.count - self.last, 0)
 
     @property
     def is_blank(self) -> bool:
@@ -204,14 +216,19 @@ class Journal(JournalReader):
     def add(self, table: str, *values: Any) -> int:
         """Append a record, in the place of one with the same key; its id. FileError where that
         fails, and then the journal is what it was before."""
-        row = (None, *values, digest_over(values))  # SQLite gives it an id
+        row = (self.last + 1, *values, digest_over(values))
         with writing(self.path):
             marks = ", ".join("?" * len(row))
-            id = self.db.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", row).lastrowid
+            self.db.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", row)
+        self.last += 1
         if not self.db.in_transaction:
+            self.acknowledge()
             self.sync_when_due()
-        assert id is not None, "a row was added"
-        return id
+        return self.last
+
+    def acknowledge(self) -> None:
+        """Write down how many records there are, outside the database."""
+        self.lock.count = self.last
 
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
@@ -225,6 +242,7 @@ class Journal(JournalReader):
             raise
         with writing(self.path):
             self.db.execute("COMMIT")
+        self.acknowledge()
 
     def discard(self, table: str, where: str, *values: Any) -> None:
         """Delete records, which are damaged or of no use."""
@@ -249,17 +267,19 @@ class Journal(JournalReader):
         assert target is not None, "it was opened"
         if (log := beside(self.path, WAL_SUFFIX)).exists():
             os.replace(log, beside(target, WAL_SUFFIX))
-        self.is_damaged = False
+        self.is_damaged, self.last = False, 0
+        self.acknowledge()
         with writing(self.path):
             self.open()
         return target
 
     def remove(self) -> None:
-        """Delete the file: what was in it is in the results."""
+        """Delete the file, and no other of its name: what was in it is in the results."""
         self.db.close()
         with contextlib.suppress(OSError):
-            for suffix in ("", WAL_SUFFIX, INDEX_SUFFIX):
-                beside(self.path, suffix).unlink(missing_ok=True)
+            if os.path.samestat(os.lstat(self.path), self.stat):
+                for suffix in ("", WAL_SUFFIX, INDEX_SUFFIX):
+                    beside(self.path, suffix).unlink(missing_ok=True)
         self.lock.remove()
 
     def release(self) -> None:
@@ -277,11 +297,15 @@ class Journal(JournalReader):
 
 
 class Lock:
-    """The lock of a journal, an empty file beside it that one process at a time has locked.
+    """The lock of a journal, a file beside it that one process at a time has locked; its text is
+    how many records were acknowledged.
 
     A lock holds for an inode, not for a name: a process that waited for it may have a file that
     was deleted since. So whoever gets it compares what is locked with what bears the name.
     """
+
+    WIDTH = 20
+    """Bytes of its text."""
 
     def __init__(self, path: Path) -> None:
         """Lock the file; FileError where another job keeps it."""
@@ -304,6 +328,16 @@ class Lock:
         self.is_locked = bool(locked)
         with writing(path):
             sync_folder(path.parent)
+
+    @property
+    def count(self) -> int:
+        text = os.pread(self.descriptor, self.WIDTH, 0).strip()
+        return int(text) if text.isdigit() else 0
+
+    @count.setter
+    def count(self, number: int) -> None:
+        with contextlib.suppress(OSError):  # as on a full disk: it is no more than a check
+            os.pwrite(self.descriptor, str(number).ljust(self.WIDTH).encode(), 0)
 
     def remove(self) -> None:
         """Delete the file, if the name is still this file's, and let go of it."""

@@ -1,34 +1,51 @@
-"""A job that a signal stops says last how it goes on, and goes on so."""
+"""A job that a signal stops says last, as a command, how it goes on; that command finishes it."""
 
+import os
+import shlex
 import signal
 import subprocess
+import sys
 import time
 
+import h5py
 import pytest
 
 from tests.ensembles.test_matrix import PAIRS
 from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
-from tests.helpers.results_files import same_data
 from tests.helpers.small_study import BESIDE_PYTHON, mpirun
 from tests.helpers.swarm_study import SWARM
 
 MANY = PAIRS.replace("replicates = 6", "replicates = 1500")
-FLOCSIM = str(BESIDE_PYTHON / "flocsim")
+FLOCSIM, MODULE = [str(BESIDE_PYTHON / "flocsim")], [sys.executable, "-m", "flocsim.ensemble"]
 OVER = ["--over", "fluid.viscosity=1e-3,2e-3"]
 
 RUNS = {
-    "pairs": (MANY, ["ensemble", "my study.toml"], signal.SIGHUP),
-    "processes": (MANY, ["ensemble", "my study.toml", "--jobs", "2"], signal.SIGINT),
-    "ranks": (MANY, ["ensemble", "my study.toml"], signal.SIGTERM),
-    "kernel": (kernel_text(replicates=2048), ["kernel", "my study.toml"], signal.SIGINT),
-    "swarm": (SWARM.replace("replicates = 2", "replicates = 40"), ["swarm", "my study.toml"],
-              signal.SIGXCPU),
-    "sweep": (MANY, ["sweep", "my study.toml", *OVER], signal.SIGHUP),
+    "pairs": (MANY, FLOCSIM, ["ensemble", "my study.toml"], signal.SIGHUP),
+    "processes": (MANY, FLOCSIM, ["ensemble", "my study.toml", "--jobs", "2"], signal.SIGINT),
+    "ranks": (MANY, [None, *FLOCSIM], ["ensemble", "my study.toml"], signal.SIGTERM),
+    "module": (MANY, MODULE, ["my study.toml", "--restart"], signal.SIGXCPU),
+    "kernel": (kernel_text(replicates=2048), FLOCSIM, ["kernel", "my study.toml"], signal.SIGINT),
+    "swarm": (SWARM.replace("replicates = 2", "replicates = 40"), FLOCSIM,
+              ["swarm", "my study.toml"], signal.SIGINT),
+    "sweep": (MANY, FLOCSIM, ["sweep", "my study.toml", *OVER], signal.SIGHUP),
 }  # fmt: skip
-"""{name: (config, words of the command, the signal that stops it)}."""
+"""{name: (config, what is started, its words, the signal that stops it)}."""
 
 JOURNALS = {"sweep": "new.parts/0000.h5.journal"}
+
+
+def rows(path):
+    """{dataset: its values as text} of a file, but for where it came from."""
+    found = {}
+
+    def take(name, node):
+        if isinstance(node, h5py.Dataset) and not name.startswith("run/"):
+            found[name] = repr(node[()].tolist())
+
+    with h5py.File(path) as file:
+        file.visititems(take)
+    return found
 
 
 def stopped(command, journal, number):
@@ -50,26 +67,32 @@ def stopped(command, journal, number):
     "name", [name if name == "pairs" else pytest.param(name, marks=pytest.mark.slow)
              for name in RUNS],
 )  # fmt: skip
-def test_a_stopped_job_goes_on_with_resume(tmp_path, monkeypatch, name):
-    text, words, number = RUNS[name]
-    start = [*([mpirun(), "-n", "2"] if name == "ranks" else []), FLOCSIM, *words]
+def test_the_last_line_of_a_stopped_job_finishes_it(tmp_path, monkeypatch, name):
+    text, start, words, number = RUNS[name]
+    start = [mpirun(), "-n", "2", *start[1:]] if start[0] is None else start
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(BESIDE_PYTHON) + os.pathsep + os.environ["PATH"])
     (tmp_path / "my study.toml").write_text(text, "utf-8")
-    journal = tmp_path / JOURNALS.get(name, "new.h5.journal")
-    code, errors = stopped([*start, "-o", "new.h5"], journal, number)
+    code, errors = stopped(
+        [*start, *words, "-o", "new.h5"], tmp_path / JOURNALS.get(name, "new.h5.journal"), number
+    )
     assert code == 75, errors
-    assert f"stopped by {number.name}: " in errors[-1]
-    assert errors[-1].endswith("; continue with --resume")
+    *_, why, last = errors
+    assert f"stopped by {number.name}: " in why
+    begun = {"ranks": "mpirun -n 2 flocsim ", "module": shlex.join(MODULE)}.get(name, "flocsim ")
+    assert last.startswith(begun) and last.endswith(" -o new.h5 --resume")
+    assert "--restart" not in last
     assert not (tmp_path / "new.h5").exists()
-    for more in (["new.h5", "--resume"], ["whole.h5"]):
-        done = [*start, "-o", *more]
-        subprocess.run(done, check=True, stdout=subprocess.DEVNULL, timeout=600)
-    assert same_data(tmp_path / "new.h5", tmp_path / "whole.h5") == []
+    subprocess.run(last, shell=True, check=True, stdout=subprocess.DEVNULL, timeout=600)
+    whole = [each for each in words if each != "--restart"]
+    undisturbed = [*(FLOCSIM if start[0] != sys.executable else start), *whole, "-o", "whole.h5"]
+    subprocess.run(undisturbed, check=True, stdout=subprocess.DEVNULL, timeout=600)
+    assert rows(tmp_path / "new.h5") == rows(tmp_path / "whole.h5")
 
 
 def test_a_sweep_under_a_launcher_is_refused_before_it_begins(tmp_path):
     (tmp_path / "study.toml").write_text(PAIRS, "utf-8")
-    words = [mpirun(), "-n", "2", FLOCSIM, "sweep", "study.toml", *OVER]
+    words = [mpirun(), "-n", "2", *FLOCSIM, "sweep", "study.toml", *OVER]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 2
     assert "flocsim: sweep runs on one rank only" in done.stderr

@@ -47,6 +47,14 @@ def filled(path, count=20):
     return journal
 
 
+def copied(journal, folder):
+    """The files of an open journal in a folder of their own, as a kill would leave them."""
+    folder.mkdir()
+    for each in journal.path.parent.glob(f"{journal.path.name}*"):
+        (folder / each.name).write_bytes(each.read_bytes())
+    return folder / journal.path.name
+
+
 def firsts(journal):
     return [record["first"] for record in journal.records(ROWS)]
 
@@ -82,7 +90,7 @@ def test_a_killed_writer_loses_no_acknowledged_record(path):
         found = list(journal.records(ROWS))
         assert [each["first"] for each in found][: acknowledged + 1] == [*range(acknowledged + 1)]
         assert all(each["data"] == each["first"].to_bytes(8, "little") * 500 for each in found)
-        assert (journal.damaged, journal.is_damaged) == (set(), False)
+        assert (journal.lost, journal.damaged, journal.is_damaged) == (0, set(), False)
         acknowledged = found[-1]["first"]
         journal.release()
 
@@ -128,6 +136,16 @@ def test_a_journal_that_is_only_looked_at_stays_as_it_is(path):
     firsts(journal)
     journal.release()
     assert path.read_bytes() == before
+
+
+def test_the_loss_of_the_log_is_noticed(path, tmp_path):
+    journal = filled(path)
+    place = copied(journal, tmp_path / "copy")
+    place.with_name(f"{place.name}-wal").unlink()
+    copy = Journal(place)
+    assert copy.lost == 20 - len(firsts(copy)) > 0
+    copy.release()
+    journal.release()
 
 
 @pytest.mark.parametrize("what", ["nothing", "another"])

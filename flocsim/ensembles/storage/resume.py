@@ -196,12 +196,12 @@ def take_journal(start: Beginning, study: StudyKind) -> None:
     store.load(study.check_whole, start.old is not None)
     for table, number in store.refused:
         journal.discard(table, "id=?", number)
-    if count := len(store.refused):
+    if count := len(store.refused) + journal.lost:
         start.remarks.append(
-            f"{journal.path}: {count} damaged record{'s' * (count != 1)}: the {store.there()} "
-            "finished replicates that are intact are used, what is missing is computed again"
+            f"{journal.path}: {count} damaged or missing record{'s' * (count != 1)} (the end of "
+            f"its -wal file may be missing): the {store.there()} finished replicates that are "
+            "intact are used, what is missing is computed again"
         )
-    store.refused.clear()  # their ids may be those of new records
 
 
 def refuse_fewer(start: Beginning, output: str | Path, replicates: int) -> None:

@@ -172,7 +172,7 @@ def test_a_damaged_chunk_is_told_and_run_again(stopped, whole, capsys):
     path.write_bytes(data)
     assert go_on(stopped).computed == 51
     said = capsys.readouterr().err
-    assert "r.h5.journal: 1 damaged record: " in said
+    assert "r.h5.journal: 1 damaged or missing record (" in said
     assert "the 29 finished replicates that are intact are used" in said
     assert same_data(stopped / "r.h5", whole) == []
 
@@ -192,7 +192,7 @@ def test_a_journal_that_was_cut_is_kept_and_the_study_begins_anew(stopped, whole
     assert (kept.read_bytes() == data) if share > 0.0 else not kept.exists()
 
 
-def test_what_a_lost_log_had_is_run_again(tmp_path, monkeypatch, whole):
+def test_a_lost_log_is_reported_and_what_it_had_is_run_again(tmp_path, monkeypatch, whole, capsys):
     with monkeypatch.context() as patch:
         patch.setattr(Journal, "release", leave)
         patch.setattr(Journal, "sync", lambda journal: None)
@@ -200,6 +200,7 @@ def test_what_a_lost_log_had_is_run_again(tmp_path, monkeypatch, whole):
         go_on(tmp_path, NEW)
     (tmp_path / "r.h5.journal-wal").unlink()
     assert go_on(tmp_path).computed > 50
+    assert "missing record" in capsys.readouterr().err
     assert same_data(tmp_path / "r.h5", whole) == []
 
 
@@ -208,7 +209,7 @@ def test_rows_of_another_study_in_the_journal_are_computed_again(stopped, whole,
     for each in records_in(path):
         change(path, ROWS, each["id"], identity="other")
     assert go_on(stopped).computed == 80
-    assert "30 damaged records" in capsys.readouterr().err
+    assert "30 damaged or missing records" in capsys.readouterr().err
     assert same_data(stopped / "r.h5", whole) == []
 
 
