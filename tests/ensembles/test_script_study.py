@@ -168,7 +168,7 @@ def test_a_stopped_run_is_an_error_of_its_own():
 
     error = error_of(75, ["", "flocsim: stopped by SIGTERM: 3 replicates are there"])
     assert type(error) is StopRequested
-    assert str(error) == "stopped by SIGTERM: 3 replicates are there"
+    assert str(error) == ('stopped by SIGTERM: 3 replicates are there; continue with mode="resume"')
     assert "killed" in str(error_of(-9, []))
 
 
