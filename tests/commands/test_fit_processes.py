@@ -160,7 +160,7 @@ def test_an_interrupt_ends_the_processes_at_once():
         found = mapped(slow, range(2))
         threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
         next(found)
-    assert multiprocessing.active_children() == []
+    assert wait_until(lambda: multiprocessing.active_children() == [])
 
 
 @needs_fork
