@@ -33,6 +33,12 @@ SAVING = 30.0
 
 WARNING = "flocsim: warning: "
 
+ROOT = Path(__file__).resolve().parents[2]
+"""The folder that holds the package."""
+
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders in which installed packages lie."""
+
 STACK = 3
 """From `run_command` to the script that called Study.run."""
 
@@ -49,9 +55,10 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
             "Study.run starts its own processes and cannot be run under MPI: use "
             "`mpirun -n 2 flocsim ensemble FILE`"
         )
-    # It finds packages, flocsim among them, where this process does.
-    known = os.pathsep.join(map(os.path.abspath, filter(None, sys.path)))
-    environment = os.environ | {"PYTHONUNBUFFERED": "1", "PYTHONPATH": known}
+    environment = os.environ | {"PYTHONUNBUFFERED": "1"}
+    if ROOT.name not in INSTALLED:  # this flocsim is not installed, but lies in a folder
+        known = filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])
+        environment["PYTHONPATH"] = os.pathsep.join(known)
     # On Windows a virtual environment's Python is the child of a process that starts it.
     ends_with_this = [] if os.name == "nt" else ["--parent", str(os.getpid())]
     # -P: what lies beside a config is no part of Python.
