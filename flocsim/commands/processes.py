@@ -65,7 +65,9 @@ def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Generat
     done = 0
     while done < len(tasks):
         with contextlib.suppress(BrokenProcessPool), new_pool(jobs) as pool:
-            for future in [pool.submit(attempt, function, task) for task in tasks[done:]]:
+            with uninterrupted():
+                futures = [pool.submit(attempt, function, task) for task in tasks[done:]]
+            for future in futures:
                 result = future.result()
                 done += 1
                 yield result
@@ -75,6 +77,21 @@ def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Generat
             result = pool.submit(attempt, function, tasks[done]).result()
         done += 1
         yield result
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Let Ctrl-C wait inside: a process that is just being started would not be known, nor ended.
+
+    Windows cannot.
+    """
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 @contextlib.contextmanager

@@ -20,21 +20,22 @@ NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": s
 SESSION_FORM = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
-DEFAULTS: dict[str, Any] = {
-    "identity": {}, "failed": [], "history": [], "overrides": {}, "warnings": [],
-    "settling": [], "size_classes": [], "equivalent_spheres": [],
+FORMS: dict[str, Any] = {
+    "identity": {}, "failed": [NOTE], "history": [{}], "overrides": {}, "warnings": [str],
+    "settling": [object], "size_classes": [{}], "equivalent_spheres": [object],
 }  # fmt: skip
-"""Names in the group ``run`` of what it has as JSON, and what that is where there is none."""
+"""Names in the group ``run`` of what it has as JSON, and their patterns."""
 
 
 def stored(run: Mapping[str, Any], name: str) -> Any:
-    """Return what the group ``run`` of a results file has as JSON under a name of DEFAULTS.
+    """Return what the group ``run`` of a results file has as JSON under a name of FORMS, empty
+    where it has none.
 
     Raises ValueError, naming it, for a text that no flocsim wrote.
     """
-    default = DEFAULTS[name]
+    form = FORMS[name]
     try:
-        return read_json(run[name], type(default)) if name in run else default
+        return read_json(run[name], form) if name in run else type(form)()
     except ValueError as error:
         raise ValueError(f"run/{name} cannot be read: {error}") from error
 
