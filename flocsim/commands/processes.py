@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 
 from flocsim.errors import FlocsimError
-from flocsim.process import end_with_parent
+from flocsim.process import blocked, end_with_parent
 
 Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
@@ -64,34 +64,26 @@ def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Generat
     """
     done = 0
     while done < len(tasks):
-        with contextlib.suppress(BrokenProcessPool), new_pool(jobs) as pool:
-            with uninterrupted():
-                futures = [pool.submit(attempt, function, task) for task in tasks[done:]]
-            for future in futures:
-                result = future.result()
+        with contextlib.closing(until_a_death(jobs, function, tasks[done:])) as results:
+            for result in results:
                 done += 1
                 yield result
-            return
-        result = Lost("its process was killed, perhaps for lack of memory")
-        with contextlib.suppress(BrokenProcessPool), new_pool(1) as pool:
-            result = pool.submit(attempt, function, tasks[done]).result()
-        done += 1
-        yield result
+        if done < len(tasks):
+            lost = Lost("its process was killed, perhaps for lack of memory")
+            yield from [*until_a_death(1, function, tasks[done : done + 1])] or [lost]
+            done += 1
 
 
-@contextlib.contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Let Ctrl-C wait inside: a process that is just being started would not be known, nor ended.
-
-    Windows cannot.
-    """
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        if hasattr(signal, "pthread_sigmask"):
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+def until_a_death(
+    jobs: int, function: Callable, tasks: Sequence[Any]
+) -> Generator[Any, None, None]:
+    """Yield the results of tasks in order, from one pool, until one of its processes dies."""
+    with contextlib.suppress(BrokenProcessPool), new_pool(jobs) as pool:
+        # Ctrl-C waits: a process that is just being started would not be known, nor ended.
+        with blocked({signal.SIGINT}):
+            futures = [pool.submit(attempt, function, task) for task in tasks]
+        for future in futures:
+            yield future.result()
 
 
 @contextlib.contextmanager

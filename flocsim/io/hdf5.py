@@ -22,7 +22,7 @@ import numpy as np
 from flocsim.errors import FileError, visible
 from flocsim.io import hdf5_child
 from flocsim.io.seals import CHANGED, check_seal, end_of, open_file
-from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING
+from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING, blocked
 
 MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
 """How names of variables begin that make a process a rank, which a child of a rank is not."""
@@ -164,15 +164,14 @@ def describe_forked(data: BinaryIO) -> bytes:
 
     reading, writing = os.pipe()
     # Signals of a terminal go to both processes: this one answers them. None comes in between.
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    with warnings.catch_warnings():
-        # Python counts the threads of numpy's libraries, too, which are idle.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        run_forked(data.fileno(), writing)
-    os.close(writing)
-    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    with blocked(SIGNALS):
+        with warnings.catch_warnings():
+            # Python counts the threads of numpy's libraries, too, which are idle.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+        if child == 0:
+            run_forked(data.fileno(), writing)
+        os.close(writing)
     with open(reading, "rb") as pipe:
         try:
             return pipe.read()
