@@ -148,6 +148,7 @@ def estimate(
     """
     first, *runs = by_runs([rows[name] for name in EXACT_RUNS])
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
+    # The shift counts a point by its most exact run if that came to an outcome, else by its first.
     known = run_so(exact) & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
     moved = [np.where(known, *pair) for pair in zip(exact, first, strict=True)]
     values = values_of(points, first, scrambles, most_unknown)
@@ -158,6 +159,7 @@ def estimate(
     for name in counts[0]:
         sides = [gains_and_losses(before[name], after[name]) for before, after in pairwise(counts)]
         values[f"{name} changes"] = kind_changes(kinds, runs, sides)
+    # A flip needs an outcome in both runs: otherwise it is not known whether there was one.
     now = became(exact)
     for name in WHAT:
         both = run_so(exact) & counts[0][name].trials & now[name].trials
