@@ -44,8 +44,7 @@ SHIPPED = Path(__file__).with_name("synthetic.h5")
 
 LIBRARY = FileFormat(
     "flocsim shape library", 3, "shape library", {}, ("measures", "population"), oldest=1,
-    attribute="kind",
-    remedy="make it again with flocsim fit",
+    attribute="kind", remedy="make it again with flocsim fit",
 )  # fmt: skip
 """Its groups are those of `groups_of`."""
 

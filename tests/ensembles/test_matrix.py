@@ -16,7 +16,7 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.io.results.file import read_results
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from tests.helpers import parts_here
 from tests.helpers.journals import has_begun
 from tests.helpers.kernel_study import kernel_text
@@ -56,7 +56,7 @@ KINDS = {
         Kind("rates", ("kernel", "rates.toml"), ("--replicates", "16"),
              kernel_text(replicates=8, scrambles=2).replace("kernel.h5", "rates.h5"), read_results),
         Kind("swarms", ("swarm", "swarms.toml"), ("--replicates", "3"),
-             SWARM.replace('file = "swarm.h5"', 'file = "swarms.h5"'), read_swarm),
+             SWARM.replace('file = "swarm.h5"', 'file = "swarms.h5"'), SWARMS.read),
     )
 }  # fmt: skip
 

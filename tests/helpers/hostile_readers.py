@@ -91,9 +91,9 @@ def read_swarm_file(path):
     """Read it, describe it, and make the shapes."""
     from flocsim.ensembles.contents import info_of
     from flocsim.io.plots.swarm import shape_of
-    from flocsim.io.results.swarm_file import read_swarm
+    from flocsim.io.results.swarm_file import SWARMS
 
-    found = read_swarm(path)
+    found = SWARMS.read(path)
     replicates, _, bodies = found.groups["snapshots"]["cluster"].shape
     for replicate in range(min(replicates, 3)):
         for body in range(min(bodies, 5)):

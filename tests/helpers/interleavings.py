@@ -31,7 +31,7 @@ from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
 from flocsim.io.journal import PART
 from flocsim.io.results.file import read_results
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from flocsim.process import install
 from tests.helpers.journals import computed_in, records_in, rows_in
 from tests.helpers.small_study import write_star_library
@@ -194,7 +194,7 @@ class Found:
     def at(cls, path, kind):
         """The file at a path; FileError where there is none that can be read."""
         if kind == "swarms":
-            found = read_swarm(path)
+            found = SWARMS.read(path)
             condition = json.dumps(["swarm", int(found.run["vertices"]), 0.0])
             columns = [
                 found.groups[group][name] for group in ("counts", "snapshots", "bodies", "ends")

@@ -21,7 +21,7 @@ from flocsim.io.hdf5 import open_hdf5
 from flocsim.io.results.file import read_results
 from flocsim.io.results.schema import RESULTS
 from flocsim.io.results.strength_file import read_strengths
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from flocsim.io.shape_library import read_library, read_settings
 from flocsim.io.trajectory import read_trajectory
 from tests.helpers import hostile_files
@@ -257,7 +257,7 @@ MAKERS = (
 
 READERS = {
     "library": read_library, "compounds": read_library, "strengths": read_strengths,
-    "swarm": read_swarm, "sweep": read_joined, "trajectory": read_trajectory,
+    "swarm": SWARMS.read, "sweep": read_joined, "trajectory": read_trajectory,
 }  # fmt: skip
 
 

@@ -148,10 +148,10 @@ TABLE = {
 }
 POOLED_PROBABILITIES = tuple(name for name in PROBABILITIES if not last_axis(name))
 """Those that are one number for each condition."""
-COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
+POOLED_TEXTS = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
 POOLED = {
-    **formed({k: f"{v}, all displacements pooled" for k, v in COMPARED.items()}, BOUNDS),
-    **formed(COMPARED, {"n_effective_{}": "independent events that {} is worth"}),
+    **formed({k: f"{v}, all displacements pooled" for k, v in POOLED_TEXTS.items()}, BOUNDS),
+    **formed(POOLED_TEXTS, {"n_effective_{}": "independent events that {} is worth"}),
 }
 CHANGE = "by how much {} would change, "
 NUMERICS = formed(PROBABILITIES, {
@@ -169,7 +169,7 @@ OUTLINES = formed(PROBABILITIES, {
 PER_APPROACH = "pr_a_per_approach"
 """Of all approaches that were decided, misses among them: what efficiencies are sums of."""
 
-COMPARED[PER_APPROACH] = "Pr[aggregation | decided approach]"
+COMPARED = POOLED_TEXTS | {PER_APPROACH: "Pr[aggregation | decided approach]"}
 """{name: meaning} of the probabilities that are compared."""
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),

@@ -169,7 +169,6 @@ class SwarmResults(Stored):
 
 
 SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS, view=SwarmResults)
-read_swarm = SWARMS.read
 """(path) → SwarmResults; FileError for a file that is absent, damaged or of another kind."""
 
 

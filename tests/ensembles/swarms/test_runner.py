@@ -19,7 +19,7 @@ from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import UsageError
 from flocsim.io import terminal
 from flocsim.io.journal import PART
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from flocsim.swarms import runner
 from tests.helpers.journals import records_in
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
@@ -44,7 +44,7 @@ def same(one, other):
 
 def columns_of(path):
     """{(group, column): array} of a file."""
-    found = read_swarm(path)
+    found = SWARMS.read(path)
     return {
         (name, column): found.groups[name][column]
         for name, group in found.kind.groups.items() for column in group.columns
@@ -239,7 +239,7 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
     before, after = (columns_of(each / "swarm.h5") for each in (finished, tmp_path))
     for name, values in before.items():
         assert after[name][: len(values)].tobytes() == values.tobytes()
-    assert read_swarm(tmp_path / "swarm.h5").run["sessions"] == 2
+    assert SWARMS.read(tmp_path / "swarm.h5").run["sessions"] == 2
 
 
 def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
