@@ -50,7 +50,6 @@ file = "r.h5"
 """
 SLOPE = "@staticmethod\n    def slope(view):\n        return math.nan\n"
 REACH = "reach = 5e-6"
-SETTLES = "no terminal velocity: Wrong.kernel "
 
 CASES = {
     "always": ("CentreForce", "", "math.nan", "gives nan at a gap of 2e-06 m"),

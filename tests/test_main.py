@@ -128,7 +128,7 @@ STREAMS = [
     ("FLOCSIM info no.h5 >&- 2>&-", 74, ""),
     ("FLOCSIM info no.h5 <&- >&-", 74, "flocsim: no.h5 could not be read"),
     ("FLOCSIM info $'\\e[31m\\n.h5'", 74, r"flocsim: \x1b[31m\n.h5 could not be read"),
-    ("FLOCSIM info r.h5 $'\\e[31m'", 2, r"flocsim: error: unrecognized arguments: \x1b[31m"),
+    ("FLOCSIM info r.h5 $'\\e[31m'", 2, r"flocsim info: error: unrecognized arguments: \x1b[31m"),
 ]
 
 

@@ -1,4 +1,4 @@
-"""Whether `--dry-run` tells the truth: core-hours and file size against the studies themselves.
+"""Whether `--dry-run` tells the truth: core-hours against the studies themselves.
 
     python -m benchmarks.accuracy.dry_run [--quick] [--replicates-of 1.0] [--studies …]
 
@@ -60,15 +60,14 @@ def judge(name, factor, table):
         study.compile(study.kinds)
         pilot, found = cpu_of(forecast_of, study, 1)
         truth, _ = cpu_of(run_to_file, config, Communicator(), config.output.file, "new")
-        size = Path(config.output.file).stat().st_size
-    ratio, of_size = found.cpu / truth, found.size / size
+    ratio = found.cpu / truth
     inside = found.low <= truth <= found.high
     table.add(
         name, study.size, found.ended.total(), pilot, found.cpu,
         f"{found.low:.3g} to {found.high:.3g}", truth, ratio,
-        found.size / 1e3, size / 1e3, of_size, "yes" if inside else "no",
+        "yes" if inside else "no",
     )  # fmt: skip
-    return max(ratio, 1.0 / ratio), max(of_size, 1.0 / of_size), inside
+    return max(ratio, 1.0 / ratio), inside
 
 
 def main():
@@ -76,15 +75,13 @@ def main():
     studies = {"nargs": "+", "choices": STUDIES, "default": list(STUDIES)}
     arguments = begin(__doc__, replicates_of=1.0, studies=studies)
     columns = ("study", "replicates", "of them in the pilot", "pilot [s]", "forecast [s]",
-               "95 %", "truth [s]", "ratio", "file, forecast [kB]", "truth [kB]", "ratio ",
-               "inside")  # fmt: skip
+               "95 %", "truth [s]", "ratio", "inside")  # fmt: skip
     table = Table("--dry-run against the study itself, CPU time of one core", columns)
     factor = arguments.replicates_of * (0.25 if arguments.quick else 1.0)
     found = [judge(name, factor, table) for name in arguments.studies]
     table.print()
-    hours, size = max(each[0] for each in found), max(each[1] for each in found)
-    inside = sum(each[2] for each in found)
-    print(f"off by at most {hours:.2f} times (goal {GOAL}) in time and {size:.2f} in size; "
+    hours, inside = max(each[0] for each in found), sum(each[1] for each in found)
+    print(f"off by at most {hours:.2f} times (goal {GOAL}); "
           f"{inside} of {len(found)} inside the interval")  # fmt: skip
 
 

@@ -31,7 +31,7 @@ def exceptions_figure(study, entries, vertices=64):
     turn = np.linspace(0.0, 2.0 * np.pi, 90)
     for place, (name, times) in enumerate(shown):
         axes = figure.add_subplot(rows, COLUMNS, place + 1)
-        core = known[name].fits[vertices].vertices
+        core = known[name].fits[vertices].table.place
         size = known[name].equivalent_radius * known[name].pixel_size
         axes.add_patch(Polygon(core, facecolor="0.8", edgecolor="black", linewidth=0.8))
         axes.plot(size * np.cos(turn), size * np.sin(turn), linewidth=0.8)

@@ -4,9 +4,6 @@ import itertools
 import math
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from typing import Any
-
-import attrs
 
 from flocsim.commands import add_settings
 from flocsim.ensembles.collision.draw import TIGHTER, exact_method
@@ -26,7 +23,6 @@ from flocsim.integrators import Implicit
 from flocsim.integrators.base import Integrator
 from flocsim.io.arguments import whole
 from flocsim.io.results.schema import AGGREGATED, CLASSES, OUTCOMES
-from flocsim.io.terminal import tell
 
 COUNT = 2
 """Replicates of each combination of ends, by default."""
@@ -62,14 +58,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_settings(parser)
 
 
-def of_extremes(config: Config) -> Config:
-    """Return the config with its smallest and its largest pair, its least and its largest N."""
+def extremes_of(config: Config) -> tuple[list[int], list[int]]:
+    """Return the places of the smallest and the largest pair, and the least and the largest N.
+
+    Of size classes, and of rates, all places.
+    """
     given, vertices = config.scene.given, config.shapes.vertices
-    order = sorted(range(len(given)), key=lambda k: sum(given[k][1]))
-    scene: Any = config.scene
-    scene = scene.only(sorted({order[0], order[-1]}) if order else [])
-    shapes = attrs.evolve(config.shapes, vertices=tuple(sorted({min(vertices), max(vertices)})))
-    return attrs.evolve(config, scene=scene, shapes=shapes)
+    places = [*range(len(config.scene.names))]
+    if given and not config.is_kernel:
+        places = sorted(places, key=lambda place: sum(given[place][1]))
+        places = sorted({places[0], places[-1]})
+    return places, sorted({min(vertices), max(vertices)})
 
 
 def verdict_on(found: Comparison, method: Integrator) -> tuple[str, str]:
@@ -108,22 +107,19 @@ def run(args: Namespace) -> int:
     """Run all cases and print the table; 0 where all are right or within their stated error."""
     config = load_config(args.config, settings_in(args.settings))
     check_study(config)
-    config = of_extremes(config)
     # The tolerances of the study and of its second runs; the reference is a hundred times tighter.
     method = config.integrator.method
     methods = [method, *filter(None, [exact_method(method)])]
     tightest = methods[-1].tolerance
     exact = Implicit(max(TIGHTER * (tightest if math.isfinite(tightest) else 1e-9), TIGHTEST))
-    tell(
+    print(
         "runs at the extremes of sizes, N and tolerance, compared with Implicit at "
         f"{exact.tolerance:.0e} m\nerror: largest of any point of an outline, at the time when the "
         f"first of the two is decided\n\n{table_line(COLUMNS)}"
     )
     verdicts: Counter[str] = Counter()
     deltas, bench = config.scene.delta, Bench(study_of(config), exact)
-    places = itertools.product(
-        range(len(config.scene.names)), config.shapes.vertices, range(args.count)
-    )
+    places = itertools.product(*extremes_of(config), range(args.count))
     for turn, (condition, n, _) in enumerate(places):
         # Other displacements and other random numbers each time, as far as there are any.
         task = (condition, n, deltas[turn % len(deltas)]), turn % config.replicates
@@ -131,12 +127,12 @@ def run(args: Namespace) -> int:
             found = bench.compare(task, each)
             verdict, why = verdict_on(found, each)
             verdicts[verdict] += 1
-            tell(table_line(COLUMNS, [
+            print(table_line(COLUMNS, [
                 config.scene.names[condition], n, type(each).__name__, setting_of(each),
                 f"{task[0][2]:.3g}", task[1], found.steps or "-", number(1e3 * found.cpu, ".2f"),
                 number(found.error), number(found.stated), f"  {verdict}{': ' * bool(why)}{why}",
             ]))  # fmt: skip
-    tell(
+    print(
         f"\n{verdicts[RIGHT]} {RIGHT} (within the tolerance), {verdicts[STATED]} {STATED}, "
         f"{verdicts[WRONG]} {WRONG}"
     )

@@ -98,9 +98,9 @@ def export_tables(args: argparse.Namespace) -> int:
 def water_factors(path: Any, allowed: Any) -> dict[str, np.ndarray]:
     """Return {mechanism: (i, j)}: how often the equivalent spheres of a study touch with the water
     between them, over how often they do without."""
-    from flocsim.ensembles.pairs.opened import open_results
+    from flocsim.ensembles.pairs.opened import StudyResults
 
-    results = open_results(path, allowed)
+    results = StudyResults(path, allowed)
     scene: Any = results.config.scene
     found: dict[str, np.ndarray] = {}
     for facts, (m, i, j) in zip(results.in_water(), scene.conditions, strict=True):

@@ -1,50 +1,38 @@
 """`flocsim fit`: pictures of flocs → a library of fitted shapes."""
 
 import argparse
-import sys
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
 from flocsim.commands import add_overwrite
 from flocsim.commands.fit_pictures import (
-    LOST,
-    Picture,
-    different,
     draw_fits,
     draw_overlays,
-    file_stem,
+    files_of,
     fit_pictures,
     list_pictures,
-    overlay_paths,
     report,
     titles_of,
 )
-from flocsim.errors import UsageError
+from flocsim.errors import FlocsimError, UsageError
 from flocsim.fields import read_number
 from flocsim.io.arguments import number, positive, several, whole
-from flocsim.io.files import Rule, make_folder, write_file
-from flocsim.io.fit_report import (
-    coarse_line,
-    errors_of,
-    format_errors,
-    plural,
-    population_lines,
-    summary_text,
-)
-from flocsim.io.images.masks import MASK_SUFFIXES
+from flocsim.io.files import make_folder, write_file
+from flocsim.io.fit_report import format_errors, plural, population_lines, summary_text
 from flocsim.io.images.paper import CUTOFF
 from flocsim.io.images.pictures import label_image, read_names
-from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL, TIFF_SUFFIXES
+from flocsim.io.images.stacks import LARGEST_PIXEL, SMALLEST_PIXEL
 from flocsim.io.outputs import check_ending, check_outputs
 from flocsim.io.plots.style import FIGURE_ENDINGS
 from flocsim.io.shape_library import make_entry, write_library
 from flocsim.plausibility import PIXEL_SIZE
 
-FILTERS = ("flocs", "min_radius", "max_radius", "max_blur", "neck")
-"""Options of `segment` and `segment_as_paper` alike."""
-
+OF_MASKS = ("min_radius", "max_radius")
+OF_PICTURES = (*OF_MASKS, "flocs", "max_blur", "neck")
 OF_STEEPEST = ("threshold", "noise_scale", "saturated")
-"""Options of `segment` alone; --background is another."""
+"""Options of `segment_mask`; of `segment` and `segment_as_paper`; of `segment` alone, as is
+--background."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,8 +63,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --masks: treat the files as masks or labels (PNG, TIFF, .npy, .npz), not pictures
     --jobs K: number of processes (default: %(default)s)
     --output FILE: shape library to write (default: %(default)s)
-    --summary FILE: table of all regions, with the reason for rejected ones (default: beside the
-        library, ending in .csv)
     --overlay FILE: draw the outlines at the largest N over the picture (.png, .pdf, .svg), and
         rejected regions dashed, with the reason; with several pictures, one file each:
         FILE-picture.png
@@ -106,7 +92,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     --neck SHARE: separate touching flocs at necks of up to this share of the smaller one's width;
         0: never (default: 0.5, only where the parts are so compact that they are surely two flocs,
         and never in a picture of fractal aggregates)
-    --max-flocs K: fit only the K largest flocs of every picture
     --drop LIST: flocs to leave out, by their numbers in the overlay and the table: 3,5 with one
         picture, 023.png#3,5 with several
     --keep LIST: fit only these regions, named as for --drop
@@ -125,7 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         add(flag, action="store_true")
     add("--jobs", type=whole, default=1)
     add("-o", "--output", default="shapes.h5")
-    for name in ("--summary", "--overlay", "--fits", "--masks-out"):
+    for name in ("--overlay", "--fits", "--masks-out"):
         add(name)
     add("--memory", type=lambda text: 1e9 * positive(text), default="1.3")
     add_overwrite(parser)
@@ -141,7 +126,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--max-radius", type=positive)
     add("--max-blur", type=number("a share, above 0", 5e-324, float("inf")), default="0.25")
     add("--neck", type=number("a share from 0 to 1", 0.0, 1.0))
-    add("--max-flocs", type=whole)
     for name in ("--drop", "--keep", "--add"):
         add(name, type=read_names, default=())
 
@@ -196,100 +180,72 @@ def run(args: argparse.Namespace) -> int:
     """Fit, print what was found and write the library; returns the exit code."""
     check(args)
     args.vertices, args.radii = sorted({1, *args.vertices}), sorted(set(args.radii))
-    own = ("cutoff",) if args.finder == "paper" else OF_STEEPEST
-    options = {name: getattr(args, name) for name in (*FILTERS, *own)}
+    own = (*OF_PICTURES, "cutoff") if args.finder == "paper" else (*OF_PICTURES, *OF_STEEPEST)
+    options = {name: getattr(args, name) for name in (OF_MASKS if args.masks else own)}
     # What is not given is as `segment`, or `segment_as_paper`, has it by default.
     args.segmentation = {name: each for name, each in options.items() if each is not None}
     args.correction = {name: getattr(args, name) for name in ("drop", "keep", "add")}
-    summary = args.summary or Path(args.output).with_suffix(".csv")
     if args.overlay is not None:
         check_ending(args.overlay, FIGURE_ENDINGS)
     paths = list_pictures(args.images, args.masks)
-    titles = titles_of(paths)
-    if args.pixel_size is None and not any(p.suffix.lower() in TIFF_SUFFIXES for p in paths):
-        raise UsageError(
-            "--pixel-size is missing, and only OME-TIFF and ImageJ files give the size of a "
-            "pixel; give the length of its side, for example --pixel-size '0.95 um'"
-        )
-    rule = args.overwrite
-    outputs = [args.output, summary]
-    if args.overlay is not None:
-        outputs += overlay_paths(args.overlay, titles, len(paths) > 1) or [args.overlay]
-    if args.fits is not None:
-        make_folder(args.fits, "--fits ")
-    if args.masks_out is not None:
-        make_folder(args.masks_out, "--masks-out ")
-        outputs += label_paths(args.masks_out, titles).values()
-    check_outputs(outputs, rule, paths)
-    try:
-        pictures, lost = fit_pictures(paths, args)
-    except KeyboardInterrupt:
-        print("flocsim: interrupted; no shape library was written", file=sys.stderr)
-        return 130
-    doubt = doubts_of_sizes(pictures, args.pixel_size)
-    if args.masks_out is not None:
-        write_labels(args.masks_out, pictures, titles, rule)
+    for option in ("fits", "masks_out"):
+        if (folder := getattr(args, option)) is not None:
+            make_folder(folder, f"--{option.replace('_', '-')} ")
+    table, rule, titles = Path(args.output).with_suffix(".csv"), args.overwrite, titles_of(paths)
+    overlays, labels = drawn_files(args, titles, len(paths) > 1)
+    check_outputs([args.output, table, *overlays, *labels], rule, paths)
+
+    pictures, lost = fit_pictures(paths, args)
     entries = [
         make_entry(picture, region, picture.fits[region.label], radius, len(args.radii) > 1)
-        for radius in args.radii for picture in pictures for region in picture.regions
+        for radius in args.radii for picture in pictures for region in picture.found.regions
     ]  # fmt: skip
-    table = summary_text(pictures).encode()
     if not entries:
-        if args.summary:
-            write_file(summary, table, rule)
-        print("flocsim: nothing was fitted, no shape library was written", file=sys.stderr)
-        return LOST if lost else 2
+        problem = FlocsimError if lost else UsageError
+        raise problem("nothing was fitted, no shape library was written")
     settings = {
         "method": args.method, "preserve_area": args.preserve_area, "inscribed": args.inscribed,
-    } | ({"warning": doubt} if doubt else {})  # fmt: skip
+    }  # fmt: skip
+    sizes = [PIXEL_SIZE.warning("the pixel size", picture.pixel_size) for picture in pictures]
+    if doubts := list(dict.fromkeys(filter(None, sizes))):
+        settings["warning"] = "; ".join(doubts)
+        report(f"warning: {settings['warning']}")
     if args.finder == "paper":
         settings |= {"finder": "paper", "cutoff": args.cutoff or CUTOFF}
     if args.holes:
         settings["holes"] = True
     write_library(args.output, entries, settings, rule)
-    write_file(summary, table, rule)
+    write_file(table, summary_text(pictures).encode(), rule)
+    print("\n".join([format_errors(entries), *population_lines(entries)]))
+    counts = ", ".join(map(str, args.vertices))
+    flocs = plural(len(entries) // len(args.radii), "floc")
+    print(f"{args.output}: {flocs} at N = {counts}; {table}: all regions")
+
+    names = [each.name for each in pictures]
+    overlays, labels = drawn_files(args, names, max(len(paths), len(names)) > 1)
+    for picture, path in zip(pictures, labels, strict=False):
+        found = picture.found
+        write_file(path, label_image(found.foreground.shape, found.regions, picture.name), rule)
     if args.overlay is not None:
-        lost += draw_overlays(pictures, args, rule, len(paths) > 1)
+        draw_overlays(overlays, pictures, args)
     if args.fits is not None:
         draw_fits(args.fits, pictures, rule)
-    print("\n".join([format_errors(entries), *population_lines(entries)]))
-    if coarse := coarse_line(errors_of(entries)):
-        print(f"warning: {coarse}")
-    counts, flocs = ", ".join(map(str, args.vertices)), sum(len(each.regions) for each in pictures)
-    print(f"{args.output}: {plural(flocs, 'floc')} at N = {counts}; {summary}: all regions")
-    if not lost:
-        return 0
-    report(f"lost: {', '.join(lost)}; all else was written")
-    return LOST
+    if lost:
+        raise FlocsimError(f"lost: {', '.join(lost)}; all else was written")
+    return 0
 
 
-def doubts_of_sizes(pictures: Sequence[Picture], given: float | None) -> str:
-    """Print the sizes of pixels that files give, and what is odd of all; that in words, or ""."""
-    names: dict[float, str] = {}
-    for picture in pictures:
-        names.setdefault(picture.pixel_size, picture.name)
-    doubts: list[str] = []
-    for size, name in names.items():
-        if given is None:
-            print(f"pixel size {1e6 * size:.4g} um, as {name} says")
-        whose = "--pixel-size" if given else f"the pixel size of {name}"
-        doubts += filter(None, [PIXEL_SIZE.warning(whose, size)])
-    for doubt in doubts:
-        report(f"warning: {doubt}")
-    return "; ".join(doubts)
-
-
-def label_paths(folder: str, names: Sequence[str]) -> dict[str, Path]:
-    """Return {name of a picture: path of its label image}, all different."""
-    made = different([f"{file_stem(name, MASK_SUFFIXES)}.png" for name in names])
-    return {name: Path(folder, file) for name, file in zip(names, made, strict=True)}
-
-
-def write_labels(
-    folder: str, pictures: Sequence[Picture], titles: Sequence[str], rule: Rule
-) -> None:
-    """Write the label images of --masks-out, of what is fitted; titles: of all files."""
-    paths = label_paths(folder, list(dict.fromkeys([*titles, *(each.name for each in pictures)])))
-    for picture in pictures:
-        image = label_image(picture.found.foreground.shape, picture.regions, picture.name)
-        write_file(paths[picture.name], image, rule)
+def drawn_files(
+    args: argparse.Namespace, names: Sequence[str], apart: bool
+) -> tuple[list[Path], list[Path]]:
+    """Return the overlays and the label images of pictures with these names, as far as they are
+    asked for; ``apart``: each overlay has the name of its picture in its own."""
+    overlays, labels = [], []
+    if args.overlay is not None:
+        path = Path(args.overlay)
+        overlays = [path] * len(names)
+        if apart:
+            overlays = files_of(names, f"{path.with_suffix('')}-", path.suffix)
+    if args.masks_out is not None:
+        labels = files_of(names, os.path.join(args.masks_out, ""), ".png")
+    return overlays, labels

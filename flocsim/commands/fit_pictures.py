@@ -7,7 +7,8 @@ import os
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,11 @@ import attrs
 import numpy as np
 
 from flocsim.commands.processes import Lost, workers
-from flocsim.errors import FlocsimError, ImageError, ShapeError, UsageError
+from flocsim.errors import FileError, FlocsimError, ImageError, ShapeError, UsageError
 from flocsim.geometry.fit.fit import Fit, fit_mask
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.files import Rule
-from flocsim.io.fit_report import picture_line, plural, warn_of_coarse
+from flocsim.io.fit_report import picture_line, plural
 from flocsim.io.images.background import FEWEST_FRAMES
 from flocsim.io.images.masks import ARRAYS, MASK_SUFFIXES, is_mask, read_masks, segment_mask
 from flocsim.io.images.paper import segment_as_paper
@@ -34,23 +35,19 @@ from flocsim.io.terminal import Progress
 Fits = dict[float, dict[int, Fit]]
 """The Fit of one mask at every spheroradius [px] and N."""
 
-LOST = FlocsimError.exit_code
-"""Exit code where pictures were lost; the library has the others."""
-
 MOST_FRAMES = 25
 """More frames than this tell hardly more about the light."""
 
 
 @attrs.frozen(eq=False)
 class Picture:
-    """One picture or mask, what was found in it, the regions of that to be fitted, and the measures
-    {label: ShapeMeasures} [px] of all its flocs; pixel_size [m]; plane: where it is in the file;
-    fits {label: [Fits]} of the regions, of the mask and, if asked for, of both ends of its band."""
+    """One picture or mask, what was found in it, and the measures {label: ShapeMeasures} [px] of
+    its flocs; pixel_size [m]; plane: where it is in the file; fits {label: [Fits]} of the flocs,
+    of the mask and, if asked for, of both ends of its band."""
 
     path: Path
     name: str
     found: Segmentation
-    regions: tuple[Region, ...]
     measures: dict[int, ShapeMeasures]
     pixel_size: float
     plane: Plane | None = None
@@ -73,34 +70,26 @@ def fit_pictures(paths: Sequence[Path], options: Namespace) -> tuple[list[Pictur
     tasks = [(p, t, background, options) for p, t in zip(paths, titles_of(paths), strict=True)]
     lost: dict[str, str] = {}
     pictures: list[Picture] = []
-    masks_found: list[str] = []
     with workers(options.jobs, compile_fit) as mapped:
         for (_, title, *_), result in zip(tasks, mapped(find_flocs, tasks), strict=True):
             if isinstance(result, Lost):
                 lost[title] = result.reason
             elif isinstance(result, FlocsimError):
                 report(result)
-            elif result is None:
-                masks_found.append(title)
             else:
                 for picture in result:
-                    line = picture_line(picture.name, picture.found, len(picture.regions))
+                    line = picture_line(picture.name, picture.found)
+                    if options.pixel_size is None:
+                        line += f", pixel size {1e6 * picture.pixel_size:.4g} um"
                     print(line, flush=True)
-                    warn_of_coarse(picture.name, picture.regions, options.radii)
                 pictures += result
-        if masks_found:
-            report(
-                f"{plural(len(masks_found), 'file')} of masks or labels among the pictures: "
-                f"{', '.join(masks_found)}; left out, fit them with --masks"
-            )
         if not options.masks:
             found = weighed([e.found for e in pictures], options.segmentation["max_blur"])
             pictures = [
-                attrs.evolve(each, found=one, regions=largest(one.regions, options.max_flocs))
-                for each, one in zip(pictures, found, strict=True)
+                attrs.evolve(each, found=one) for each, one in zip(pictures, found, strict=True)
             ]
         check_names(options.correction, [(each.name, each.found) for each in pictures])
-        regions = [(each, region) for each in pictures for region in each.regions]
+        regions = [(each, region) for each in pictures for region in each.found.regions]
         masks = []
         for picture, region in regions:
             # At the ends of a band that is not known lies the mask itself.
@@ -141,10 +130,11 @@ def different(names: Sequence[str]) -> list[str]:
     return found
 
 
-def file_stem(name: str, suffixes: Sequence[str]) -> str:
-    """Return the name of a picture in names of files, without one of these endings."""
-    plain = Path(name.replace(":", "-").replace("/", "-"))
-    return plain.stem if plain.suffix.lower() in suffixes else plain.name
+def files_of(names: Sequence[str], start: str, ending: str) -> list[Path]:
+    """Return a file START-picture.ENDING for each of the pictures with these names."""
+    plain = [Path(name.replace(":", "-").replace("/", "-")) for name in names]
+    stems = [path.stem if path.suffix.lower() in MASK_SUFFIXES else path.name for path in plain]
+    return [Path(name) for name in different([f"{start}{stem}{ending}" for stem in stems])]
 
 
 def compile_fit() -> None:
@@ -158,39 +148,36 @@ def report(error: object) -> None:
 
 
 def find_flocs(task: tuple[Path, str, np.ndarray | None, Namespace]) -> Any:
-    """Return the Pictures of (path, name, background, options); the error of its file; None of a
-    mask among pictures."""
+    """Return the Pictures of (path, name, background, options), or the error of its file."""
     path, name, background, options = task
     try:
         if options.masks:
             return [
-                picture_of(path, name + inner[len(path.name) :], segment_mask(
-                    mask, **{key: options.segmentation[key] for key in ("min_radius", "max_radius")
-                             if key in options.segmentation}), options)
+                picture_of(path, name + inner[len(path.name) :],
+                           segment_mask(mask, **options.segmentation), options)
                 for inner, mask in read_masks(path, options.memory)
             ]  # fmt: skip
-        pictures = []
-        for page, plane in planes_in(path, options):
-            pixels = read_pixels(path, plane, options.memory)
-            if is_mask(pixels):
-                return None
-            grey = grey_of(pixels, path)
-            if options.finder == "paper":
-                found = segment_as_paper(grey, **options.segmentation)
-            else:
-                found = segment(grey, background=background, **options.segmentation)
-            pictures.append(picture_of(path, name + page, found, options, plane))
-        return pictures
-    except FlocsimError as error:
+        find: Any = partial(segment, background=background)
+        if options.finder == "paper":
+            find = segment_as_paper
+        return [
+            picture_of(path, name + page, find(grey, **options.segmentation), options, plane)
+            for page, plane, grey in pictures_in(path, options)
+        ]
+    except (ImageError, FileError) as error:
         return error
 
 
-def planes_in(path: Path, options: Namespace) -> list[tuple[str, Plane]]:
-    """Return [(what follows its name, Plane)] of the pictures of a file that are asked for."""
+def pictures_in(path: Path, options: Namespace) -> Iterator[tuple[str, Plane, np.ndarray]]:
+    """Yield (what follows its name, Plane, grey) of the pictures of a file that are asked for."""
     check_file(path, "picture file")
     if path.suffix.lower() in ARRAYS:
         raise ImageError(f"{path}: {path.suffix} files hold masks, not pictures: give --masks")
-    return planes_of(path, stack_of(path), options.page, options.channel, options.crop)
+    for page, plane in planes_of(path, stack_of(path), options.page, options.channel, options.crop):
+        pixels = read_pixels(path, plane, options.memory)
+        if is_mask(pixels):
+            raise ImageError(f"{path}: holds masks or labels, left out: fit them with --masks")
+        yield page, plane, grey_of(pixels, path)
 
 
 def picture_of(
@@ -199,7 +186,7 @@ def picture_of(
     """Return the Picture of a Segmentation, corrected as the user wants it."""
     size = options.pixel_size or pixel_size_in(path, stack_of(path))
     if size is None:
-        raise ImageError(
+        raise UsageError(
             f"{path}: does not give the size of a pixel, as OME-TIFF and ImageJ files do; give the "
             "length of its side, for example --pixel-size '0.95 um'"
         )
@@ -209,14 +196,7 @@ def picture_of(
         found = attrs.evolve(found, regions=opened)
     found = attrs.evolve(found, holes=None)
     measures = {region.label: mask_measures(region.mask) for region in found.regions}
-    regions = largest(found.regions, options.max_flocs)
-    return Picture(path, name, found, regions, measures, size, plane)
-
-
-def largest(regions: Sequence[Region], count: int | None) -> tuple[Region, ...]:
-    """Return the `count` largest regions, in their old order; all for None."""
-    by_size = sorted(regions, key=lambda region: (-region.area, region.label))[:count]
-    return tuple(sorted(by_size, key=lambda region: region.label))
+    return Picture(path, name, found, measures, size, plane)
 
 
 def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
@@ -232,7 +212,7 @@ def fit_region(task: tuple[str, Sequence[np.ndarray], Namespace]) -> list[Fits]:
         )  # fmt: skip
 
     with warnings.catch_warnings():
-        # Printed once a picture, by warn_of_coarse, not once a floc and N.
+        # The library's warnings say it once, not once a floc and N.
         warnings.simplefilter("ignore", UserWarning)
         try:
             return [
@@ -266,10 +246,7 @@ def find_background(paths: Sequence[Path], options: Namespace) -> np.ndarray | N
     for path in paths[:: max(1, len(paths) // MOST_FRAMES)]:
         # A file that cannot be read, or is a mask, is reported when its own turn comes.
         with contextlib.suppress(ImageError, MemoryError):
-            for _, plane in planes_in(path, options):
-                pixels = read_pixels(path, plane, options.memory)
-                if not is_mask(pixels):
-                    frames.append(grey_of(pixels, path))
+            frames += [grey for _, _, grey in pictures_in(path, options)]
     shapes = {frame.shape for frame in frames}
     if len(frames) < FEWEST_FRAMES or len(shapes) > 1:
         sizes = ", ".join(f"{width} × {height}" for height, width in sorted(shapes))
@@ -280,46 +257,23 @@ def find_background(paths: Sequence[Path], options: Namespace) -> np.ndarray | N
     return np.median(np.stack(frames), axis=0)
 
 
-def overlay_paths(overlay: str, names: Sequence[str], several: bool) -> list[Path]:
-    """Return a path for the overlay of each of the pictures with these names."""
-    path = Path(overlay)
-    if not several:
-        return [path] * len(names)
-    stems = [file_stem(name, MASK_SUFFIXES) for name in names]
-    made = different([f"{path.stem}-{stem}{path.suffix}" for stem in stems])
-    return [path.with_name(name) for name in made]
-
-
 def draw_fits(folder: str, pictures: Sequence[Picture], rule: Rule) -> None:
     """Write a picture of every fit at the largest N and the smallest spheroradius."""
-    for picture in pictures:
-        for region in picture.regions:
+    starts = files_of([each.name for each in pictures], os.path.join(folder, ""), "")
+    for picture, start in zip(pictures, starts, strict=True):
+        for region in picture.found.regions:
             name = f"{picture.name}#{region.label}"
             figure = single_fit(region.mask, picture.finest(region), name)
-            path = Path(folder, f"{file_stem(picture.name, ())}-{region.label}.png")
-            save(figure, path, rule)
+            save(figure, Path(f"{start}-{region.label}.png"), rule)
 
 
-def draw_overlays(
-    pictures: Sequence[Picture], options: Namespace, rule: Rule, several: bool
-) -> list[str]:
-    """Write each picture with the outlines at the largest N and the smallest spheroradius.
-
-    Returns what could not be drawn because its picture cannot be read any more.
-    """
-    most, radius, lost = options.vertices[-1], options.radii[0], []
-    names = [each.name for each in pictures]
-    paths = overlay_paths(options.overlay, names, several or len(pictures) > 1)
+def draw_overlays(paths: Sequence[Path], pictures: Sequence[Picture], options: Namespace) -> None:
+    """Write each picture with the outlines at the largest N and the smallest spheroradius."""
     for picture, path in zip(pictures, paths, strict=True):
-        flocs = [(region, picture.finest(region)) for region in picture.regions]
-        title = f"{picture.name}: {plural(len(flocs), 'floc')}, N = {most}, r = {radius:g} px"
+        flocs = [(region, picture.finest(region)) for region in picture.found.regions]
+        title = (f"{picture.name}: {plural(len(flocs), 'floc')}, N = {options.vertices[-1]}, "
+                 f"r = {options.radii[0]:g} px")  # fmt: skip
         grey = picture.found.foreground
-        try:
-            if not options.masks:
-                grey = read_grey(picture.path, picture.plane or Plane(), options.memory)
-        except (ImageError, MemoryError) as error:
-            report(str(error) or f"{picture.name}: not enough memory to draw its overlay")
-            lost.append(str(path))
-            continue
-        save(draw_overlay(grey, flocs, title, picture.found.rejected), path, rule)
-    return lost
+        if not options.masks:
+            grey = read_grey(picture.path, picture.plane or Plane(), options.memory)
+        save(draw_overlay(grey, flocs, title, picture.found.rejected), path, options.overwrite)

@@ -8,22 +8,17 @@ import functools
 import multiprocessing
 import signal
 import sys
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from itertools import islice
 from typing import Any
 
 import attrs
 
 from flocsim.errors import FlocsimError
-from flocsim.process import end_with_parent
+from flocsim.process import blocked, end_with_parent
 
-AHEAD = 3
-"""Tasks for each process that are handed out before there are results: none has to wait."""
-
-Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
+Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
 
 @attrs.frozen
@@ -43,17 +38,10 @@ def workers(jobs: int, prepare: Callable[[], object]) -> Iterator[Map]:
         yield lambda function, tasks: map(functools.partial(attempt, function), tasks)
         return
     prepare()
-    begun: list[Any] = []
-
-    def start(function: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Any]:
-        begun.append(in_processes(jobs, function, tasks))
-        return begun[-1]
-
-    try:
-        yield start
-    finally:
-        for each in begun:
-            each.close()
+    with contextlib.ExitStack() as begun:
+        yield lambda function, tasks: begun.enter_context(
+            contextlib.closing(in_processes(jobs, function, tasks))
+        )
 
 
 def attempt(function, task):
@@ -68,39 +56,34 @@ def attempt(function, task):
         return Lost(f"internal error, please report it: {type(error).__name__}: {error}")
 
 
-def in_processes(jobs: int, function: Callable, tasks: Iterable[Any]) -> Iterator[Any]:
+def in_processes(jobs: int, function: Callable, tasks: Sequence[Any]) -> Generator[Any, None, None]:
     """Yield the results of tasks in order, from a pool that is made anew when a process dies.
 
-    Nothing tells which task a dead process was at: all that were handed out and have no result are
-    tried again, each in a process of its own. One whose process dies then is lost.
+    Nothing tells which task a dead process was at: the first one without a result is tried again in
+    a process of its own, and is lost if that dies as well; the rest goes to a new pool.
     """
-    remaining = iter(tasks)
-    while True:
-        running: deque[list[Any]] = deque()  # [task, future], in order
-        try:
-            with new_pool(jobs) as pool:
-                while True:
-                    for task in islice(remaining, AHEAD * jobs - len(running)):
-                        running.append([task, None])  # not lost where the pool breaks just now
-                        running[-1][1] = pool.submit(attempt, function, task)
-                    if not running:
-                        return
-                    result = running[0][1].result()
-                    running.popleft()
-                    yield result
-        except BrokenProcessPool:
-            for task, future in running:
-                is_done = future is not None and future.done() and not future.exception()
-                yield future.result() if is_done else alone(function, task)
+    done = 0
+    while done < len(tasks):
+        with contextlib.closing(until_a_death(jobs, function, tasks[done:])) as results:
+            for result in results:
+                done += 1
+                yield result
+        if done < len(tasks):
+            lost = Lost("its process was killed, perhaps for lack of memory")
+            yield from [*until_a_death(1, function, tasks[done : done + 1])] or [lost]
+            done += 1
 
 
-def alone(function, task):
-    """Return the result of a task in a process of its own."""
-    with new_pool(1) as pool:
-        try:
-            return pool.submit(attempt, function, task).result()
-        except BrokenProcessPool:
-            return Lost("its process was killed, perhaps for lack of memory")
+def until_a_death(
+    jobs: int, function: Callable, tasks: Sequence[Any]
+) -> Generator[Any, None, None]:
+    """Yield the results of tasks in order, from one pool, until one of its processes dies."""
+    with contextlib.suppress(BrokenProcessPool), new_pool(jobs) as pool:
+        # Ctrl-C waits: a process that is just being started would not be known, nor ended.
+        with blocked({signal.SIGINT}):
+            futures = [pool.submit(attempt, function, task) for task in tasks]
+        for future in futures:
+            yield future.result()
 
 
 @contextlib.contextmanager

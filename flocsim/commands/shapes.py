@@ -18,14 +18,7 @@ from flocsim.ensembles.contents import Contents, Figures, Summary
 from flocsim.errors import UsageError
 from flocsim.hydrodynamics import prism_drag
 from flocsim.io.arguments import document, number
-from flocsim.io.fit_report import (
-    coarse_line,
-    errors_of,
-    format_errors,
-    measures_in,
-    plural,
-    population_lines,
-)
+from flocsim.io.fit_report import format_errors, measures_in, plural, population_lines
 from flocsim.io.labelled import Labelled, Tables
 from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.shapes import POPULATION_FIGURES
@@ -124,10 +117,6 @@ def run_list(args: argparse.Namespace) -> int:
         print("\n".join([f"{library}: {plural(len(entries), 'floc')}", *aligned(rows, left=1)]))
         if entries:
             print("\n".join(population_lines(entries)))
-        if coarse := coarse_line(errors_of(entries)):
-            print(f"warning: {coarse}")
-        if any(each.measures is None for each in entries):
-            print("shape measures of the finest fit where the library has none of the picture")
     return 0
 
 

@@ -15,7 +15,6 @@ from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.arguments import whole
 from flocsim.io.outputs import check_outputs
 from flocsim.io.seals import held
-from flocsim.io.terminal import tell
 from flocsim.process import STOPPED, handle
 
 WAYS = "continue it with --resume, or add --overwrite, which keeps the old one under another name"
@@ -66,7 +65,7 @@ def run(args: Namespace) -> int:
     check_outputs([output], rule, [args.results], WAYS)
     check_outputs([figure], drawn, [args.results, output])
     survey = Survey(args.results, args.flow, args.count, args.precision, allowed_by(args))
-    say = (lambda line: None) if args.quiet else tell
+    say = (lambda line: None) if args.quiet else print
     tested = earlier(survey, output) if resumed else {}
     doublets = bound_doublets(survey.results, args.count)
     say(f"{len(doublets)} bound doublets of {args.results} in {args.flow}")
@@ -104,7 +103,7 @@ def run(args: Namespace) -> int:
             write()
             kept = f"{len(tested)} tested doublets are in {output}"
         who = str(error) or "stopped by SIGINT"
-        tell(f"flocsim: {who}: {kept}\n{continuing()}", sys.stderr)
+        print(f"flocsim: {who}: {kept}\n{continuing()}", file=sys.stderr)
         return STOPPED
     found = write(complete=True)
     say(f"{table_of(found)}\n{source_line(found.about)}\n{output}")

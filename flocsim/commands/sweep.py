@@ -14,7 +14,6 @@ from flocsim.ensembles.cli import continuing
 from flocsim.ensembles.config.loader import parse_setting, settings_in
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.errors import UsageError
-from flocsim.io.terminal import tell
 from flocsim.process import STOPPED, handle
 
 COMMAS = re.compile(r""",(?=(?:[^"'\[\]]|"[^"]*"|'[^']*'|\[[^\]]*\])*$)""")
@@ -63,14 +62,13 @@ def run(args: Namespace) -> int:
     except (KeyboardInterrupt, StopRequested) as error:
         # The process of a part may have been stopped alone, and has said by what.
         who = str(error).partition(":")[0] or "stopped by SIGINT"
-        tell(f"flocsim: {who}: what was finished is kept\n{continuing()}", sys.stderr)
+        print(f"flocsim: {who}: what was finished is kept\n{continuing()}", file=sys.stderr)
         return STOPPED
 
 
 def run_study(args: Namespace) -> int:
     """Do what the arguments ask for; return the exit code."""
     from flocsim.ensembles.script_study import Study, settings_of
-    from flocsim.ensembles.storage.resume import WAYS
     from flocsim.ensembles.sweep import planned, sweep
 
     pairs = [values_of(text) for text in args.over]
@@ -84,12 +82,11 @@ def run_study(args: Namespace) -> int:
     if args.dry_run:
         for path, part in planned(study, over, Path(output)).items():
             words = " ".join(f"--set {quote(f'{k}={v}')}" for k, v in settings_of(part.overrides))
-            tell(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
+            print(f"flocsim ensemble {quote(args.config)} {words} -o {quote(str(path))}")
         return 0
     mode = "resume" if args.resume else "new"
-    sweep(study, over, output, jobs=args.jobs, mode=mode, overwrite=args.overwrite, tell=tell,
-          ways=WAYS)  # fmt: skip
-    tell(output)
+    sweep(study, over, output, jobs=args.jobs, mode=mode, overwrite=args.overwrite, tell=print)
+    print(output)
     return 0
 
 

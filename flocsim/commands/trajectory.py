@@ -2,7 +2,6 @@
 what commands show of a file of motion."""
 
 from argparse import ArgumentParser, Namespace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +36,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     --type NAME: collision type (default: the first)
     --vertices N: vertices of the bodies (default: the last)
     --delta F: default: the first
-    --seed: seed, overriding the config's
     --frames K: default: %(default)s
-    --output FILE: strip of frames: .png, .pdf or .svg, or several files (default: a .png named
-        after the config and the replicate)
+    --output FILE: strip of frames: .png, .pdf or .svg (default: a .png named after the config and
+        the replicate)
     --distance FILE: also draw the centre distance against time
     --forces FILE: also draw the forces against time
     --animation FILE.gif: also write an animation
@@ -52,14 +50,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     add("--type")
     add("--vertices", type=int)
     add("--delta", type=float)
-    add("--seed", type=int)
     add("--frames", type=lambda text: int(number("2 to 500", 2, MOST_FRAMES)(text)), default=6)
-    add("-o", "--output", nargs="+", default=[])
-    for figure in ("--distance", "--forces"):
-        add(figure, nargs="+", default=[])
-    add("--animation")
+    add("-o", "--output")
+    for name in ("--distance", "--forces", "--animation", "--save"):
+        add(name)
     add_settings(parser)
-    add("--save")
     add_overwrite(parser)
 
 
@@ -78,22 +73,21 @@ def outcome_line(name: str, vertices: int, share: float, replicate: int, row: di
 
 def run(args: Namespace) -> int:
     """Run the replicate, draw it, print what happened; the exit code."""
-    over = settings_in(args.settings)
-    config = load_config(args.config, over if args.seed is None else over | {"seed": args.seed})
+    config = load_config(args.config, settings_in(args.settings))
     place = place_of(config, args.type, args.vertices, args.delta, "--")
     check_study(config)
     name, vertices, share = config.scene.names[place[0]], *place[1:]
     shows = f"{name}-{vertices}-{share:g}-{args.replicate}"  # as in study-I-64-0.5-17.png
-    args.output = args.output or [f"{Path(args.config).stem}-{shows}.png"]
-    asked = {"strip": args.output, "distance": args.distance, "forces": args.forces}
+    named = args.output or f"{Path(args.config).stem}-{shows}.png"
+    asked = {"strip": named, "distance": args.distance, "forces": args.forces}
+    figures = {figure: path for figure, path in asked.items() if path}
     rule = args.overwrite
     # What could not be written is reported now, not after the run.
-    figures = [*chain(*asked.values())]
-    for path in figures:
+    for path in figures.values():
         check_ending(path, FIGURE_ENDINGS)
     if args.animation:
         check_ending(args.animation, (".gif",))
-    outputs = [*figures, *filter(None, [args.animation, args.save])]
+    outputs = [*figures.values(), *filter(None, [args.animation, args.save])]
     check_outputs(outputs, rule, inputs_of(config, args.config))
     study = one_count_study(config, place[1])
     found = replicate_of(args.replicate, place, study)
@@ -102,10 +96,8 @@ def run(args: Namespace) -> int:
     source, head = source_line(study.source), title.split(";")[0]
     print(title)
     print(source)
-    for figure, paths in asked.items():
-        made = drawn(found, figure, args.frames, head) if paths else None
-        for path in paths:
-            save(made, path, rule, source)
+    for figure, path in figures.items():
+        save(drawn(found, figure, args.frames, head), path, rule, source)
     if args.animation:
         animated(found, Path(args.animation), ANIMATION_FRAMES, head, rule)
     if args.save:

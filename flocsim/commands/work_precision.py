@@ -23,7 +23,6 @@ from flocsim.io.outputs import check_outputs
 from flocsim.io.plots.accuracy import error_against_time
 from flocsim.io.plots.style import FIGURE_ENDINGS, save
 from flocsim.io.results.run_group import source_line
-from flocsim.io.terminal import tell
 
 DECADES = 6
 """Of the tolerance; the reference has a tenth of the tightest."""
@@ -125,15 +124,15 @@ def run(args: Namespace) -> int:
         places = [*product([condition], config.shapes.vertices, config.scene.delta)]
         tasks = list(islice(sample_of(config, places), args.count))
         about = f"{len(tasks)} replicates over all N and delta"
-        tell(f"\ntype {name}, {about}\n{table_line(COLUMNS)}")
+        print(f"\ntype {name}, {about}\n{table_line(COLUMNS)}")
         lines = ladders.setdefault(name, {})
         for each in climb(study, tasks):
             lines.setdefault(each.method, []).append(each.point)
-            tell(each.line)
+            print(each.line)
     # Half of Wilson's 95 % interval of a probability of ½.
     error = 50.0 * Z / math.sqrt(expected_replicates(config) + Z * Z)
-    tell(f"\nto compare with flips: the sampling error of the study is {error:.2g} %")
+    print(f"\nto compare with flips: the sampling error of the study is {error:.2g} %")
     if args.output:
         save(error_against_time(ladders), args.output, rule, source_line(study.source))
-        tell(args.output)
+        print(args.output)
     return 0

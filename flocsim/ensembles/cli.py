@@ -21,7 +21,7 @@ from flocsim.ensembles.parallel.processes import (
 )
 from flocsim.errors import FlocsimError, UsageError
 from flocsim.io.outputs import check_outputs
-from flocsim.io.terminal import plain_warnings, tell
+from flocsim.io.terminal import plain_warnings
 from flocsim.process import INTERRUPTED, INTERRUPTION, STOPPED, end_with_parent, stop_requested
 
 
@@ -132,27 +132,27 @@ def study(config: Any, comm: Communicator, options: argparse.Namespace) -> int:
     ended = run_to_file(config, comm, output, options.mode, options.quiet, options.overwrite)
     if ended.code == STOPPED:
         if comm.rank == 0:
-            tell(INTERRUPTION.farewell(), sys.stderr)
+            print(INTERRUPTION.farewell(), file=sys.stderr)
         return STOPPED
     if comm.rank > 0:
         return 0
     shown = contents_of(kind_of(config).format)
     found, seconds = ended.results, ended.wall_time
     if not options.quiet:
-        tell(shown.told(found))
-        tell(shown.source(found))
-        tell(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
+        print(shown.told(found))
+        print(shown.source(found))
+        print(f"{output}: {ended.total} replicates, {ended.computed} of them run in "
              f"{seconds:.1f} s, {ended.computed / seconds:.0f}/s")  # fmt: skip
     code, line = shown.verdict(found)
     if line:
-        tell(f"flocsim: {line}; the rows are in {output}", sys.stderr)
+        print(f"flocsim: {line}; the rows are in {output}", file=sys.stderr)
     return code
 
 
 def end_all(comm: Communicator, text: str, code: int) -> int:
     """Print why, and end every rank; returns the exit code where this process is alone."""
     who = f"rank {comm.rank}: " if comm.size > 1 else ""
-    tell(f"flocsim: {who}{text}", sys.stderr)
+    print(f"flocsim: {who}{text}", file=sys.stderr)
     if comm.size > 1:
         comm.abort(code)
     return code
@@ -168,7 +168,7 @@ def dry_run(config: Any, comm: Communicator, options: argparse.Namespace) -> int
         text = shown.dry_run(config, max(comm.size, options.jobs), options.pilot)
         if stop_requested():
             raise StopRequested(f"stopped by {INTERRUPTION.name}")
-        tell(text)
+        print(text)
     return 0
 
 
@@ -187,12 +187,12 @@ def guarded(comm: Communicator, options: argparse.Namespace | None = None) -> in
         except SharedError as error:
             code = error.args[0].exit_code
             if comm.rank == 0:
-                tell(f"flocsim: {error}", sys.stderr)
+                print(f"flocsim: {error}", file=sys.stderr)
         comm.close()
         return code
     except StopRequested:
         if comm.rank == 0:
-            tell(INTERRUPTION.farewell(), sys.stderr)
+            print(INTERRUPTION.farewell(), file=sys.stderr)
         if comm.size > 1:
             comm.abort(STOPPED)  # others may wait for this rank
         return STOPPED

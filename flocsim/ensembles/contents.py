@@ -10,7 +10,7 @@ import contextlib
 import importlib
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -19,11 +19,11 @@ import numpy as np
 from flocsim.ensembles.config import FILES, STUDIES, contents_of
 from flocsim.ensembles.config.sources import Allowed
 from flocsim.errors import FileError, UsageError, visible
-from flocsim.io.groups import UNREADABLE, Group
+from flocsim.io.groups import UNREADABLE, FileFormat
 from flocsim.io.hdf5 import Unfit, open_hdf5
-from flocsim.io.labelled import Column, Labelled, Tables
+from flocsim.io.labelled import Column, Labelled, Tables, with_unit
 from flocsim.io.results.run_group import source_line, stored
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import table_along
 
 Facts = list[tuple[str, str]]
 """[(name, value)]."""
@@ -31,6 +31,9 @@ Facts = list[tuple[str, str]]
 Figures = Mapping[str, Callable[..., Any]]
 """{name: function that returns a matplotlib Figure}, the first line of whose docstring is its
 help."""
+
+Row = Callable[[tuple[int, ...]], Sequence[str]]
+"""Gives the cells of a table at a place along its axes."""
 
 SAID_APART = ("config", "preset", "shapes", "identity", "failed", "overrides", "history",
               "warnings", "modules")  # fmt: skip
@@ -41,11 +44,9 @@ MOST_FAILURES = 10
 
 @attrs.frozen
 class Summary:
-    """What a file says of itself: ``facts`` and ``origin``, where it came from; warnings, and what
-    failed, a line each."""
+    """What a file says of itself: facts; warnings, and what failed, a line each."""
 
     facts: Facts
-    origin: Facts = attrs.Factory(list)
     warnings: list[str] = attrs.Factory(list)
     failed: list[str] = attrs.Factory(list)
 
@@ -62,22 +63,6 @@ class Example:
     reason: str = ""
 
 
-@attrs.frozen(eq=False)
-class Joined:
-    """What a sweep joins of its parts: ``groups`` of results; how many places the last ``axes``
-    have; coordinates that may differ from part to part, ``own``; the rows of `info`, heads first,
-    and lines below; the figures."""
-
-    groups: Mapping[str, Group]
-    rows: Callable[[Any], list[tuple[str, ...]]]
-    figures: Callable[[], Figures]
-    asked: Callable[[Any], dict]
-    """(results) → the axes and the number of replicates, as StudyKind.asked has them."""
-    axes: Mapping[str, int] = attrs.Factory(dict)
-    own: Sequence[str] = ()
-    below: Callable[[Any], list[str]] = lambda swept: []
-
-
 def later(module: str, name: str) -> Any:
     """Return a function of a module of flocsim that is loaded when it is called, as a static
     method: what shows a file has no need of the engine."""
@@ -91,15 +76,18 @@ def later(module: str, name: str) -> Any:
 class Contents:
     """What the commands ask of a kind of file; ``found`` is what `read` gives.
 
-    A subclass gives ``title``, what such a file holds in words, `read` and `summary`. All else has
-    a default, and an ability that is None is refused in one line.
+    A subclass gives ``title``, what such a file holds in words, its ``file`` (or `read`), and
+    `summary`. All else has a default, and an ability that is None is refused in one line.
     """
 
     title: str
+    file: FileFormat
     compared: Mapping[str, str] = {}
     """{name: words} of what can be compared."""
-    joined: Joined | None = None
-    """What sweeps join; None where they cannot be run."""
+    swept: Sequence[str] = ()
+    """Groups of results that sweeps join, the first being printed; none: they cannot be run."""
+    swept_table: Any = None
+    """(that group, Labelled) → (heads, row) of `table_along` at the values of the swept keys."""
     compare: Any = None
     """(opened, opened) → Tables of differences, whose ``table(name)`` is text."""
     animate: Any = None
@@ -112,7 +100,7 @@ class Contents:
     def read(self, path: Any) -> Any:
         """Return what a file holds; FileError for one that is absent, damaged, or of another
         kind."""
-        raise NotImplementedError
+        return self.file.read(path)
 
     def summary(self, found: Any) -> Summary:
         """Return what a file says of itself; ValueError where that cannot be read."""
@@ -204,28 +192,27 @@ def studies() -> list[Contents]:
     return [contents_of(name) for name in STUDIES]
 
 
-def summary_of(path: object, kind: Contents, found: Any) -> Summary:
-    """What a file says of itself; FileError where that cannot be read."""
-    try:
-        return kind.summary(found)
-    except UNREADABLE as error:
-        raise FileError(f"{path} has no readable {kind.title}: {error}") from error
-
-
 def text_of(path: object, kind: Contents, found: Any) -> str:
     """Return what `flocsim info` prints of a file, and its page shows."""
-    said, mark = summary_of(path, kind, found), kind.mark(found)
-    title = f"{kind.title}; {mark}" if mark else kind.title
-    lines = [f"{path}: {title}", *filter(None, [kind.source(found)]), ""]
-    lines += fact_lines(said.facts + said.origin)
-    if said.warnings:
-        lines += ["", *(f"warning: {visible(line, '')}" for line in said.warnings)]
-    if said.failed:
-        lines += ["", *(f"failed: {visible(line, '')}" for line in said.failed[:MOST_FAILURES])]
+    try:
+        said, mark = kind.summary(found), kind.mark(found)
+    except UNREADABLE as error:
+        raise FileError(f"{path} has no readable {kind.title}: {error}") from error
+    head = f"{path}: {kind.title}; {mark}" if mark else f"{path}: {kind.title}"
+    return page_of(head, kind.source(found), said, kind.table(found))
+
+
+def page_of(head: str, source: str, said: Summary, table: str) -> str:
+    """Return all of these as lines; what a file says is shown, and steers no terminal."""
+    width = max(len(name) for name, _ in said.facts)
+    lines = [head, *filter(None, [source]), ""]
+    lines += [f"{name:<{width}}  {value}" for name, value in said.facts]
+    for word, notes in (("warning", said.warnings), ("failed", said.failed[:MOST_FAILURES])):
+        lines += ["", *(f"{word}: {each}" for each in notes)] if notes else []
     if len(said.failed) > MOST_FAILURES:
         lines.append(f"and {len(said.failed) - MOST_FAILURES} more in run/failed")
-    table = kind.table(found)
-    return "\n".join([*lines, *(["", table] if table else [])])
+    lines += ["", *table.split("\n")] if table else []
+    return "\n".join(visible(line, "") for line in lines)
 
 
 def info_of(path: str | os.PathLike) -> str:
@@ -241,17 +228,22 @@ def unfinished_text(found: Any) -> str:
     if found.unread:
         facts.append(("damaged", f"{found.unread} records, left out"))
     reasons = Counter(str(note["why"]) for note in found.notes)
-    lines = [f"{found.path}: {found.progress}", *filter(None, [str(last.get("source", ""))]), ""]
-    lines += fact_lines(facts)
-    shown = reasons.most_common(MOST_FAILURES)
-    lines += [f"failed: {count} times {visible(why, '')}" for why, count in shown]
-    return "\n".join([*lines, "", f"{found.progress}:", kind.table(found.results)])
+    failed = [f"{count} times {why}" for why, count in reasons.most_common(MOST_FAILURES)]
+    said, source = Summary(facts, [], failed), str(last.get("source", ""))
+    return page_of(f"{found.path}: {found.progress}", source, said, kind.table(found.results))
 
 
-def fact_lines(facts: Facts) -> list[str]:
-    """[(name, value)] as aligned lines; what a file says is shown, and steers no terminal."""
-    width = max(len(name) for name, _ in facts)
-    return [f"{visible(name, ''):<{width}}  {visible(value, '')}" for name, value in facts]
+def study_summary(
+    facts: Facts, run: Mapping[str, Any], note_words: Callable[[dict], str],
+    apart: Collection[str] = (), more: Iterable[str] = (),
+) -> Summary:  # fmt: skip
+    """Return the Summary of a study: facts, and what the group ``run`` says but ``apart``.
+
+    ``note_words`` tells of a failed replicate; ``more``: warnings besides the stored ones.
+    """
+    warnings, failed = stored(run, "warnings"), stored(run, "failed")
+    return Summary(facts + origin(run, apart), [*map(str, warnings), *more],
+                   list(map(note_words, failed)))  # fmt: skip
 
 
 def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
@@ -265,11 +257,6 @@ def origin(run: Mapping[str, Any], apart: Collection[str] = ()) -> Facts:
             value = f"{value:.6g} s" if "time" in name else f"{value:.6g}"
         facts.append((name.replace("_", " "), str(value)))
     return facts
-
-
-def in_words(value: object) -> str:
-    """A coordinate as text."""
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def open_any(
@@ -294,12 +281,13 @@ MEANINGS = {
     "difference": "second minus first",
     "difference_low": "difference, lower 95 % bound",
     "difference_high": "difference, upper 95 % bound",
-    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
-    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
     "n_first": "how many count in the first file",
     "n_second": "how many count in the second file",
+    "change_low": "change of the difference if all runs were exact: lower 95 % bound",
+    "change_high": "change of the difference if all runs were exact: upper 95 % bound",
 }
-"""The arrays of a comparison of one quantity; changes by numerics only where they are known."""
+"""The arrays of a comparison of one quantity; changes by numerics, last, only where they are
+known."""
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -344,20 +332,19 @@ class Differences(Tables):
         quantity = self.known(quantity)
         unit, text = self.quantities[quantity]
         arrays = self.arrays[quantity]
-        heads = [f"{name} [{each.about['units']}]" if each.about["units"] != "1" else name
-                 for name, each in self.axes.items()]  # fmt: skip
         numerics = "change_low" in arrays
-        rows = [[*heads, "n", "first", "second", "difference [95 %]" + " numerics" * numerics]]
-        lengths = [len(each.values) for each in self.axes.values()]
-        for place in np.ndindex(*lengths):
+
+        def row(place: tuple[int, ...]) -> Sequence[str]:
             at = {name: float(values[place]) for name, values in arrays.items()}
-            keys = (in_words(each.values.tolist()[k])
-                    for each, k in zip(self.axes.values(), place, strict=True))  # fmt: skip
-            numbers = f"{at['n_first']:.0f}/{at['n_second']:.0f}"
             values = (f"{at[name]:{self.digits}}" for name in ("first", "second"))
-            rows.append([*(visible(key, "") for key in keys), numbers, *values, self.interval(at)])
-        title = f"{text}{'' if unit == '1' else f' [{unit}]'}, second minus first: {self.how}"
-        return "\n".join([*self.changes, title, "", *aligned(rows)])
+            return f"{at['n_first']:.0f}/{at['n_second']:.0f}", *values, self.interval(at)
+
+        axes = {with_unit(k, each.about["units"]): each.values for k, each in self.axes.items()}
+        heads = "n", "first", "second", "difference [95 %]" + " numerics" * numerics
+        both = f"the {self.pairs} {self.noun} that both have, paired"
+        how = both if self.paired else "independent samples"
+        title = f"{with_unit(text, unit)}, second minus first: {how}"
+        return "\n".join([*self.changes, title, "", table_along(axes, heads, row)])
 
     def interval(self, at: Mapping[str, float]) -> str:
         """Return "+0.030 [+0.010, +0.050] -0.004 +0.010 *": a difference, what numerics may change
@@ -371,17 +358,6 @@ class Differences(Tables):
         numerics = "".join(f" {at[name]:{form}}" for name in ("change_low", "change_high")
                            if name in at)  # fmt: skip
         return f"{at['difference']:{form}} [{low:{form}}, {high:{form}}]{numerics}{star}"
-
-    @property
-    def how(self) -> str:
-        """How they were compared, in words."""
-        both = f"the {self.pairs} {self.noun} that both have, paired"
-        return both if self.paired else "independent samples"
-
-    def __repr__(self) -> str:
-        how = f"{self.pairs} pairs" if self.paired else "independent"
-        shape = " × ".join(str(len(each.values)) for each in self.axes.values())
-        return f"{type(self).__name__}({shape} places, {how})"
 
 
 def stored_in(results: Any, name: str = "identity") -> dict[str, Any]:
@@ -425,11 +401,10 @@ def compare(first: Any, second: Any) -> Differences:
     They are paired where both have drawn the same replicates, one by one: studies of one seed.
     UsageError where they have nothing in common, or are of two kinds.
     """
-    formats = {getattr(each, "format", "") for each in (first, second)}
-    for name in formats & STUDIES.keys() if len(formats) == 1 else ():
-        if (difference := contents_of(name).compare) is not None:
-            found: Differences = difference(first, second)
-            return found
+    name, other = (getattr(each, "format", "") for each in (first, second))
+    if name == other and name in STUDIES and contents_of(name).compare is not None:
+        found: Differences = contents_of(name).compare(first, second)
+        return found
     words = " and ".join(type(each).__name__ for each in (first, second))
     able = ", or ".join(f"two {each.title}" for each in studies() if each.compare)
     raise UsageError(f"{able} can be compared: found {words}")

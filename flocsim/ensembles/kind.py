@@ -224,11 +224,6 @@ class StudyKind:
         return dict(zip(SOURCE, (*found, package_version("flocsim")), strict=True))
 
     @property
-    def remark(self) -> str:
-        """Return a second line about the study; "" for none."""
-        return ""
-
-    @property
     def allowed(self) -> float:
         """Return how many replicates may fail before the study ends with an error."""
         return self.config.stop.failed * self.size

@@ -4,7 +4,7 @@ replicate.
 Such a kind declares its columns as a OneTable; its file, its results and what commands show follow.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,18 +14,17 @@ import numpy as np
 from flocsim.ensembles.contents import (
     Contents,
     Facts,
-    Figures,
-    Joined,
+    Row,
     Summary,
-    in_words,
-    origin,
+    study_summary,
 )
 from flocsim.ensembles.kind import OldResults, places_in
 from flocsim.errors import FileError
 from flocsim.io.groups import FileFormat, Group, Schema, Stored, declared
-from flocsim.io.plots.style import Figure, house_style, new_figure
+from flocsim.io.labelled import Labelled, with_unit
+from flocsim.io.results.run_group import describe_note
 from flocsim.io.results.schema import AXES, COORDINATES
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import in_words, table_along
 
 ROWS = "replicates"
 
@@ -41,13 +40,15 @@ class OneTable(Contents):
     title: str
     columns: Schema
 
+    swept = (ROWS,)
+
     @property
     def row(self) -> np.dtype:
         """Columns of a finished replicate."""
         return np.dtype([(name, f"<{kind}") for name, (kind, *_) in self.columns.items()])
 
     @property
-    def file(self) -> FileFormat:
+    def file(self) -> FileFormat:  # type: ignore[override]
         """The results file."""
         columns = declared(self.columns, (*AXES, "replicate"))
         return FileFormat(self.name, 1, self.title, {ROWS: Group.of(columns, COORDINATES)})
@@ -74,9 +75,7 @@ class OneTable(Contents):
         found = self.read(output)
         values = found.groups[ROWS]
         places = places_in(*(values[axis] for axis in AXES))
-        rows = np.zeros(values[next(iter(self.columns))].shape, self.row)
-        for name in self.columns:
-            rows[name] = values[name]
+        rows = np.rec.fromarrays([values[name] for name in self.columns], dtype=self.row)
         chunks = [(condition, 0, rows[place]) for condition, place in places.items()]
         yield OldResults(list(places), rows.shape[-1], chunks, found.run)
 
@@ -91,79 +90,27 @@ class OneTable(Contents):
 
     def table(self, found: Stored) -> str:
         """Return means over replicates, a row for each condition."""
-        return "\n".join(aligned(self.means(found.labelled(ROWS).columns, axes_in(found), AXES)))
+        return table_along(axes_in(found), *self.swept_table(found.labelled(ROWS)))
 
-    def means(
-        self, columns: Mapping[str, Any], axes: Mapping[str, np.ndarray], names: Any
-    ) -> list[tuple[str, ...]]:
-        """Return means over the last axis at every place of the others, the heads first."""
-        heads = [f"{name} [{unit}]" if unit != "1" else name
-                 for name, (_, unit, _) in self.columns.items()]  # fmt: skip
-        rows = [(*names, *heads)]
-        for place in np.ndindex(*(len(axes[name]) for name in names)):
-            keys = (in_words(axes[name].tolist()[k]) for name, k in zip(names, place, strict=True))
-            values = (f"{columns[name].values[place].mean():.4g}" for name in self.columns)
-            rows.append((*keys, *values))
-        return rows
-
-    def sweep_rows(self, swept: Any) -> list[tuple[str, ...]]:
-        """Return the same at all swept values."""
-        table = swept.labelled(ROWS)
-        axes = {name: each.values for name, each in table.axes.items()}
-        return self.means(table.columns, axes, (*swept.swept, *AXES))
-
-    def figures(self, found: Any) -> Figures:
-        """Return a figure for each column of numbers that are not whole."""
-
-        def figure_of(name: str) -> Any:
-            _, unit, text = self.columns[name]
-
-            def draw(found: Stored) -> Figure:
-                with house_style():
-                    figure = new_figure(4.0, 3.0)
-                    axes = figure.subplots()
-                    values = found.groups[ROWS][name]
-                    for kind, each in zip(found.groups[ROWS]["type"], values, strict=True):
-                        means = each.mean(axis=(-2, -1))
-                        axes.plot(found.groups[ROWS]["vertices"], means, "o-", label=str(kind))
-                    axes.set(xlabel="number of vertices N", ylabel=f"{text} [{unit}]")
-                    axes.legend()
-                return figure
-
-            draw.__doc__ = f"Mean {text} against N."
-            return draw
-
-        return {name: figure_of(name) for name, (kind, *_) in self.columns.items() if kind == "f8"}
-
-    def read(self, path: Any) -> Stored:
-        """Return what a results file holds."""
-        found: Stored = self.file.read(path)
-        return found
+    def swept_table(self, table: Labelled) -> tuple[Sequence[str], Row]:
+        """Return means over replicates: heads, and the cells at a place along the other axes."""
+        heads = [with_unit(name, unit) for name, (_, unit, _) in self.columns.items()]
+        return heads, lambda place: [
+            f"{table.columns[name].values[place].mean():.4g}" for name in self.columns
+        ]
 
     def summary(self, found: Stored) -> Summary:
         """Return what a results file says of itself."""
-        return Summary(facts_of(found), origin(found.run))
+        return study_summary(facts_of(found), found.run, describe_note)
 
     def running(self, found: Any) -> Facts:
         """Return facts of a study that has not ended."""
         return facts_of(found.results)
 
-    @property
-    def joined(self) -> Joined:  # type: ignore[override]
-        """Return what sweeps join."""
-        return Joined(self.file.groups, self.sweep_rows, dict, asked_of)
-
 
 def axes_in(found: Stored) -> dict[str, np.ndarray]:
     """Return {axis: values} of the conditions of results."""
     return {axis: found.groups[ROWS][axis] for axis in AXES}
-
-
-def asked_of(found: Stored) -> dict[str, Any]:
-    """Return the axes of results, and how many replicates each condition has."""
-    types, vertices, delta = (values.tolist() for values in axes_in(found).values())
-    count = len(found.groups[ROWS]["replicate"])
-    return {"types": types, "vertices": vertices, "delta": delta, "replicates": count}
 
 
 def facts_of(found: Stored) -> Facts:

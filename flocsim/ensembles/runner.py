@@ -1,7 +1,7 @@
 """Runs a study on the ranks of a job: from a config to Results, or to a results file.
 
 Rank 0 `lead`s: it knows what is missing, hands it out, takes it in and writes the results. All
-others `follow`: they run the chunks that rank 0 gives them. Rank 0 runs chunks as well.
+others run the chunks that rank 0 gives them. Rank 0 runs chunks as well.
 """
 
 import contextlib
@@ -83,7 +83,12 @@ def run_to_file(
     and is not to be extended is kept under another name.
     """
     if comm.rank > 0:
-        return follow(join(config, comm)[0], comm)
+        study, _ = join(config, comm)
+        if comm.broadcast(None):
+            compile_in_turn(study, comm)
+        # From here on a signal is rank 0's business, which waits for all ranks to report.
+        run_chunks(study, RemoteCoordinator(comm))
+        return Ended(comm.receive(0, heed_signals=False))
     with comm.sharing_errors():
         journal, remarks = claim(output, mode, overwrite)
     with contextlib.ExitStack() as resources:
@@ -150,15 +155,6 @@ def first_difference(rank: int, leader: dict, own: dict) -> str:
     return ""
 
 
-def follow(study: StudyKind, comm: Communicator) -> Ended:
-    """Run chunks for rank 0 until there are no more, as every other rank does."""
-    if comm.broadcast(None):
-        compile_in_turn(study, comm)
-    # From here on a signal is rank 0's business, which waits for all ranks to report.
-    run_chunks(study, RemoteCoordinator(comm))
-    return Ended(comm.receive(0, heed_signals=False))
-
-
 def lead(
     study: StudyKind, start: Beginning, comm: Communicator, progress: Progress,
     output: str | Path,
@@ -174,8 +170,6 @@ def lead(
     line = f"{study.title}, on {ranks} rank{'s' * (ranks > 1)}"
     line += f"; {existing} of them exist already" if existing else ""
     progress.say(f"{line}; {source_line(study.source)}")
-    if study.remark:
-        progress.say(study.remark)
     comm.broadcast(remaining)
     if remaining:
         compile_in_turn(study, comm)
@@ -256,17 +250,18 @@ def facts(study, start, ended, ranks):
     kernels = [value for name, value in identity.items() if name.startswith("kernels.")]
     found = provenance(config.text, config.seed, " ".join(kernels))
     if config.modules:
-        found["modules"] = storable(kept_sources(config.modules))
-    return found | {
-        "overrides": storable(json.dumps(config.overrides)),
-        "identity": storable(json.dumps(identity, sort_keys=True)),
-        "failed": storable(json.dumps(start.store.notes)),
+        found["modules"] = kept_sources(config.modules)
+    found |= {
+        "overrides": json.dumps(config.overrides),
+        "identity": json.dumps(identity, sort_keys=True),
+        "failed": json.dumps(start.store.notes),
         "ranks": ranks,
         "sessions": 1 + len(start.history),
-        "history": storable(json.dumps(start.history)),
+        "history": json.dumps(start.history),
         "computed": ended.computed,
         "wall_time": ended.wall_time,
-        **{name: storable(each) for name, each in study.source.items()},
-        "warnings": storable(json.dumps(study.doubts())),
-        **{k: storable(v) if isinstance(v, str) else v for k, v in more.items()},
+        **study.source,
+        "warnings": json.dumps(study.doubts()),
+        **more,
     }
+    return {name: storable(value) for name, value in found.items()}

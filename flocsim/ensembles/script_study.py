@@ -20,24 +20,16 @@ from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.config.sources import Sources
 from flocsim.ensembles.config.toml_text import parse, read_text_file, settings_of
 from flocsim.ensembles.contents import open_any
-from flocsim.ensembles.diagnose.preflight import inputs_of
 from flocsim.ensembles.kind import kind_of, study_of
 from flocsim.ensembles.pairs.opened import StudyResults, one_count_study, place_of, replicate_of
 from flocsim.ensembles.parallel.communicator import StopRequested
 from flocsim.ensembles.parallel.processes import launched_size
 from flocsim.errors import ConfigError, FileError, FlocsimError, PlausibilityWarning, UsageError
-from flocsim.io.outputs import check_outputs
 from flocsim.process import INTERRUPTED, STOPPED, WITHHELD
 from flocsim.trajectories.trajectory import Trajectory
 
 SAVING = 30.0
 """Seconds that an interrupted run has to keep what it has finished."""
-
-WORDS = {
-    "--resume": 'mode="resume"', "--restart": 'mode="restart"', "--overwrite": "overwrite=True",
-}  # fmt: skip
-"""What the command calls it → what a script calls it."""
-
 
 WARNING = "flocsim: warning: "
 
@@ -102,15 +94,12 @@ def run_command(words: Sequence[str], text: str, folder: Path, quiet: bool) -> N
 
 
 def error_of(code: int, said: Sequence[str]) -> FlocsimError:
-    """Return the error that an exit code stands for, with the last line in a script's terms."""
+    """Return the error that an exit code stands for, with the last line that was printed."""
     last = next((line for line in reversed(said) if line.strip()), "without output")
-    for word, meant in WORDS.items():
-        last = last.replace(word, meant)
     last = last.removeprefix("flocsim: ")
-    if code == STOPPED:
-        return StopRequested(f'{last}; continue with mode="resume"')
-    kind = {UsageError.exit_code: UsageError, FileError.exit_code: FileError}
-    return kind.get(code, FlocsimError)(last if code > 0 else f"the run was killed: {last}")
+    last += '; continue with mode="resume"' if code == STOPPED else ""
+    kinds = {kind.exit_code: kind for kind in (UsageError, FileError, StopRequested)}
+    return kinds.get(code, FlocsimError)(last if code > 0 else f"the run was killed: {last}")
 
 
 MODES = ("new", "resume", "restart")
@@ -188,9 +177,6 @@ class Study:
         with tempfile.TemporaryDirectory() if in_memory else contextlib.nullcontext() as scratch:
             target = Path(self.config.output.file if output is None else output)
             target = Path(scratch, target.name) if scratch else target
-            # The command reads the text from a pipe, and cannot know the file.
-            sources = inputs_of(self.config, str(self.path))
-            check_outputs([target], overwrite or mode == "resume", sources, WAYS)
             words = ["ensemble", "-", "-o", os.path.abspath(target), "--jobs", str(jobs)]
             words += [f"--{mode}"] if mode != "new" else []
             words += ["--overwrite"] if overwrite else []
@@ -239,6 +225,3 @@ class Study:
         count = len(scene.names) * len(vertices) * len(scene.delta)
         over = f", {len(list(settings_of(self.overrides)))} changed" if self.overrides else ""
         return f"Study({str(self.path)!r}: {count} conditions × {self.config.replicates}{over})"
-
-
-WAYS = 'give mode="resume" to resume or extend it, or overwrite=True, which keeps the old one'

@@ -40,7 +40,7 @@ from flocsim.ensembles.collision.equivalent import kinds, placed_system, sphere_
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, pool_of
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.ensembles.collision.outcomes import OBSERVER
-from flocsim.ensembles.collision.pairings import Pairing, class_facts, pairings_of
+from flocsim.ensembles.collision.pairings import Pairing, pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.kernel_scene import KernelScene
 from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING, PairScene
@@ -50,7 +50,6 @@ from flocsim.ensembles.kind import Code, Condition, Going, Keep, StudyKind
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.driver import advance
 from flocsim.io.results.events import flips_easily
-from flocsim.io.results.run_group import class_words
 from flocsim.io.results.schema import BAND_ENDS, NOT_APPLICABLE, OUTCOMES, RADII, UNKNOWN
 
 TRIED_AGAIN = ("step budget", "stalled", "too deep", "not finite")
@@ -162,11 +161,6 @@ class Study(StudyKind):
         """{r_i, r_j: (types,)} [m] that stand for the collision types."""
         columns = zip(*(each.radii for each in self.pairings), strict=True)
         return {name: np.array(values) for name, values in zip(RADII, columns, strict=True)}
-
-    @property
-    def remark(self) -> str:
-        """The size classes, where measured flocs are in any."""
-        return class_words(class_facts(self.pairings))
 
     @property
     def point_scrambles(self) -> int:

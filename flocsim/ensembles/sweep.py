@@ -15,38 +15,32 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.ensembles.config import STUDIES, contents_of
 from flocsim.ensembles.config.schema import TABLES, TOP_KEYS, Config, keys_of
 from flocsim.ensembles.contents import (
     Contents,
     Figures,
-    Joined,
     Summary,
-    in_words,
     open_any,
     stored_in,
     studies,
 )
 from flocsim.ensembles.kind import ORDER, flocs_of, study_of
-from flocsim.ensembles.script_study import WAYS, Study
-from flocsim.ensembles.storage.identity import (
-    differences,
-    identity_of,
-)
+from flocsim.ensembles.script_study import Study
+from flocsim.ensembles.storage.identity import differences, identity_of
+from flocsim.ensembles.storage.resume import WAYS
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
 from flocsim.io.files import Rule, make_folder
 from flocsim.io.labelled import Column, Labelled
 from flocsim.io.outputs import check_outputs
 from flocsim.io.results.run_group import SOURCE
-from flocsim.io.results.schema import GROUPS
+from flocsim.io.results.schema import AXES
 from flocsim.io.results.sweep_file import SweepResults, Swept, read_sweep, write_sweep
 from flocsim.io.seals import held
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import in_words, table_along
 
 Facts = dict[str, Any]
 
-MOST_PARTS = 10_000
 FIXED = ("seed", "scene.types", "scene.pairs", "scene.classes", "scene.delta", "shapes.vertices")
 NO_PHYSICS = ("output", "stop")
 """Keys, and tables, that cannot be swept: they are dimensions already, or no physics."""
@@ -55,15 +49,15 @@ NO_PHYSICS = ("output", "stop")
 def sweep(
     study: Study, over: Mapping[str, Sequence], output: str | os.PathLike, *, jobs: int = 1,
     mode: str = "new", overwrite: bool = False, quiet: bool = True,
-    tell: Callable[[str], object] = lambda line: None, ways: str = WAYS,
+    tell: Callable[[str], object] = lambda line: None,
 ) -> SweepResults:  # fmt: skip
     """Run a Study at every value of some keys, and join the results in the file ``output``.
 
     ``over``: {dotted key: values}; several keys make a grid. ``mode`` "resume" goes on with what is
     there, extends it, or takes it as it is, as Study.run does with each part; ``tell`` is given a
-    line for each; ``ways``: what to say where a file is in the way. All values have the study's
-    seed: what differs between them is paired. UsageError for a key that is none, a value that does
-    not fit, a file in the way, and for a part that is, or becomes, another than when it began.
+    line for each. All values have the study's seed: what differs between them is paired. UsageError
+    for a key that is none, a value that does not fit, a file in the way, and for a part that is, or
+    becomes, another than when it began.
     """
     output = Path(output)
     parts = planned(study, over, output)
@@ -71,10 +65,15 @@ def sweep(
     wanted = wanted_of(parts)
     rule: Rule = overwrite
     if mode == "resume" and output.exists():
-        refuse_other_sweep(read_joined(output), swept)
+        for name, each in read_joined(output).swept.items():
+            if name not in swept or not set(each.values) <= set(swept[name].values):
+                raise UsageError(
+                    f"{output} has other values of {each.key}: ask for these too, or name another "
+                    "file"
+                )
         rule = held(output)
-    check_outputs([output], rule, [study.path], ways)
-    make_folder(parts_folder(output))
+    check_outputs([output], rule, [study.path], WAYS)
+    make_folder(next(iter(parts)).parent)
     # A part that is whole already is taken as it is; any other is run as a study of its own.
     found = []
     for number, (path, part) in enumerate(parts.items(), 1):
@@ -104,35 +103,21 @@ def unlike(results: Any, identity: Facts, asked: Facts, ends_early: bool = False
         return "it is of another kind"
     if lines := differences(stored_in(results), identity):
         return lines[0]
-    has = kind.asked(results)
-    for name in (*ORDER, "replicates"):
-        there, here = has[name], asked[name]
+    # What was asked for, as far as the axes of the results say it; types of swarms are all alike.
+    axes = results.labelled(kind.swept[0]).axes
+    has = {k: axes[v].values.tolist() for k, v in zip(ORDER, AXES, strict=True) if v in axes}
+    alone = axes.get("replicate")
+    has["replicates"] = results.count if alone is None else len(alone.values)
+    for name, there in has.items():
+        here = asked[name]
         if there != here and not (ends_early and name == "replicates" and there < here):
             return f"{name} are {listed(there)} in the file, {listed(here)} now"
     return ""
 
 
-def listed(values):
-    return ", ".join(
-        f"{v:g}" if isinstance(v, float) else f"{v}" for v in np.ravel(values).tolist()
-    )
-
-
-def refuse_other_sweep(before: SweepResults, swept: Mapping[str, Swept]) -> None:
-    """UsageError where a joined file has values that a new one in its place would not have."""
-    lost = [
-        each.key for name, each in before.swept.items()
-        if name not in swept or not set(each.values) <= set(swept[name].values)
-    ]  # fmt: skip
-    if lost:
-        raise UsageError(
-            f"{before.path} has other values of {lost[0]}: ask for these too, or name another file"
-        )
-
-
-def parts_folder(output: Path) -> Path:
-    """Return the folder of the results of the single values."""
-    return output.with_name(f"{output.stem}.parts")
+def listed(values: Any) -> str:
+    """Return one value, or several, as text."""
+    return ", ".join(map(in_words, np.ravel(values).tolist()))
 
 
 def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Path, Study]:
@@ -140,12 +125,10 @@ def planned(study: Study, over: Mapping[str, Sequence], output: Path) -> dict[Pa
     values = {key: list(each) for key, each in over.items()}
     if not values or not all(values.values()):
         raise UsageError("a sweep needs at least one key and one value: --over KEY=VALUE,VALUE")
-    if int(np.prod([len(each) for each in values.values()], dtype=object)) > MOST_PARTS:
-        raise UsageError(f"a sweep has at most {MOST_PARTS} values")
     for key in values:
         if key in FIXED or key.split(".")[0] in NO_PHYSICS:
             raise UsageError(f"{key} cannot be swept: it is a dimension already, or not physics")
-    folder = parts_folder(output)
+    folder = output.with_name(f"{output.stem}.parts")
     return {
         folder / f"{number:04d}.h5": study.with_(dict(zip(values, point, strict=True)))
         for number, point in enumerate(itertools.product(*values.values()))
@@ -184,10 +167,11 @@ def swept_keys(over: Mapping[str, Sequence], configs: Sequence[Config]) -> dict[
     """
     lasts = [key.rpartition(".")[2] for key in over]
     lengths = [len(values) for values in over.values()]
+    groups = (group for each in kinds_joined() for group in each.file.groups.values())
+    taken = {axis for group in groups for axis in group.index}
     swept = {}
     for axis, (key, last) in enumerate(zip(over, lasts, strict=True)):
-        taken = [*GROUPS.values(), *(g for each in kinds_joined() for g in each.groups.values())]
-        clash = lasts.count(last) > 1 or any(last in group.index for group in taken)
+        clash = lasts.count(last) > 1 or last in taken
         name = key.replace(".", "_") if clash else last
         stride = int(np.prod(lengths[axis + 1 :]))
         found = [value_of(configs[stride * place], key) for place in range(lengths[axis])]
@@ -225,7 +209,7 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
     lengths = [len(each.values) for each in swept.values()]
     coordinates = {name: each.column(name) for name, each in swept.items()}
     found = {}
-    for group in kind.groups:
+    for group in kind.swept:
         labelled = [each.labelled(group) for each in parts]
 
         def stacked(kind, name, labelled=labelled):
@@ -235,33 +219,30 @@ def joined(swept: dict[str, Swept], parts: Sequence[Any]) -> dict[str, Labelled]
             return Column((*swept, *columns[0].axes), values.reshape(shape), columns[0].about)
 
         columns = {name: stacked("columns", name) for name in labelled[0].columns}
-        # Sizes may follow from what is swept, as from the limits of measured flocs.
-        axes = labelled[0].axes | {name: stacked("axes", name) for name in kind.own}
+        # Sizes, which are no axes, may follow from what is swept, as from limits of measured flocs.
+        axes = {
+            name: each if each.axes == (name,) else stacked("axes", name)
+            for name, each in labelled[0].axes.items()
+        }
         found[group] = Labelled(coordinates | axes, columns)
     return found
 
 
-def kinds_joined() -> list[Joined]:
-    """Return what is joined of each kind that sweeps can run."""
-    return [each.joined for each in studies() if each.joined is not None]
+def kinds_joined() -> list[Contents]:
+    """Return the kinds of studies that sweeps can run."""
+    return [each for each in studies() if each.swept]
 
 
-def joined_of(results: Any) -> Joined | None:
-    """Return what is joined of results; None for those of a kind that sweeps cannot run."""
+def joined_of(results: Any) -> Contents | None:
+    """Return the kind of results; None for one that sweeps cannot run."""
     name = getattr(results, "format", "")
-    found: Joined | None = contents_of(name).joined if name in STUDIES else None
-    return found
+    return next((each for each in kinds_joined() if each.file.name == name), None)
 
 
 def read_joined(path: str | os.PathLike) -> SweepResults:
     """The SweepResults in a joined file; FileError for one that is absent, damaged, of another kind
     or version."""
-    return read_sweep(path, [(each.groups, each.axes) for each in kinds_joined()])
-
-
-def joined_in(found: SweepResults) -> Joined:
-    """Return what was joined in a file."""
-    return next(each for each in kinds_joined() if each.groups.keys() == found.groups.keys())
+    return read_sweep(path, [(each.file, each.swept) for each in kinds_joined()])
 
 
 class SweepFiles(Contents):
@@ -272,21 +253,26 @@ class SweepFiles(Contents):
 
     def summary(self, found: SweepResults) -> Summary:
         """Return the swept keys, by the names of their dimensions, and their values."""
-        facts: list[tuple[str, str]] = []
-        for name, each in found.swept.items():
-            unit = "" if each.unit == "1" else f" {each.unit}"
-            values = ", ".join(map(in_words, each.values))
-            facts.append((f"{each.key} (as {name})", f"{values}{unit}"))
-        return Summary(facts)
+        return Summary([
+            (f"{each.key} (as {name})", f"{listed(each.values)} {each.unit}".removesuffix(" 1"))
+            for name, each in found.swept.items()
+        ])  # fmt: skip
 
     def table(self, found: SweepResults) -> str:
         """Return numbers at every value."""
-        kind = joined_in(found)
-        return "\n".join([*aligned(kind.rows(found)), *kind.below(found)])
+        kind = next(each for each in kinds_joined() if {*each.swept} == found.groups.keys())
+        table = found.labelled(kind.swept[0])
+        axes = {
+            name: table.axes[name].values for name in table.shared_axes
+            if name not in ("replicate", "time")
+        }  # fmt: skip
+        return table_along(axes, *kind.swept_table(table))
 
     def figures(self, found: SweepResults) -> Figures:
         """Return figures along a swept key."""
-        return joined_in(found).figures()
+        from flocsim.io.plots.curves import SWEEP_FIGURES
+
+        return SWEEP_FIGURES.get(next(iter(found.groups)), {})
 
 
 CONTENTS = SweepFiles()

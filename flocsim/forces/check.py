@@ -39,9 +39,9 @@ SAMPLE_CONTACTS = tuple(
 
 
 def sample_gaps(reach):
-    """Return gaps [m] in overlap, near contact, and apart, within a reach."""
+    """Return gaps [m] in overlap, just touching, nearly so, and apart, within a reach."""
     # Half of the reach is well inside: no sample is beyond the end of a force.
-    return [min(gap, 0.5 * reach) for gap in (-1e-9, 1e-10, 1e-7)]
+    return [min(gap, 0.5 * reach) for gap in (-1e-9, -1e-12, 0.0, 1e-12, 1e-10, 1e-7)]
 
 
 def sample_pairs(reach: float) -> tuple[PairView, ...]:

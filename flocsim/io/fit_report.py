@@ -5,17 +5,14 @@ and of a population what is published, D10, D50, D90 and its fractal dimension.
 import csv
 import io
 import math
-import sys
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
-import attrs
 import numpy as np
 
 from flocsim.geometry.shapes.outline import ShapeMeasures
 from flocsim.io.images.pictures import Segmentation
-from flocsim.io.images.regions import Region
-from flocsim.io.shape_library import MEASURE_COLUMNS, ShapeEntry
+from flocsim.io.shape_library import MEASURE_COLUMNS, ShapeEntry, scaled_measures
 
 MOST_ERROR = 5.0
 """RE [%] above which the form of a floc is lost on its outline of so few vertices."""
@@ -38,16 +35,12 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def picture_line(name: str, found: Segmentation, fitted: int) -> str:
+def picture_line(name: str, found: Segmentation) -> str:
     """Return a line on a picture's Segmentation: flocs, rejected regions by reason, foreground."""
     parts = [plural(len(found.regions), f"{found.flocs} floc")]
-    if fitted < len(found.regions):
-        parts.append(f"the {fitted} largest fitted")
-    reasons = [f"{count} {reason}" for reason, count in found.rejected_by_reason().items()]
-    if reasons:
-        *others, last = reasons
-        listed = f"{', '.join(others)} and {last}" if others else last
-        parts.append(f"rejected {listed}")
+    if reasons := found.rejected_by_reason():
+        listed = (f"{count} {reason}" for reason, count in reasons.items())
+        parts.append(f"rejected {' and '.join(listed)}")
     if found.left_whole:
         parts.append(f"{found.left_whole} with necks not separated (--neck)")
     sure = [each.parted for each in found.regions if each.parted == each.parted]
@@ -64,43 +57,27 @@ def picture_line(name: str, found: Segmentation, fitted: int) -> str:
     return f"{name}: {', '.join(parts)}; {about}{alarms}"
 
 
-def warn_of_coarse(name: str, regions: Iterable[Region], radii: Iterable[float]) -> None:
-    """Print a line on stderr for every spheroradius not below r_eq of some flocs (section 3.2)."""
-    for radius in radii:
-        coarse = sum(region.equivalent_radius <= radius for region in regions)
-        if coarse:
-            print(
-                f"flocsim: {name}: the spheroradius of {radius:g} px is not "
-                f"below r_eq of {plural(coarse, 'floc')}, whose outline the fit cannot follow; use "
-                "a smaller --radius",
-                file=sys.stderr,
-            )
-
-
-def coarse_line(errors: Mapping[str, Mapping[int, float]]) -> str:
-    """Return what to say where the largest N is too small for flocs; "" where it is not.
-
-    errors: {floc: {N: RE [%]}}.
-    """
-    most = max((n for found in errors.values() for n in found), default=1)
-    coarse = {name: found[most] for name, found in errors.items() if found[most] > MOST_ERROR}
-    if most == 1 or not coarse:
-        return ""
-    worst = max(coarse, key=lambda name: coarse[name])
-    return (
-        f"N = {most} is too small for {len(coarse)} of {plural(len(errors), 'floc')}: RE is above "
-        f"{MOST_ERROR:g} %, and {coarse[worst]:.3g} % for {worst}; raise the number of vertices"
-    )
-
-
-def errors_of(entries: Sequence[ShapeEntry]) -> dict[str, dict[int, float]]:
-    """Return {floc: {N: RE [%]}} at the smallest spheroradius, of flocs that are larger than that:
-    what a disk cannot follow, more vertices do not mend."""
-    least = min((each.spheroradius for each in entries), default=0.0)
-    return {
-        each.floc_id: {count: fit.relative_error for count, fit in each.fits.items()}
-        for each in entries if each.spheroradius == least < each.equivalent_radius
-    }  # fmt: skip
+def coarse_lines(entries: Sequence[ShapeEntry]) -> list[str]:
+    """Return warnings of what fits cannot follow: outlines narrower than the disk (paper, section
+    3.2), and those for which the largest N is too small."""
+    lines = []
+    if wide := sum(each.spheroradius >= each.equivalent_radius for each in entries):
+        lines.append(
+            f"the spheroradius is not below r_eq of {wide} of {plural(len(entries), 'floc')}, "
+            "whose outline the fit cannot follow: use a smaller --radius"
+        )
+    # What a disk cannot follow, more vertices do not mend.
+    flocs = [e for e in one_each(entries) if e.spheroradius < e.equivalent_radius]
+    most = max(entries[0].fits)
+    errors = {each.floc_id: each.fits[most].relative_error for each in flocs}
+    if most > 1 and (coarse := [name for name in errors if errors[name] > MOST_ERROR]):
+        worst = max(coarse, key=errors.__getitem__)
+        lines.append(
+            f"N = {most} is too small for {len(coarse)} of {plural(len(errors), 'floc')}: RE is "
+            f"above {MOST_ERROR:g} %, and {errors[worst]:.3g} % for {worst}; raise the number of "
+            "vertices"
+        )
+    return [f"warning: {line}" for line in lines]
 
 
 def format_errors(entries: Sequence[ShapeEntry]) -> str:
@@ -132,14 +109,13 @@ def summary_text(pictures: Sequence[Any]) -> str:
     for picture in pictures:
         for region in (*picture.found.regions, *picture.found.rejected):
             fits = None if region.reason else picture.fits.get(region.label)
-            why = region.reason or ("" if fits else "not among the largest")
             measures = None if region.reason else picture.measures[region.label]
             radius, band = (
                 region.equivalent_radius,
                 region.radius_band if region.band else (NAN, NAN),
             )
             table.writerow([
-                picture.name, region.label, why,
+                picture.name, region.label, region.reason,
                 *(f"{each:.2f}" for each in region.centroid),
                 region.area, f"{radius:.3f}", f"{radius * picture.pixel_size:.4g}",
                 cell(region.blur, ".3g"), cell(region.level, ".4g"),
@@ -156,13 +132,6 @@ def cell(value: float, form: str) -> str:
     return "" if math.isnan(value) else f"{value:{form}}"
 
 
-class Slope(NamedTuple):
-    """A fractal dimension and half its 95 % interval [-]."""
-
-    value: float
-    error: float
-
-
 def one_each(entries: Sequence[ShapeEntry]) -> list[ShapeEntry]:
     """Return the entries at the smallest spheroradius: every floc once."""
     first = min(entry.spheroradius for entry in entries)
@@ -170,13 +139,8 @@ def one_each(entries: Sequence[ShapeEntry]) -> list[ShapeEntry]:
 
 
 def measures_in(entry: ShapeEntry) -> ShapeMeasures:
-    """Return the measures of a floc [m]: those of its picture, or of its finest fit where a library
-    has none."""
-    if entry.measures is None:
-        return entry.fits[max(entry.fits)].shape.measures
-    lengths = {name: getattr(entry.measures, name) * entry.pixel_size
-               for name in ("perimeter", "feret_max", "feret_min")}  # fmt: skip
-    return attrs.evolve(entry.measures, **lengths)
+    """Return the measures of a floc [m]."""
+    return scaled_measures(entry.measures, entry.pixel_size)
 
 
 def diameters_at(
@@ -194,9 +158,10 @@ def diameters_at(
     return np.interp(shares, below, ordered)
 
 
-def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | None:
+def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> tuple[float, float] | None:
     """Return the perimeter-based fractal dimension D_f2 of a population: P ∝ A^(D_f2/2), by least
-    squares of ln P on ln A (n,) each; None for fewer than FEWEST flocs of different areas.
+    squares of ln P on ln A (n,) each, and half its 95 % interval; None for fewer than FEWEST flocs
+    of different areas.
 
     1 for outlines that are scaled copies of each other, towards 2 where larger ones are the more
     ragged. Source: B. B. Mandelbrot, The Fractal Geometry of Nature (1982), ch. 12.
@@ -208,11 +173,11 @@ def perimeter_dimension(areas: np.ndarray, perimeters: np.ndarray) -> Slope | No
         return None
     # ln P = D_f2/2 ln A + constant; the interval is Student's t of the slope.
     line = linregress(np.log(areas), np.log(perimeters))
-    return Slope(2.0 * line.slope, 2.0 * float(stdtrit(len(areas) - 2, 0.975)) * line.stderr)
+    return 2.0 * line.slope, 2.0 * float(stdtrit(len(areas) - 2, 0.975)) * line.stderr
 
 
 def population_lines(entries: Sequence[ShapeEntry]) -> list[str]:
-    """Return lines on D10, D50, D90 and D_f2 of some flocs."""
+    """Return lines on D10, D50, D90 and D_f2 of some flocs, and on fits that are too coarse."""
     flocs = one_each(entries)
     sizes = np.array([2e6 * each.measured_radius for each in flocs])
     lines = []
@@ -223,8 +188,6 @@ def population_lines(entries: Sequence[ShapeEntry]) -> list[str]:
         )
     perimeters = np.array([measures_in(each).perimeter for each in flocs])
     areas = np.array([np.pi * each.measured_radius**2 for each in flocs])
-    if (found := perimeter_dimension(areas, perimeters)) is not None:
-        lines.append(
-            f"perimeter-based fractal dimension D_f2 {found.value:.3f} ± {found.error:.3f} (95 %)"
-        )
-    return lines
+    if found := perimeter_dimension(areas, perimeters):
+        lines.append("perimeter-based fractal dimension D_f2 {:.3f} ± {:.3f} (95 %)".format(*found))
+    return lines + coarse_lines(entries)

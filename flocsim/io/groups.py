@@ -158,7 +158,7 @@ class Group:
         return values
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Stored(Tables):
     """What a file of one ``kind`` holds, or is to hold: ``groups`` {group: {name: values}},
     coordinates among them; ``run``, the scalars of the group ``run``; the ``attributes`` of the
@@ -343,14 +343,10 @@ class FileFormat:
             other = file.kind or "file of another kind"
             raise FileError(f"{path} holds a {other}: name a file with {self.title}")
         found = file.attributes.get("schema_version")
-        if not isinstance(found, int):
-            raise Unfit("it does not record a schema version")
-        if not (self.oldest or self.version) <= found <= self.version:
-            what = "read it with the version that wrote it"
-            if found < self.version:
-                what = f"it is of a flocsim that was never released; {self.remedy}"
+        if found not in range(self.oldest or self.version, self.version + 1):
             raise FileError(
-                f"{path} has schema version {found}, and this flocsim reads {self.version}: {what}"
+                f"{path} has schema version {found}, and this flocsim reads {self.version}: read "
+                f"it with the version that wrote it, or {self.remedy}"
             )
 
     def check(self, file: File) -> dict[str, int]:

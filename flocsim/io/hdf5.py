@@ -5,6 +5,7 @@ which takes some ms; where that is not safe it is started anew, in 0.2 s. It has
 the file and a pipe, and does not outlive its limit of time, whatever becomes of this process.
 """
 
+import contextlib
 import json
 import math
 import os
@@ -21,7 +22,7 @@ import numpy as np
 from flocsim.errors import FileError, visible
 from flocsim.io import hdf5_child
 from flocsim.io.seals import CHANGED, check_seal, end_of, open_file
-from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING
+from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING, blocked
 
 MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
 """How names of variables begin that make a process a rank, which a child of a rank is not."""
@@ -127,15 +128,14 @@ def describe(path: object, data: BinaryIO) -> dict[str, list]:
     # The other process may move the place in the file that both have, which a buffer does not
     # notice unless it is sought from the end.
     seconds = hdf5_child.cpu_seconds(data.seek(0, os.SEEK_END))
-    text, status = describe_forked(data) if can_fork() else describe_spawned(data, seconds)
+    text = describe_forked(data) if can_fork() else describe_spawned(data, seconds)
     data.seek(0, os.SEEK_END)
     try:
         found = json.loads(text.rpartition(b"\n")[2])  # behind what others print as Python starts
     except ValueError:
-        late = status == -getattr(signal, "SIGXCPU", 1)
-        what = f"took more than {seconds} s" if late else f"crashed ({status})"
         raise FileError(
-            f"{path} is damaged or hostile: the HDF5 library {what}; use a copy or run it again"
+            f"{path} is damaged or hostile: the HDF5 library crashed, or took more than {seconds} "
+            "s; use a copy or run it again"
         ) from None
     if "refused" in found:
         raise Unfit(visible(found["refused"][:LONGEST], ""))
@@ -158,30 +158,28 @@ def can_fork() -> bool:
     )
 
 
-def describe_forked(data: BinaryIO) -> tuple[bytes, int]:
-    """Return what a forked process writes, and its status: −n where signal n ended it."""
+def describe_forked(data: BinaryIO) -> bytes:
+    """Return what a forked process writes, "" where it is ended."""
     import h5py  # noqa: F401 (so that the process has it)
 
     reading, writing = os.pipe()
     # Signals of a terminal go to both processes: this one answers them. None comes in between.
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    with warnings.catch_warnings():
-        # Python counts the threads of numpy's libraries, too, which are idle.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        child = os.fork()
-    if child == 0:
-        run_forked(data.fileno(), writing)
-    os.close(writing)
-    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    with blocked(SIGNALS):
+        with warnings.catch_warnings():
+            # Python counts the threads of numpy's libraries, too, which are idle.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
+        if child == 0:
+            run_forked(data.fileno(), writing)
+        os.close(writing)
     with open(reading, "rb") as pipe:
         try:
-            text = pipe.read()
+            return pipe.read()
         except BaseException:
             os.kill(child, signal.SIGKILL)
             raise
         finally:
-            _, status = os.waitpid(child, 0)
-    return text, os.waitstatus_to_exitcode(status)
+            os.waitpid(child, 0)
 
 
 def run_forked(file: int, writing: int) -> None:
@@ -200,17 +198,15 @@ def run_forked(file: int, writing: int) -> None:
         os._exit(2)
 
 
-def describe_spawned(data: BinaryIO, seconds: int) -> tuple[bytes, int]:
-    """Return what a new process writes, and its exit code: −n where signal n ended it."""
+def describe_spawned(data: BinaryIO, seconds: int) -> bytes:
+    """Return what a new process writes, "" where it is ended."""
     variables = {
         name: value for name, value in os.environ.items() if not name.startswith(MPI_VARIABLES)
     } | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), BLAS_THREADS: "1"}  # fmt: skip
-    try:
-        done = subprocess.run(
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        return subprocess.run(
             [sys.executable, "-P", hdf5_child.__file__],
             stdin=data, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=variables,
             start_new_session=True, check=False, timeout=hdf5_child.PATIENCE * seconds,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return b"", -getattr(signal, "SIGXCPU", 1)
-    return done.stdout, done.returncode
+        ).stdout  # fmt: skip
+    return b""

@@ -43,10 +43,8 @@ def main() -> None:
 
         set_limits()
         text = json.dumps({"nodes": described(h5py)}, default=plain, ensure_ascii=False).encode()
-    except MemoryError:
-        text = json.dumps({"refused": "it takes more than 768 MiB of memory"}).encode()
     except Exception as error:
-        text = json.dumps({"refused": str(error)}).encode()
+        text = json.dumps({"refused": str(error) or "it takes too much memory"}).encode()
     with open(1, "wb", closefd=False) as output:
         output.write(text)
     os._exit(0)
@@ -90,34 +88,27 @@ def walk(h5py: Any, group: Any, above: str, nodes: dict[str, tuple]) -> None:
     """Add all that is in a group to the nodes."""
     for name in group:
         path = above + name
-        if not path.isprintable():
-            raise Refused("it has unprintable names")
-        if path.count("/") > MOST_LEVELS:
-            raise Refused("its groups are nested too deep")
-        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise Refused(f"{path} is a link, which flocsim never writes")
-        each = group[name]
-        if isinstance(each, h5py.Group):
+        # Links are not followed: they lead to other files, or nowhere.
+        is_own = isinstance(group.get(name, getlink=True), h5py.HardLink)
+        each = group[name] if is_own and path.isprintable() else None
+        if isinstance(each, h5py.Group) and path.count("/") < MOST_LEVELS:
             nodes[path] = (None, (), None, attributes(each), None)
             walk(h5py, each, f"{path}/", nodes)
         elif isinstance(each, h5py.Dataset):
             nodes[path] = dataset(h5py, path, each)
         else:
-            raise Refused(f"{path} is neither a group nor a dataset")
+            raise Refused(f"{path} is no group and no dataset that flocsim writes")
 
 
 def dataset(h5py: Any, path: str, each: Any) -> tuple:
     """Return the node of a dataset whose values lie in the file in one piece."""
     words = h5py.check_string_dtype(each.dtype)
     kind = "text" if words and words.length is None else TYPES.get(each.dtype.str)
-    if kind is None or each.shape is None:
-        raise Refused(f"{path} has a type or a shape that flocsim does not write")
-    plan = each.id.get_create_plist()
+    plan, end = each.id.get_create_plist(), os.fstat(0).st_size
     whole = plan.get_layout() == h5py.h5d.CONTIGUOUS and not plan.get_nfilters()
-    if not whole or plan.get_external_count():
-        raise Refused(f"the values of {path} are packed, in pieces, or in another file or dataset")
+    if kind is None or each.shape is None or not whole or plan.get_external_count():
+        raise Refused(f"{path} has a type, a shape or a layout that flocsim does not write")
     size, offset = each.size * each.dtype.itemsize, each.id.get_offset()
-    end = os.fstat(0).st_size
     if size and (not each.id.get_storage_size() or (offset or end) + size > end):
         raise Refused(f"the values of {path} are missing")
     text = None

@@ -226,10 +226,6 @@ class Journal(JournalReader):
             self.sync_when_due()
         return self.last
 
-    def add_session(self, about: dict[str, Any]) -> int:
-        """Write down how a run was started; the id of its session."""
-        return self.add(SESSION, as_text(about))
-
     def acknowledge(self) -> None:
         """Write down how many records there are, outside the database."""
         self.lock.count = self.last

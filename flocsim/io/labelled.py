@@ -119,6 +119,11 @@ class Labelled:
             yield "_".join([name, *parts]), own.ravel(), words
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Return a quantity with its unit, if it has one: "speed [m s-1]"."""
+    return name if unit == "1" else f"{name} [{unit}]"
+
+
 class Tables:
     """Results of named groups of arrays.
 
@@ -134,6 +139,9 @@ class Tables:
     def labelled(self, group: str) -> Labelled:
         """Return the arrays of a group with their axes; UsageError for an unknown one."""
         raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self.indices)})"
 
     def known(self, group: str | None) -> str:
         """Return the name of a group; UsageError for an unknown one."""

@@ -13,11 +13,8 @@ from pathlib import Path
 from flocsim.errors import UsageError
 from flocsim.io.files import Rule, check_writable, is_kept, ordinary_target
 
-WAYS = "add --overwrite, which keeps the old one under another name"
+WAYS = "add --overwrite (in Python overwrite=True), which keeps the old one under another name"
 """What a user can do where a file is in the way, besides naming another place."""
-
-SCRIPT_WAYS = "give overwrite=True, which keeps the old one under another name"
-"""The same in Python."""
 
 
 def check_ending(path: str | os.PathLike, endings: Sequence[str]) -> None:

@@ -37,11 +37,6 @@ def seal_of(file: BinaryIO, size: int) -> bytes:
     return SEAL_MARK + digest.hexdigest().encode() + b"\n"
 
 
-def seal(data: bytes) -> bytes:
-    """Return the bytes of an HDF5 file with their checksum appended."""
-    return data + SEAL_MARK + digest_of(data).hex().encode() + b"\n"
-
-
 def seal_file(file: BinaryIO) -> None:
     """Append the checksum of an open file to it."""
     file.flush()

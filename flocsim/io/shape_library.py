@@ -2,11 +2,10 @@
 
 - ``flocs``              each floc in its picture (FLOC_COLUMNS), in the order of writing; of
                          several spheroradii each has a row, e.g. "023.png#7 r=2"
-- ``fits/N``             for every N, so that between conditions nothing changes but N
-                         (FIT_COLUMNS); in version 2, of holes or several parts, POINT_COLUMNS too
-- ``measures``           of their masks (MEASURE_COLUMNS); NaN for one without; earlier files may
-                         lack the group
-- ``population``         what the picture leaves open (POPULATION_COLUMNS); the same
+- ``fits/N``             for every N, so that between conditions nothing changes but N: the relative
+                         error, and of every vertex its place, part, ring and radius
+- ``measures``           of their masks (MEASURE_COLUMNS)
+- ``population``         what the picture leaves open (POPULATION_COLUMNS)
 - ``closer/N, wider/N``  as ``fits/N``, of the outlines cut closer and wider, about the centroid of
                          the floc as it was cut, where these were fitted as well
 
@@ -25,10 +24,10 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.cores import Part, PointTable, is_compound, parts_in, table_of
+from flocsim.geometry.shapes.cores import Part, Parts, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.outline import ShapeMeasures
-from flocsim.geometry.shapes.shape import Shape, Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule
 from flocsim.io.groups import Dataset, FileFormat, Group, Stored, declared, facts_of
 from flocsim.io.labelled import Column, Labelled
@@ -43,12 +42,9 @@ NAME_OF_SHIPPED = "synthetic"
 SHIPPED = Path(__file__).with_name("synthetic.h5")
 """Its place; tests/helpers/shipped_library.py made it."""
 
-POLYGONS, COMPOUNDS = 1, 2
-"""Schema versions of libraries of polygons, and of those with holes or parts."""
-
 LIBRARY = FileFormat(
-    "flocsim shape library", COMPOUNDS, "shape library", {}, optional=("measures", "population"),
-    oldest=POLYGONS, attribute="kind", remedy="make it again with flocsim fit",
+    "flocsim shape library", 3, "shape library", {}, ("measures", "population"), oldest=1,
+    attribute="kind", remedy="make it again with flocsim fit",
 )  # fmt: skip
 """Its groups are those of `groups_of`."""
 
@@ -74,17 +70,6 @@ FLOC_COLUMNS["centroid"] = attrs.evolve(
     FLOC_COLUMNS["centroid"], axes=("floc", 2), low=-MOST_PIXELS
 )
 
-FIT_COLUMNS = {
-    "vertices": ("f8", "m", "vertices around the floc's centroid, x right and y up"),
-    "radius": ("f8", "m", "spheroradius"),
-    "relative_error": ("f8", "percent", "pixels that differ, in percent of the mask's pixels"),
-}
-POINT_COLUMNS = {
-    "part": ("i8", "", "part of the floc that a vertex belongs to"),
-    "ring": ("i8", "", "ring of the part: 0 its outline, from 1 its holes"),
-    "point_radius": ("f8", "m", "spheroradius of the part"),
-}
-
 MEASURE_COLUMNS = declared(
     {
         "perimeter": ("f8", "px", "length of the outline"),
@@ -98,8 +83,6 @@ MEASURE_COLUMNS = declared(
 )
 """The measures of the masks."""
 
-UNMEASURED = ShapeMeasures(*[float("nan")] * len(MEASURE_COLUMNS))
-
 POPULATION_COLUMNS = declared(
     {
         "weight": ("f8", "1", "number of flocs that it represents, of which filters kept only it"),
@@ -111,57 +94,69 @@ POPULATION_COLUMNS = declared(
 """What the picture leaves open."""
 
 ATTRIBUTES = {
-    "id": "floc_id", "part": "points.part", "ring": "points.ring",
-    "point_radius": "points.radius",
+    "id": "floc_id", "vertices": "table.place", "part": "table.part", "ring": "table.ring",
+    "point_radius": "table.radius",
 }  # fmt: skip
 """Column → attribute of a ShapeEntry or a StoredFit, where that has another name."""
 
 
-def groups_of(kinds: Iterable[str], counts: Sequence[int], compound: bool) -> dict[str, Group]:
+def groups_of(kinds: Iterable[str], counts: Sequence[int]) -> dict[str, Group]:
     """Return the groups of a library of fits at these numbers of vertices.
 
-    ``kinds``: "fits", and the ends of bands where these were fitted; ``compound``: of flocs with
-    holes or parts.
+    ``kinds``: "fits", and the ends of bands where these were fitted.
     """
     groups = {"flocs": Group(FLOC_COLUMNS, {}), "measures": Group(MEASURE_COLUMNS, {}),
               "population": Group(POPULATION_COLUMNS, {})}  # fmt: skip
     for count in counts:
-        columns = declared(FIT_COLUMNS, ("floc",), low=0.0, high=LARGEST)
-        columns["vertices"] = attrs.evolve(
-            columns["vertices"], axes=("floc", count, 2), low=-LARGEST
-        )
-        columns["relative_error"] = attrs.evolve(columns["relative_error"], high=np.inf)
-        if compound:
-            columns |= declared(POINT_COLUMNS, ("floc", count), low=0)
+        points = ("floc", count)
+        columns = {
+            "vertices": Dataset("f8", (*points, 2), "m", "vertices around the floc's centroid, x "
+                                "right and y up", low=-LARGEST, high=LARGEST),
+            "part": Dataset("i4", points, "", "part of the floc that a vertex belongs to", low=0),
+            "ring": Dataset("i4", points, "", "ring of the part: 0 its outline, from 1 its holes",
+                            low=0),
+            "point_radius": Dataset("f8", points, "m", "spheroradius of the part", low=0.0,
+                                    high=LARGEST),
+            "relative_error": Dataset("f8", ("floc",), "percent", "pixels that differ, in percent "
+                                      "of the mask's pixels", low=0.0),
+        }  # fmt: skip
         groups |= {f"{kind}/{count}": Group(columns, {}) for kind in kinds}
     return groups
 
 
+def earlier_groups(groups: Mapping[str, Group], version: int) -> dict[str, Group]:
+    """Return the groups as version 1 or 2 has them: fits have one spheroradius, and parts and rings
+    are stored in version 2 alone, of libraries with holes or several parts."""
+    found = dict(groups)
+    for name in (each for each in groups if "/" in each):
+        columns = dict(groups[name].columns)
+        for column in ("part", "ring"):
+            columns[column] = attrs.evolve(columns[column], type="i8")
+        if version == 1:
+            columns = {each: columns[each] for each in ("vertices", "relative_error")}
+        radius = {"radius": ("f8", "m", "spheroradius")}
+        columns |= declared(radius, ("floc",), low=0.0, high=LARGEST)
+        found[name] = Group(columns, {})
+    return found
+
+
 @attrs.frozen(eq=False)
 class StoredFit:
-    """One fit: vertices (N, 2) [m] about the floc's centroid, y up; radius [m], the smallest of
-    its parts; RE [%]; of a core with holes, or of several parts, the ``table`` of its points."""
+    """One fit: its parts, cores of vertices [m] about the floc's centroid, y up, which disks
+    sweep; RE [%]."""
 
-    vertices: np.ndarray
-    radius: float
+    parts: Parts
     relative_error: float
-    table: PointTable | None = None
 
     @property
     def shape(self) -> Shape:
         """The Sphere (N = 1), SpheroPolygon or Composite [m], around its own centroid."""
-        if len(self.vertices) == 1:
-            return Sphere(self.radius)
-        if self.table is not None:
-            return shape_of_parts(parts_in(self.table))
-        return SpheroPolygon(self.vertices, self.radius)
+        return shape_of_parts(self.parts)
 
     @property
-    def points(self) -> PointTable:
-        """Its core points, with the parts and rings that they belong to."""
-        if self.table is not None:
-            return self.table
-        return table_of((Part((self.vertices,), self.radius),))
+    def table(self) -> PointTable:
+        """Its vertices, with the parts and rings that they belong to."""
+        return table_of(self.parts)
 
 
 def own_radius() -> Any:
@@ -172,12 +167,24 @@ def own_radius() -> Any:
     )
 
 
+def measures_of_fit(entry: "ShapeEntry") -> ShapeMeasures:
+    """Return the measures [px] of the finest fit of a floc."""
+    shape = entry.fits[max(entry.fits)].shape
+    return scaled_measures(shape.measures, 1.0 / entry.pixel_size)
+
+
+def scaled_measures(measures: ShapeMeasures, factor: float) -> ShapeMeasures:
+    """Return measures whose lengths are ``factor`` times as large."""
+    lengths = ("perimeter", "feret_max", "feret_min")
+    return attrs.evolve(measures, **{name: factor * getattr(measures, name) for name in lengths})
+
+
 @attrs.frozen(eq=False)
 class ShapeEntry:
     """One floc: where it comes from, its size in the picture, and its fits {N: StoredFit}.
 
     floc_id: text such as "023.png#7"; pixel_size [m]; centroid (x, y) [px, y down]; area [px];
-    equivalent_radius and spheroradius [px]; measures [px] of its mask, None where nobody took them;
+    equivalent_radius and spheroradius [px]; measures [px] of its mask, or of its finest fit;
     weight: that of Region; radius_low, radius_high: r_eq [px] at the ends of its band, its own
     where nothing is known; closer, wider: the fits there, none where nobody made them.
     """
@@ -190,7 +197,7 @@ class ShapeEntry:
     equivalent_radius: float
     spheroradius: float
     fits: dict[int, StoredFit]
-    measures: ShapeMeasures | None = None
+    measures: ShapeMeasures = attrs.Factory(measures_of_fit, takes_self=True)
     weight: float = 1.0
     radius_low: float = own_radius()
     radius_high: float = own_radius()
@@ -239,18 +246,16 @@ def make_entry(
     return ShapeEntry(
         floc_id, picture.name, float(picture.pixel_size), region.centroid, region.area,
         region.equivalent_radius, float(spheroradius), stored(own, 1),
-        picture.measures.get(region.label),
+        picture.measures[region.label],
         weight=region.weight, radius_low=low, radius_high=high, **ends,
     )  # fmt: skip
 
 
 def stored_fit(fit: "Fit", centroid: np.ndarray, pixel_size: float) -> StoredFit:
     """Return the StoredFit of a Fit in a mask with the floc's centroid at ``centroid`` [px]."""
-    vertices, radius = (fit.vertices - centroid) * pixel_size, fit.radius * pixel_size
-    table = None
-    if fit.hole_sizes:
-        table = table_of(fit.parts)._replace(place=vertices, radius=np.full(len(vertices), radius))
-    return StoredFit(vertices, radius, fit.relative_error, table)
+    [(rings, radius)] = fit.parts
+    moved = tuple((ring - centroid) * pixel_size for ring in rings)
+    return StoredFit((Part(moved, radius * pixel_size),), fit.relative_error)
 
 
 def write_library(
@@ -284,19 +289,17 @@ def write_library(
             "the size of one, as in '0.95 um'"
         )
 
-    compound = any(fit.table is not None for entry in entries for fit in entry.fits.values())
     kinds = ("fits", *(BAND_ENDS if all(entry.is_banded for entry in entries) else ()))
     groups = {}
-    for name, group in groups_of(kinds, sorted(entries[0].fits), compound).items():
+    for name, group in groups_of(kinds, sorted(entries[0].fits)).items():
         kind, _, count = name.partition("/")
         owners: list[Any] = entries
         if count:
             owners = [getattr(entry, kind)[int(count)] for entry in entries]
         elif name == "measures":
-            owners = [entry.measures or UNMEASURED for entry in entries]
+            owners = [entry.measures for entry in entries]
         groups[name] = labelled(group.columns, owners)
-    version = COMPOUNDS if compound else POLYGONS
-    attrs.evolve(LIBRARY, version=version).write(path, groups, attributes=settings, rule=rule)
+    LIBRARY.write(path, groups, attributes=settings, rule=rule)
 
 
 def labelled(columns: Mapping[str, Dataset], owners: Sequence[Any]) -> Labelled:
@@ -312,15 +315,14 @@ def labelled_flocs(entries: Sequence[ShapeEntry]) -> Labelled:
     """Return all that is known of each floc but its fits, with the axes ``floc`` and ``2``."""
     columns = labelled(FLOC_COLUMNS | POPULATION_COLUMNS, entries).columns
     axes = {"floc": columns.pop("id"), "2": Column(("2",), np.array(["x", "y"], object))}
-    measures = labelled(MEASURE_COLUMNS, [entry.measures or UNMEASURED for entry in entries])
+    measures = labelled(MEASURE_COLUMNS, [entry.measures for entry in entries])
     return Labelled(axes, columns | measures.columns)
 
 
 def reach_of(entry: ShapeEntry) -> float:
     """Return the largest coordinate or radius of a floc's fits [m]."""
-    return max(
-        max(np.abs(fit.vertices).max(), fit.points.radius.max()) for fit in entry.fits.values()
-    )
+    tables = [fit.table for fit in entry.fits.values()]
+    return max(max(np.abs(table.place).max(), table.radius.max()) for table in tables)
 
 
 def read_settings(path: str | os.PathLike) -> dict[str, Any]:
@@ -338,8 +340,9 @@ def read_library(path: str | os.PathLike) -> list[ShapeEntry]:
     with LIBRARY.opened(path) as file:
         kinds = [kind for kind in ("fits", *BAND_ENDS) if kind in file]
         counts = sorted(map(int, file.names("fits")))
-        compound = file.attributes["schema_version"] == COMPOUNDS
-        groups = groups_of(kinds, counts, compound)
+        groups, version = groups_of(kinds, counts), file.attributes["schema_version"]
+        if version < LIBRARY.version:
+            groups = earlier_groups(groups, version)
         stored = attrs.evolve(LIBRARY, groups=groups).contents(file)
         return entries_in(stored, kinds, counts)
 
@@ -350,28 +353,27 @@ def entries_in(stored: Stored, kinds: Sequence[str], counts: Sequence[int]) -> l
     flocs = {ATTRIBUTES.get(name, name): values.tolist() for name, values in columns.items()}
     flocs["centroid"] = [tuple(centroid) for centroid in flocs["centroid"]]
     if "measures" in stored.groups:
-        rows = np.stack(list(stored.groups["measures"].values()), axis=1)
-        flocs["measures"] = [
-            None if np.isnan(row).any() else ShapeMeasures(*row.tolist()) for row in rows
-        ]
+        measures = (values.tolist() for values in stored.groups["measures"].values())
+        flocs["measures"] = [ShapeMeasures(*row) for row in zip(*measures, strict=True)]
     for kind in kinds:
         fits = [fits_in(stored.groups[f"{kind}/{count}"]) for count in counts]
         flocs[kind] = [dict(zip(counts, own, strict=True)) for own in zip(*fits, strict=True)]
-    return [
-        ShapeEntry(**dict(zip(flocs, row, strict=True)))
-        for row in zip(*flocs.values(), strict=True)
-    ]
+    entries = [dict(zip(flocs, row, strict=True)) for row in zip(*flocs.values(), strict=True)]
+    for entry in entries:
+        # Versions 1 and 2 have NaN of a floc that nobody has measured: its finest fit is.
+        if "measures" in entry and np.isnan(entry["measures"].perimeter):
+            del entry["measures"]
+    return [ShapeEntry(**entry) for entry in entries]
 
 
 def fits_in(columns: Mapping[str, np.ndarray]) -> list[StoredFit]:
     """Return the StoredFits of all flocs at one number of vertices."""
-    fits = []
-    for row, vertices in enumerate(columns["vertices"]):
-        table = None
-        if "part" in columns:
-            table = PointTable(vertices, *(columns[name][row] for name in POINT_COLUMNS))
-        if table is not None and not is_compound(parts_in(table)):
-            table = None
-        radius, error = float(columns["radius"][row]), float(columns["relative_error"][row])
-        fits.append(StoredFit(vertices, radius, error, table))
-    return fits
+    if "part" not in columns:  # version 1
+        alone = np.zeros(columns["vertices"].shape[:2], int)
+        radius = np.broadcast_to(columns["radius"][:, None], alone.shape)
+        columns = {**columns, "part": alone, "ring": alone, "point_radius": radius}
+    points = (columns[name] for name in ("vertices", "part", "ring", "point_radius"))
+    return [
+        StoredFit(parts_in(PointTable(*table)), error)
+        for *table, error in zip(*points, columns["relative_error"].tolist(), strict=True)
+    ]

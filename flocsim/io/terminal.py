@@ -11,7 +11,8 @@ import os
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, TextIO
 
 from flocsim.compiler import units
@@ -45,6 +46,29 @@ def aligned(rows: Sequence[Sequence[str]], left: int = 0, gap: str = "  ") -> li
     return [gap.join(map(format, row, forms)).rstrip() for row in rows]
 
 
+def in_words(value: object) -> str:
+    """Return a coordinate as text that steers no terminal."""
+    return f"{value:g}" if isinstance(value, float) else visible(str(value), "")
+
+
+def table_along(
+    axes: Mapping[str, Any], heads: Sequence[str],
+    row: Callable[[tuple[int, ...]], Sequence[str]],
+    places: Iterable[tuple[int, ...]] | None = None, left: int = 0,
+) -> str:  # fmt: skip
+    """Return a table as text, with a row for every place along some axes, or for these ``places``.
+
+    ``axes`` {name: values}: the coordinates, with which each row begins; ``row``: the cells that
+    follow at a place, which has an index along each of the axes; ``left`` as in `aligned`.
+    """
+    rows = [[*axes, *heads]]
+    every = product(*(range(len(each)) for each in axes.values()))
+    for place in every if places is None else places:
+        keys = [in_words(values[k]) for values, k in zip(axes.values(), place, strict=True)]
+        rows.append([*keys, *row(place)])
+    return "\n".join(aligned(rows, left))
+
+
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table as text without a newline at its end; cells are shown by ``str``.
 
@@ -76,8 +100,9 @@ class PlainStream:
         self.problem = None if stream else OSError(errno.EBADF, "it is closed")
         self.stream = stream or open(os.devnull, "w")  # noqa: SIM115 (as long as the process)
         if hasattr(stream, "reconfigure"):
-            # A letter that a terminal does not know must not end a command.
-            stream.reconfigure(errors="replace")
+            # A letter that a terminal does not know must not end a command, and a line that goes
+            # into a pipe or a file is to be seen when it is printed.
+            stream.reconfigure(errors="replace", line_buffering=True)
 
     def write(self, text: str) -> int:
         """Write a text; a carriage return begins the line anew, as `Progress` does."""
@@ -130,18 +155,6 @@ def output_problem() -> str:
     return f"standard output could not be written: {problem.strerror or problem}"
 
 
-def tell(text: str, stream: TextIO | None = None, end: str = "\n") -> None:
-    """Print; a reader that has gone (`| head`), or a full disk, must not cost a study its results.
-
-    What cannot be printed is lost, and so is what comes after it; the exit code says the rest.
-    """
-    stream = sys.stdout if stream is None else stream
-    try:
-        print(text, end=end, file=stream, flush=True)
-    except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
 class Progress:
     """How far a long work is: whole lines, or on a terminal one line that renews itself."""
 
@@ -157,11 +170,11 @@ class Progress:
     def say(self, text: str) -> None:
         """Print a line, unless quiet."""
         if not self.quiet:
-            tell(text, self.stream)
+            print(text, file=self.stream, flush=True)
 
     def warn(self, text: str) -> None:
         """Print a line on stderr, quiet or not."""
-        tell(f"flocsim: {visible(text, keep='')}", sys.stderr)
+        print(f"flocsim: {visible(text, keep='')}", file=sys.stderr, flush=True)
 
     def start(self, todo: int) -> None:
         """Begin with so much of the total to do."""
@@ -182,11 +195,11 @@ class Progress:
         if self.tty:
             self.renew(text)
         else:
-            tell(text, self.stream)
+            print(text, file=self.stream, flush=True)
 
     def renew(self, text: str, end: str = "") -> None:
         """Write a line over the last one of a terminal."""
-        tell(f"\r{text[:WIDTH]:<{WIDTH}}", self.stream, end)
+        print(f"\r{text[:WIDTH]:<{WIDTH}}", end=end, file=self.stream, flush=True)
 
     def finish(self) -> float:
         """End the line that renews itself; return the seconds since the start."""

@@ -13,17 +13,17 @@ import attrs
 import numpy as np
 
 from flocsim.errors import UsageError
-from flocsim.geometry.shapes.cores import PointTable, parts_in, table_of
+from flocsim.geometry.shapes.cores import Part, PointTable, parts_in, table_of
 from flocsim.geometry.shapes.outline import swept_geometry
-from flocsim.geometry.shapes.shape import Shape, Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, shape_of_parts
+from flocsim.geometry.shapes.shape import Shape
+from flocsim.geometry.shapes.spheropolygon import shape_of_parts
 from flocsim.io.files import Rule, write_file
 from flocsim.io.groups import FileFormat, Group, declared, facts_of
 from flocsim.io.hdf5 import File
 from flocsim.io.labelled import Labelled, Tables
 
 TRAJECTORY = FileFormat(
-    "flocsim trajectory", 2, "trajectory", {}, attribute="kind", remedy="write it again"
+    "flocsim trajectory", 3, "trajectory", {}, oldest=2, attribute="kind", remedy="write it again"
 )
 """Its arrays are those of `motion_group`, without a group."""
 
@@ -40,30 +40,25 @@ DATASETS = {
     "position": ("f8", "m, m, rad", "x, y and angle of each body (time, body, 3)"),
     "velocity": ("f8", "m/s, m/s, rad/s", "velocity and spin of each body (time, body, 3)"),
 }
-DISTANCE = {"centre_distance": ("f8", "m", "distance of the two centroids")}
 POINTS = {
     "part": ("i8", "1", "part of the body that a core point belongs to"),
     "ring": ("i8", "1", "ring of the part: 0 its outline, from 1 its holes"),
     "point_radius": ("f8", "m", "radius of the disk that sweeps the part"),
 }
-"""Columns of the core points of a body with holes or several parts."""
-
+"""Columns of the core points of a body."""
 
 MOTION = Group.of(declared(DATASETS, ("time", "body", "component")), SCALES)
 
 
-def motion_group(compounds: Sequence[bool]) -> Group:
-    """Return the table of a motion; ``compounds``: which bodies have holes or several parts."""
+def motion_group(bodies: int) -> Group:
+    """Return the table of a motion of so many bodies and of their core points."""
     columns, scales = dict(MOTION.columns), dict(SCALES)
-    if len(compounds) == 2:
-        columns |= declared(DISTANCE, ("time",))
-    for body, compound in enumerate(compounds):
+    for body in range(bodies):
         vertex = f"vertex_{body}"
         scales[vertex] = ("i8", "1", f"core point of body {body}")
         points = {f"vertices_{body}": ("f8", "m", f"core points of body {body}")}
         columns |= declared(points, (vertex, "axis"))
-        if compound:
-            columns |= declared({f"{n}_{body}": about for n, about in POINTS.items()}, (vertex,))
+        columns |= declared({f"{n}_{body}": about for n, about in POINTS.items()}, (vertex,))
     return Group.of(columns, scales)
 
 
@@ -83,25 +78,20 @@ def write_trajectory(
 ) -> None:
     """Write one replicate's motion; ``facts`` {name: number or text} become attributes.
 
-    Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m],
-    their spheroradii in the attribute ``radius``, of bodies with holes or parts also what part,
-    ring and radius belongs to a point (``part_0``, ``ring_0``, ``point_radius_0``); ``rule`` says
-    what becomes of a file that is there. Raises FileError if it cannot be written.
+    Arrays as in DATASETS; the bodies' core points lie in ``vertices_0``, ``vertices_1``, … [m], and
+    the part, ring and spheroradius of each in ``part_0``, ``ring_0``, ``point_radius_0``, …;
+    ``rule`` says what becomes of a file that is there. Raises FileError if it cannot be written.
     """
     values: dict[str, Any] = {
         "time": times, "body": np.arange(len(shapes)), "component": COMPONENTS,
         "axis": COMPONENTS[:2], "position": position, "velocity": velocity,
     }  # fmt: skip
-    if len(shapes) == 2:
-        values["centre_distance"] = centre_distance(position)
     for body, shape in enumerate(shapes):
         table = table_of(shape.parts)
-        values |= {f"vertex_{body}": np.arange(len(shape.vertices)),
-                   f"vertices_{body}": shape.vertices, f"part_{body}": table.part,
-                   f"ring_{body}": table.ring, f"point_radius_{body}": table.radius}  # fmt: skip
-    motion = motion_group([shape.is_compound for shape in shapes]).labelled(values)
-    for body, shape in enumerate(shapes):
-        motion.columns[f"vertices_{body}"].about["radius"] = shape.radius
+        values |= {f"vertex_{body}": np.arange(len(table.place)), f"vertices_{body}": table.place,
+                   f"part_{body}": table.part, f"ring_{body}": table.ring,
+                   f"point_radius_{body}": table.radius}  # fmt: skip
+    motion = motion_group(len(shapes)).labelled(values)
     TRAJECTORY.write(path, {"": motion}, attributes=facts, rule=rule)
 
 
@@ -314,9 +304,9 @@ def read_trajectory(path: str | os.PathLike) -> StoredTrajectory:
 
 def stored_shape(file: File, body: int) -> Shape:
     """Return the shape of one body of an open file; ValueError where it is none."""
-    points = file.read(f"vertices_{body}")
-    radius = float(file.node(f"vertices_{body}").attributes["radius"])
-    if f"part_{body}" in file:
-        columns = (file.read(f"{name}_{body}") for name in POINTS)
-        return shape_of_parts(parts_in(PointTable(points, *columns)))
-    return SpheroPolygon(points, radius) if len(points) > 1 else Sphere(radius)
+    points = f"vertices_{body}"
+    if f"part_{body}" not in file:  # version 2, of a body without holes or parts
+        radius = float(file.node(points).attributes["radius"])
+        return shape_of_parts((Part((file.read(points),), radius),))
+    columns = (file.read(f"{name}_{body}") for name in ("vertices", *POINTS))
+    return shape_of_parts(parts_in(PointTable(*columns)))

@@ -268,10 +268,10 @@ class Trajectory:
         A file that is there is left alone, unless ``overwrite``, which keeps it under another name.
         FileError where it cannot be written.
         """
-        from flocsim.io.outputs import SCRIPT_WAYS, check_outputs
+        from flocsim.io.outputs import check_outputs
         from flocsim.io.trajectory import write_trajectory
 
-        check_outputs([file], overwrite, [], SCRIPT_WAYS)
+        check_outputs([file], overwrite)
         facts: dict[str, str | float] = {
             "status": self.status.name, "steps": self.steps, "rejected": self.rejected,
             "error": self.error,
@@ -308,14 +308,14 @@ class Trajectory:
         that is there is left alone, unless ``overwrite``. UsageError for another ending, and where
         gsd is not installed (``pip install 'flocsim[formats]'``).
         """
-        from flocsim.io.outputs import SCRIPT_WAYS, check_outputs
+        from flocsim.io.outputs import check_outputs
         from flocsim.io.trajectory import WRITERS
 
         path, rule = Path(file), overwrite
         write = WRITERS.get(path.suffix.lower())
         if write is None:
             raise UsageError(f"{path}: an exported file must end in {' or '.join(WRITERS)}")
-        check_outputs([path], rule, [], SCRIPT_WAYS)
+        check_outputs([path], rule)
         write(path, self.t, self.position, self.velocity, self.shapes, rule)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.ensembles.pairs.opened import open_results
+from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.results.schema import OUTCOMES
 from flocsim.io.results.strength_file import STATUS
@@ -76,7 +76,7 @@ def test_rates_give_a_row_for_every_pair_of_classes(capsys):
     assert (float(first["r_i"]), float(first["r_j"])) == (5e-6, 1e-5)
     assert rows[0]["efficiency3"] == "", "bodies of one size do not settle onto each other"
     assert "kernel-replicates.csv" in exported(capsys, "kernel.h5")
-    assert open_results("kernel.h5").labelled("kernel").axes["r_j"].axes == ("j",)
+    assert StudyResults("kernel.h5").labelled("kernel").axes["r_j"].axes == ("j",)
 
 
 def test_swarms_give_what_is_counted_over_time(capsys):

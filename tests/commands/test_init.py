@@ -5,7 +5,7 @@ import re
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.commands.init import COMMANDS, KINDS, TEMPLATES
+from flocsim.commands.init import COMMANDS, KINDS
 from flocsim.ensembles.config.loader import load_any_config
 from flocsim.ensembles.config.schema import PRESETS
 from flocsim.io.shape_library import SHIPPED
@@ -109,16 +109,3 @@ def test_few_spheres_of_it_come_to_results(kind, tmp_path, monkeypatch, capsys):
     assert main([COMMANDS.get(kind, "ensemble"), "s.toml", *few]) == 0
     told = capsys.readouterr().out
     assert ("capture widths" if kind == "kernel" else "touched before they escaped") in told
-
-
-def test_each_kind_has_its_file():
-    assert {path.stem for path in TEMPLATES.glob("*.toml")} == set(KINDS)
-
-
-def test_the_study_of_measured_flocs_is_the_other_one_but_for_who_meets_whom():
-    study, measured = (
-        (TEMPLATES / f"{kind}.toml").read_text("utf-8").split("\n[")
-        for kind in ("study", "measured")
-    )
-    differing = {a.partition("]")[0] for a, b in zip(study, measured, strict=True) if a != b}
-    assert {name for name in differing if "#" not in name} == {"scene", "shapes"}

@@ -72,12 +72,6 @@ def test_unknown_figures_are_refused(study, figures):
         call("plot", study, "--figures", figures)
 
 
-@pytest.mark.parametrize("command", ["plot", "info"])
-def test_an_absent_file_is_told(command, tmp_path):
-    with pytest.raises(FileError, match="absent"):
-        call(command, tmp_path / "absent.h5")
-
-
 def test_an_impossible_folder_is_told(study):
     with pytest.raises(FileError, match="--output-dir"):
         call("plot", study, "--output-dir", study)
@@ -100,31 +94,19 @@ def test_info_tells_conditions_and_origin(study, capsys):
     assert facts["wall time"] == "12.3457 s"
     assert facts["seed"] == "3"
     assert CONFIG not in text
-
-
-def test_info_counts_outcomes(study, capsys):
-    outcome = make_results(count=8).replicates["outcome"]
-    call("info", study)
-    facts = facts_printed(capsys.readouterr().out)
-    assert facts["outcomes"].startswith(f"{np.sum(outcome == 0)} A, {np.sum(outcome == 1)} B, ")
-    failed, undecided = np.sum(outcome == 6), np.sum(outcome == 5)
+    made = make_results(count=8)
+    a, failed, undecided = (int(np.sum(made.replicates["outcome"] == code)) for code in (0, 6, 5))
+    assert facts["outcomes"].startswith(f"{a} A, ")
     assert f"{undecided} undecided, {failed} failed" in facts["outcomes"]
+    checked, flipped = (made.probabilities[name].sum() for name in ("n_checked", "n_flipped"))
+    again = f"{checked} replicates were run again more accurately, {flipped} of them"
+    assert facts["numerical error"].startswith(again)
 
 
 def test_info_ends_with_the_table_of_probabilities(study, capsys):
     call("info", study)
     table = format_table(make_results(count=8))
     assert capsys.readouterr().out.endswith("\n\n" + table + "\n")
-
-
-def test_info_tells_how_many_were_run_again_and_flipped(study, tmp_path, capsys):
-    table = make_results(count=8).probabilities
-    checked, flipped = table["n_checked"].sum(), table["n_flipped"].sum()
-    call("info", study)
-    fact = facts_printed(capsys.readouterr().out)["numerical error"]
-    assert fact.startswith(
-        f"{checked} replicates were run again more accurately, {flipped} of them"
-    )
 
 
 def test_info_gives_the_config_back_exactly(study, capsys):

@@ -78,7 +78,6 @@ def test_it_is_one_file_of_readable_size():
         ("ensemble s.toml -o b.h5 --dry-run", "8 replicates: 1 type x 2 vertex counts"),
         ("info a.h5", "results of single flocs past a wall"),
         ("info a.h5 --config", 'kind = "lone"'),
-        ("plot a.h5", "a-speed.png"),
         ("report a.h5", "a.html"),
         ("export csv a.h5", ".csv"),
     ],

@@ -175,11 +175,6 @@ def test_a_link_out_of_the_folder_is_not_followed(study, finished):
     assert "leads out of" in refused(study, folder=study)
 
 
-def test_a_module_with_the_name_of_a_loaded_one_is_refused(study):
-    renamed(study, "json:JSONDecoder")
-    assert "same name as a module that is already loaded" in refused(study, folder=study)
-
-
 def test_an_installed_module_is_allowed_by_its_whole_name(study, spy, finished, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(finished), *sys.path[2:]])
     assert flocsim.open(study / "r.h5", own=["own_pull"]).replicate(0).row["outcome"]

@@ -13,7 +13,6 @@ from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
 from flocsim.io.plots import results as figures
 from flocsim.io.shape_library import read_library, write_library
-from tests.helpers.results_files import same_data
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
 from tests.helpers.tiers import rest_slow
 
@@ -93,17 +92,6 @@ def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
     assert (table["pr_a_shape_low"] <= 0.0).all() and (table["pr_a_shape_high"] >= 0.0).all()
     assert main(["report", "study.h5"]) == 0
     assert "shape: with outlines cut closer or wider" in (folder / "study.html").read_text("utf-8")
-
-
-@pytest.mark.slow
-def test_a_study_that_grows_has_the_bytes_of_one_run_at_once(folder, monkeypatch):
-    monkeypatch.chdir(folder)
-    text = STUDY.format(outlines="band", scene=SCENES["resized"])
-    (folder / "study.toml").write_text(text)
-    for words in (["-o", "once.h5"], ["-o", "grown.h5", "--replicates", "3"],
-                  ["-o", "grown.h5", "--resume", "--replicates", "8"]):  # fmt: skip
-        assert main(["ensemble", "study.toml", "--quiet", *words]) == 0
-    assert same_data("once.h5", "grown.h5") == []
 
 
 def test_rows_follow_from_the_ends_of_the_bands(folder):

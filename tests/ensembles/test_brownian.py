@@ -96,11 +96,6 @@ def folder(tmp_path, monkeypatch):
         ({"scene": 'rest_time = "3 s"'}, "scene.rest_time: applies only with meeting"),
         ({"scene": 'rate = "3 1/s"'}, "only with meeting = 'shear' or 'extension'"),
         ({"scene": 'receiver = "fixed"'}, "applies only with meeting = 'settling': remove"),
-        (
-            {"scene": "release = 1.1",
-             "shapes": 'source = "library"\nfile = "synthetic"\nvertices = [16]\nradius = "50 nm"'},
-            "scene.release = 1.1 (r_i + r_j) lets outlines touch that reach 1.6",
-        ),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_one_line(tmp_path, changes, words):
@@ -195,17 +190,8 @@ def test_a_pair_that_a_secondary_minimum_holds_never_touches(folder, capsys):
 
 @pytest.mark.slow
 def test_a_replicate_can_be_looked_at(folder, capsys):
-    words = [
-        "trajectory",
-        "study.toml",
-        "--type",
-        "0.5um-0.5um",
-        "--vertices",
-        "1",
-        "--replicate",
-        "1",
-    ]
-    assert main([*words, "-o", "a.png"]) == 0
+    words = "trajectory study.toml --type 0.5um-0.5um --vertices 1 --replicate 1 -o a.png"
+    assert main(words.split()) == 0
     row = Study(load_config("study.toml")).run(0, 1, 0.0, 1)
     assert OUTCOMES[row["outcome"]] in capsys.readouterr().out
 

@@ -81,7 +81,7 @@ def test_other_draws_are_independent_samples(files, tmp_path):
     first, a, _ = files
     other = changed(tmp_path / "c.h5", first, angle_i=first.replicates["angle_i"] + 1e-9)
     comparison = flocsim.compare(flocsim.open(a), flocsim.open(other))
-    assert not comparison.paired and "independent" in repr(comparison)
+    assert not comparison.paired and "independent" in comparison.table()
     counts = first.probabilities["n_class"]
     held, decided = counts[..., [0, 2]].sum(-1), counts.sum(-1)
     unknown = first.probabilities["n_undecided"] + first.probabilities["n_failed"]

@@ -56,7 +56,7 @@ def test_the_table_and_figures_are_the_commands(synthetic, tmp_path):
     assert "Pr[inside]" in opened.table()
     figure = opened.plot("4", file=tmp_path / "figure.png")
     assert figure.axes and (tmp_path / "figure.png").stat().st_size > 1000
-    assert repr(opened).startswith("StudyResults(")
+    assert repr(opened).startswith("StudyResults(probabilities, ")
 
 
 @pytest.mark.parametrize("library", ["xarray", "pandas"])

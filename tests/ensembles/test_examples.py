@@ -8,8 +8,8 @@ from flocsim.__main__ import main
 from flocsim.ensembles.config.loader import load_any_config, load_config
 from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.swarms.study import SwarmStudy
+from flocsim.io.results import swarm_file
 from flocsim.io.results.file import read_results
-from flocsim.io.results.swarm_file import read_swarm
 from tests.helpers.small_study import ROOT, problems, run_command, write_star_library
 from tests.helpers.tiers import rest_slow
 
@@ -94,4 +94,7 @@ def test_a_reduced_swarm_runs(examples):
     words = ["--set", "scene.number=24", "--set", "scene.duration=0.2", "--quiet"]
     done = run_command(examples, SWARM.name, *words)
     assert (done.returncode, done.stdout, problems(done.stderr)) == (0, "", [])
-    assert read_swarm(examples / "swarm.h5").groups["ends"]["finished"].tolist() == [1, 1]
+    assert swarm_file.SWARMS.read(examples / "swarm.h5").groups["ends"]["finished"].tolist() == [
+        1,
+        1,
+    ]

@@ -13,21 +13,14 @@ from flocsim.ensembles.collision.start import (
     place_pair,
 )
 from flocsim.ensembles.kind import study_of
-from flocsim.ensembles.study import KernelStudy, Study
 from flocsim.geometry.shapes.shape import Sphere
 from flocsim.geometry.shapes.spheropolygon import Composite, SpheroPolygon
 from tests.helpers.kernel_study import kernel_config
-from tests.helpers.small_study import small_config
 
 
 @pytest.fixture
 def study(tmp_path):
     return study_of(kernel_config(tmp_path))
-
-
-def test_the_scene_says_which_study_it_is(study, tmp_path):
-    assert isinstance(study, KernelStudy)
-    assert type(study_of(small_config(tmp_path))) is Study
 
 
 def test_a_replicate_has_an_offset_of_its_own(study):

@@ -8,9 +8,7 @@ from flocsim.__main__ import main
 from flocsim.ensembles.config.schema import ShapesConfig
 from flocsim.io.plots.results import FIGURES
 from flocsim.io.plots.style import add_foot, keep_titles_whole
-from flocsim.io.results.run_group import source_line
 from flocsim.io.shape_library import SHIPPED
-from tests.helpers.results_files import write_results
 from tests.helpers.small_study import run_command, write_small, write_star_library
 from tests.helpers.synthetic_results import make_results
 
@@ -33,18 +31,6 @@ def test_flocs_in_words(keys, count, words):
     assert ShapesConfig(**keys).described(count) == words
 
 
-@pytest.mark.parametrize(
-    ("run", "line"),
-    [
-        ({}, ""),
-        ({"flocsim_version": "0.1.0", "preset": ""}, "flocsim 0.1.0"),
-        ({"shapes": "spheres", "preset": "si"}, "spheres · preset si"),
-    ],
-)
-def test_what_a_file_does_not_state_is_left_out(run, line):
-    assert source_line(run) == line
-
-
 def test_run_info_report_and_comparison_name_the_source(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_star_library(tmp_path / "stars.h5")
@@ -62,14 +48,6 @@ def test_run_info_report_and_comparison_name_the_source(tmp_path, monkeypatch, c
     assert capsys.readouterr().out.count(f"small.h5: {SOURCE}\n") == 2
     drawn = flocsim.open("small.h5").plot("4")
     assert drawn._supxlabel.get_text() == SOURCE
-
-
-def test_files_without_a_source_are_shown_without(tmp_path, capsys):
-    write_results(tmp_path / "old.h5", make_results(count=2, run={}))
-    assert main(["info", str(tmp_path / "old.h5")]) == 0
-    assert capsys.readouterr().out.splitlines()[1] == ""
-    main(["plot", str(tmp_path / "old.h5"), "--figures", "4", "--output-dir", str(tmp_path)])
-    assert (tmp_path / "old-figure-4.png").exists()
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -9,8 +9,6 @@ from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.pairs.opened import replicate_of
 from flocsim.ensembles.storage.identity import identity_of
 from flocsim.ensembles.study import Study
-from flocsim.errors import ZoneError
-from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import OUTCOMES, REPLICATES
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.compound_shapes import framed
@@ -27,11 +25,6 @@ from tests.helpers.small_study import (
 def study(tmp_path_factory):
     """The small study."""
     return small_study(tmp_path_factory.mktemp("study"))
-
-
-def test_shape_and_size(study):
-    assert study.shape == (2, 3, 2, 3)
-    assert study.size == 36
 
 
 def test_conditions_are_in_the_order_of_the_results_file(study):
@@ -98,22 +91,10 @@ def test_each_type_has_its_zone(study):
     assert first - 39.43e-6 == pytest.approx(second - 9.57e-6, rel=1e-9)
 
 
-def test_pairs_are_named_by_their_radii(tmp_path):
-    overrides = {"scene": {"pairs": [["10 um", "20.5 um"]]}, "shapes": {"vertices": [1]}}
-    study = Study(small_config(tmp_path, overrides))
-    assert [each.name for each in study.pairings] == ["10um-20.5um"]
-
-
 def test_spheres_alone_need_no_flocs(tmp_path):
     study = Study(small_config(tmp_path, {"shapes": {"vertices": [1]}}))
     assert study.flocs == []
     assert study.shape == (2, 1, 2, 3)
-
-
-def test_no_zone_no_study(tmp_path):
-    config = small_config(tmp_path, {"forces": {"double_layer": {"potential": "1 mV"}}})
-    with pytest.raises(ZoneError):
-        Study.check(config)
 
 
 def star_study(tmp_path, **shapes):
@@ -201,4 +182,4 @@ pool = 3
 
 def stored(shape):
     """A fit of a library with all rings of a shape."""
-    return StoredFit(shape.vertices, shape.radius, 1.0, table_of(shape.parts))
+    return StoredFit(shape.parts, 1.0)

@@ -17,15 +17,13 @@ from PIL import Image
 from flocsim import Sphere
 from flocsim.ensembles.contents import open_any
 from flocsim.ensembles.sweep import joined
-from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.results.schema import POOLED
 from flocsim.io.results.sweep_file import SweepResults, Swept, write_sweep
-from flocsim.io.seals import seal
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from flocsim.io.trajectory import write_trajectory
 from tests.helpers.compound_shapes import beads, cross, framed
 from tests.helpers.results_files import write_results
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 from tests.helpers.small_rates import mixed, some_kernel
 from tests.helpers.small_study import VALID, write_star_library
 from tests.helpers.swarm_study import make_swarm_results
@@ -96,8 +94,7 @@ def valid_compounds(folder):
     fits = {}
     for make in (framed, beads, cross):
         shape = make(1e-6)
-        table = table_of(shape.parts)
-        fits[len(shape.vertices)] = StoredFit(shape.vertices, shape.radius, 1.0, table)
+        fits[len(shape.vertices)] = StoredFit(shape.parts, 1.0)
     entry = ShapeEntry("a floc", "flocs.png", 1e-6, (0.0, 0.0), 100, 8.0, 1.0, fits)
     write_library(folder / "valid-compounds.h5", [entry])
     return read_sealed(folder / "valid-compounds.h5")

@@ -54,7 +54,7 @@ def read_library_file(path):
     entries = read_library(path)
     for entry in entries:
         for fit in entry.fits.values():
-            assert np.isfinite(fit.vertices).all() and np.isfinite(fit.radius)
+            assert np.isfinite(fit.table.place).all() and np.isfinite(fit.table.radius).all()
             assert math.isfinite(fit.shape.area)
         assert math.isfinite(entry.equivalent_radius / entry.spheroradius)
     info_of(path)
@@ -91,9 +91,9 @@ def read_swarm_file(path):
     """Read it, describe it, and make the shapes."""
     from flocsim.ensembles.contents import info_of
     from flocsim.io.plots.swarm import shape_of
-    from flocsim.io.results.swarm_file import read_swarm
+    from flocsim.io.results.swarm_file import SWARMS
 
-    found = read_swarm(path)
+    found = SWARMS.read(path)
     replicates, _, bodies = found.groups["snapshots"]["cluster"].shape
     for replicate in range(min(replicates, 3)):
         for body in range(min(bodies, 5)):

@@ -31,7 +31,7 @@ from flocsim.ensembles.swarms.study import SwarmStudy
 from flocsim.errors import FileError
 from flocsim.io.journal import PART
 from flocsim.io.results.file import read_results
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from flocsim.process import install
 from tests.helpers.journals import computed_in, records_in, rows_in
 from tests.helpers.small_study import write_star_library
@@ -194,7 +194,7 @@ class Found:
     def at(cls, path, kind):
         """The file at a path; FileError where there is none that can be read."""
         if kind == "swarms":
-            found = read_swarm(path)
+            found = SWARMS.read(path)
             condition = json.dumps(["swarm", int(found.run["vertices"]), 0.0])
             columns = [
                 found.groups[group][name] for group in ("counts", "snapshots", "bodies", "ends")
@@ -282,7 +282,7 @@ def wait_until(holds, seconds):
     """Wait until something holds, for so many seconds at most."""
     until = time.monotonic() + seconds
     while not holds() and time.monotonic() < until:
-        time.sleep(0.003)
+        time.sleep(0.01)
 
 
 def forget_modules():
@@ -311,6 +311,10 @@ def state_of(pid):
 
 def group(number):
     """The processes of a group that have not ended."""
+    try:
+        os.killpg(number, 0)
+    except ProcessLookupError:
+        return []
     states = {int(name): state_of(name) for name in os.listdir("/proc") if name.isdigit()}
     return [pid for pid, (state, of) in states.items() if of == number and state != "Z"]
 

@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 from scipy.special import ndtri
 
+from flocsim.geometry.shapes.shape import Sphere
 from flocsim.io.results.schema import Results
 from flocsim.io.shape_library import ShapeEntry, StoredFit
 from tests.helpers.synthetic_results import bonds_of
@@ -56,6 +57,7 @@ def blank_replicates(shape):
     return blank | {name: np.full(shape, 255, "u1") for name in again}
 
 
+DISC = Sphere(1e-6)
 FIT_VERTICES = (4, 16, 28, 64)
 SMALL_ERRORS = {4: 14.0, 16: 5.0, 28: 2.0, 64: 2.6}
 """RE of small flocs at r = 1, least at N = 28; at larger r it hardly hangs on N."""
@@ -76,7 +78,7 @@ def paper_fits(radii=(1.0, 2.0, 4.0), scale=1.0, sphere=38.0):
             else:
                 errors = {n: SMALL_ERRORS[n] + 0.1 * few for n in FIT_VERTICES}
             errors = {n: scale * re for n, re in errors.items()} | {1: sphere + floc % 3}
-            fits = {n: StoredFit(np.zeros((n, 2)), 1e-6, re) for n, re in errors.items()}
+            fits = {n: StoredFit(DISC.parts, re) for n, re in errors.items()}
             entries.append(ShapeEntry(f"f#{floc} r={radius}", "f.png", 1e-6, (0.0, 0.0), 100, size,
                                       radius, fits))  # fmt: skip
     return entries

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
+from flocsim.io.hdf5 import open_hdf5
 from flocsim.io.results.file import write_results
-from flocsim.io.results.schema import RESULTS
 
 __all__ = ["same_data", "write_results"]
 
 
 def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
-    """Names of the datasets outside ``run`` whose shapes, types or bytes differ.
+    """Names of the datasets outside ``run`` of two files whose shapes, types or bytes differ.
 
     Coordinates included; a dataset that only one file has differs. Empty when all agree.
     """
@@ -22,7 +22,7 @@ def same_data(path_a: str | Path, path_b: str | Path) -> list[str]:
             return mine.text == yours.text
         return one.read(path).tobytes() == other.read(path).tobytes()
 
-    with RESULTS.opened(path_a) as a, RESULTS.opened(path_b) as b:
-        names = {f"{group}/{name}" for file in (a, b) for group in file.names("")
-                 for name in file.names(group) if group != "run"}  # fmt: skip
-        return sorted(n for n in names if n not in a or n not in b or not agree(a, b, n))
+    a, b = open_hdf5(path_a), open_hdf5(path_b)
+    found = {**a, **b}
+    names = [name for name in found if found[name].type and not name.startswith("run/")]
+    return sorted(n for n in names if n not in a or n not in b or not agree(a, b, n))

@@ -2,7 +2,12 @@
 
 import os
 
-from flocsim.io.seals import SEAL_LENGTH, check_seal, open_file
+from flocsim.io.seals import SEAL_LENGTH, SEAL_MARK, check_seal, digest_of, open_file
+
+
+def seal(data: bytes) -> bytes:
+    """Return the bytes of an HDF5 file with their checksum appended."""
+    return data + SEAL_MARK + digest_of(data).hex().encode() + b"\n"
 
 
 def read_sealed(path: str | os.PathLike) -> bytes:

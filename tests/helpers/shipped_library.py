@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from flocsim.geometry.fit.fit import fit_mask
+from flocsim.geometry.shapes.cores import Part
 from flocsim.geometry.shapes.synthetic import EQUIVALENT_PIXELS, synthetic_floc
 from flocsim.io.shape_library import NAME_OF_SHIPPED, SHIPPED, ShapeEntry, StoredFit, write_library
 
@@ -30,7 +31,7 @@ def entry(index: int) -> ShapeEntry:
     size = float(np.sqrt(mask.sum() / np.pi))
     pixel = float(SIZES[index]) / size
     stored = {
-        n: StoredFit(pixel * np.array(fit.shape.vertices), pixel * fit.shape.radius,
+        n: StoredFit((Part((pixel * fit.shape.vertices,), pixel * fit.shape.radius),),
                      fit.relative_error)
         for n, fit in fits.items()
     }  # fmt: skip

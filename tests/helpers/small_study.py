@@ -12,6 +12,7 @@ import pytest
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
+from flocsim.geometry.shapes.cores import Part
 from flocsim.io.shape_library import ShapeEntry, StoredFit, write_library
 from tests.helpers.waiting import PATIENCE
 
@@ -160,7 +161,8 @@ def star_fit(count, ratio):
     """A star of ``count`` vertices around a spheroradius of 1 um."""
     angles = 2.0 * np.pi * np.arange(count) / count
     rays = ratio * 1e-6 * np.where(np.arange(count) % 2, 0.7, 1.0)
-    return StoredFit((rays * np.array([np.cos(angles), np.sin(angles)])).T, 1e-6, 3.0)
+    core = (rays * np.array([np.cos(angles), np.sin(angles)])).T
+    return StoredFit((Part((core,), 1e-6),), 3.0)
 
 
 def mpirun():

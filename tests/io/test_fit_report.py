@@ -2,7 +2,14 @@
 
 import pytest
 
-from flocsim.io.fit_report import coarse_line
+from flocsim.geometry.shapes.shape import Sphere
+from flocsim.io.fit_report import coarse_lines
+from flocsim.io.shape_library import ShapeEntry, StoredFit
+
+
+def entry(name, errors, spheroradius=1.0):
+    fits = {n: StoredFit(Sphere(5e-6).parts, error) for n, error in errors.items()}
+    return ShapeEntry(name, "a.png", 1e-6, (3.0, 4.0), 80, 5.0, spheroradius, fits)
 
 
 @pytest.mark.parametrize(
@@ -10,7 +17,6 @@ from flocsim.io.fit_report import coarse_line
     [
         ({"a": {1: 40.0, 16: 9.0, 64: 4.9}}, ""),
         ({"a": {1: 40.0}}, ""),
-        ({}, ""),
         # Above 5 % at the largest N alone counts.
         (
             {"a": {8: 20.0, 16: 10.0}},
@@ -23,5 +29,10 @@ from flocsim.io.fit_report import coarse_line
     ],
 )
 def test_an_n_too_small_is_reported_with_the_worst_floc(errors, said):
-    line = coarse_line(errors)
-    assert said in line if said else line == ""
+    lines = coarse_lines([entry(name, of_floc) for name, of_floc in errors.items()])
+    assert said in lines[0] if said else lines == []
+
+
+def test_a_disk_as_large_as_a_floc_is_reported_and_its_error_is_not():
+    [line] = coarse_lines([entry("a", {16: 50.0}, 5.0), entry("b", {16: 1.0}, 5.0)])
+    assert line.startswith("warning: the spheroradius is not below r_eq of 2 of 2 flocs")

@@ -9,8 +9,7 @@ import pytest
 from flocsim.errors import FileError
 from flocsim.io.groups import FileFormat, Group, declared
 from flocsim.io.hdf5 import open_hdf5
-from flocsim.io.seals import seal
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 
 SCALES = {
     "replicate": ("i8", "1", "number of the replicate"),
@@ -116,8 +115,8 @@ def instead(name, values):
         (put("touches/of", 0, 3), "touches/of has impossible values"),
         (lambda file: file.attrs.__setitem__("format", "else"), "holds a else: name a file with"),
         (lambda file: file.attrs.__delitem__("format"), "holds a file of another kind"),
-        (lambda file: file.attrs.__delitem__("schema_version"), "does not record a schema version"),
-        (lambda file: file.attrs.__setitem__("schema_version", 1), "never released; run the study"),
+        (lambda file: file.attrs.__delitem__("schema_version"), "has schema version None"),
+        (lambda file: file.attrs.__setitem__("schema_version", 1), "or run the study again"),
         (lambda file: file.attrs.__setitem__("schema_version", 4), "reads 3: read it with"),
     ],
 )

@@ -12,7 +12,7 @@ import pytest
 
 from flocsim.errors import FileError
 from flocsim.io import journal as module
-from flocsim.io.journal import PART, ROWS, SESSION, Journal, journal_of, read_journal
+from flocsim.io.journal import PART, ROWS, SESSION, Journal, as_text, journal_of, read_journal
 from tests.helpers.journals import leave
 
 KEY = '["I", 4, 0.5]'
@@ -61,7 +61,7 @@ def firsts(journal):
 
 def test_what_is_written_is_read(path):
     journal = Journal(path)
-    number = journal.add_session({"command": "é"})
+    number = journal.add(SESSION, as_text({"command": "é"}))
     for data in (b"old", b"new"):
         journal.add(PART, "id", number, "[1]", 7, "state", "{}", data)
     journal.release()
@@ -180,7 +180,7 @@ def test_a_full_disk_leaves_the_journal_as_it_was(path):
 
 def test_a_journal_without_anything_computed_is_removed(path):
     journal = Journal(path)
-    journal.add_session({})
+    journal.add(SESSION, "{}")
     assert journal.is_blank
     journal.release()
     assert list(path.parent.iterdir()) == []

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flocsim.errors import FileError
-from flocsim.io.seals import BLOCK, HDF5_SIGNATURE, SEAL_LENGTH, seal, seal_file
-from tests.helpers.sealed import read_sealed
+from flocsim.io.seals import BLOCK, HDF5_SIGNATURE, SEAL_LENGTH, seal_file
+from tests.helpers.sealed import read_sealed, seal
 
 DATA = HDF5_SIGNATURE + np.random.default_rng(1).bytes(BLOCK + 1000)
 

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from flocsim.io import terminal
-from flocsim.io.terminal import Progress, duration, markdown_table, tell
+from flocsim.io.terminal import Progress, duration, markdown_table
 
 
 class Terminal(io.StringIO):
@@ -101,14 +101,6 @@ def test_what_runs_is_said_and_a_line_on_a_terminal_stays_one(clock):
     assert bar.getvalue().startswith(f"\r 50%  500 of 1000 snapshots, 60 s left; {going}")
 
 
-def test_other_things_than_replicates_are_counted(clock):
-    stream = io.StringIO()
-    report = Progress(4, False, stream, "flocs")
-    clock[0] = 6.0
-    report.report(3)
-    assert stream.getvalue() == " 25%  1 of 4 flocs, 18 s left\n"
-
-
 def in_memory(monkeypatch):
     """Standard output and error as text in memory; pytest puts its own back between fixtures."""
     out, err = io.StringIO(), io.StringIO()
@@ -133,8 +125,7 @@ def test_letters_that_steer_a_terminal_are_written_out(monkeypatch, text, shown)
     with terminal.plain_streams():
         print(text)
         print(text, file=terminal.sys.stderr)
-        tell(text)
-    assert streams[0].getvalue() == 2 * (shown + "\n")
+    assert streams[0].getvalue() == shown + "\n"
     assert streams[1].getvalue() == shown + "\n"
     assert terminal.sys.stdout is streams[0]
 
@@ -184,7 +175,7 @@ def test_a_closed_stream_takes_what_it_is_given(monkeypatch, name):
     streams = in_memory(monkeypatch)
     monkeypatch.setattr(terminal.sys, name, None)
     with terminal.plain_streams():
-        tell("hello")
+        print("hello")
         Progress(3, False).warn("careful")
         assert bool(terminal.output_problem()) == (name == "stdout")
     shown = "".join(each.getvalue() for each in streams)

@@ -10,10 +10,9 @@ from flocsim import Sphere, SpheroPolygon
 from flocsim.__main__ import main
 from flocsim.errors import FileError
 from flocsim.io.hdf5 import open_hdf5
-from flocsim.io.seals import seal
-from flocsim.io.trajectory import DATASETS, DISTANCE, TRAJECTORY, read_trajectory, write_trajectory
+from flocsim.io.trajectory import DATASETS, TRAJECTORY, read_trajectory, write_trajectory
 from tests.helpers.compound_shapes import beads, framed
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 
 SHAPES = (Sphere(2e-6), SpheroPolygon([[0, 0], [4e-6, 0], [0, 3e-6]], 5e-7))
 
@@ -36,9 +35,7 @@ def test_arrays_come_back_with_units(tmp_path):
     with h5py.File(tmp_path / "m.h5") as file:
         for name, array in (("time", times), ("position", position), ("velocity", velocity)):
             np.testing.assert_array_equal(file[name][()], array)
-        gaps = position[:, 1, :2] - position[:, 0, :2]
-        np.testing.assert_allclose(file["centre_distance"][()] ** 2, (gaps**2).sum(axis=1))
-        for name, (_, units, text) in (DATASETS | DISTANCE).items():
+        for name, (_, units, text) in DATASETS.items():
             assert (file[name].attrs["units"], file[name].attrs["long_name"]) == (units, text)
 
 
@@ -47,7 +44,7 @@ def test_shapes_and_facts_come_back(tmp_path):
     with h5py.File(tmp_path / "m.h5") as file:
         for body, shape in enumerate(SHAPES):
             np.testing.assert_array_equal(file[f"vertices_{body}"][()], shape.vertices)
-            assert file[f"vertices_{body}"].attrs["radius"] == shape.radius
+            assert set(file[f"point_radius_{body}"]) == {shape.radius}
             assert file[f"vertices_{body}"].attrs["units"] == "m"
         assert file.attrs["kind"] == "flocsim trajectory"
         assert file.attrs["config"] == 'preset = "si"'
@@ -102,6 +99,29 @@ def test_holes_and_parts_come_back(tmp_path):
         assert [part.radius for part in other.parts] == [part.radius for part in one.parts]
 
 
+def changed(path, change):
+    """Change the HDF5 content of a file and seal it anew."""
+    image = io.BytesIO(read_sealed(path))
+    with h5py.File(image, "r+") as file:
+        change(file)
+    path.write_bytes(seal(image.getvalue()))
+
+
+def as_version_2(file):
+    """Store the first body as version 2 did one without holes or parts: with one radius."""
+    file["vertices_0"].attrs["radius"] = file["point_radius_0"][0]
+    for name in ("part_0", "ring_0", "point_radius_0"):
+        del file[name]
+    file.attrs["schema_version"] = 2
+
+
+def test_trajectories_of_version_2_are_read(tmp_path):
+    write_trajectory(tmp_path / "m.h5", *motion(), SHAPES, {})
+    changed(tmp_path / "m.h5", as_version_2)
+    for one, other in zip(SHAPES, read_trajectory(tmp_path / "m.h5").shapes, strict=True):
+        assert (other.area, other.radius) == pytest.approx((one.area, one.radius), rel=1e-12)
+
+
 def other_ring(file):
     file["ring_0"][5] = 3
 
@@ -115,9 +135,6 @@ def one_short(file):
 @pytest.mark.parametrize("change", [other_ring, one_short])
 def test_rings_that_cannot_be_are_refused(tmp_path, change):
     write_trajectory(tmp_path / "m.h5", *motion(), (framed(1e-6), beads(1e-6)), {})
-    image = io.BytesIO(read_sealed(tmp_path / "m.h5"))
-    with h5py.File(image, "r+") as file:
-        change(file)
-    (tmp_path / "m.h5").write_bytes(seal(image.getvalue()))
+    changed(tmp_path / "m.h5", change)
     with pytest.raises(FileError, match="has no readable trajectory"):
         read_trajectory(tmp_path / "m.h5")

@@ -176,7 +176,7 @@ def test_a_saved_motion_opens_in_xarray(resting, tmp_path):
         np.testing.assert_array_equal(data["position"].sel(body=1, component="y"),
                                       run.position[:, 1, 1])  # fmt: skip
         np.testing.assert_array_equal(data["time"], run.t)
-    with pytest.raises(UsageError, match=r"already exists .* give overwrite=True"):
+    with pytest.raises(UsageError, match=r"already exists .*in Python overwrite=True"):
         run.save(tmp_path / "m.h5")
 
 

@@ -13,7 +13,7 @@ from flocsim.ensembles.collision.pairings import pairings_of
 from flocsim.ensembles.collision.start import zone_distance
 from flocsim.ensembles.config.schema import Config
 from flocsim.geometry.shapes.shape import Shape, Sphere
-from flocsim.geometry.shapes.spheropolygon import SpheroPolygon
+from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 from flocsim.system import System
 
 
@@ -39,14 +39,14 @@ def sphere_pairs(
 
 
 def stand_in(shape, options):
-    """Return a polygon about as large as a sphere: only that it has edges matters."""
+    """Return a polygon as large as a sphere; ShapeError where the spheroradius leaves no core."""
     if options.own is not None:
         return options.own.scaled(shape.radius / options.own.equivalent_radius)
     # Measured flocs have spheroradii of their own.
     radius = options.radius if options.size == "scene" else min(options.radius, 0.5 * shape.radius)
     angles = np.arange(6) * np.pi / 3.0
-    hexagon = np.column_stack([np.cos(angles), np.sin(angles)])
-    return SpheroPolygon((shape.radius - radius) * hexagon, radius)
+    hexagon = SpheroPolygon(np.column_stack([np.cos(angles), np.sin(angles)]), 1.0)
+    return resized(hexagon, shape.radius, radius)
 
 
 def placed_system(config: Config, system: System, shapes: Sequence[Shape]) -> System:

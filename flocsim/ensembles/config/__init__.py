@@ -1,17 +1,17 @@
-"""A study's TOML file: what may stand in it, how it is read strictly, and the objects it makes.
+"""A study's TOML file: its keys, how it is read and checked, and the objects that it makes.
 
-``schema`` holds every table and key, ``pair_scene`` and ``kernel_scene`` those of [scene], a class
-for each kind of it, which other kinds keep in their folders (STUDIES is the table of all);
-``loader`` makes a Config of a file. Under it lie ``presets``, over it ``--set``;
-``sources`` keeps what was read of files. ``values`` reads one value, and tells all that is wrong at
-once, with the lines that ``toml_text`` knows; ``own_classes`` finds a user's force, integrator or
-shape. May import forces, integrators, geometry and body, and nothing else of
-``ensembles``.
+``schema`` declares every table and key; ``pair_scene`` and ``kernel_scene`` declare those of
+[scene], with one class for each kind of it; other kinds keep theirs in their own folders (STUDIES
+lists all kinds). ``loader`` makes a Config of a file, with the preset under it and ``--set`` over
+it, and reports all problems at once, each with its line, which ``toml_text`` finds; ``fields``
+reads single values. ``sources`` keeps the text of the file and of the user's modules, and
+``own_classes`` finds a user's force, integrator or shape in them. This room may import forces,
+integrators, geometry and body, and nothing else of ``ensembles``.
 
-All that a kind of study is lies in one file or folder, whose modules are loaded by name when
-something of the kind is there: `scene` has the class of its [scene] as SCENE, where that has a
-`kind` of its own; `study` what runs it as KINDS, classes of `flocsim.ensembles.kind.StudyKind`;
-`results` what its files hold as CONTENTS, a `flocsim.ensembles.contents.Contents`.
+A kind of study is in one file or folder, whose modules are loaded by name when they are needed:
+`scene` has the class of its [scene] as SCENE, if that has a `kind` of its own; `study` has what
+runs it as KINDS, classes of `flocsim.ensembles.kind.StudyKind`; `results` has what its files hold
+as CONTENTS, a `flocsim.ensembles.contents.Contents`.
 """
 
 import importlib

@@ -112,10 +112,6 @@ class KernelScene(pair_scene.PairScene):
         """Places of the two size classes of every collision type."""
         return tuple((i, j) for _, i, j in self.conditions)
 
-    def only(self, places: Any) -> "KernelScene":
-        """Return the scene as it is: its classes stay together."""
-        return self
-
     def problems(self, config: Any) -> Iterator[pair_scene.Problem]:
         """Yield what does not go together with the other tables of a config."""
         yield from super().problems(config)

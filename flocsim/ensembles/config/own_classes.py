@@ -6,7 +6,6 @@ The module lies beside the config file or is installed; the attrs fields of the 
 import contextlib
 import importlib
 import inspect
-import os
 import sys
 import traceback
 from numbers import Real
@@ -96,7 +95,7 @@ def load_module(named: str, folder: Path, sources: Sources) -> Any:
     importlib.invalidate_caches()
     try:
         if allowed is None or name not in allowed.own:
-            file, top = finder.file_of(name), name.partition(".")[0]
+            file = finder.file_of(name)
             if allowed is not None and (allowed.folder is None or file is None):
                 lacking = f"{allowed.folder} does not have it; " if allowed.folder else ""
                 raise ConfigError(
@@ -106,16 +105,6 @@ def load_module(named: str, folder: Path, sources: Sources) -> Any:
                     f'it is installed, the module (--own {name}, or own=["{name}"])'
                 )
             finder.forget_changed()
-            known = getattr(sys.modules.get(top), "__file__", None) or ""
-            beside = finder.file_of(top)
-            if (
-                beside
-                and top in sys.modules
-                and os.path.realpath(known) != os.path.realpath(beside)
-            ):
-                raise ConfigError(
-                    f"{beside} has the same name as a module that is already loaded: rename it"
-                )
             sys.meta_path.insert(0, finder)
             # Extension modules and folders without __init__.py are found by Python itself.
             sys.path[:0] = [str(finder.folder)] if allowed is None else []

@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import attrs
 
@@ -291,18 +291,6 @@ class PairScene:
         if len(labels) == 1:
             return (MEASURED,)
         return tuple(f"{labels[a]}-{labels[b]}" for a, b in self.class_pairs)
-
-    def only(self, places: Iterable[int]) -> Self:
-        """Return the scene with the collision types, or pairs, at these places alone.
-
-        Pairs of size classes stay together: there the scene is as it was.
-        """
-        if isinstance(self.pairs, str):
-            return self
-        if self.pairs:
-            return attrs.evolve(self, pairs=tuple(self.pairs[place] for place in places))
-        names = self.types or ()
-        return attrs.evolve(self, types=tuple(names[place] for place in places))
 
     def problems(self, config: Any) -> Iterator[Problem]:
         """Yield what does not go together with the other tables of a config."""

@@ -98,10 +98,7 @@ def collision_lines(config: Config, flocs: Sequence[Floc]) -> Iterator[str]:
             yield f"  {sphere_words(thermal[name])}"
         if own:
             spans = (f"{1e6 * low:.4g} to {1e6 * high:.4g} um" for low, high in pairing.spans)
-            yield (
-                f"  measured sizes, r_i {', r_j '.join(spans)}; delta_max and D_0 are those of "
-                "each pair"
-            )
+            yield f"  measured sizes, r_i {', r_j '.join(spans)}"
         numbers = [
             f"{each['body']} {1e3 * each['speed']:.4g} mm/s, Re = {each['reynolds']:.2g}, "
             f"St = {each['stokes']:.2g}"
@@ -130,6 +127,4 @@ def pilot_lines(config: Config, ranks: int) -> list[str]:
         f"core-hours{most * (found.replicates < config.replicates)}: {hours[0]:.2g} "
         f"({hours[1]:.2g} to {hours[2]:.2g}); on {ranks} rank{'s' * (ranks != 1)} "
         f"{duration(found.cpu / ranks)}, and some tens of seconds where code is compiled first",
-        f"results file: about {found.size / 1e6:.3g} MB; its journal takes as much again until the "
-        "study is done",
     ]

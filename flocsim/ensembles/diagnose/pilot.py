@@ -33,9 +33,6 @@ START = 0.8
 EACH = 2.5e-4
 """CPU time [s] of handing out, storing and counting a replicate (benchmarks.accuracy.dry_run)."""
 
-FILE_BYTES, CONDITION_BYTES = 180_000, 1_600
-"""Size of a results file besides its rows: in all, and for each condition."""
-
 
 T = TypeVar("T")
 
@@ -43,15 +40,14 @@ T = TypeVar("T")
 class Forecast(NamedTuple):
     """The cost of a study with so many ``replicates`` of each condition.
 
-    ``cpu`` and its 95 % interval ``low`` to ``high`` [s], compiling left out; ``size`` of the
-    results file [B]; ``ended``: how many replicates of the pilot had which outcome.
+    ``cpu`` and its 95 % interval ``low`` to ``high`` [s], compiling left out; ``ended``: how many
+    replicates of the pilot had which outcome.
     """
 
     replicates: int
     cpu: float
     low: float
     high: float
-    size: float
     ended: Counter
 
 
@@ -123,5 +119,4 @@ def forecast_of(study: Any, ranks: int, seconds: float = SECONDS) -> Forecast:
         cpu += pairs_made(study, count, ranks) * float(np.mean(setups))
     spread = float(np.std(runs or [0.0])) / max(mean, 1e-9) / math.sqrt(max(len(runs), 1))
     factor = math.exp(2.0 * math.hypot(spread, CLOCK))
-    file = FILE_BYTES + len(study.conditions) * CONDITION_BYTES + size * study.row.itemsize
-    return Forecast(count, cpu, cpu / factor, cpu * factor, file, ended)
+    return Forecast(count, cpu, cpu / factor, cpu * factor, ended)

@@ -1,112 +1,63 @@
 """What is wrong or implausible in a study, known before anything is compiled or run.
 
-Each question about a study is one function here. Those of REFUSALS raise the error that the study
-would meet; `study_warnings` collects warnings, of which `flocsim.plausibility` asks those that any
-scene has. Measured flocs are judged by the largest of each collision type, which settle fastest.
+`check_study` raises the error that the study would meet; `study_warnings` collects warnings, of
+which `flocsim.plausibility` asks those that any scene has. Measured flocs are judged by the largest
+of each collision type, which settle fastest.
 """
 
-import itertools
 import math
-import sys
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from flocsim.compiler.fingerprint import refuse_interpreter
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.ensembles.collision.draw import exact_method
 from flocsim.ensembles.collision.encounter import Encounter
-from flocsim.ensembles.collision.equivalent import kinds, measured_flocs, sphere_pairs
-from flocsim.ensembles.collision.flocs import Floc, pool_of, read_flocs
-from flocsim.ensembles.collision.mechanisms import refuse_release
+from flocsim.ensembles.collision.equivalent import kinds, sphere_pairs
+from flocsim.ensembles.collision.flocs import Floc, read_flocs
 from flocsim.ensembles.collision.outcomes import OBSERVER
-from flocsim.ensembles.collision.pairings import pairings_of
-from flocsim.ensembles.collision.start import zone_distance
-from flocsim.ensembles.config.pair_scene import BROWNIAN, SETTLING
 from flocsim.ensembles.config.schema import PRESETS, Config
+from flocsim.ensembles.config.sources import RUN
 from flocsim.errors import ConfigError, KernelError
 from flocsim.explain import pairs_of
-from flocsim.forces import Contact, ContactForce, Force
+from flocsim.forces import Contact, ContactForce, Force, PairForce
 from flocsim.forces.body_forces import kick_parameters
+from flocsim.forces.check import samples_of
 from flocsim.forces.codegen import laws_of
 from flocsim.forces.contact import impact_exponent
-from flocsim.geometry.shapes.shape import Shape, Sphere
 from flocsim.integrators.loop.driver import advance
 from flocsim.plausibility import ROUNDING, Names, plausibility_warnings
-from flocsim.run import invalid_value
-from flocsim.state.views import ContactView, OrientedView, OutlineView, PairView
+from flocsim.run import family, invalid_value
+from flocsim.state.views import ContactView
 from flocsim.system import System
 
 Flocs = Sequence[Floc]
-
-CLOSE_GAPS = (1e-9, 1e-12, 0.0, -1e-12)
-"""Gaps [m] that any two bodies that collide come through: a pole at 0 turns a repulsion into an
-attraction there."""
 
 PARTS = 16
 """Intervals of the work of the contact force."""
 
 
 def inputs_of(config: Config, path: str) -> list[str]:
-    """Return the files of a study: the config at ``path``, its library, its own classes."""
+    """Return the files of a study: the config at ``path``, its library, the user's modules."""
     library = [str(config.shapes.file)] if config.shapes.file else []
-    # A class of the user's own is read from the file of a module that is loaded.
-    files = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
-    return [path, *library, *(file for file in files if isinstance(file, str))]
+    return [path, *library, *(str(file) for file, _ in RUN.values())]
 
 
 def check_study(config: Config) -> None:
     """Raise the FlocsimError that a study of pairs or rates would meet."""
     flocs = read_flocs(config.shapes) if config.shapes.source == "library" else []
-    for question in REFUSALS:
-        question(config, flocs)
+    require_contact(config)
+    require_meeting(config, flocs)
+    require_stiffness(config, flocs)
 
 
-def require_contact(config: Config, _: Flocs = ()) -> None:
+def require_contact(config: Config) -> None:
     """Raise ConfigError without a contact force."""
     if not any(isinstance(force, ContactForce) for force in config.forces):
         raise ConfigError(
             "bodies that meet need a contact force, found none among "
             f"{', '.join(config.force_names)}: add [forces.contact]"
         )
-
-
-def require_core(config: Config, _: Flocs) -> None:
-    """Raise ConfigError where the spheroradius is as large as the smallest body."""
-    if resizes(config) and config.shapes.radius >= smallest(config):
-        raise ConfigError(
-            f"shapes.radius = {config.shapes.radius:g} m leaves no room for a core in the smallest "
-            f"body, of r_eq = {smallest(config):g} m: choose a smaller shapes.radius"
-        )
-
-
-def resizes(config: Config) -> bool:
-    """Return True if flocs are resized to the radii of the scene, their spheroradius given."""
-    shapes = config.shapes
-    return shapes.own is None and shapes.size == "scene" and max(shapes.vertices) > 1
-
-
-def smallest(config: Config) -> float:
-    """Return the smallest radius of a scene that gives them [m]."""
-    return min(min(radii) for _, radii in config.scene.given)
-
-
-def require_apart(config: Config, flocs: Flocs) -> None:
-    """Raise ConfigError where outlines may touch as a brownian meeting begins.
-
-    Of flocs that are yet to grow it is not known.
-    """
-    if config.scene.meeting != BROWNIAN:
-        return
-    pool = pool_of(config.shapes, flocs)
-    shapes: list[Shape] = [config.shapes.own or Sphere(1.0)]
-    for each in pairings_of(config, flocs, pool):
-        for radius in each.radii:
-            for place, floc in enumerate(flocs):
-                shapes += [pool.shape(place, n, radius) for n in floc.shapes]
-    farthest = max(shapes, key=lambda shape: shape.bounding_radius / shape.equivalent_radius)
-    refuse_release(config.scene, [farthest, farthest])
 
 
 def require_meeting(config: Config, flocs: Flocs) -> None:
@@ -133,51 +84,18 @@ def check_laws(pair: Encounter) -> None:
     refuse_interpreter(advance, system.fillings(OBSERVER))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
-    views = close_views(system)
+    # Colliding bodies come through all gaps that samples have, a gap of 0 among them: a pole there
+    # would turn a repulsion into an attraction.
     for name, force in system.pieces.used.items():
-        if words := invalid_value(force, laws_of([force], system.fluid), views, system.fluid):
+        if not isinstance(force, PairForce | ContactForce):
+            continue
+        own = laws_of([force], system.fluid)
+        views = {key: [*samples_of(force)] for key in map(family, own.laws)}
+        if words := invalid_value(force, own, views, system.fluid):
             raise KernelError(
                 f"{name}: {words}, which every collision reaches: bound whatever it divides by or "
                 "takes a root, power or logarithm of, as in max(pair.gap, 1e-10)"
             )
-
-
-VIEWS: dict[str, Any] = {
-    "centre": PairView, "surface": PairView, "contact": ContactView, "outline": OutlineView,
-    "oriented": OrientedView,
-}  # fmt: skip
-"""What laws of each name are shown of two bodies."""
-
-
-def close_views(system: System) -> dict[str, list]:
-    """Return what laws are shown of two bodies that come to touch, spheres of their size."""
-    i, j = system.bodies
-    radius_i, radius_j = i.shape.equivalent_radius, j.shape.equivalent_radius
-    known = {
-        "time": 0.0, "slip": 0.0, "slip_rate": 0.0, "angle_i": 2.0, "angle_j": -1.0,
-        "radius_i": radius_i, "radius_j": radius_j, "smaller_radius": min(radius_i, radius_j),
-        "reduced_radius": radius_i * radius_j / (radius_i + radius_j), "depth": radius_i,
-        "effective_mass": j.mass if i.fixed else i.mass * j.mass / (i.mass + j.mass),
-    }  # fmt: skip
-    views: dict[str, list] = {name: [] for name in VIEWS}
-    for gap, rate in itertools.product(CLOSE_GAPS, (-1e-4, 1e-4)):
-        known |= {"gap": gap, "gap_rate": rate, "centre_distance": radius_i + radius_j + gap}
-        known |= {"parted_gap": gap, "overlap": max(abs(gap), 1e-12), "overlap_rate": rate}
-        known |= dict.fromkeys(("plate_gap", "depth_gap"), max(gap, 1e-10))
-        for name, view in VIEWS.items():
-            views[name].append(view(*map(known.__getitem__, view._fields)))
-    return views
-
-
-def require_exactness(config: Config, _: Flocs) -> None:
-    """Raise ConfigError where second runs are asked for that no parameter makes more exact."""
-    share, method = config.integrator.check_share, config.integrator.method
-    if not isinstance(share, str) and share > 0.0 and exact_method(method) is None:
-        raise ConfigError(
-            f"integrator.check_share = {share:g} cannot be: {config.integrator.label} has no "
-            "parameter `tolerance` or `step` that could be made smaller for a second run: give it "
-            "one, or leave check_share out"
-        )
 
 
 def require_stiffness(config: Config, flocs: Flocs) -> None:
@@ -193,17 +111,9 @@ def require_stiffness(config: Config, flocs: Flocs) -> None:
             if flocs and config.shapes.size == "own" and shapes is not spheres:
                 measured = [shape.radius for floc in flocs for shape in floc.shapes.values()]
                 radii = [float(np.median(measured))] * 2
-            what = "the spheres" if shapes is spheres else "the outlines, their spheroradii"
-            found += impact(name, pair, radii, what)
+            found += impact(name, pair, radii)
     if found:
         raise ConfigError(max(found)[1])
-
-
-REFUSALS = (
-    require_contact, require_core, require_apart, require_meeting, require_exactness,
-    require_stiffness,
-)  # fmt: skip
-"""Questions (config, flocs of its library) whose answer may be an error."""
 
 
 def depth(speed: float, mass: float, stiffness: float, damping: float) -> float:
@@ -244,12 +154,10 @@ def spring_and_dashpot(
     return 2.0 * mean / deepest, max(2.0 * damped / speed, 0.0)
 
 
-def impact(
-    name: str, pair: Encounter, radii: Sequence[float], what: str
-) -> Iterator[tuple[float, str]]:
+def impact(name: str, pair: Encounter, radii: Sequence[float]) -> Iterator[tuple[float, str]]:
     """Yield how many times too soft a contact is and the words on it, where it is too soft.
 
-    ``radii`` [m] of the outlines that touch, of ``what``: the law is valid to half of their sum.
+    ``radii`` [m] of spheres, or spheroradii of outlines: the law is valid to half of their sum.
     The speed is that at which the spheres settle onto each other.
     """
     speed, deepest = math.hypot(*pair.drift), DEEPEST_OVERLAP * sum(radii)
@@ -267,8 +175,8 @@ def impact(
         cure = f"give forces.contact.{key} {wanted:g} {unit} or more"
     words = (
         f"{name}: an impact at {1e3 * speed:.4g} mm/s is {1e6 * reached:.3g} um deep, more than "
-        f"the {1e6 * deepest:.3g} um for which the contact law is valid (half of r_i + r_j of "
-        f"{what}): {cure}, or lighter bodies"
+        f"the {1e6 * deepest:.3g} um for which the contact law is valid (half of r_i + r_j, of "
+        f"outlines their spheroradii): {cure}, or lighter bodies"
     )
     yield factor, words
 
@@ -320,32 +228,8 @@ def study_warnings(config: Config, flocs: Flocs | None = None) -> list[str]:
     systems = [pair.system for _, pair in sphere_pairs(config, flocs, "largest")]
     # In a flow bodies meet without their weight.
     lines = config_warnings(config, systems, systems[0].forces)
-    if resizes(config):
-        share = config.shapes.radius / smallest(config)
+    shapes = config.shapes
+    if shapes.own is None and shapes.size == "scene" and max(shapes.vertices) > 1:
+        share = shapes.radius / min(min(radii) for _, radii in config.scene.given)
         lines.append(ROUNDING.warning("shapes.radius over the smallest equivalent radius", share))
-    return [line for line in lines if line] + trivial_values(config, flocs)
-
-
-def trivial_values(config: Config, flocs: Flocs | None = None) -> list[str]:
-    """Return lines on values that make the answer of a study known beforehand."""
-    scene, shapes, lines = config.scene, config.shapes, []
-    if shapes.source == "library" and shapes.vertices == (1,):
-        lines.append(
-            "shapes.vertices = [1] takes every floc of the library for its equivalent sphere, so "
-            "that no shape counts: add a number of vertices, as in [1, 16]"
-        )
-    if scene.kind != "binary" or scene.meeting == BROWNIAN:
-        return lines
-    # D_0 over r_i + r_j of every collision type.
-    reaches = [
-        zone_distance(config.zone, config.forces, *pairing.largest) / sum(pairing.largest)
-        for pairing in pairings_of(config, measured_flocs(config) if flocs is None else flocs)
-    ]
-    beyond = [delta for delta in scene.delta if delta > max(1.0, *reaches)]
-    if beyond and scene.meeting == SETTLING:
-        lines.append(
-            f"scene.delta = {beyond[-1]:g} misses by construction: offsets are fractions of "
-            "delta_max, at 1 of which the outlines just graze, and the attraction zone ends at "
-            f"{max(reaches):.3g} of it: give fractions up to 1, as 0.5 for 50 %"
-        )
-    return lines
+    return [line for line in lines if line]

@@ -52,7 +52,7 @@ from flocsim.ensembles.study import KernelStudy
 from flocsim.forces.pair_resistance import resistance_of_pairs
 from flocsim.io.confidence import student_quantile, wilson
 from flocsim.io.results.events import AGGREGATED, WITHOUT_OUTCOME, Events, kinds_of
-from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel, fractal_in
+from flocsim.io.results.kernel_group import ESTIMATES, KERNEL, WHAT, Kernel
 from flocsim.io.results.schema import NOT_APPLICABLE
 
 Rows = Mapping[str, np.ndarray] | np.ndarray
@@ -148,6 +148,7 @@ def estimate(
     """
     first, *runs = by_runs([rows[name] for name in EXACT_RUNS])
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
+    # The shift counts a point by its most exact run if that came to an outcome, else by its first.
     known = run_so(exact) & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
     moved = [np.where(known, *pair) for pair in zip(exact, first, strict=True)]
     values = values_of(points, first, scrambles, most_unknown)
@@ -158,6 +159,7 @@ def estimate(
     for name in counts[0]:
         sides = [gains_and_losses(before[name], after[name]) for before, after in pairwise(counts)]
         values[f"{name} changes"] = kind_changes(kinds, runs, sides)
+    # A flip needs an outcome in both runs: otherwise it is not known whether there was one.
     now = became(exact)
     for name in WHAT:
         both = run_so(exact) & counts[0][name].trials & now[name].trials
@@ -287,5 +289,4 @@ def kernel_of(study: KernelStudy, store: RowStore, count: int) -> Kernel:
         if scene.sizes is None and i == j:
             radii[i] = float(np.mean(study.pairings[place].radii))
     water = resistance_of_pairs(study.config.forces) is not None
-    fractal = fractal_in(repr(study.config.bodies.density))
-    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water, fractal)
+    return Kernel(scene.meeting, np.array(vertices), labels, radii, arrays, water)

@@ -108,12 +108,14 @@ def count_changes(
     (…, 2), by how much the most exact runs change trials and successes.
     """
     runs = again, (np.full_like(again[0], NOT_APPLICABLE),) * 3 if third is None else third
+    # Exact are third runs that came to an outcome, else second ones; kinds are those of first runs.
     exact, kinds = most_exact(*runs), kinds_of(first[0], first[2])
     checked, thrice = map(run_so, runs)
     differ = [(one[0] != other[0]) | (one[1] != other[1])
               for one, other in ((first, exact), runs)]  # fmt: skip
     flags = {"n_checked": checked, "n_flipped": checked & differ[0], "n_third": thrice,
              "n_third_flipped": thrice & differ[1]}  # fmt: skip
+    # A replicate shifts the estimate only if its most exact run came to an outcome.
     known = checked & ~np.isin(exact[0], WITHOUT_OUTCOME) & kinds.any(axis=0)
     counts = {KIND_COUNTS: kind_counts(kinds, *runs)}
     tables = [of(*codes) for codes in (first, *runs, exact)]
@@ -141,12 +143,15 @@ def further(of_kinds: np.ndarray, counts: np.ndarray) -> list[np.ndarray]:
     if of_kinds.ndim > counts.ndim:  # each class or bond by itself
         of_each = [further(of_kinds[..., k, :, :], counts) for k in range(of_kinds.shape[-3])]
         return [np.stack(side, axis=-1) for side in zip(*of_each, strict=True)]
+    # First axis: gained and lost from the first run to the second, then from that to the third.
     changed = np.moveaxis(of_kinds, (-1, -2), (0, 1))
     members, checked, thrice, lost_sight = np.moveaxis(counts, (-1, -2), (0, 1))
     found = []
     for side in range(2):
+        # What has no second run may flip, and so may what came to no outcome when run again.
         parts = [*further_of_kinds(changed[side], checked, members - checked + lost_sight)]
         if thrice.any():
+            # Second runs are not exact either: all that have no third run may flip once more.
             third = changed[2 + side], thrice, members - thrice
             parts.append(further_of_all(*(each.sum(axis=0) for each in third)))
         found.append(flips_together(parts))
@@ -170,6 +175,7 @@ def change_intervals(
         with np.errstate(divide="ignore", invalid="ignore"):
             share = successes / trials
             again = (successes + more_successes) / (trials + more_trials)
+            # The change that is known; further flips may add to it on either side.
             change = np.where(trials + more_trials > 0, again - share, 0.0)
             # No change leads beyond probabilities of 0 and 1.
             low = np.maximum(change - lost / trials, -share)
@@ -190,6 +196,7 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
         for part, *of_kind in zip(found, flipped, checked, exposed, strict=True):
             f, c, u = (each[at] for each in of_kind)
             more = further_flips(f, c, u)
+            # Of a kind that nobody has looked at all may flip, but not where nothing is known.
             if np.any(checked[:, *np.index_exp[at]]):
                 more = np.where(np.isnan(more[0]), [np.ceil(u), u, np.zeros(u.shape)], more)
             part[:, *np.index_exp[at]] = more
@@ -240,6 +247,7 @@ def further_flips(
     if not np.any(c > 0.0):
         unknown = np.where(u > 0.0, np.nan, 0.0)
         return np.stack([unknown, unknown, 1.0 + unknown])
+    # Conditions of the same f of c weigh the distributions alike: computed once, counted often.
     seen, times = np.unique(np.stack([f.ravel(), c.ravel()]), axis=1, return_counts=True)
     k, m = (each.ravel() for each in np.meshgrid(SHAPES, MEANS))
     rate = (k / m)[:, np.newaxis]
@@ -251,6 +259,7 @@ def further_flips(
         + k[:, np.newaxis] * np.log(rate / (rate + c_seen)) - f_seen * np.log(rate + c_seen)
     )  # fmt: skip
     logs = logs @ times + 0.5 * np.log(m)
+    # The largest weight is set to 1 before exponentials are taken: none of them overflows.
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
     some = weights > NEGLIGIBLE

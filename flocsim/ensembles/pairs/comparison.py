@@ -6,7 +6,7 @@ from typing import ClassVar
 import attrs
 import numpy as np
 
-from flocsim.ensembles.contents import Differences, changes_between, common
+from flocsim.ensembles.contents import MEANINGS, Differences, changes_between, common
 from flocsim.ensembles.estimates.numerical import Codes, change_intervals, count_changes
 from flocsim.ensembles.estimates.statistics import (
     EXACT_RUNS,
@@ -137,9 +137,5 @@ def interval_of(each: Events, scrambles: int) -> tuple[np.ndarray, np.ndarray, n
 def arrays_of(s, n, t, m, ends):
     """Return the arrays of MEANINGS of s of n events in the first file, and t of m in the second;
     ``ends``: the difference with its interval."""
-    difference, low, high = ends
     with np.errstate(divide="ignore", invalid="ignore"):
-        return {
-            "first": s / n, "second": t / m, "difference": difference, "difference_low": low,
-            "difference_high": high, "n_first": n, "n_second": m,
-        }  # fmt: skip
+        return dict(zip(MEANINGS, (s / n, t / m, *ends, n, m), strict=False))

@@ -32,7 +32,7 @@ from flocsim.io.plots.style import Figure, add_foot, save
 from flocsim.io.results.file import FORMAT, first_of_each, read_results
 from flocsim.io.results.kernel_group import KERNEL_GROUP
 from flocsim.io.results.run_group import source_line
-from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS, Results
+from flocsim.io.results.schema import CLASSES, FLAGS, GROUPS
 from flocsim.run import Run
 from flocsim.trajectories.replay import Origin
 from flocsim.trajectories.trajectory import Trajectory
@@ -64,14 +64,10 @@ def chosen(value: Any, known: Sequence, option: str, default: int) -> int:
     return known.index(value)
 
 
-def with_one_count(config: Config, vertex_count: int) -> Config:
-    """The config with one number of vertices: the flocs need no fits at the others."""
-    return attrs.evolve(config, shapes=attrs.evolve(config.shapes, vertices=(vertex_count,)))
-
-
 def one_count_study(config: Config, vertex_count: int) -> Study:
-    """Return the Study of `with_one_count`."""
-    return study_of(with_one_count(config, vertex_count))
+    """Return a Study with one number of vertices: the flocs need no fits at the others."""
+    shapes = attrs.evolve(config.shapes, vertices=(vertex_count,))
+    return study_of(attrs.evolve(config, shapes=shapes))
 
 
 def begin_replicate(draw: Draw, steps: int, method: Integrator | None, record: bool = False) -> Run:
@@ -133,14 +129,10 @@ class StudyResults(Tables):
     exported: Sequence[str] = ("probabilities", "replicates")
     format = FORMAT
 
-    def __init__(
-        self, results: Results, source: str | os.PathLike, allowed: Allowed,
-        sources: Sources | None = None,
-    ) -> None:  # fmt: skip
-        self.results, self.source = results, source
-        self.folder = allowed.folder or Path(source).parent
-        self.allowed, self.sources = allowed, sources or Sources()
-        self.path = Path(source)
+    def __init__(self, path: str | os.PathLike, allowed: Allowed | None = None) -> None:
+        self.results = results = read_results(path)
+        self.path, self.allowed = Path(path), allowed or Allowed()
+        self.folder = self.allowed.folder or self.path.parent
         self.types, self.vertices, self.delta = results.types, results.vertices, results.delta
         self.count, self.run = results.count, results.run
         self.probabilities, self.pooled = results.probabilities, results.pooled
@@ -169,10 +161,9 @@ class StudyResults(Tables):
         text = str(self.run.get("config", ""))
         if not text:
             raise FileError(f"{self.path} has no config: it was not written by flocsim ensemble")
-        if self.sources.config is None:
-            self.sources.config, self.sources.allowed = text, self.allowed
+        sources = Sources(text, allowed=self.allowed)
         try:
-            return load_config(self.folder / "study.toml", self.stored("overrides"), self.sources)
+            return load_config(self.folder / "study.toml", self.stored("overrides"), sources)
         except ConfigError as error:
             line, *more = str(error).split("\n")
             further = f" (and {len(more)} more)" if more else ""
@@ -234,9 +225,12 @@ class StudyResults(Tables):
                 f"replicate must be a whole number from 0 to {self.count - 1}, found {replicate!r}"
             )
         place = place_of(self.config, type, vertices, delta)
-        study, row = self.study_with(place[1]), self.row(int(replicate), place)
-        found = replicate_of(int(replicate), place, study)
-        assert found.row is not None, "a replicate of a study"
+        n, share = self.vertices.tolist().index(place[1]), self.delta.tolist().index(place[2])
+        found = replicate_of(int(replicate), place, self.study_with(place[1]))
+        assert self.results.replicates is not None and found.row is not None, "rows of a study"
+        stored = {name: self.results.replicates[name] for name in REPEATED}
+        at = place[0], n, share, int(replicate)
+        row = row_in_words({name: column[at] for name, column in stored.items()})
         for name in REPEATED:
             if found.row[name] != row[name]:
                 self.refuse(f"{name} is {row[name]} in the file, {found.row[name]} now")
@@ -250,16 +244,6 @@ class StudyResults(Tables):
         second for each type. UsageError where that is not known.
         """
         return water_facts(self.config)
-
-    def row(self, replicate: int, place: Place) -> dict[str, Any]:
-        """Return REPEATED of the stored row of a replicate, in words."""
-        name = self.config.scene.names[place[0]]
-        at = (
-            list(self.types).index(name), self.vertices.tolist().index(place[1]),
-            self.delta.tolist().index(place[2]), replicate,
-        )  # fmt: skip
-        assert self.results.replicates is not None
-        return row_in_words({each: self.results.replicates[each][at] for each in REPEATED})
 
     def study_with(self, vertices: int) -> Study:
         """The study of the file with bodies of so many vertices, ready to run replicates again.
@@ -281,23 +265,11 @@ class StudyResults(Tables):
             "and the kind of machine that it was made with"
         )
 
-    def __repr__(self) -> str:
-        shape = " × ".join(map(str, self.results.shape))
-        return f"StudyResults({str(self.path)!r}: {shape} conditions × {self.count} replicates)"
-
-
-def open_results(
-    path: str | os.PathLike, allowed: Allowed | None = None, sources: Sources | None = None
-) -> StudyResults:
-    """A results file of pairs or rates; see `flocsim.open`. ``sources``: what has been read of its
-    modules and libraries."""
-    return StudyResults(read_results(path), path, allowed or Allowed(), sources)
-
 
 def examples_of(path: str | os.PathLike, allowed: Allowed) -> list[Example]:
     """Return the first replicate of each class that the file has, of its flocs with the most
     vertices."""
-    opened, found = open_results(path, allowed), []
+    opened, found = StudyResults(path, allowed), []
     first = first_of_each(opened.results)
     for outcome in filter(first.__contains__, CLASSES):
         t, v, d, k = first[outcome]

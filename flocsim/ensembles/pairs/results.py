@@ -4,9 +4,8 @@ page.
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from flocsim.ensembles import report
 from flocsim.ensembles.config.sources import Allowed
@@ -14,15 +13,14 @@ from flocsim.ensembles.contents import (
     Contents,
     Facts,
     Figures,
-    Joined,
+    Row,
     Summary,
-    in_words,
     later,
-    origin,
+    study_summary,
 )
-from flocsim.errors import visible
+from flocsim.io.labelled import Labelled
 from flocsim.io.results import run_group, schema
-from flocsim.io.results.events import ENDS_COUNTED, ends_of
+from flocsim.io.results.events import ends_of
 from flocsim.io.results.file import read_results
 from flocsim.io.results.run_group import stored
 
@@ -87,54 +85,34 @@ def thermal(run):
     return [("thermal", f"{each['type']}: {run_group.sphere_words(each)}") for each in found]
 
 
-def sweep_rows(found: Any) -> list[tuple[str, ...]]:
-    """Outcomes and Pr[A] of every value and condition, heads first."""
-    table = found.labelled("probabilities")
-    ends = ends_of({name: table.columns[name].values for name in ENDS_COUNTED})
-    rows = [(*found.swept, "type", "N", "delta", "n", *ends, "Pr[A]", "[95 %]")]
-    axes = [table.axes[name].values.tolist() for name in table.columns["pr_a"].axes]
-    columns = [table.columns[name].values for name in ("n_total", "pr_a", "pr_a_low", "pr_a_high")]
-    for place in np.ndindex(*columns[0].shape):
-        names = [axis[k] for axis, k in zip(axes, place, strict=True)]
-        n, value, low, high = (column[place] for column in columns)
-        told = (f"{value:.3f}" if value == value else "-",
-                f"[{low:.3f}, {high:.3f}]" if high == high else "-")  # fmt: skip
-        counts = (str(each[place]) for each in ends.values())
-        rows.append((*(visible(in_words(each), "") for each in names), str(n), *counts, *told))
-    return rows
+def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
+    """Return outcomes and Pr[A] of the conditions of a sweep: heads, and the cells at a place."""
+    columns = {name: each.values for name, each in table.columns.items()}
+    ends = ends_of(columns)
 
+    def row(place: tuple[int, ...]) -> Sequence[str]:
+        counts = (str(each[place]) for each in (columns["n_total"], *ends.values()))
+        pr_a, low, high = (columns[name][place] for name in ("pr_a", "pr_a_low", "pr_a_high"))
+        return *counts, report.with_spread(pr_a, low, high, report.share, report.share)
 
-def asked(results: Any) -> dict[str, Any]:
-    """Return the axes of results, and how many replicates each condition has."""
-    return {"types": list(results.types), "vertices": results.vertices.tolist(),
-            "delta": results.delta.tolist(), "replicates": results.count}  # fmt: skip
-
-
-def sweep_figures() -> Figures:
-    """Return the figures of a sweep of pairs or rates."""
-    from flocsim.io.plots.curves import SWEEP_FIGURES
-
-    return SWEEP_FIGURES
+    return ("n", *ends, "Pr[A] 95 %"), row
 
 
 class PairFiles(Contents):
     """What becomes of the rows of a study of pairs or rates; what commands show of its files."""
 
     title = "results of a collision ensemble"
+    file = schema.RESULTS
     compared = schema.COMPARED
-    joined = Joined(
-        {name: schema.GROUPS[name] for name in ("probabilities", "pooled")}, sweep_rows,
-        sweep_figures, asked, {axis: len(words) for axis, words in schema.LAST_AXES.items()},
-        tuple(schema.RADII),
-        lambda swept: report.graze_lines(swept.labelled("probabilities").axes["delta"].values),
-    )  # fmt: skip
+    swept = ("probabilities", "pooled")
+    swept_table = staticmethod(swept_table)
     results = later("ensembles.pairs.study", "results")
     old_rows = later("ensembles.pairs.study", "old_rows")
     so_far = later("ensembles.pairs.study", "so_far")
     facts = later("ensembles.pairs.study", "facts")
     stop_rule = later("ensembles.estimates.statistics", "stop_rule")
     dry_run = later("ensembles.diagnose.dry_run", "dry_run")
-    opened = later("ensembles.pairs.opened", "open_results")
+    opened = later("ensembles.pairs.opened", "StudyResults")
     compare = later("ensembles.pairs.comparison", "compare")
     examples = later("ensembles.pairs.opened", "examples_of")
     verdict = staticmethod(report.verdict)
@@ -147,12 +125,10 @@ class PairFiles(Contents):
         checked = report.checked_line(results) or "unknown: no replicate was run again"
         facts.append(("numerical error", checked))
         facts += [("", line) for line in report.change_lines(results)]
-        warnings = [str(line) for line in stored(run, "warnings")]
-        warnings += filter(None, [report.undecided_line(results)])
-        failed = [run_group.describe_note(note) for note in stored(run, "failed")]
         facts += settling(run) + thermal(run)
         facts += [("touched", line) for line in report.touch_lines(results)]
-        return Summary(facts, origin(run, SAID_APART), warnings, failed)
+        more = filter(None, [report.undecided_line(results)])
+        return study_summary(facts, run, run_group.describe_note, SAID_APART, more)
 
     def table(self, results: schema.Results) -> str:
         """Return the rates; or the efficiencies, if there are any, and the counts and

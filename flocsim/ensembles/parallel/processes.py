@@ -210,15 +210,10 @@ def in_copies(works: Sequence[Callable[[], object]]) -> None:
         context.Process(target=as_copy, args=(work, place > 0), daemon=True)
         for place, work in enumerate(works)
     ]
-    try:
-        for copy in copies:
-            copy.start()
-        for copy in copies:
-            copy.join()
-    finally:
-        for copy in copies:
-            if copy.pid is not None:
-                copy.kill()
+    for copy in copies:
+        copy.start()
+    for copy in copies:
+        copy.join()
 
 
 def as_copy(work, silent):

@@ -193,29 +193,20 @@ def short(identity: dict) -> str:
 
 def differences(stored: dict, current: dict) -> list[str]:
     """Return lines on what differs between two identities; none where rows of both agree."""
-    names = sorted(stored.keys() | current.keys())
-    apart = [name for name in names if stored.get(name) != current.get(name)]
-    both = [
+    apart = [
         name
-        for name in apart
-        if not name.startswith(PARTIAL) or (name in stored and name in current)
+        for name in sorted(stored.keys() | current.keys())
+        if stored.get(name) != current.get(name)
+        and (not name.startswith(PARTIAL) or (name in stored and name in current))
     ]
-    # What the user has changed comes first; what follows from it need not be said.
-    telling = [name for name in both if name.partition(".")[0] not in EXPLAINED] or both
-    if "arithmetic" in telling:
-        telling = [name for name in telling if not name.startswith("flocs.")]
-    lines = []
-    for name in telling:
-        kind, _, rest = name.partition(".")
-        if kind in EXPLAINED:
-            lines.append(EXPLAINED[kind].format(rest))
-        else:
-            there, here = (
-                json.dumps(each[name]) if each.get(name) is not None else "nothing"
-                for each in (stored, current)
-            )
-            lines.append(f"{name} is {there} in the file, {here} now")
-    return lines
+    # What the user has changed; what follows from it is said where there is nothing else.
+    lines = [
+        f"{name} is {json.dumps(stored.get(name))} in the file, {json.dumps(current.get(name))} now"
+        for name in apart if name.partition(".")[0] not in EXPLAINED
+    ]  # fmt: skip
+    return lines or [
+        EXPLAINED[kind].format(rest) for kind, _, rest in (name.partition(".") for name in apart)
+    ]
 
 
 EXPLAINED = {

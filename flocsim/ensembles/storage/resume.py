@@ -19,7 +19,7 @@ from flocsim.ensembles.storage.row_store import RowStore, sessions_of
 from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.files import Rule, ordinary_target, set_aside
 from flocsim.io.groups import UNREADABLE
-from flocsim.io.journal import DAMAGED, ROWS, Journal, journal_path
+from flocsim.io.journal import DAMAGED, ROWS, SESSION, Journal, as_text, journal_path
 from flocsim.io.outputs import in_the_way
 from flocsim.io.results.run_group import now, processor, source_line, stored
 from flocsim.io.seals import held
@@ -28,12 +28,14 @@ NEW, RESUME, RESTART = "new", "resume", "restart"
 """What to do about an unfinished run: refuse to touch it, go on with it, put it aside."""
 
 WAYS = (
-    "extend it with --resume if it belongs to this study, or add --overwrite, which keeps the old "
-    "one under another name"
+    "extend it with --resume (in Python mode='resume') if it belongs to this study, or add "
+    "--overwrite (overwrite=True), which keeps the old one under another name"
 )
 """What a user can do about a file in the place of the results."""
 
 MOST_DIFFERENCES = 5
+"""Lines on what differs between two studies in one message."""
+
 HISTORY = ("date", "command", "processor")
 """What is kept of a run that contributed to a results file."""
 
@@ -98,8 +100,9 @@ def claim(output: str | Path, mode: str, overwrite: bool = False) -> tuple[Journ
             remarks.append(
                 f"the file system of {path} has no locks: make sure that no two jobs write there"
             )
-        if mode != RESUME and not overwrite:
-            check_free(output)  # before an unfinished run is put aside
+        # Before an unfinished run is put aside, and after the job that this one waited for.
+        if mode != RESUME and not overwrite and os.path.lexists(ordinary_target(output)):
+            raise in_the_way(output, WAYS)
         if journal.is_blank:
             journal.discard("session", "1")
         elif mode == RESTART:
@@ -145,29 +148,21 @@ def begin(
             if not overwrite:
                 raise UsageError(f"{error}; --overwrite keeps it under another name") from error
             start.remarks.append(str(error))
-    if start.old is None:
-        if not overwrite:
-            check_free(output)
-        elif aside := set_aside(output):
-            start.remarks.append(f"{output} is kept as {aside.name}")
+    # Without `overwrite` a file that has come since `claim` is spared when results are written.
+    if start.old is None and overwrite and (aside := set_aside(output)):
+        start.remarks.append(f"{output} is kept as {aside.name}")
     take_journal(start, study)
     refuse_fewer(start, output, study.config.replicates)
     stop = study.config.stop
     ends_early = None if stop.half_width is None else [stop.half_width, list(stop.of), stop.least]
-    store.session = journal.add_session({
+    store.session = journal.add(SESSION, as_text({
         "kind": study.format, "identity": identity, "layout": layout(study.row), "date": now(),
         "command": shlex.join(sys.argv), "processor": processor(), "rule": ends_early,
         "asked": study.asked(), "source": source_line(study.source),
-    })  # fmt: skip
+    }))  # fmt: skip
     start.rules[store.session] = ends_early
     journal.sync()
     return start
-
-
-def check_free(output: str | Path) -> None:
-    """UsageError where there is a file at the place of the results."""
-    if os.path.lexists(ordinary_target(output)):
-        raise in_the_way(output, WAYS)
 
 
 def take_results(start: Beginning, study: StudyKind, output: str | Path) -> None:
@@ -214,17 +209,12 @@ def refuse_fewer(start: Beginning, output: str | Path, replicates: int) -> None:
     old = start.old
     if old is None or start.is_covered(replicates):
         return
-    asked = set(start.store.conditions)
-    left_out = [condition for condition in old.conditions if condition not in asked]
+    left_out = set(old.conditions) - set(start.store.conditions)
     if left_out or old.count > replicates:
-        what = [f"{old.count} replicates of each"] if old.count > replicates else []
-        if left_out:
-            name, n, share = left_out[0]
-            such = f"type {name}, N = {n}, delta {share:g}"
-            what.insert(0, f"{len(left_out)} conditions such as {such}")
         raise UsageError(
-            f"{output} has rows that this run does not ask for ({'; '.join(what)}), and lacks "
-            "others: ask for all of them together, or name another output"
+            f"{output} has rows that this run does not ask for ({old.count} replicates of each "
+            f"condition, and {len(left_out)} conditions more), and lacks others: ask for all of "
+            "them together, or name another output"
         )
     start.at_least = old.count
 
@@ -237,6 +227,4 @@ def refuse_other(start: Beginning, path: str | Path, stored: dict, remedy: str =
     """UsageError where an identity in a file is not that of this study."""
     if lines := differences(stored, start.identity):
         shown = "; ".join(lines[:MOST_DIFFERENCES])
-        rest = len(lines) - MOST_DIFFERENCES
-        more = f"; and {rest} more" if rest > 0 else ""
-        raise UsageError(f"{path} belongs to another study: {shown}{more}; {remedy}")
+        raise UsageError(f"{path} belongs to another study: {shown}; {remedy}")

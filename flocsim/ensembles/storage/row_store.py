@@ -7,7 +7,6 @@ their checksums whenever they are needed.
 import json
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from sqlite3 import Row
 from typing import Any
 
 import attrs
@@ -32,8 +31,8 @@ from flocsim.io.journal import (
     JournalReader,
     as_text,
 )
-from flocsim.io.json_text import read_json
-from flocsim.io.results.run_group import NOTE, is_session
+from flocsim.io.json_text import matches, read_json
+from flocsim.io.results.run_group import NOTE, SESSION_FORM
 
 
 def sessions_of(journal: JournalReader) -> dict[int, dict]:
@@ -42,7 +41,7 @@ def sessions_of(journal: JournalReader) -> dict[int, dict]:
         found = {row["id"]: read_json(row["about"], {}) for row in journal.records(SESSION)}
     except ValueError as error:
         raise FileError(f"{journal.path} {DAMAGED} ({error})") from error
-    if not all(map(is_session, found.values())):
+    if not all(matches(each, SESSION_FORM) for each in found.values()):
         raise FileError(f"{journal.path} {DAMAGED} (it was not begun by flocsim)")
     return found
 
@@ -147,39 +146,31 @@ class RowStore:
         is not all there. Copies of rows have no parts, but those in the older results that lie
         beside the journal (``trusts_copies``).
         """
-        for record in self.journal.records(PART):
-            place = self.indices.get(record["condition"])
+        known = {self.identity, *self.known}
+        records = ((table, each) for table in (PART, ROWS) for each in self.journal.records(table))
+        for table, record in records:
+            first, place = record["first"], self.indices.get(record["condition"])
+            is_replicate = isinstance(first, int) and 0 <= first < LARGEST_REPLICATE
             try:
-                self.check_record(record)
+                if record["identity"] not in known or not is_replicate:
+                    raise ValueError("a record is of no run of this study")
+                if table == ROWS:
+                    rows = np.frombuffer(record["data"], self.row)
+                    is_copy = record["session"] is None
+                    notes = read_json(record["notes"], [NOTE])
+                    if len(rows) != record["count"] or len(rows) > MOST_ROWS:
+                        raise ValueError("a record has other rows than it says")
+                    if place is not None and not (is_copy and trusts_copies):
+                        check_whole(rows, self.parts.get((place, first), ()))
+                    self.computed += 0 if is_copy else len(rows)
             except (ValueError, TypeError):
-                self.refused.add((PART, record["id"]))
+                self.refused.add((table, record["id"]))
                 continue
-            if place is not None:
-                self.parts[place, record["first"]].ids[record["name"]] = record["id"]
-        for record in self.journal.records(ROWS):
-            place, is_copy = self.indices.get(record["condition"]), record["session"] is None
-            try:
-                self.check_record(record)
-                rows = np.frombuffer(record["data"], self.row)
-                notes = read_json(record["notes"], [NOTE])
-                if len(rows) != record["count"] or len(rows) > MOST_ROWS:
-                    raise ValueError("a record has other rows than it says")
-                if place is not None and not (is_copy and trusts_copies):
-                    check_whole(rows, self.parts.get((place, record["first"]), ()))
-            except (ValueError, TypeError):
-                self.refused.add((ROWS, record["id"]))
-                continue
-            self.computed += 0 if is_copy else len(rows)
-            if place is not None:
-                self.note(place, record["first"], len(rows), notes)
+            if place is not None and table == PART:
+                self.parts[place, first].ids[record["name"]] = record["id"]
+            elif place is not None:
+                self.note(place, first, len(rows), notes)
         self.refused |= self.journal.damaged
-
-    def check_record(self, record: Row) -> None:
-        """ValueError for a record of another study, or of no replicate."""
-        first, known = record["first"], {self.identity, *self.known}
-        is_replicate = isinstance(first, int) and 0 <= first < LARGEST_REPLICATE
-        if record["identity"] not in known or not is_replicate:
-            raise ValueError("a record is of no run of this study")
 
     def there(self) -> int:
         """Return how many replicates exist."""

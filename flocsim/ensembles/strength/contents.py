@@ -5,7 +5,7 @@ from typing import Any
 
 from flocsim.ensembles.contents import Contents, Facts, Figures, Summary
 from flocsim.io.results.run_group import source_line
-from flocsim.io.results.strength_file import STATUS, Strengths, read_strengths, table_of
+from flocsim.io.results.strength_file import STATUS, STRENGTHS, Strengths, table_of
 
 
 def facts_of(found: Strengths) -> Facts:
@@ -27,7 +27,7 @@ class StrengthFiles(Contents):
     """What commands show of a file of `flocsim strength`."""
 
     title = "strengths of bonds"
-    read = staticmethod(read_strengths)
+    file = STRENGTHS
     table = staticmethod(table_of)
 
     def summary(self, found: Strengths) -> Summary:

@@ -11,7 +11,7 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.config.sources import Allowed
-from flocsim.ensembles.pairs.opened import open_results
+from flocsim.ensembles.pairs.opened import StudyResults
 from flocsim.ensembles.strength.opening import FLOWS, Doublet, Opening
 from flocsim.errors import UsageError
 from flocsim.fields import is_number
@@ -100,7 +100,7 @@ class Survey:
 @cache
 def opened(path: Path, folder: Path | None, own: tuple[str, ...]) -> Any:
     """Open results whose bonds can be tested."""
-    results = open_results(path, Allowed(folder, own))
+    results = StudyResults(path, Allowed(folder, own))
     refuse_outlines(results.config.forces, "the strength of a bond")
     return results
 

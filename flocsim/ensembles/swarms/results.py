@@ -3,7 +3,6 @@ commands show of a file and of two.
 """
 
 import io
-import json
 import warnings
 import zipfile
 from collections.abc import Container, Iterator, Mapping, Sequence
@@ -15,26 +14,26 @@ import attrs
 import numpy as np
 
 from flocsim.ensembles.contents import (
+    MEANINGS,
     Contents,
     Differences,
     Facts,
     Figures,
-    Joined,
+    Row,
     Summary,
     changes_between,
     common,
-    in_words,
     later,
-    origin,
+    study_summary,
 )
 from flocsim.ensembles.kind import Condition, OldResults
-from flocsim.errors import FileError, FlocsimError, UsageError, visible
+from flocsim.errors import FileError, FlocsimError, UsageError
 from flocsim.io.groups import UNREADABLE
-from flocsim.io.labelled import Column, about_of
+from flocsim.io.labelled import Column, Labelled, about_of
 from flocsim.io.results import swarm_file
 from flocsim.io.results.run_group import stored
 from flocsim.io.results.swarm_file import SwarmResults
-from flocsim.state.work import grown
+from flocsim.io.terminal import in_words
 
 # What is saved of a replicate while it runs.
 
@@ -73,88 +72,62 @@ def decoded(data: bytes) -> dict[str, np.ndarray]:
 
 # Results of the parts.
 
-Groups = dict[str, dict[str, np.ndarray]]
-
-PLACED = ("bond_replicate", "cluster_replicate", "event_replicate")
-"""Columns that count replicates."""
-
-
-def groups_of(parts: Any, times: int, classes: int) -> Groups:
-    """Return {group: {column: array}} of the Parts of one replicate, but for its ends; NaN, or no
-    cluster, at times that it has not reached."""
-    bodies = decoded(parts.read(BODIES)[1])
-    moments = {
-        place: decoded(parts.read(moment_name(place))[1])
-        for place in range(times) if moment_name(place) in parts
-    }  # fmt: skip
-    groups: Groups = {"bodies": {name: values[np.newaxis] for name, values in bodies.items()}}
-    lengths: dict[Any, int] = {"class": classes, "body": len(bodies["r_eq"]), "component": 3}
-    for group in ("counts", "snapshots"):
-        groups[group] = {}
-        for name, each in swarm_file.GROUPS[group].columns.items():
-            shape = 1, times, *(lengths[axis] for axis in each.axes[2:])
-            values = np.full(shape, -1 if name == "cluster" else np.nan, each.type)
-            for place, moment in moments.items():
-                # Empty swarms have no means of clusters.
-                values[0, place] = moment.get(name, np.nan)
-            groups[group][name] = values
-    # Lists of pairs and clusters, after the replicate and the time that they are of.
-    for group in ("bonds", "clusters"):
-        replicate, time, *names = swarm_file.GROUPS[group].columns
-        counts = [len(moment[names[0]]) for moment in moments.values()]
-        listed = {replicate: np.zeros(sum(counts)), time: np.repeat([*moments], counts)} | {
-            name: np.concatenate([[], *(moment[name] for moment in moments.values())])
-            for name in names
-        }
-        groups[group] = {
-            name: values.astype(swarm_file.GROUPS[group].columns[name].type)
-            for name, values in listed.items()
-        }
-    groups["events"] = swarm_file.events_of(groups["snapshots"]["cluster"])
-    return groups
-
-
-def joined(parts: Sequence[Mapping[str, Any]]) -> Groups:
-    """Return the groups of replicates after each other, core points filled up with zeros."""
-    most = max(each["bodies"]["points"].shape[1] for each in parts)
-    begun = np.cumsum([0, *(len(each["bodies"]["box"]) for each in parts)])
-
-    def column(group: str, name: str) -> np.ndarray:
-        values = [each[group][name] for each in parts]
-        if name in swarm_file.POINTS | swarm_file.RINGS:
-            values = [grown(each, 1, most) for each in values]
-        if name in PLACED:
-            values = [each + first for each, first in zip(values, begun, strict=False)]
-        return np.concatenate(values).astype(swarm_file.GROUPS[group].columns[name].type)
-
-    return {
-        group: {name: column(group, name) for name in swarm_file.GROUPS[group].columns}
-        for group in swarm_file.GROUPS if group != "ends"
-    }  # fmt: skip
-
 
 def results_from(
-    groups: Groups, ends: Mapping[str, np.ndarray], asked: Mapping[str, Any],
-    run: Mapping[str, Any], replicates: Sequence[int],
+    swarms: Mapping[int, Any], times: int, rows: np.ndarray, asked: Mapping[str, Any],
+    run: Mapping[str, Any], old: SwarmResults | None = None,
 ) -> SwarmResults:  # fmt: skip
-    """Return the results of the replicates of these numbers."""
-    times = groups["counts"]["clusters"].shape[1]
-    axes = {
-        "replicate": replicates, "time": asked["times"][:times], "class": [0.0, *asked["bounds"]],
-        "component": swarm_file.COMPONENTS, "axis": swarm_file.AXES,
+    """Return the results of swarms up to so many times.
+
+    First come those of an ``old`` file, then ``swarms``, {number of the replicate: its Parts};
+    ``rows`` say how each of them ended.
+    """
+    begun = 0 if old is None else len(old.scales["replicate"])
+    # Arrays by column, for a place along the first axes: all of the old ones have no such axis.
+    saved: dict[tuple, dict[str, np.ndarray]] = {}
+    if old is not None:
+        saved[()] = {name: each for group in old.groups.values() for name, each in group.items()}
+    for k, parts in enumerate(swarms.values(), begun):
+        saved[k,] = decoded(parts.read(BODIES)[1])
+        for time in filter(lambda time: moment_name(time) in parts, range(times)):
+            moment = saved[k, time] = decoded(parts.read(moment_name(time))[1])
+            # Lists of pairs and clusters say of which replicate and time they are.
+            for kind, last in (("bond", "kind"), ("cluster", "number")):
+                shape = moment[f"{kind}_{last}"].shape
+                moment[f"{kind}_replicate"] = np.full(shape, k)
+                moment[f"{kind}_time"] = np.full(shape, time)
+
+    def most(name: str, axis: int) -> int:
+        return max(each[name].shape[axis] for each in saved.values() if name in each)
+
+    lengths: dict[Any, int] = {
+        "replicate": begun + len(swarms), "time": times, "class": 1 + len(asked["bounds"]),
+        "body": most("r_eq", -1), "component": 3, "point": most("points", -2), "axis": 2,
     }  # fmt: skip
-    found: SwarmResults = swarm_file.SWARMS.stored(groups | {"ends": ends}, axes, run)
+    groups: dict[str, dict[str, np.ndarray]] = {}
+    for group in ("counts", "snapshots", "bodies", "bonds", "clusters"):
+        groups[group] = {}
+        for name, column in swarm_file.GROUPS[group].columns.items():
+            # An empty swarm has no means of clusters.
+            there = {place: each[name] for place, each in saved.items() if name in each}
+            if "replicate" not in column.axes:
+                groups[group][name] = np.concatenate([[], *there.values()]).astype(column.type)
+                continue
+            # NaN, or no cluster, at times that were not reached; zeros after a body's last point.
+            blank = 0 if group == "bodies" else -1 if name == "cluster" else np.nan
+            values = np.full([lengths[axis] for axis in column.axes], blank, column.type)
+            for place, each in there.items():
+                values[place + tuple(map(slice, each.shape))] = each
+            groups[group][name] = values
+    groups["events"] = swarm_file.events_of(groups["snapshots"]["cluster"])
+    groups["ends"] = {name: rows[name] for name in swarm_file.ENDS}
+    axes = {
+        "replicate": [*range(begun), *swarms], "time": asked["times"][:times],
+        "class": [0.0, *asked["bounds"]], "component": swarm_file.COMPONENTS,
+        "axis": swarm_file.AXES,
+    }  # fmt: skip
+    found: SwarmResults = swarm_file.SWARMS.stored(groups, axes, run)
     return found
-
-
-def first_of(found: SwarmResults, count: int) -> Groups:
-    """Return the groups of the first replicates of results."""
-    groups = {}
-    for group, columns in found.groups.items():
-        listed = [columns[name] for name in PLACED if name in columns]
-        chosen = listed[0] < count if listed else slice(count)
-        groups[group] = {name: columns[name][chosen] for name in swarm_file.GROUPS[group].columns}
-    return groups
 
 
 # What commands show.
@@ -180,33 +153,23 @@ def facts_of(results: SwarmResults) -> Facts:
     ]  # fmt: skip
 
 
-def sweep_rows(found: Any) -> list[tuple[str, ...]]:
-    """Return clusters at the end at every value, means over swarms, heads first."""
-    table = found.labelled("counts")
-    rows = [(*found.swept, "swarms", "time [s]", "clusters", "mean size", "settling [mm/s]")]
-    axes = [table.axes[name].values.tolist() for name in found.swept]
+def note_words(note: dict) -> str:
+    """Return a swarm that ended early in words."""
+    return f"swarm {note['replicate']}: {note['why']}"
+
+
+def swept_table(table: Labelled) -> tuple[Sequence[str], Row]:
+    """Return clusters at the end, means over swarms: heads, and the cells at swept values."""
+
+    def row(place: tuple[int, ...]) -> Sequence[str]:
+        last = (table.columns[name].values[place][:, -1] for name in names)
+        clusters, size, settling = (float(swarm_file.mean(each)) for each in last)
+        return many, time, f"{clusters:.1f}", f"{size:.2f}", f"{1e3 * settling:.4g}"
+
     names = ("clusters", "mean_size", "settling")
-    for place in np.ndindex(*map(len, axes)):
-        last = {name: table.columns[name].values[place][:, -1] for name in names}
-        clusters, size, settling = (float(swarm_file.mean(last[name])) for name in names)
-        keys = (visible(in_words(axis[k]), "") for axis, k in zip(axes, place, strict=True))
-        time = in_words(float(table.axes["time"].values[-1]))
-        rows.append((*keys, str(len(last["clusters"])), time,
-                     f"{clusters:.1f}", f"{size:.2f}", f"{1e3 * settling:.4g}"))  # fmt: skip
-    return rows
-
-
-def sweep_figures() -> Figures:
-    """Return the figures of a sweep of swarms."""
-    from flocsim.io.plots.curves import SWARM_SWEEP_FIGURES
-
-    return SWARM_SWEEP_FIGURES
-
-
-def asked(results: SwarmResults) -> dict[str, Any]:
-    """Return the axes of results, and how many replicates there are."""
-    return {"types": ["swarm"], "vertices": [int(results.run.get("vertices", 0))], "delta": [0.0],
-            "replicates": len(results.scales["replicate"])}  # fmt: skip
+    many = str(len(table.axes["replicate"].values))
+    time = in_words(float(table.axes["time"].values[-1]))
+    return ("swarms", "time [s]", "clusters", "mean size", "settling [mm/s]"), row
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -249,21 +212,18 @@ def mean_differences(
     low, high = (np.where(spread, end, np.where(difference == 0.0, 0.0, np.nan))
                  for end in (low, high))  # fmt: skip
     counts = [np.isfinite(each).sum(axis=0) for each in (first, second)]
-    return {
-        "first": means[0], "second": means[1], "difference": difference,
-        "difference_low": low, "difference_high": high,
-        "n_first": counts[0], "n_second": counts[1],
-    }  # fmt: skip
+    return dict(zip(MEANINGS, (*means, difference, low, high, *counts), strict=False))
 
 
 class SwarmFiles(Contents):
     """What becomes of the rows of a study of swarms, and what commands show of its files."""
 
     title = "results of a swarm study"
-    read = staticmethod(swarm_file.read_swarm)
+    file = swarm_file.SWARMS
     table = staticmethod(swarm_file.table_of)
     compared = {name: words for name, (_, _, words) in swarm_file.COUNTS.items()}  # noqa: RUF012
-    joined = Joined({"counts": swarm_file.GROUPS["counts"]}, sweep_rows, sweep_figures, asked)
+    swept = ("counts",)
+    swept_table = staticmethod(swept_table)
     dry_run = later("ensembles.swarms.study", "dry_run")
     animate = later("io.plots.swarm", "write_swarm_animation")
 
@@ -271,29 +231,19 @@ class SwarmFiles(Contents):
         self, study: Any, start: Any, count: int, run: dict, output: str | Path
     ) -> SwarmResults:
         """Write the results of so many replicates to ``output``, and return them."""
-        store, asked = start.store, study.asked()
-        old = [first_of(start.old.found, count)] if start.old else []
-        begun = len(old[0]["bodies"]["box"]) if old else 0
-        new = [
-            groups_of(store.parts[0, each], study.pieces, 1 + len(asked["bounds"]))
-            for each in range(begun, count)
-        ]
-        rows = store.rows(0, 0, count)
-        ends = {name: rows[name].copy() for name in swarm_file.ENDS}
-        made = results_from(joined([*old, *new]), ends, asked, run, range(count))
+        old = start.old
+        new = {k: start.store.parts[0, k] for k in range(old.count if old else 0, count)}
+        rows, found = start.store.rows(0, 0, count), old.found if old else None
+        made = results_from(new, study.pieces, rows, study.asked(), run, found)
         made.write(output, start.replacing)
         return made
 
     @contextmanager
     def old_rows(self, output: str | Path) -> Iterator[OldResults]:
         """Open a results file that is to be extended."""
-        found = swarm_file.read_swarm(output)
-        ends = found.groups["ends"]
-        rows = np.zeros(
-            len(ends["finished"]), [(name, ends[name].dtype) for name in swarm_file.ENDS]
-        )
-        for name in swarm_file.ENDS:
-            rows[name] = ends[name]
+        found = self.read(output)
+        ends = [found.groups["ends"][name] for name in swarm_file.ENDS]
+        rows = np.rec.fromarrays(ends, dtype=swarm_file.ROW)
         condition = Condition("swarm", int(found.run.get("vertices", 0)), 0.0)
         yield OldResults([condition], len(rows), [(condition, 0, rows)], found.run, found)
 
@@ -306,15 +256,10 @@ class SwarmFiles(Contents):
         if not swarms:
             raise FileError(f"{store.journal.path} has no snapshot yet: try again later")
         planned = len(asked["times"])
-        there = [
-            [place for place in range(planned) if moment_name(place) in parts]
-            for parts in swarms.values()
-        ]
-        times, classes = 1 + max(each[-1] for each in there), 1 + len(asked["bounds"])
-        groups = joined([groups_of(parts, times, classes) for parts in swarms.values()])
-        ends = {name: np.zeros(len(swarms), kind) for name, (kind, *_) in swarm_file.ENDS.items()}
-        made = results_from(groups, ends, asked, {"periodic": asked["periodic"]}, [*swarms])
-        return made, sum(map(len, there)), asked["replicates"] * planned
+        there = [k for parts in swarms.values() for k in range(planned) if moment_name(k) in parts]
+        rows, run = np.zeros(len(swarms), swarm_file.ROW), {"periodic": asked["periodic"]}
+        made = results_from(swarms, 1 + max(there), rows, asked, run)
+        return made, len(there), asked["replicates"] * planned
 
     def facts(self, study: Any) -> dict[str, Any]:
         """Return what the results say of a study besides their groups."""
@@ -327,10 +272,8 @@ class SwarmFiles(Contents):
         missed = int(np.count_nonzero(finished == 0))
         if not missed:
             return 0, ""
-        notes = json.loads(found.run.get("failed", "[]"))
-        first = (
-            f"swarm {notes[0]['replicate']}: {notes[0]['why']}" if notes else "see `flocsim info`"
-        )
+        notes = stored(found.run, "failed")
+        first = note_words(notes[0]) if notes else "see `flocsim info`"
         line = f"{missed} of {len(finished)} swarms ended early; the first: {first}"
         return (
             (FlocsimError.exit_code, line) if missed == len(finished) else (0, f"warning: {line}")
@@ -338,11 +281,7 @@ class SwarmFiles(Contents):
 
     def summary(self, results: SwarmResults) -> Summary:
         """Return what a results file of swarms says of its study."""
-        failed = [
-            f"swarm {note['replicate']}: {note['why']}" for note in stored(results.run, "failed")
-        ]
-        warnings = [str(line) for line in stored(results.run, "warnings")]
-        return Summary(facts_of(results), origin(results.run), warnings, failed)
+        return study_summary(facts_of(results), results.run, note_words)
 
     def running(self, found: Any) -> Facts:
         """Return facts of swarms that still run."""

@@ -38,7 +38,7 @@ from flocsim.forces.settling import terminal_motion
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.base import Status
-from flocsim.io.results.swarm_file import ENDS, GONE, SWARMS, WALL
+from flocsim.io.results.swarm_file import ENDS, GONE, ROW, SWARMS, WALL
 from flocsim.io.terminal import duration
 from flocsim.plausibility import settled
 from flocsim.swarms.islands import run_islands
@@ -91,7 +91,7 @@ class SwarmStudy(StudyKind):
     scenes: ClassVar[Sequence[type]] = (SwarmScene,)
     format: ClassVar[str] = SWARMS.name
     code: ClassVar[Sequence[str]] = (*PHYSICS, "swarms", "ensembles/swarms/study.py")
-    row: ClassVar[np.dtype] = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
+    row: ClassVar[np.dtype] = ROW
     most_rows: ClassVar[int] = 1
     noun: ClassVar[str] = "snapshots"
     check = staticmethod(require_contact)
@@ -377,11 +377,10 @@ def bodies_part(bodies: Sequence[Body], drawn: Drawn) -> Arrays:
         "first_point": np.cumsum(counts) - counts,
         "point_count": counts,
         "points": np.concatenate([each.place for each in tables]),
-        "point_part": np.concatenate([each.part for each in tables]).astype(np.int32),
-        "point_ring": np.concatenate([each.ring for each in tables]).astype(np.int32),
-        "point_radius": np.concatenate([each.radius for each in tables]),
+        **{f"point_{name}": np.concatenate([getattr(each, name) for each in tables])
+           for name in ("part", "ring", "radius")},
         "box": np.array(drawn.box),
-    }
+    }  # fmt: skip
 
 
 def moment_part(

@@ -173,8 +173,10 @@ SHOWN = (
 )  # fmt: skip
 """Columns of the counts, factors to the units of their labels."""
 
-SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": against_key}
-SWARM_SWEEP_FIGURES: dict[str, Callable[[Any], Figure]] = {"sweep": over_time}
+SWEEP_FIGURES: dict[str, dict[str, Callable[[Any], Figure]]] = {
+    "probabilities": {"sweep": against_key}, "counts": {"sweep": over_time},
+}  # fmt: skip
+"""Figures of a joined file, by the first of its groups."""
 
 
 MICRO = 1e6

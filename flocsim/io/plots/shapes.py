@@ -128,10 +128,11 @@ def draw_dimension(axes, areas, perimeters):
     axes.plot(areas, perimeters, "o", color="#0072B2", ms=2.5)
     ends = np.array([areas.min(), areas.max()])
     axes.plot(ends, 2.0 * np.sqrt(np.pi * ends), color="0.6", linewidth=0.8, label="disc")
-    if (slope := perimeter_dimension(areas, perimeters)) is not None:
-        middle = np.exp(np.log(perimeters).mean() - 0.5 * slope.value * np.log(areas).mean())
-        label = f"$D_{{f2}}$ = {slope.value:.2f} ± {slope.error:.2f}"
-        axes.plot(ends, middle * ends ** (0.5 * slope.value), color="#D55E00", label=label)
+    if (found := perimeter_dimension(areas, perimeters)) is not None:
+        slope, error = found
+        middle = np.exp(np.log(perimeters).mean() - 0.5 * slope * np.log(areas).mean())
+        label = f"$D_{{f2}}$ = {slope:.2f} ± {error:.2f}"
+        axes.plot(ends, middle * ends ** (0.5 * slope), color="#D55E00", label=label)
     axes.set(xscale="log", yscale="log", xlabel="area [µm²]", ylabel="perimeter [µm]")
     style.set_log_axis(axes.xaxis)
     style.set_log_axis(axes.yaxis)

@@ -1,6 +1,5 @@
 """Group `kernel` of a results file: rates of encounters by mechanism, N and two size classes."""
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,45 +14,36 @@ AXES = ("mechanism", "vertices", "i", "j")
 WHAT = {"c": "that touch", "inside": "that touch inside the zone", "a": "that aggregate"}
 """Encounters by what becomes of them."""
 
-WIDTHS = {
-    f"width_{name}": ("f8", "m", f"capture width of encounters {words}")
-    for name, words in WHAT.items()
-}
-RATES = {
+ESTIMATES = {
+    **{f"width_{k}": ("f8", "m", f"capture width of encounters {v}") for k, v in WHAT.items()},
     "beta2_c": ("f8", "m2 s-1", "kernel of encounters that touch, in the plane"),
     "beta2": ("f8", "m2 s-1", "kernel of encounters that aggregate, in the plane"),
     "beta3_c": ("f8", "m3 s-1", "kernel of encounters that touch, closed for three dimensions"),
     "beta3": ("f8", "m3 s-1", "kernel of encounters that aggregate, closed for three dimensions"),
-}
-EFFICIENCIES = {
     "alpha": (
         "f8",
         "1",
-        "efficiency: encounters that aggregate, of those that touch, in the plane",
+        "efficiency: encounters that aggregate of those that touch, in the plane",
     ),
     "efficiency2": ("f8", "1", "beta2 over beta2_reference"),
     "efficiency3": ("f8", "1", "beta3 over beta3_reference"),
 }
-ESTIMATES = WIDTHS | RATES | EFFICIENCIES
 BOUNDS = {
     "": "",
     "_low": ", lower 95 % bound, undecided and failed points counted as misses",
     "_high": ", upper 95 % bound, undecided and failed points counted as captures",
     "_numerical": ", its change by numerical error: 95 % bound",
-}
-CHANGE = {
     "_change_low": ", its change if all runs were exact: lower 95 % bound",
     "_change_high": ", its change if all runs were exact: upper 95 % bound",
 }
 FLIPS = {
-    f"flips_{name}": ("f8", "1", f"share of points run again that flip: encounters {words} or not")
-    for name, words in WHAT.items()
+    f"flips_{k}": ("f8", "1", f"share of points run again that flip: encounters {v} or not")
+    for k, v in WHAT.items()
 }
 BESIDES = {
     "beta2_reference": ("f8", "m2 s-1", "rectilinear kernel of the equivalent spheres, in a plane"),
     "beta3_reference": ("f8", "m3 s-1", "rectilinear kernel of the equivalent spheres"),
-    "speed": ("f8", "m s-1", "at which the pair settles against each other; in a flow rate times "
-              "r_i + r_j"),
+    "speed": ("f8", "m s-1", "relative settling speed of the pair; in a flow rate times r_i + r_j"),
     "checked": ("f8", "1", "points that were run again at a tighter tolerance"),
     "undecided": ("f8", "1", "share of the sampled flux whose encounters are undecided or failed"),
     "edge": ("f8", "1", "share of what aggregates that came from the outermost tenth of the "
@@ -62,7 +52,7 @@ BESIDES = {
 KERNEL = {
     name + suffix: (kind, unit, text + bound)
     for name, (kind, unit, text) in ESTIMATES.items()
-    for suffix, bound in (BOUNDS | CHANGE).items()
+    for suffix, bound in BOUNDS.items()
 } | FLIPS | BESIDES  # fmt: skip
 """{name: (type, units, long name)} of arrays (mechanism, vertices, i, j)."""
 
@@ -83,8 +73,7 @@ class Kernel:
 
     NaN where a pair was not run: bodies of one size do not meet by settling, and all of theirs is
     0 but efficiencies, which are not known. ``water``: whether the bodies moved the water around
-    each other; ``fractal``: where their weight goes by their size, the diameter D_p of the primary
-    particles [m], the dimension n_f and the density of the solid [kg/m³].
+    each other.
     """
 
     mechanisms: tuple[str, ...]
@@ -93,7 +82,6 @@ class Kernel:
     radii: np.ndarray
     arrays: dict[str, np.ndarray]
     water: bool = False
-    fractal: tuple[float, float, float] | None = None
 
     def labelled(self) -> Labelled:
         """Return the arrays with their axes."""
@@ -109,17 +97,4 @@ def kernel_in(values: Mapping[str, Any], identity: str) -> Kernel:
     return Kernel(
         tuple(values["mechanism"]), values["vertices"], tuple(values["i"]), values["r_eq"],
         {name: values[name] for name in KERNEL}, '"PairResistance"' in identity,
-        fractal_in(identity),
     )  # fmt: skip
-
-
-def fractal_in(identity: str) -> tuple[float, float, float] | None:
-    """Return (D_p, n_f, density of the solid) of a FractalDensity in what rows follow from."""
-    found = re.search(
-        r"FractalDensity\(law='fractal', primary=([^,]+), dimension=([^,]+), solid=([^)]+)\)",
-        identity,
-    )
-    if found is None:
-        return None
-    primary, dimension, solid = map(float, found.groups())
-    return primary, dimension, solid

@@ -161,12 +161,6 @@ def kernel_matrix(
             "bounds (_low, _high) include every outcome that they could have had"
         )
     lines.append(f"shapes of N = {vertices} vertices; rows i, columns j: equivalent radii [m]")
-    if kernel.fractal is not None:
-        primary, dimension, solid = kernel.fractal
-        lines.append(
-            f"flocs of n_f = {dimension:g}, D_p = {primary:g} m, solid of {solid:g} kg/m3: "
-            "drho = (rho_p - rho_w) (D_p/D)^(3 - n_f), as the model is to have it"
-        )
     text = io.StringIO()
     text.writelines(f"# {line}\n" for line in lines + bound)
     writer = csv.writer(text, lineterminator="\n")

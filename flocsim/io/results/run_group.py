@@ -12,36 +12,32 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 
-from flocsim.io.json_text import matches, read_json
+from flocsim.io.json_text import read_json
 
 NOTE = {"type": str, "vertices": int, "delta": float, "replicate": int, "why": str}
 """What is kept of a failed replicate, as a pattern of `flocsim.io.json_text`."""
 
-SESSION = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
+SESSION_FORM = {"identity": {}, "layout": str, "date": str, "command": str, "processor": str}
 """The description of a journal's session, as a pattern of `flocsim.io.json_text`."""
 
-DEFAULTS: dict[str, Any] = {
-    "identity": {}, "failed": [], "history": [], "overrides": {}, "warnings": [],
-    "settling": [], "size_classes": [], "equivalent_spheres": [],
+FORMS: dict[str, Any] = {
+    "identity": {}, "failed": [NOTE], "history": [{}], "overrides": {}, "warnings": [str],
+    "settling": [object], "size_classes": [{}], "equivalent_spheres": [object],
 }  # fmt: skip
-"""Names in the group ``run`` of what it has as JSON, and what that is where there is none."""
+"""Names in the group ``run`` of what it has as JSON, and their patterns."""
 
 
 def stored(run: Mapping[str, Any], name: str) -> Any:
-    """Return what the group ``run`` of a results file has as JSON under a name of DEFAULTS.
+    """Return what the group ``run`` of a results file has as JSON under a name of FORMS, empty
+    where it has none.
 
     Raises ValueError, naming it, for a text that no flocsim wrote.
     """
-    default = DEFAULTS[name]
+    form = FORMS[name]
     try:
-        return read_json(run[name], type(default)) if name in run else default
+        return read_json(run[name], form) if name in run else type(form)()
     except ValueError as error:
         raise ValueError(f"run/{name} cannot be read: {error}") from error
-
-
-def is_session(description: dict) -> bool:
-    """Return True if a description, whoever wrote it, can be that of a session of a journal."""
-    return matches(description, SESSION)
 
 
 def describe_note(note: dict) -> str:

@@ -4,7 +4,6 @@ The file itself is read and written by `flocsim.io.results.file`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import attrs
 import numpy as np
@@ -47,9 +46,18 @@ ENDED = {
 """What further runs of a replicate say, in columns of their own."""
 
 
-def ended(run: str, words: str) -> dict[str, tuple[str, str, str]]:
-    """Return the columns of a further run."""
-    return {f"{run}_{name}": ("u1", "1", f"{text}, {words}") for name, text in ENDED.items()}
+def formed(
+    texts: Mapping[str, str], forms: Mapping[str, str], kind: str = "f8"
+) -> dict[str, tuple[str, str, str]]:
+    """Return {name: (kind, unit, long name)} of columns without a unit.
+
+    Each of ``forms``, {form of the name: form of the long name}, is filled with each of ``texts``.
+    """
+    return {
+        form.format(name): (kind, "1", words.format(text))
+        for name, text in texts.items()
+        for form, words in forms.items()
+    }
 
 
 REPLICATES = {  # name: (dtype, units, long name)
@@ -62,8 +70,8 @@ REPLICATES = {  # name: (dtype, units, long name)
     "inside": ("u1", "1", "centre distance below D_0 at the collision"),
     "crossed_zone": ("u1", "1", "centre distance crossed D_0 after the collision"),
     "bond": ("u1", "1", "what holds an aggregated pair"),
-    **ended("checked", "when run again at a tighter tolerance"),
-    **ended("third", "in the third run, at a tolerance tighter still"),
+    **formed(ENDED, {"checked_{}": "{}, when run again at a tighter tolerance"}, "u1"),
+    **formed(ENDED, {"third_{}": "{}, in the third run, at a tolerance tighter still"}, "u1"),
     "d_c_collision": ("f8", "m", "centre distance at the collision"),
     "d_c_over_D_0": ("f8", "1", "centre distance at the collision over D_0"),
     "d_c_max": ("f8", "m", "largest centre distance after the collision"),
@@ -76,15 +84,24 @@ REPLICATES = {  # name: (dtype, units, long name)
     "failure": ("u1", "1", "reason of an undecided or failed outcome"),
     "floc_i": ("i4", "1", "floc of the receiving body, a place in /flocs; -1 for a sphere"),
     "floc_j": ("i4", "1", "floc of the approaching body, a place in /flocs; -1 for a sphere"),
-} | {
-    f"{name}_{body}": ("f8", "1", f"{text} of body {body}, as run")
-    for name, text in SHAPE_MEASURES.items()
-    for body in "ij"
+    **formed(SHAPE_MEASURES, {f"{{}}_{body}": f"{{}} of body {body}, as run" for body in "ij"}),
+    **formed(ENDED, {"closer_{}": "{}, both outlines cut closer"}, "u1"),
+    **formed(ENDED, {"wider_{}": "{}, both outlines cut wider"}, "u1"),
 }
-for end in BAND_ENDS:
-    REPLICATES |= ended(end, f"both outlines cut {end}")
 BLANKS = {"f8": float("nan"), "u1": NOT_APPLICABLE, "i4": -1, "i8": 0}
 """By its type, what a column of `REPLICATES` holds where there is nothing to say."""
+
+BONDS = ("certificate", "hook", "rest")
+"""Kinds of bond, from code 1 on: no later load can open it; the contacts carry the load, as statics
+shows; the pair has kept its pose under its load, without such a proof."""
+LAST_AXES = {"class": CLASSES, "bond": BONDS}
+"""The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
+
+
+def last_axis(name: str) -> tuple[str, ...]:
+    """The last axis of an array of `TABLE`, where it has one more than the conditions; or none."""
+    return tuple(axis for axis in LAST_AXES if axis in name)
+
 
 COUNTS = {
     "n_total": "replicates",
@@ -113,62 +130,46 @@ PROBABILITIES = {
     "pr_bond": "Pr[bond | aggregation]",
 }
 CHANGES = {
-    "n_checked": "replicates run again that count in {} in either run",
-    "n_gained": "of these, raised {} when run again",
-    "n_lost": "of these, lowered {} when run again",
+    "n_checked_{}": "replicates run again that count in {} in either run",
+    "n_gained_{}": "of these, raised {} when run again",
+    "n_lost_{}": "of these, lowered {} when run again",
 }
 """What is counted for every probability, beside `COUNTS`."""
 BOUNDS = {
-    "": "",
-    "_low": ", lower 95 % bound",
-    "_high": ", upper 95 % bound",
-    "_numerical": ", numerical error: 95 % bound of its change, run exactly",
+    "{}": "{}",
+    "{}_low": "{}, lower 95 % bound",
+    "{}_high": "{}, upper 95 % bound",
+    "{}_numerical": "{}, numerical error: 95 % bound of its change, run exactly",
 }
-TABLE = {name: ("i8", "1", text) for name, text in COUNTS.items()} | {
-    name + suffix: ("f8", "1", text + bound)
-    for name, text in PROBABILITIES.items()
-    for suffix, bound in BOUNDS.items()
+TABLE = {
+    **formed(COUNTS, {"{}": "{}"}, "i8"),
+    **formed(PROBABILITIES, BOUNDS),
+    **formed(PROBABILITIES, CHANGES, "i8"),
 }
-TABLE |= {
-    f"{count}_{name}": ("i8", "1", words.format(text))
-    for name, text in PROBABILITIES.items()
-    for count, words in CHANGES.items()
-}
-POOLED_PROBABILITIES = (
-    "pr_inside", "pr_a_given_inside", "pr_a_given_outside", "pr_a", "pr_sticks", "pr_hangs",
-)  # fmt: skip
+POOLED_PROBABILITIES = tuple(name for name in PROBABILITIES if not last_axis(name))
+"""Those that are one number for each condition."""
+POOLED_TEXTS = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES}
 POOLED = {
-    name + suffix: ("f8", "1", f"{PROBABILITIES[name]}, all displacements pooled{bound}")
-    for name in POOLED_PROBABILITIES
-    for suffix, bound in BOUNDS.items()
-} | {
-    f"n_effective_{name}": ("f8", "1", f"independent events that {PROBABILITIES[name]} is worth")
-    for name in POOLED_PROBABILITIES
+    **formed({k: f"{v}, all displacements pooled" for k, v in POOLED_TEXTS.items()}, BOUNDS),
+    **formed(POOLED_TEXTS, {"n_effective_{}": "independent events that {} is worth"}),
 }
-NUMERICS = {
-    f"{name}_change{end}": (
-        "f8", "1", f"by how much {text} would change, run exactly: {word} 95 % bound"
-    )
-    for name, text in PROBABILITIES.items()
-    for end, word in (("_low", "lower"), ("_high", "upper"))
-}  # fmt: skip
+CHANGE = "by how much {} would change, "
+NUMERICS = formed(PROBABILITIES, {
+    "{}_change_low": CHANGE + "run exactly: lower 95 % bound",
+    "{}_change_high": CHANGE + "run exactly: upper 95 % bound",
+})  # fmt: skip
 """The numerical error as a signed change of every probability of `PROBABILITIES`."""
-OUTLINES = {
-    f"{name}_{end}": ("f8", "1", f"by how much {text} would change, {words}")
-    for name, text in PROBABILITIES.items()
-    for end, words in {
-        **{end: f"all outlines cut {end}" for end in BAND_ENDS},
-        "shape_low": "outlines cut within their bands: lower 95 % bound",
-        "shape_high": "outlines cut within their bands: upper 95 % bound",
-    }.items()
-}  # fmt: skip
+OUTLINES = formed(PROBABILITIES, {
+    "{}_closer": CHANGE + "all outlines cut closer",
+    "{}_wider": CHANGE + "all outlines cut wider",
+    "{}_shape_low": CHANGE + "outlines cut within their bands: lower 95 % bound",
+    "{}_shape_high": CHANGE + "outlines cut within their bands: upper 95 % bound",
+})  # fmt: skip
 """The error by the shape: what the ends of the outlines' bands make of every probability."""
 PER_APPROACH = "pr_a_per_approach"
 """Of all approaches that were decided, misses among them: what efficiencies are sums of."""
 
-COMPARED = {name: PROBABILITIES[name] for name in POOLED_PROBABILITIES} | {
-    PER_APPROACH: "Pr[aggregation | decided approach]"
-}
+COMPARED = POOLED_TEXTS | {PER_APPROACH: "Pr[aggregation | decided approach]"}
 """{name: meaning} of the probabilities that are compared."""
 DIFFERENCES = {
     "n_pairs": ("i8", "1", "replicates that count in both conditions"),
@@ -176,11 +177,6 @@ DIFFERENCES = {
     "difference_low": ("f8", "1", "difference, lower 95 % bound of the paired interval"),
     "difference_high": ("f8", "1", "difference, upper 95 % bound of the paired interval"),
 }
-BONDS = ("certificate", "hook", "rest")
-"""Kinds of bond, from code 1 on: no later load can open it; the contacts carry the load, as statics
-shows; the pair has kept its pose under its load, without such a proof."""
-LAST_AXES = {"class": CLASSES, "bond": BONDS}
-"""The last axis of the arrays of `TABLE` whose names have its name in them, and its words."""
 EVENTS = ("inside", "aggregated")
 """Whose probabilities are compared: a collision is inside; a decided collision aggregates."""
 INSIDE_CODES = (0, 1, NOT_APPLICABLE), ("outside", "inside", "not_applicable")
@@ -191,11 +187,10 @@ FLAGS: dict[str, tuple[tuple[int, ...], tuple[str, ...]]] = {
     "crossed_zone": ((0, 1, NOT_APPLICABLE), ("no", "yes", "not_applicable")),
     "bond": BOND_CODES,
 }
+AGAIN_CODES = (*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")
 for run in FURTHER_RUNS:
-    FLAGS[f"{run}_outcome"] = (
-        (*range(len(OUTCOMES)), NOT_APPLICABLE), (*OUTCOMES, "not_run_again")
-    )  # fmt: skip
-    FLAGS |= {f"{run}_inside": INSIDE_CODES, f"{run}_bond": BOND_CODES}
+    FLAGS[f"{run}_outcome"], FLAGS[f"{run}_inside"] = AGAIN_CODES, INSIDE_CODES
+    FLAGS[f"{run}_bond"] = BOND_CODES
 COORDINATES = {
     "type": ("text", "1", "collision type, pair of equivalent radii (i-j) or of size classes"),
     "vertices": ("i8", "1", "vertices N of each body; 1 is the equivalent sphere"),
@@ -203,7 +198,7 @@ COORDINATES = {
     "class": (
         "text",
         "1",
-        "A inside aggregated, B inside departed, C outside aggregated, D outside departed",
+        "A, C: aggregated; B, D: departed; A, B: inside the zone; C, D: not",
     ),
     "bond": (
         "text",
@@ -225,11 +220,6 @@ RADII = {
 """Numbers that stand for each collision type, along the axis `type`."""
 
 
-def last_axis(name: str) -> tuple[str, ...]:
-    """The last axis of an array of `TABLE`, where it has one more than the conditions; or none."""
-    return tuple(axis for axis in LAST_AXES if axis in name)
-
-
 def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Dataset]:
     """Arrays with a value, or one for each word of a last axis, for every condition."""
     return {
@@ -240,7 +230,7 @@ def of_conditions(schema: Mapping[str, tuple[str, str, str]]) -> dict[str, Datas
 
 SIZES = declared(RADII, AXES[:1])
 ROWS = declared(REPLICATES, (*AXES, "replicate"), FLAGS)
-for name in ("steps", "rejected", "failure"):
+for name in ("steps", "rejected"):
     ROWS[name] = attrs.evolve(ROWS[name], low=0)
 for name in ("floc_i", "floc_j"):
     ROWS[name] = attrs.evolve(ROWS[name], low=-1)
@@ -340,13 +330,9 @@ class Results:
                 name: np.broadcast_to(np.zeros((), each.type), shape)
                 for name, each in columns.items()
             }
-        return declared.labelled({**self.axes, **self.radii, **values})
-
-    @property
-    def axes(self) -> dict[str, Any]:
-        """{axis: its values} of all groups."""
-        own = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
-        return {**own, "replicate": np.arange(self.count), **WORDS}
+        axes = {"type": self.types, "vertices": self.vertices, "delta": self.delta}
+        axes |= {"replicate": np.arange(self.count), **WORDS, **self.radii}
+        return declared.labelled({**axes, **values})
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -20,7 +20,7 @@ import numpy as np
 from flocsim.io.groups import FileFormat, Group, Stored, declared
 from flocsim.io.json_text import read_json
 from flocsim.io.results.schema import AXES, COORDINATES, FLAGS
-from flocsim.io.terminal import aligned
+from flocsim.io.terminal import table_along
 
 STATUS = ("opened", "opens_at_least_rate", "holds_at_most_rate", "failed")
 """Words of the codes of ``status``: between two rates; at the lowest rate already; at none; a run
@@ -70,7 +70,7 @@ GROUPS = {
 }
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class Strengths(Stored):
     """What `flocsim strength` has found: the two groups of its file, and ``about``, how."""
 
@@ -149,12 +149,12 @@ def strengths_of(
 def table_of(found: Strengths) -> str:
     """Return counts and quantiles of every condition that has a bound doublet, as text."""
     counts = ("n_bound", "n_tested", "n_opened")
-    heads = ["type", "N", "delta", *(name.removeprefix("n_") for name in counts)]
-    rows = [heads + [f"G {100.0 * each:g} %" for each in QUANTILES]]
-    axes = [found.table(name).tolist() for name in AXES]
-    for place in map(tuple, np.argwhere(found.table("n_bound"))):
-        name, n, delta = (values[each] for values, each in zip(axes, place, strict=True))
-        rates = [f"{each:.4g}" for each in found.table("rate")[place]]
-        rows.append([name, str(n), f"{delta:g}", *(str(found.table(c)[place]) for c in counts),
-                     *rates])  # fmt: skip
-    return "\n".join(aligned(rows, left=1))
+    heads = [name.removeprefix("n_") for name in counts] + [f"G {100 * p:g} %" for p in QUANTILES]
+
+    def row(place: tuple[int, ...]) -> Sequence[str]:
+        rates = (f"{each:.4g}" for each in found.table("rate")[place])
+        return *(str(found.table(name)[place]) for name in counts), *rates
+
+    axes = {name: found.table(name) for name in AXES}
+    places = map(tuple, np.argwhere(found.table("n_bound")).tolist())
+    return table_along(axes, heads, row, places, left=1)

@@ -24,10 +24,8 @@ COUNTS = {
     "largest": ("f8", "1", "bodies of the largest cluster"),
     "mean_size": ("f8", "1", "body-weighted mean cluster size"),
     "percolating": ("f8", "1", "clusters connected to their own images around the box"),
-    "gyration": ("f8", "m", "radius of gyration of a cluster, mass-weighted mean; of those that "
-        "do not percolate"),
-    "porosity": ("f8", "1", "1 - area/area of the convex hull of a cluster, mass-weighted mean; "
-        "of those that do not percolate"),
+    "gyration": ("f8", "m", "mass-weighted mean radius of gyration; without percolating clusters"),
+    "porosity": ("f8", "1", "1 - area/area of the convex hull, mean over the same clusters"),
     "fractal_dimension": ("f8", "1", "slope of log mass over log radius of gyration of clusters"),
     "settling": ("f8", "m s-1", "downward velocity of clusters, mass-weighted mean"),
     "bonds_certificate": ("f8", "1", "touching pairs that no later load can separate"),
@@ -69,8 +67,7 @@ CLUSTERS = {
     "cluster_bodies": ("i4", "1", "bodies of the cluster"),
     "cluster_mass": ("f8", "kg", "mass"),
     "cluster_gyration": ("f8", "m", "radius of gyration; NaN: it percolates"),
-    "cluster_hydrodynamic": ("f8", "m", "hydrodynamic radius of spheres of r_eq at its bodies' "
-                             "places; NaN: it percolates"),
+    "cluster_hydrodynamic": ("f8", "m", "hydrodynamic radius of spheres of r_eq; NaN: percolates"),
     "cluster_speed": ("f8", "m s-1", "downward velocity of its centre of mass"),
     "cluster_porosity": ("f8", "1", "1 - area/area of the convex hull; NaN: it percolates"),
     "cluster_bonds": ("i4", "1", "pairs of its bodies that touch"),
@@ -83,8 +80,7 @@ EVENTS = {
     "event_before": ("i4", "1", "clusters before"),
     "event_after": ("i4", "1", "clusters after; fewer: they merged, more: they broke up"),
     "event_bodies": ("i4", "1", "bodies of these clusters"),
-    "event_largest": ("i4", "1", "bodies of the largest of the clusters before, or of those after "
-                      "where these are more"),
+    "event_largest": ("i4", "1", "bodies of the largest of the clusters, of the side with more"),
     "event_second": ("i4", "1", "bodies of the second largest of them"),
 }  # fmt: skip
 """Columns (event,)."""
@@ -117,6 +113,8 @@ ENDS = {
     "windows": ("i8", "1", "common times"),
 }
 """Columns (replicate,)."""
+ROW = np.dtype([(name, f"<{kind}") for name, (kind, *_) in ENDS.items()])
+"""How a replicate ended."""
 
 SCALES = {
     "replicate": ("i8", "1", "number of the replicate"),
@@ -169,13 +167,8 @@ class SwarmResults(Stored):
 
     exported = ("counts", "clusters", "events")
 
-    def __repr__(self) -> str:
-        shape = self.groups["snapshots"]["cluster"].shape
-        return f"SwarmResults({shape[0]} replicates × {shape[1]} times × {shape[2]} bodies)"
-
 
 SWARMS = FileFormat("flocsim swarm", 6, "results of a swarm", GROUPS, view=SwarmResults)
-read_swarm = SWARMS.read
 """(path) → SwarmResults; FileError for a file that is absent, damaged or of another kind."""
 
 
@@ -250,7 +243,5 @@ def table_of(found: SwarmResults) -> str:
         "median position error [m]": (mean(counts["median_error"]), "{:.1e}"),
         "largest [m]": (mean(counts["error"]), "{:.1e}"),
     }
-    if not np.any(counts["percolating"] > 0.0):
-        del columns["percolating"]
     rows = zip(*(map(form.format, values) for values, form in columns.values()), strict=True)
     return "\n".join(aligned([[*columns], *rows]) + [f"means over {many} swarms"] * (many > 1))

@@ -42,7 +42,7 @@ class Swept:
         return Column((name,), values, {"units": self.unit, "long_name": self.key})
 
 
-@attrs.frozen(eq=False)
+@attrs.frozen(eq=False, repr=False)
 class SweepResults(Tables):
     """A joined file as `flocsim.open` gives it; ``swept`` {dimension: Swept} are its keys, and
     ``run`` has what `source_line` tells of all parts."""
@@ -61,10 +61,6 @@ class SweepResults(Tables):
         """Return the arrays of a group: "probabilities" or "pooled", or "counts" of swarms."""
         return self.groups[self.known(group)]
 
-    def __repr__(self) -> str:
-        over = ", ".join(f"{each.key}: {len(each.values)} values" for each in self.swept.values())
-        return f"SweepResults({str(self.path)!r}: {over})"
-
 
 def write_sweep(results: SweepResults, rule: Rule = False) -> None:
     """Write the joined file, whole or not at all; FileError if that is impossible."""
@@ -73,23 +69,22 @@ def write_sweep(results: SweepResults, rule: Rule = False) -> None:
 
 
 def read_sweep(
-    path: str | os.PathLike, known: Sequence[tuple[Mapping[str, Group], Mapping[str, int]]]
+    path: str | os.PathLike, known: Sequence[tuple[FileFormat, Sequence[str]]]
 ) -> SweepResults:
     """Return the SweepResults in a joined file; FileError for one that is absent, damaged, of
     another kind or version.
 
-    ``known``: (groups of results, how many places their last axes have) of all kinds of studies
-    that are joined.
+    ``known``: (results file, groups of it that are joined) of all kinds of studies.
     """
     with SWEEP.opened(path) as file:
         about = read_json(file.attributes["swept"], {})
         if not all(matches(each, {"key": str, "unit": str}) for each in about.values()):
             raise ValueError("its attribute swept does not name any keys")
-        joined, lengths = next((each for each in known if each[0].keys() <= file.keys()), ({}, {}))
-        if not joined:
+        part, names = next((each for each in known if {*each[1]} <= file.keys()), (SWEEP, ()))
+        if not names:
             raise ValueError("it has no group of a sweep")
-        groups = {name: joined_group(each, name, about, file) for name, each in joined.items()}
-        stored = attrs.evolve(SWEEP, groups=groups, lengths=lengths).contents(file)
+        groups = {name: joined_group(part.groups[name], name, about, file) for name in names}
+        stored = attrs.evolve(SWEEP, groups=groups, lengths=part.lengths).contents(file)
         first = next(iter(stored.groups.values()))
         swept = {
             name: Swept(each["key"], first[name].tolist(), each["unit"])

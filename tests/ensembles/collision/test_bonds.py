@@ -205,15 +205,13 @@ def test_spin_counts_as_energy_to_climb_out_with(tmp_path):
     assert doublet.bond() == NO_BOND
 
 
-@pytest.mark.parametrize(
-    ("share", "expected"), [(0.01, REST), (0.9, REST), (1.1, REST), (2.9, REST)]
-)
-def test_spheres_that_rest_are_no_hook(tmp_path, share, expected):
+@pytest.mark.parametrize("share", [0.01, 2.9])
+def test_spheres_that_rest_are_no_hook(tmp_path, share):
     """However weak attraction is: no shape holds a sphere."""
     doublet = Doublet(tmp_path, hamaker(strength_for(tmp_path, share)))
     assert doublet.rest(0.99) == NO_BOND
-    assert doublet.rest(1.01) == expected
-    assert BONDS[expected - 1] == "rest" and BONDS[HOOK - 1] == "hook"
+    assert doublet.rest(1.01) == REST
+    assert BONDS[REST - 1] == "rest" and BONDS[HOOK - 1] == "hook"
 
 
 def test_a_doublet_that_has_moved_begins_to_rest_anew(tmp_path):

@@ -17,9 +17,7 @@ from flocsim.ensembles.collision.draw import (
     further_runs,
 )
 from flocsim.ensembles.diagnose.dry_run import checked_words
-from flocsim.ensembles.diagnose.preflight import check_study
 from flocsim.ensembles.storage.identity import differences, identity_of
-from flocsim.errors import ConfigError
 from flocsim.integrators import DormandPrince54, Implicit, Overdamped, VelocityVerlet
 from flocsim.integrators.parts import FixedStep
 from flocsim.io.confidence import score_interval
@@ -83,14 +81,11 @@ def with_method(config, method, **options):
     return attrs.evolve(config, integrator=integrator)
 
 
-def test_a_method_without_tolerance_and_step_is_not_checked_and_cannot_be_asked_to(tmp_path):
+def test_a_method_without_tolerance_and_step_is_not_checked(tmp_path):
     assert exact_method(Unchangeable()) is None
     config = small_config(tmp_path, {"shapes": {"vertices": (1,)}})
-    own = with_method(config, Unchangeable())
-    assert "none" in checked_words(own)
-    with pytest.raises(ConfigError, match=r"check_share = 0\.2 cannot be: .*Unchangeable") as told:
-        check_study(with_method(config, Unchangeable(), check_share=0.2))
-    assert "\n" not in str(told.value)
+    for share in ("auto", 0.2):
+        assert "none" in checked_words(with_method(config, Unchangeable(), check_share=share))
 
 
 def test_the_dry_run_says_how_many_and_at_what(tmp_path):

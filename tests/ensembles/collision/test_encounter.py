@@ -7,7 +7,7 @@ import pytest
 
 from flocsim import Sphere
 from flocsim.ensembles.collision import outcomes
-from flocsim.ensembles.collision.draw import draws, orientations
+from flocsim.ensembles.collision.draw import draws
 from flocsim.ensembles.collision.encounter import LIMIT_TURNS, REST_TURNS
 from flocsim.ensembles.collision.mechanisms import make_encounter
 from flocsim.io.results.schema import OUTCOMES
@@ -119,25 +119,6 @@ def test_a_record_holds_every_step_with_the_instant_of_the_collision(study):
     assert distance[-1] == to_rounding(row["d_c_last"])
     assert distance[times >= row["t_collision"]].max() == to_rounding(row["d_c_max"])
     assert velocity.shape == position.shape
-
-
-def test_before_they_meet_both_only_settle(study):
-    _, (times, position, velocity) = recorded(study)
-    fall = study.encounter(0, 16, draws(1, 0)).settling[1][0][1]
-    # 2 um apart the forces along the centres are weak: the first step shows settling alone.
-    assert velocity[1, 1, 1] == pytest.approx(fall, rel=1e-2)
-    assert position[1, 1, 2] == pytest.approx(orientations(draws(1, 0))[1], abs=1e-6)
-    assert times[1] < 1e-4
-
-
-def test_a_finer_tolerance_finds_the_same_collision(tmp_path):
-    coarse, fine = (
-        small_study(tmp_path, {"integrator": {"tolerance": tolerance}}).run(0, 16, 0.0, 0)
-        for tolerance in ("1 nm", "0.01 nm")
-    )
-    assert coarse["d_c_collision"] == pytest.approx(fine["d_c_collision"], abs=2e-9)
-    assert coarse["t_collision"] == pytest.approx(fine["t_collision"], rel=1e-3)
-    assert coarse["steps"] < fine["steps"]
 
 
 def test_contacts_that_never_pull_come_to_an_end(tmp_path):

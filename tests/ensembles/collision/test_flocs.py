@@ -115,7 +115,7 @@ def test_flocs_keep_their_measured_size(library):
         kept = pool.shape(place, 4, 1e-3)
         assert kept.equivalent_radius == pytest.approx(size, rel=1e-12)
         share = size / entry.fits[4].shape.equivalent_radius
-        assert kept.radius == pytest.approx(share * entry.fits[4].radius, rel=1e-12)
+        assert kept.radius == pytest.approx(share * entry.fits[4].shape.radius, rel=1e-12)
 
 
 def measured(sizes):

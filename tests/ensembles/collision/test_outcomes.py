@@ -111,12 +111,6 @@ def test_no_decision_is_overturned_in_ten_times_the_time(study, condition, verti
     assert decisions & {"A", "B", "C", "D"}
 
 
-def test_all_kinds_of_decision_were_put_to_that_test(study):
-    rows = [study.run(condition, n, share, k) for condition in (0, 2) for n in (4, 16)
-            for share in (0.0, 0.5) for k in range(6)]  # fmt: skip
-    assert {outcome(row) for row in rows} >= {"A", "B", "D"}
-
-
 def test_beyond_the_largest_displacement_all_miss(study):
     for condition in range(3):
         for vertices in (1, 4, 16):

@@ -6,8 +6,8 @@ from scipy.stats import kstest
 from shapely.geometry import LineString, Point, Polygon
 
 from flocsim import Sphere, SpheroPolygon
-from flocsim.ensembles.collision.draw import draws, orientations
-from flocsim.ensembles.collision.start import half_extents, largest_displacement, place_pair
+from flocsim.ensembles.collision.draw import draws
+from flocsim.ensembles.collision.start import largest_displacement, place_pair
 from flocsim.io.results.schema import OUTCOMES
 from tests.helpers.small_study import small_study
 
@@ -60,24 +60,19 @@ def facing_heights(shapes, angles):
     return level, np.linspace(-reach, reach, 200)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95, 1.0])
-def test_the_outlines_start_a_gap_apart(share):
+@pytest.mark.parametrize(
+    ("share", "gap"), [(0.0, 1e-9), (0.0, 1e-4), (0.3, GAP), (0.7, GAP), (0.95, 1e-7), (1.0, GAP)]
+)
+def test_the_outlines_start_a_gap_apart(share, gap):
     for shapes, angles in pairs(30):
         largest = largest_displacement("projected", shapes[0], angles[0], shapes[1], angles[1])
-        places = place_pair(shapes, angles, share * largest, GAP)
-        assert gap_of(shapes, places) == pytest.approx(GAP, abs=2e-6 * GAP)
+        places = place_pair(shapes, angles, share * largest, gap)
+        assert gap_of(shapes, places) == pytest.approx(gap, rel=2e-6, abs=1e-15)
         assert places[1, :2].tolist() == pytest.approx([share * largest, places[1, 1]])
         assert places[:, 2].tolist() == list(angles)
         # Nothing lies above: from the start upwards the pair only comes apart.
         above = slide(shapes, angles, share * largest, places[1, 1] + np.linspace(1e-9, 5e-5, 20))
-        assert min(above) > GAP
-
-
-@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-4])
-def test_any_gap(gap):
-    for shapes, angles in pairs(10):
-        places = place_pair(shapes, angles, 0.0, gap)
-        assert gap_of(shapes, places) == pytest.approx(gap, rel=2e-6, abs=1e-15)
+        assert min(above) > gap
 
 
 def test_one_just_grazes():
@@ -116,14 +111,6 @@ def test_by_the_radius_rule_a_straight_fall_never_overlaps():
         assert min(slide(shapes, angles, largest, heights)) > -1e-15
 
 
-def test_extents_are_those_of_the_outline():
-    for shapes, angles in pairs(20):
-        left, right = half_extents(shapes[0], angles[0])
-        bounds = core_of(shapes[0], (0.0, 0.0, angles[0])).bounds
-        assert right == pytest.approx(1e-6 * bounds[2] + shapes[0].radius, rel=1e-12)
-        assert left == pytest.approx(-1e-6 * bounds[0] + shapes[0].radius, rel=1e-12)
-
-
 def test_draws_repeat_and_do_not_depend_on_what_was_drawn_before():
     first = draws(5, 17)
     np.random.default_rng(0).random(3)
@@ -143,10 +130,6 @@ def test_draws_are_uniform_and_independent():
     for column in table.T:
         assert kstest(column, "uniform").pvalue > 1e-3
     assert np.abs(np.corrcoef(table.T) - np.eye(5)).max() < 0.07
-
-
-def test_orientations_are_full_turns():
-    assert orientations([0.25, 0.5, 0.9, 0.9]) == (0.5 * np.pi, np.pi)
 
 
 def test_one_replicate_has_the_same_angles_and_flocs_everywhere(tmp_path):

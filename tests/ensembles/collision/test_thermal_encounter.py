@@ -1,6 +1,5 @@
 """Encounters with thermal motion: kicks by (seed, replicate), the same in whatever order."""
 
-import attrs
 import numpy as np
 import pytest
 
@@ -58,17 +57,3 @@ def test_without_thermal_motion_encounters_are_shared(tmp_path):
     cold = small_study(tmp_path, {name: WARM[name] for name in ("scene", "shapes", "integrator")})
     encounter = cold.encounter(0, 1, [0.0] * 4)
     assert encounter.keyed(1, 2) is encounter
-
-
-def test_kicks_move_a_pair_off_its_way(study):
-    """The centre of both bodies diffuses away from where settling takes it."""
-    warm = end_of(study, 0, 0.5)
-    cold_forces = [force for force in study.config.forces if type(force).__name__ != "Thermal"]
-    draw = study.draw(0, 1, 0.5, 0)
-    system = attrs.evolve(draw.encounter.system, forces=cold_forces)
-    cold = attrs.evolve(draw.encounter, system=system)
-    driver = cold.system.compose(observer=OBSERVER, jit=False)
-    run = attrs.evolve(draw, encounter=cold).begin(driver, 10**6, 0.0015)
-    run.to_end()
-    moved = np.abs(warm[:, :2] - run.work.place[NOW, :, :2]).max()
-    assert 1e-10 < moved < 2e-6

@@ -123,22 +123,11 @@ def test_a_root_needs_just_one_force_of_each_kind(some):
         zone_distance(ZoneConfig(), some, *RADII)
 
 
-def zones(study):
-    """D_0 [m] of the spheres of each collision type."""
-    return [study.encounter(k, 1, study.numbers(0)).zone_distance for k in range(2)]
-
-
 def test_the_paper_as_printed_has_no_zone(tmp_path):
     config = small_config(tmp_path, {"preset": "tang2014-literal"})
+    study = Study(config, flocs=[])
     with pytest.raises(ZoneError, match=r"S = 86\.5"):
-        zones(Study(config, flocs=[]))
-
-
-def test_the_paper_as_printed_runs_with_a_zone_that_is_given(tmp_path):
-    given = {"preset": "tang2014-literal", "zone": {"centre": "45 um"}}
-    assert zones(Study(small_config(tmp_path, given), flocs=[])) == [45e-6, 45e-6]
-    outer = zones(Study(small_config(tmp_path), flocs=[]))
-    assert outer[0] == pytest.approx(sum(RADII) + 5924.98e-9, rel=1e-6)
+        study.encounter(0, 1, study.numbers(0))
 
 
 @pytest.mark.parametrize(("root", "branch"), [("inner", 0), ("outer", -1)])

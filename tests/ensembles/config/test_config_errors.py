@@ -169,15 +169,6 @@ def test_a_key_of_an_inline_table_has_the_line_of_the_table(tmp_path):
     assert places == ["study.toml:2", "study.toml:3", "study.toml:4"]
 
 
-@pytest.mark.parametrize("comma", [", # row\n", " # row\n,"])
-def test_a_list_of_very_many_lines_is_soon_told(tmp_path, comma):
-    rows = comma.join(f'["{i} um", "{i + 1} um"]' for i in range(1, 3001))
-    text = f'preset = "si"\n[scene]\npairs = [{rows}]\nreceiver = 3\n'
-    assert problem_lines(tmp_path, text) == [
-        "study.toml:3003: scene.receiver must be 'free' or 'fixed', found 3"
-    ]
-
-
 @pytest.mark.parametrize("key", ["presett", "preet", "Preset"])
 def test_a_misspelt_preset_is_all_that_is_told(tmp_path, key):
     [line] = problem_lines(tmp_path, f'{key} = "si"\nseed = 1\n[shapes]\nvertices = [1]\n')

@@ -30,12 +30,6 @@ def test_one_mechanism_may_be_a_word(tmp_path):
     assert kernel_config(tmp_path, meeting='"settling"').scene.meeting == ("settling",)
 
 
-def test_nine_classes_make_45_pairs(tmp_path):
-    sizes = str([f"{k} um" for k in range(2, 11)])
-    config = kernel_config(tmp_path, sizes=sizes, meeting='"shear"', scene='rate = "1 1/s"')
-    assert len(config.scene.names) == 45
-
-
 def test_replicates_are_4096_where_nothing_is_said(tmp_path):
     path = tmp_path / "kernel.toml"
     path.write_text(kernel_text(scrambles=8).replace("replicates = 32\n", ""), "utf-8")
@@ -79,8 +73,3 @@ def test_two_bodies_may_meet_in_a_flow(tmp_path):
     path.write_text('preset = "si"\n[scene]\nmeeting = "shear"\nrate = "3 1/s"\n', "utf-8")
     scene = load_config(path).scene
     assert (scene.meeting, scene.rate) == ("shear", 3.0)
-    path.write_text(
-        'preset = "si"\n[scene]\nmeeting = "shear"\nrate = "3 1/s"\nreceiver = "fixed"\n', "utf-8"
-    )
-    with pytest.raises(ConfigError, match="receiver"):
-        load_config(path)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import attrs
 import pytest
 
 from flocsim import Sphere
@@ -39,14 +38,6 @@ def test_quantities_and_numbers_are_the_same(tmp_path):
     in_metres = load_text(tmp_path, 'preset = "si"\n[scene]\npairs = [[16.41e-6, 23.02e-6]]\n')
     assert in_units.scene == in_metres.scene
     assert in_units.scene.given == (("16.41um-23.02um", (16.41e-6, 23.02e-6)),)
-
-
-def test_order_of_tables_and_keys_does_not_matter(tmp_path):
-    top, *tables = VALID.split("\n\n")
-    shuffled = load_text(tmp_path, "\n\n".join([top, *reversed(tables)]))
-    config = load_text(tmp_path, VALID)
-    same = attrs.fields_dict(type(config)).keys() - {"text", "fluid"}
-    assert all(getattr(config, name) == getattr(shuffled, name) for name in same)
 
 
 @pytest.mark.parametrize(

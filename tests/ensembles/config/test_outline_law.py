@@ -2,8 +2,8 @@
 
 import pytest
 
-from flocsim.ensembles import load_config
 from flocsim.errors import ConfigError
+from tests.helpers.small_study import load_text
 
 SETTLING = """
 preset = "si"
@@ -16,15 +16,11 @@ wavelength = "100 nm"
 """
 
 
-def loaded(tmp_path, text):
-    path = tmp_path / "study.toml"
-    path.write_text(text)
-    return load_config(path)
-
-
 def test_it_goes_with_pairs_that_settle(tmp_path):
     [force] = [
-        each for each in loaded(tmp_path, SETTLING).forces if type(each).__name__ == "VanDerWaals"
+        each
+        for each in load_text(tmp_path, SETTLING).forces
+        if type(each).__name__ == "VanDerWaals"
     ]
     assert (force.acts_on, force.depth, force.wavelength) == ("outlines", 5e-6, 1e-7)
 
@@ -50,9 +46,9 @@ def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
     text = f'preset = "si"\n[scene]\n{scene}\n[forces.faces]\nclass = "faces_turned:Faces"\n'
     if words:
         with pytest.raises(ConfigError, match=words):
-            loaded(tmp_path, text)
+            load_text(tmp_path, text)
     else:
-        assert loaded(tmp_path, text).forces[-1].acts_on == "orientations"
+        assert load_text(tmp_path, text).forces[-1].acts_on == "orientations"
 
 
 @pytest.mark.parametrize(
@@ -66,4 +62,4 @@ def test_so_do_forces_that_ask_how_bodies_are_turned(tmp_path, scene, words):
 def test_elsewhere_it_is_refused(tmp_path, scene, more, words):
     text = SETTLING.replace("[scene]\n", f"[scene]\n{scene}\n") + more
     with pytest.raises(ConfigError, match=words):
-        loaded(tmp_path, text)
+        load_text(tmp_path, text)

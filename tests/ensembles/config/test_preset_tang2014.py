@@ -27,14 +27,6 @@ def reproduce(folder, *words, env=None):
     )
 
 
-def test_the_study_is_the_papers():
-    config = load_config(FOLDER / "study.toml")
-    counts = len(config.scene.names), len(config.shapes.vertices), len(config.scene.delta)
-    assert counts == (3, 17, 5)
-    assert config.replicates == 1000
-    assert config.shapes.radius == 1e-6
-
-
 @pytest.mark.parametrize("name", [name for name, each in READINGS.items() if "shapes" not in each])
 def test_a_reading_is_another_config(name):
     plain = load_config(FOLDER / "study.toml")

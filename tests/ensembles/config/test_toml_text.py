@@ -24,15 +24,6 @@ def test_texts_beyond_the_limits_are_refused(tmp_path, text, said):
     assert all(len(line) < 3000 for line in str(caught.value).split("\n"))
 
 
-@pytest.mark.parametrize("comma", [", ", ",\n"])
-@pytest.mark.parametrize("count", [5, 6, 7, 100])
-def test_a_list_of_decimals_may_be_long(tmp_path, comma, count):
-    delta = [k / 1000 for k in range(count)]
-    text = f'preset = "tang2014"\n[scene]\ndelta = [{comma.join(map(str, delta))}]\n'
-    (tmp_path / "c.toml").write_text(text)
-    assert load_config(tmp_path / "c.toml").scene.delta == tuple(delta)
-
-
 @pytest.mark.parametrize("value", ["[" * 5000, "b." * 3000, "10 N/m", '"open'])
 def test_a_setting_that_is_no_toml_is_a_word(value):
     assert parse_setting(f"a.b={value}") == (["a", "b"], value)

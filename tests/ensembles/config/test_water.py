@@ -3,16 +3,15 @@
 import pytest
 
 from flocsim import Fluid
-from flocsim.ensembles import load_config
 from flocsim.errors import ConfigError
+from tests.helpers.small_study import load_text
 
 OCEAN = 'temperature = "15 degC"\nsalinity = "35 g/kg"'
 
 
 def loaded(tmp_path, fluid, more="", overrides=None):
-    path = tmp_path / "study.toml"
-    path.write_text(f'preset = "si"\nreplicates = 1\n[fluid]\n{fluid}\n{more}')
-    return load_config(path, overrides)
+    text = f'preset = "si"\nreplicates = 1\n[fluid]\n{fluid}\n{more}'
+    return load_text(tmp_path, text, overrides)
 
 
 def force(config, name):

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 from flocsim.__main__ import main
 from flocsim.ensembles.collision.equivalent import sphere_pairs
-from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.contents import info_of
 from flocsim.ensembles.diagnose.dry_run import dry_run
 from flocsim.ensembles.diagnose.preflight import (
@@ -80,11 +79,6 @@ def test_the_depth_is_that_of_the_damped_spring(share):
     assert found == pytest.approx(max(motion.y[0]), rel=1e-4)
 
 
-def test_critical_damping_stops_at_an_e_th():
-    damping = 2.0 * math.sqrt(20.0 * 3e-9)
-    assert depth(0.2, 3e-9, 20.0, damping) == pytest.approx(0.2 * math.sqrt(3e-9 / 20.0) / math.e)
-
-
 def test_a_value_is_rounded_up():
     assert [rounded_up(x) for x in (38.0, 37.01, 0.0991, 2751.0)] == [38.0, 38.0, 0.1, 2800.0]
 
@@ -150,12 +144,6 @@ def test_the_command_refuses_before_it_runs(tmp_path, monkeypatch, capsys):
         said = capsys.readouterr()
         assert said.out == "" and "forces.contact.k_n 90 N/m or more" in said.err
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
-
-
-def test_si_and_the_examples_are_not_refused(tmp_path):
-    path = tmp_path / "si.toml"
-    path.write_text('preset = "si"\n[scene]\ntypes = ["I", "II", "III"]\n', "utf-8")
-    check_study(load_config(path))
 
 
 USUAL = {

@@ -10,7 +10,6 @@ from flocsim.ensembles.collision.draw import points_of
 from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.capture import (
     estimate,
-    kernel_of,
     numerics_of,
     ratio_of,
     weighted,
@@ -251,17 +250,3 @@ def test_a_study_ends_with_its_kernel(tmp_path):
     assert arrays["width_c"][1, 0, 1, 1] == pytest.approx(8e-5, rel=1e-9, abs=0.0)
     assert np.array_equal(arrays["beta2"], np.swapaxes(arrays["beta2"], 2, 3), equal_nan=True)
     assert np.all(arrays["checked"][1] > 0)
-
-
-def test_rates_follow_from_rows_however_they_were_run(tmp_path):
-    study = study_of(kernel_config(tmp_path, more=BARE))
-    results = run(study.config)
-    rows = {name: values[0, 0, 0] for name, values in results.replicates.items()}
-
-    class Store:
-        def rows(self, place, first, stop):
-            return {name: values[first:stop] for name, values in rows.items()}
-
-    again = kernel_of(study, Store(), 32)
-    for name, values in results.kernel.arrays.items():
-        assert np.array_equal(values, again.arrays[name], equal_nan=True), name

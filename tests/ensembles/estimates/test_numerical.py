@@ -72,15 +72,6 @@ def test_every_kind_of_change_counts_as_it_should():
     }
 
 
-def test_classes_gain_and_lose_by_their_own_share():
-    first, again = [[0, 0, 3]], [[0, 1, 4]]
-    table = tabulate(first, [[1, 1, 0]], bonds_of(first), again, [[1, 1, NOT]], bonds_of(again))
-    # A → B: A loses, B gains. D → missed: D loses, for the others a failure goes.
-    assert table["n_gained_pr_class"].tolist() == [[1, 2, 1, 0]]
-    assert table["n_lost_pr_class"].tolist() == [[1, 0, 0, 1]]
-    assert table["n_checked_pr_class"].tolist() == [[3, 3, 3, 3]]
-
-
 @pytest.mark.parametrize("seed", rest_slow(range(20), lambda seed: seed < 6))
 def test_no_probability_moves_further_than_its_flips(seed):
     codes = draw_codes(np.random.default_rng(seed), (2, 3, 2, 200))

@@ -12,7 +12,6 @@ from flocsim.ensembles.config.schema import StopConfig
 from flocsim.ensembles.estimates.statistics import (
     CODES,
     borders,
-    probabilities,
     stop_rule,
 )
 from flocsim.ensembles.parallel.communicator import Communicator
@@ -174,18 +173,6 @@ def test_no_events_give_nan_not_zero():
         assert np.isnan(table[name]).all(), name
 
 
-def test_counts_of_two_halves_pool_to_the_whole():
-    codes = draw_codes(np.random.default_rng(2), (2, 3, 2, 50))
-    whole = tabulate(*codes)
-    halves = (slice(17), slice(17, None))
-    parts = [tabulate(*(each[..., k] for each in codes)) for k in halves]
-    counts = [name for name in whole if name.startswith("n_")]
-    pooled = {name: parts[0][name] + parts[1][name] for name in counts}
-    pooled |= probabilities(pooled)
-    for name in pooled:
-        np.testing.assert_array_equal(whole[name], pooled[name])
-
-
 def test_swapping_inside_and_outside_mirrors_the_table():
     outcome, inside, bond = draw_codes(np.random.default_rng(3), (2, 2, 2, 50))
     swapped = np.choose(outcome, [2, 3, 0, 1, 4, 5, 6])
@@ -273,14 +260,6 @@ def test_a_study_ends_at_the_first_look_that_is_narrow_enough(tmp_path):
     before = looks[looks.index(results.count) - 1]
     codes = (results.replicates[name][..., :before] for name in CODES)
     assert np.max(half_widths(tabulate(*codes))) > 0.12
-
-
-@pytest.mark.slow
-def test_it_is_the_beginning_of_the_study_without_a_rule(tmp_path):
-    ended = run(small_config(tmp_path, SPHERES | {"stop": RULE}))
-    whole = run(small_config(tmp_path, SPHERES))
-    for name, values in ended.replicates.items():
-        np.testing.assert_array_equal(values, whole.replicates[name][..., : ended.count])
 
 
 def test_the_study_goes_on_where_the_rule_is_made_stricter(tmp_path):

@@ -5,9 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,19 +14,12 @@ import pytest
 from flocsim.compiler import composer
 from flocsim.ensembles import runner
 from flocsim.ensembles.kind import flocs_of, study_of
-from flocsim.ensembles.parallel import processes
 from flocsim.ensembles.parallel.processes import in_copies
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_study import swarm_config
 from tests.helpers.waiting import PATIENCE, wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux")
-
-
-@pytest.fixture(params=[1, 8])
-def processors(monkeypatch, request):
-    """So many processors, whatever there are."""
-    monkeypatch.setattr(processes.os, "sched_getaffinity", lambda number: set(range(request.param)))
 
 
 def has_ended(number):
@@ -43,7 +34,7 @@ def has_ended(number):
     return wait_until(gone)
 
 
-def test_works_are_done_in_other_processes_by_the_end(tmp_path, processors):
+def test_works_are_done_in_other_processes_by_the_end(tmp_path):
     paths = [tmp_path / str(place) for place in range(3)]
     in_copies([partial(leave, path) for path in paths])
     numbers = {path.read_text() for path in paths}
@@ -54,27 +45,9 @@ def leave(path):
     path.write_text(str(os.getpid()))
 
 
-def test_the_first_one_speaks_and_how_a_work_fails_is_not_told(capfd, processors):
+def test_the_first_one_speaks_and_how_a_work_fails_is_not_told(capfd):
     in_copies([partial(print, "one"), partial(print, "two"), lambda: 1 / 0])
     assert capfd.readouterr() == ("one\n", "")
-
-
-def test_they_end_with_what_goes_wrong_here(tmp_path, monkeypatch):
-    path = tmp_path / "number"
-
-    def work():
-        leave(path)
-        time.sleep(2 * PATIENCE)
-
-    def interrupted(*arguments):
-        while not (path.exists() and path.read_text()):
-            time.sleep(0.01)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(BaseProcess, "join", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        in_copies([work])
-    assert has_ended(int(path.read_text()))
 
 
 KILLED = """

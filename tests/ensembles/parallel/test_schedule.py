@@ -11,7 +11,6 @@ from flocsim.ensembles.parallel.schedule import (
     Schedule,
     StudyState,
     TooManyFailures,
-    chunk_seconds,
 )
 from tests.helpers.study_state import make_state, result_of
 
@@ -87,11 +86,6 @@ def test_an_earlier_stage_comes_first_and_an_end_stops_the_rest():
     schedule.end_at(4)
     schedule.give_back(first[5], 0)  # what comes late is no harm
     assert (schedule.take(), schedule.remaining, schedule.final) == (None, 0, 4)
-
-
-@pytest.mark.parametrize(("size", "seconds"), [(1, 0.25), (100, 0.25), (10_000, 10.0)])
-def test_the_time_of_a_chunk_grows_with_the_ranks(size, seconds):
-    assert chunk_seconds(size) == seconds
 
 
 def run_all(state):

@@ -13,9 +13,8 @@ from flocsim.ensembles.storage.resume import NEW, RESUME
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FlocsimError
 from flocsim.io.journal import ROWS, SESSION
-from flocsim.io.seals import seal
 from tests.helpers.journals import change, records_in
-from tests.helpers.sealed import read_sealed
+from tests.helpers.sealed import read_sealed, seal
 from tests.helpers.small_study import small_config
 from tests.helpers.swarm_study import swarm_config
 

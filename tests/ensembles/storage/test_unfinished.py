@@ -11,7 +11,7 @@ from flocsim.ensembles.storage.identity import short
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.ensembles.storage.unfinished import read_unfinished
 from flocsim.errors import FileError
-from flocsim.io.journal import Journal, journal_of
+from flocsim.io.journal import SESSION, Journal, as_text, journal_of
 from tests.helpers.synthetic_results import make_results
 from tests.helpers.tabulate import tabulate
 
@@ -26,7 +26,7 @@ def write_journal(path):
         "command": "x y", "processor": "z", "asked": ASKED,
     }  # fmt: skip
     journal = Journal(path)
-    journal.add_session(session)
+    journal.add(SESSION, as_text(session))
     pieces = [((0, v, d), 0, 40) for v in range(2) for d in range(2)] + [((1, 1, 0), 10, 25)]
     for (t, v, d), first, stop in pieces:
         rows = np.zeros(stop - first, ROW)

@@ -16,11 +16,10 @@ import flocsim
 from flocsim.__main__ import main
 from flocsim.ensembles.swarms.results import decoded
 from flocsim.ensembles.swarms.study import SwarmStudy
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
 from flocsim.io import terminal
-from flocsim.io.groups import FileFormat
 from flocsim.io.journal import PART
-from flocsim.io.results.swarm_file import read_swarm
+from flocsim.io.results.swarm_file import SWARMS
 from flocsim.swarms import runner
 from tests.helpers.journals import records_in
 from tests.helpers.swarm_study import swarm_config, write_swarm_study
@@ -45,7 +44,7 @@ def same(one, other):
 
 def columns_of(path):
     """{(group, column): array} of a file."""
-    found = read_swarm(path)
+    found = SWARMS.read(path)
     return {
         (name, column): found.groups[name][column]
         for name, group in found.kind.groups.items() for column in group.columns
@@ -240,25 +239,7 @@ def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, mo
     before, after = (columns_of(each / "swarm.h5") for each in (finished, tmp_path))
     for name, values in before.items():
         assert after[name][: len(values)].tobytes() == values.tobytes()
-    assert read_swarm(tmp_path / "swarm.h5").run["sessions"] == 2
-
-
-@pytest.mark.slow
-def test_results_of_a_run_that_found_all_rows_are_extended(finished, tmp_path, monkeypatch):
-    """Killed between the last row and the file: the next run computes nothing, makes no trial."""
-    monkeypatch.chdir(tmp_path)
-    path = write_swarm_study(tmp_path)
-
-    def full(*words):
-        raise FileError("the disk is full")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(FileFormat, "write", full)
-        assert main(["swarm", str(path), "--quiet"]) == 74
-    assert main(["swarm", str(path), "--quiet", "--resume"]) == 0
-    assert read_swarm("swarm.h5").run["computed"] == 0
-    assert main(["swarm", str(path), "--quiet", "--resume", "--replicates", "3"]) == 0
-    assert len(read_swarm("swarm.h5").scales["replicate"]) == 3
+    assert SWARMS.read(tmp_path / "swarm.h5").run["sessions"] == 2
 
 
 def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):

@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
+from flocsim.geometry.shapes.cores import Part
 from flocsim.io.plots.shapes import POPULATION_FIGURES, figure_2, figure_3, shape, sizes
 from flocsim.io.plots.style import save
 from flocsim.io.shape_library import ShapeEntry, StoredFit
@@ -19,7 +20,7 @@ def ring(count, radius):
 
 def entry(radius, errors, spheroradius=1.0):
     """A floc of a library with fits at the N of `errors` {N: RE}."""
-    fits = {n: StoredFit(ring(n, radius), 1e-6, error) for n, error in errors.items()}
+    fits = {n: StoredFit((Part((ring(n, radius),), 1e-6),), error) for n, error in errors.items()}
     return ShapeEntry(f"a#{radius}", "a", 1e-6, (0.0, 0.0), 50, radius, spheroradius, fits)
 
 

@@ -8,7 +8,7 @@ from flocsim.errors import FileError
 from flocsim.geometry.shapes.cores import table_of
 from flocsim.io.plots.style import new_figure
 from flocsim.io.plots.swarm import SWARM_FIGURES, draw_bodies, last_known, outlines_of, shape_of
-from flocsim.io.results.swarm_file import GONE, read_swarm
+from flocsim.io.results.swarm_file import GONE, SWARMS
 from tests.helpers.compound_shapes import beads, framed
 from tests.helpers.swarm_study import make_swarm_results
 
@@ -36,7 +36,7 @@ def compound_results():
 
 def test_shapes_come_back_from_the_file(tmp_path):
     compound_results().write(tmp_path / "s.h5")
-    results = read_swarm(tmp_path / "s.h5")
+    results = SWARMS.read(tmp_path / "s.h5")
     for body in range(4):
         shape = shape_of(results, 1, body)
         assert shape.area == pytest.approx(SHAPES[body % 2].area, rel=1e-12)

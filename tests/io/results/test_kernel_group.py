@@ -2,13 +2,10 @@
 
 import csv
 
-import attrs
 import numpy as np
 import pytest
 
-from flocsim.body import FractalDensity
 from flocsim.errors import UsageError
-from flocsim.io.results.kernel_group import fractal_in
 from flocsim.io.results.kernel_tables import (
     curvilinear_factor,
     efficiency_for,
@@ -72,12 +69,3 @@ def test_flocmods_settling_kernel_lacks_an_eighteenth():
         efficiency_for(kernel, "shear", 1, "spheres"), efficiency_for(kernel, "shear", 1, "flocmod")
     )
     assert "1/18" in kernel_matrix(kernel, "settling", 1, model="flocmod")
-
-
-def test_a_matrix_says_what_fractal_flocs_weigh():
-    density = FractalDensity("fractal", primary=4e-6, dimension=2.1, solid=2650.0)
-    found = fractal_in(f'{{"bodies.density": "{density!r}"}}')
-    text = kernel_matrix(attrs.evolve(some_kernel(), fractal=found), "shear", 32)
-    assert "# flocs of n_f = 2.1, D_p = 4e-06 m, solid of 2650 kg/m3" in text
-    assert "n_f" not in kernel_matrix(some_kernel(), "shear", 32)
-    assert fractal_in('{"bodies.density": 2650.0}') is None
