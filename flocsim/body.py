@@ -365,10 +365,13 @@ def scene_of(
         [shape.long_axis for shape in shapes],
         range(len(bodies)),
     )
-    if resistances is None:
-        resistances = np.zeros((len(bodies), RESISTANCE_COLUMNS))
+    without_drag = np.zeros((len(bodies), RESISTANCE_COLUMNS))
     known = BodyConstants.rows(len(bodies))
-    rows = zip(zip(*columns, strict=True), resistances, strict=True)
+    rows = zip(
+        zip(*columns, strict=True),
+        without_drag if resistances is None else resistances,
+        strict=True,
+    )
     known[:] = [(*own, *resistance, *UNSHIELDED) for own, resistance in rows]
     scene = Scene(
         bodies=known,

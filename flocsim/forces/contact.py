@@ -195,13 +195,13 @@ class Contact(ContactForce):
         # k_t/k_n of an isotropic elastic lattice (Wang and Mora 2008).
         ratio = 0.0 if self.poisson is None else (1.0 - 3.0 * self.poisson) / (1.0 + self.poisson)
         k_t, ratio = (self.k_t or 0.0, ratio) if sheared else (0.0, 0.0)
-        damping_ratio, normal_damping = 0.0, 0.0
+        damping_ratio, normal_damping = 0.0, 0.0  # of these one alone is above zero
         if self.restitution is not None:
             damping_ratio = damping_ratio_for(self.restitution, self.tension)
         elif self.damping_n == "critical":
             damping_ratio = 1.0
         else:
-            normal_damping = self.damping_n
+            normal_damping = float(self.damping_n)
         proportional = sheared and self.damping_t == "proportional"
         tangential_damping = 0.0 if proportional or not sheared else float(self.damping_t)
         # Friction limits springs and dashpots; without either there is nothing to limit.

@@ -6,7 +6,7 @@ numpy's structured type of them. An element of an array of that type (``rows``),
 are never instantiated; type checkers take them for the type of such an element.
 """
 
-from typing import Any, ClassVar, Self, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, get_type_hints
 
 import numpy as np
 
@@ -18,6 +18,11 @@ class Record:
     """Base of all records; see the module."""
 
     dtype: ClassVar[np.dtype[Any]]
+
+    if TYPE_CHECKING:
+
+        def copy(self) -> Self:
+            """Return a record of the same numbers, as elements of arrays have it."""
 
     def __init_subclass__(cls) -> None:
         fields = [

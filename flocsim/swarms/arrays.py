@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from flocsim.state.bodies import MOTION_COLUMNS, Disc
+from flocsim.state.clock import Clock
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
@@ -100,7 +101,7 @@ class Swarm(NamedTuple):
     times: np.ndarray  # see BEGIN
 
 
-def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: np.ndarray) -> Swarm:
+def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: Clock) -> Swarm:
     """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet; the
     ``clock`` that its method begins with."""
     n = len(scene.bodies)
