@@ -1,8 +1,10 @@
-"""Integrators: each gives its step; loop, error control, events and recording exist once.
+"""Integrators: each takes its own kind of step; the loop around all of them exists once.
 
-``base``: the contract.  ``parts``: the pieces that a method of one's own may call.  ``rhs``: forces
-and their derivatives.  ``events``: what ends a step early.  ``loop``: the driver.  ``radau``: the
-stages of the implicit methods.  May import geometry, body and what is below.
+``base``: the contract.  ``parts``: building blocks of a user's own method.  ``implicit``: the
+default, made of ``exponential`` (power series) and ``radau`` (Radau IIA).  ``backward_euler``:
+beds. ``explicit``: Dormand–Prince and velocity Verlet.  ``rhs``: forces and their derivatives.
+``events``: where steps end early.  ``loop``: the driver.  May import geometry, body and what is
+below.
 """
 
 from flocsim.integrators.backward_euler.method import BackwardEuler

@@ -1,4 +1,4 @@
-"""By how much a motion amplifies a small difference of its start, by one nudged companion."""
+"""Error amplification of a motion, measured by a companion run with a slightly different start."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,21 +9,21 @@ import numpy as np
 from flocsim.body import Body
 
 NUDGE = 1e-4
-"""How far the companion's bodies are moved, in the bounding radius of the smallest body that moves:
-far enough to be told from what the steps' errors do, and near enough to be small."""
+"""Displacement of the companion's bodies, over the smallest bounding radius of a moving body: large
+against the errors of steps, small enough for a linear response."""
 
 SEED = 13
-"""Keys the directions in which they are moved: the same for every run."""
+"""Seed of the directions of displacement: the same for every run."""
 
 MOST_AMPLIFIED = 10.0
-"""A motion that amplifies a nudge by more is one of whose error no sum of parts can speak."""
+"""Amplification above which no sum of step errors can bound the error of the motion."""
 
 
 def end_distance(bodies: Sequence[Body], position: np.ndarray, exact: np.ndarray) -> float:
-    """The furthest [m] that any point of an outline is from where it ought to be.
+    """Return the largest distance [m] of any point of an outline from its exact position.
 
     ``position`` and ``exact`` (n, 3): x, y [m] and angle [rad] of the bodies at the end of two
-    runs. Largest |Δx| + R |Δθ| of a body, R its largest centroid-to-outline distance.
+    runs. It is the largest |Δx| + R |Δθ| of a body, R its largest centroid-to-outline distance.
     """
     sizes = np.array([body.shape.bounding_radius for body in bodies])
     shift = np.hypot(*(position[:, :2] - exact[:, :2]).T)
@@ -31,19 +31,20 @@ def end_distance(bodies: Sequence[Body], position: np.ndarray, exact: np.ndarray
 
 
 def nudge_of(bodies: Sequence[Body]) -> float:
-    """How far to move bodies [m]: NUDGE of the smallest one that moves; 0 where none does."""
+    """Return the displacement [m] of a companion's bodies; 0 where no body can move."""
     return NUDGE * min((b.shape.bounding_radius for b in bodies if not b.fixed), default=0.0)
 
 
 def nudged(bodies: Sequence[Body], nudge: float) -> list[Body]:
-    """The bodies, each that moves displaced by ``nudge`` [m] in a direction of its own."""
-    ways = np.random.default_rng(SEED).uniform(0.0, 2.0 * math.pi, len(bodies))
+    """Return the bodies, each free one displaced by ``nudge`` [m] in a random direction."""
+    directions = np.random.default_rng(SEED).uniform(0.0, 2.0 * math.pi, len(bodies))
     moved = []
-    for body, way in zip(bodies, ways.tolist(), strict=True):
+    # Fixed bodies stay: they are part of the scene.
+    for body, direction in zip(bodies, directions.tolist(), strict=True):
         size = 0.0 if body.fixed else nudge
         x, y = body.position
-        place = (x + size * math.cos(way), y + size * math.sin(way))
-        moved.append(attrs.evolve(body, position=place))
+        moved_to = (x + size * math.cos(direction), y + size * math.sin(direction))
+        moved.append(attrs.evolve(body, position=moved_to))
     return moved
 
 
@@ -53,10 +54,12 @@ def amplification_of(
     companion: Callable[[list[Body]], np.ndarray | None],
     nudge: float | None = None,
 ) -> float:
-    """The distance at the end between a motion and its nudged companion, over the nudge.
+    """Return the distance between a motion and its companion at the end, over the initial
+    displacement.
 
-    ``end`` (n, 3): where the bodies have come to; ``companion(bodies)``: where others come to in
-    the same time, None where they do not get that far, which counts as inf; ``nudge`` [m].
+    ``end`` (n, 3) holds the bodies' final positions. ``companion(bodies)`` runs displaced bodies
+    for the same time and returns theirs, or None if they do not get that far, which counts as inf.
+    ``nudge`` is the displacement [m].
     """
     nudge = nudge_of(bodies) if nudge is None else nudge
     if nudge == 0.0:

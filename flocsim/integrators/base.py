@@ -1,4 +1,4 @@
-"""The contract of an integrator, and how a run can end."""
+"""The contract of an integrator (Integrator), and how a run can end (Status)."""
 
 import math
 from abc import ABC, abstractmethod
@@ -13,7 +13,12 @@ from flocsim.state.clock import Clock, Counts
 
 
 class Status(IntEnum):
-    """How a run ended: a typed result, never an exception."""
+    """How a run ended. Runs report it as a value and never raise it.
+
+    FINISHED, STOPPED, STEP_BUDGET, STALLED, TOO_DEEP and NOT_FINITE end a run; after NO_ROOM,
+    RECORD_FULL and PAUSED the same call goes on. ``reason`` says what happened and what to do. The
+    compiled loop (flocsim.integrators.loop.driver) returns the same numbers.
+    """
 
     FINISHED = 1
     STOPPED = 2
@@ -30,7 +35,7 @@ class Status(IntEnum):
 
     @property
     def reason(self) -> str:
-        """What happened and what to do, in one line."""
+        """One line: what happened, and what to do about it."""
         return REASONS[self]
 
 
@@ -50,32 +55,47 @@ REASONS = {
 
 @attrs.frozen
 class Integrator(ABC):
-    """A way to take one step; lists, error control, events and recording exist once, around it.
+    """Base class of integrators. A subclass takes one step; the loop around it exists once.
 
-    A subclass gives ``attempt``, a plain function that numba can compile, on arrays of which it
-    uses elements, ``shape``, ``len``, rows and slices:
+    Candidate lists, error control, events and recording are the loop's
+    (flocsim.integrators.loop.driver).
 
-    ``attempt(scene, work, clock, step) → ratio``. Given are the motion now, ``work.place[NOW]``
-    (n, 3: x, y, angle) and ``work.velocity[NOW]``, the time ``clock.time`` and the step [s] to be
-    tried. It must write the motion a step later to the same arrays at NEW, and the tangential
-    displacements there to ``work.slip[NEW]`` (flocsim.integrators.parts has the pieces). It returns
-    the step's error over what is allowed: above 1 the step is tried again, shorter; below 0 it has
-    failed and is tried again much shorter. A method of controlled error writes that error to
-    ``clock.step_error`` [m] and, for each body, how long a velocity is remembered to
-    ``work.errors[body].velocity_lifetime`` [s], which says how finely switches must be located:
-    ``parts.error_ratio`` and ``parts.weigh_velocities`` do both. A method of fixed steps returns 0
-    or, where the motion is no longer finite, −1, and subclasses ``parts.FixedStep``.
+    Attributes
+    ----------
+    tolerance : float
+        Largest error of a step [m]; infinite for a method of fixed steps.
+    first_step : float
+        Size of the first step [s].
+    largest_step : float
+        Largest size of a step [s].
+    estimate_share : float
+        Fraction of the estimated errors that enters the stated error; far below 1 where the
+        estimate is of much lower order than the method.
+    across : bool
+        True if steps go on across events instead of ending there. Such a method marks, as closed,
+        the pairs that took part in the step.
 
-    ``next_step(clock, step, ratio)`` is the size of the step after one with that ratio.
-    ``replaces`` {hook: function} are other functions of the engine that it stands in for.
-    ``tolerance`` [m] and ``first_step`` [s] are read by the driver; a fixed-step method has an
-    infinite tolerance. ``estimate_share``: the share of the errors that it estimates for its steps
-    that counts in the stated error, far below 1 where the estimate is of a much lower order.
-    ``across``: whether its steps go on across switches instead of ending there, for which they
-    flag, as closed, the pairs that have taken part.
+    Notes
+    -----
+    ``attempt(scene, work, clock, step)`` returns a ratio. It is a plain function that numba
+    compiles; on arrays it may use elements, ``shape``, ``len``, rows and slices. Input:
+    ``work.place[NOW]`` (n, 3: x, y, angle), ``work.velocity[NOW]``, the time ``clock.time`` and the
+    ``step`` [s] to try. Output: the motion one step later in the same arrays at NEW, and the
+    tangential displacements in ``work.slip[NEW]`` (flocsim.integrators.parts has the building
+    blocks).
 
-    All that a method keeps from one step to the next lies in the arrays of flocsim.state, each
-    column with its unit: a pause, a copy of a run, a System and a Swarm all go on from these.
+    The ratio is the error of the step over its tolerance. Above 1 the step is repeated, shorter;
+    below 0 it has failed, and is repeated much shorter. An adaptive method writes the error to
+    ``clock.step_error`` [m] and, for each body, the time for which a velocity error persists to
+    ``work.errors[body].velocity_lifetime`` [s], which decides how exactly events are located.
+    ``parts.error_ratio`` and ``parts.weigh_velocities`` do both. A method of fixed steps subclasses
+    ``parts.FixedStep`` and returns 0, or −1 where the motion is no longer finite.
+
+    ``next_step(clock, step, ratio)`` returns the size of the next step. ``replaces`` maps hooks of
+    flocsim.hooks to functions that this method puts in their place.
+
+    A method stores everything that it needs later in the records of flocsim.state. So a pause, a
+    copy of a run, a System and a Swarm can all resume.
     """
 
     tolerance = math.inf
@@ -87,33 +107,51 @@ class Integrator(ABC):
     @staticmethod
     @abstractmethod
     def attempt(scene, work, clock, step):
-        """Try one step; see the class."""
+        """Try one step; return its error over the tolerance. See the class.
+
+        Parameters
+        ----------
+        scene : Scene
+            Everything that stays the same in a run: bodies, parameters, laws.
+        work : Work
+            Everything that changes: motion, contacts, scratch space.
+        clock : Clock
+            Time, step sizes and tolerance.
+        step : float
+            Size of the step [s].
+
+        Returns
+        -------
+        float
+            Error over tolerance; above 1: too large; below 0: the step failed.
+        """
 
     @staticmethod
     @abstractmethod
     def next_step(clock, step, ratio):
-        """The size of the step after one of that size [s]."""
+        """Return the size [s] of the step after one of size ``step`` [s] with this error ratio."""
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """{hook of flocsim.hooks.HOOKS: function} besides."""
+        """{hook of flocsim.hooks.HOOKS: function} that this method replaces; none by default."""
         return {}
 
     @property
     def fillings(self) -> dict[Callable, Callable]:
-        """{hook: function} of this integrator."""
+        """{hook: function} of this integrator, its attempt and next_step among them."""
         return {
             hooks.attempt: self.attempt, hooks.next_step: self.next_step, **self.replaces,
         }  # fmt: skip
 
     def fresh_clock(self) -> Clock:
-        """The float state of a run that starts at time zero."""
+        """Return the clock of a run that starts at time zero."""
         clock = Clock.one()
         clock.until = math.inf
         clock.step = self.first_step
         clock.tolerance = self.tolerance
         clock.largest_step = self.largest_step
         clock.estimate_share = self.estimate_share
+        # No step has been taken: nothing limits the first one but ``first_step``.
         clock.previous_step = math.inf
         clock.feasible_step = math.inf
         clock.step_after_switch = math.inf
@@ -121,8 +159,9 @@ class Integrator(ABC):
         return clock
 
     def fresh_counts(self, max_steps: int) -> Counts:
-        """The integer state of a run with a step budget."""
+        """Return the counters of a run with a budget of steps, tried ones included."""
         counts = Counts.one()
         counts.max_steps = max_steps
+        # Never pause.
         counts.pause_at = np.iinfo(np.int64).max
         return counts

@@ -1,5 +1,7 @@
-"""Methods that solve no systems: Dormand and Prince's, of order 5 with an embedded error estimate
-of order 4, and velocity Verlet, of order 2, whose steps are fixed.
+"""Explicit methods: Dormand and Prince, of order 5 with an embedded estimate of order 4, and
+velocity Verlet, of order 2 with fixed steps.
+
+They solve no linear systems, and are limited to steps of a few 1/ω of the stiffest contact.
 """
 
 import attrs
@@ -16,7 +18,7 @@ from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, STEP_ERROR
 
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
-"""Where the stages lie in the step."""
+"""Times of the stages, as fractions of the step."""
 
 MATRIX = (
     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -27,77 +29,95 @@ MATRIX = (
     (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0, 0.0),
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0),
 )
-"""Weights of the earlier stages' rates in each stage; the last one is the result."""
+"""Runge–Kutta matrix: weights of the earlier stages' rates in each stage; the last row is the
+result."""
 
 ESTIMATE = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 """Weights of the rates in the error estimate (Hairer, Nørsett & Wanner 1993, table II.5.2)."""
 
-ORDER_OF_ESTIMATE = 5.0
-"""The estimate goes with this power of the step."""
+ESTIMATE_ORDER = 5.0
+"""The error estimate scales as this power of the step size."""
 
 
 def state_of(stage):
-    """The state of a stage: the first one is NOW."""
+    """Return the state of a stage; the first stage is NOW."""
     return NOW if stage == 0 else FIRST_STAGE + stage - 1
 
 
 def acceleration_of(scene, work, state, body, axis):
-    """Rate of a velocity in a state."""
+    """Return the rate of a velocity in a state [m/s² or rad/s²]."""
     rate = work.force[state, body, axis]
     return rate * scene.bodies[body].free / inertia(scene, body, axis)
 
 
 def combine(scene, work, weights, stages, base, end):
-    """State ``end`` = ``base`` times state NOW + the weighted rates of the first stages."""
+    """Write ``base`` times the motion of NOW, plus the weighted rates of the first stages, to
+    ``end``."""
     for body in range(scene.bodies.shape[0]):
         for axis in range(3):
-            way = faster = 0.0
+            displacement = speed_change = 0.0
             for stage in range(stages):
+                # Most rows of the tableau have zeros.
                 if weights[stage] != 0.0:
                     state = state_of(stage)
-                    way += weights[stage] * work.velocity[state, body, axis]
-                    faster += weights[stage] * acceleration_of(scene, work, state, body, axis)
-            work.place[end, body, axis] = base * work.place[NOW, body, axis] + way
-            work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + faster
+                    displacement += weights[stage] * work.velocity[state, body, axis]
+                    speed_change += weights[stage] * acceleration_of(scene, work, state, body, axis)
+            work.place[end, body, axis] = base * work.place[NOW, body, axis] + displacement
+            work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + speed_change
 
 
 def combine_slips(scene, work, weights, stages, step, end):
-    """Tangential displacements of the closed pairs in state ``end``."""
+    """Write the tangential displacements of closed contacts, by the weighted rates, to state
+    ``end``."""
     for row in range(work.tally.candidates):
         if work.candidates[row].contact_mode == 1:
             total = 0.0
             for stage in range(stages):
                 total += weights[stage] * work.slip_rate[state_of(stage), row]
+            # A contact that slides stays at its limit.
             work.slip[end, row] = slip_in(scene, work, end, row, work.slip[NOW, row] + step * total)
 
 
-def times(weights, step):
+def scaled(weights, step):
     a, b, c, d, e, f, g = weights
     return a * step, b * step, c * step, d * step, e * step, f * step, g * step
 
 
 def evaluate_stages(scene, work, time, step):
-    """Rates of all seven stages; the last one becomes NEW."""
+    """Evaluate all seven stages; the last one becomes NEW."""
     for stage in range(7):
         state = state_of(stage)
         if stage > 0:
-            combine(scene, work, times(MATRIX[stage], step), stage, 1.0, state)
+            combine(scene, work, scaled(MATRIX[stage], step), stage, 1.0, state)
+        # Contacts are located before the forces are summed: these need the tangential
+        # displacements.
         locate_with_slip_rates(scene, work, state)
         if stage > 0:
             combine_slips(scene, work, MATRIX[stage], stage, step, state)
         sum_forces(scene, work, time + NODES[stage] * step, state)
+    # First same as last: the seventh stage is the result of order 5.
     adopt_stage(work, state)
 
 
 @attrs.frozen
 class DormandPrince54(Integrator):
-    """Explicit Runge–Kutta of order 5, adaptive: for scenes that are not stiff, and to compare.
+    """Explicit Runge–Kutta method of order 5 with error control, for scenes that are not stiff.
 
-    Steps end where a pair of features touches or parts, so that the forces are smooth inside them.
-    Parameters: ``tolerance`` [m], the error of a step in the place of any outline point, what its
-    velocity error leads to included; ``first_step`` [s].
+    Steps end where a contact opens, closes, sticks or slides, so that the forces are smooth inside
+    them. It serves as a comparison for the implicit methods.
 
-    Source: Dormand & Prince (1980), as in Hairer, Nørsett & Wanner (1993), table II.5.2.
+    Parameters
+    ----------
+    tolerance : float
+        Largest error of a step [m], > 0: displacement of any point of an outline, including the
+        displacement that the error of the velocity leads to later.
+    first_step : float
+        Size of the first step [s], > 0.
+
+    Notes
+    -----
+    Source: Dormand & Prince (1980), as in Hairer, Nørsett & Wanner, Solving Ordinary Differential
+    Equations I (1993), table II.5.2.
     """
 
     tolerance: float = quantity("m", above=0.0, default=1e-9)
@@ -105,59 +125,78 @@ class DormandPrince54(Integrator):
 
     @staticmethod
     def attempt(scene, work, clock, step):
-        """One step: error over tolerance, or −1 where the motion is no longer finite."""
+        """Take one step; return its error over the tolerance, or −1 where the motion is no longer
+        finite."""
         time = clock.time
         evaluate_stages(scene, work, time, step)
+        # For how long a velocity error persists decides its weight.
         weigh_velocities(scene, work, time, max(end_of_run(clock) - time, step))
-        combine(scene, work, times(ESTIMATE, step), 7, 0.0, STEP_ERROR)
+        # The embedded estimate, to STEP_ERROR.
+        combine(scene, work, scaled(ESTIMATE, step), 7, 0.0, STEP_ERROR)
         return error_ratio(scene, work, clock, step)
 
     @staticmethod
     def next_step(clock, step, ratio):
-        """The step for which the estimate meets the tolerance."""
-        return step * adaptive_factor(clock, step, ratio, ORDER_OF_ESTIMATE)
+        """Return the size [s] of the next step, for which the estimate meets the tolerance."""
+        return step * adaptive_factor(clock, step, ratio, ESTIMATE_ORDER)
 
 
 HALFWAY = FIRST_STAGE
-"""The state whose velocity is that of the middle of the step."""
+"""The state that holds the velocity of the middle of the step."""
 
 
 def kick_and_drift(scene, work, step):
-    """Half a kick into HALFWAY, whose velocity leads to the place of NEW; NEW has a whole kick."""
+    """Write the velocity after half the step to HALFWAY, and the position that it leads to into
+    NEW.
+
+    NEW also gets a preliminary velocity, for the drag at the end of the step.
+    """
     for body in range(work.place.shape[1]):
         for axis in range(3):
             speed = work.velocity[NOW, body, axis]
-            kick = gain(scene, work, NOW, body, axis, step)
+            kick = velocity_increment(scene, work, NOW, body, axis, step)
             work.velocity[HALFWAY, body, axis] = speed + 0.5 * kick
             work.place[NEW, body, axis] = work.place[NOW, body, axis] + step * (speed + 0.5 * kick)
-            # Drag at the half step's velocity would be half a step late: take a whole kick's.
+            # Drag at the velocity of HALFWAY would lag by half a step: predict the velocity of the
+            # end.
             work.velocity[NEW, body, axis] = speed + kick
 
 
 def finish_kick(scene, work, step):
-    """The velocity of NEW: that of HALFWAY and half a kick at the force of NEW."""
+    """Write the final velocity of NEW: HALFWAY plus half a step at the force of NEW."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            kick = gain(scene, work, NEW, body, axis, 0.5 * step)
+            kick = velocity_increment(scene, work, NEW, body, axis, 0.5 * step)
             work.velocity[NEW, body, axis] = work.velocity[HALFWAY, body, axis] + kick
 
 
-def gain(scene, work, state, body, axis, step):
-    """Change of a velocity in a step at the force of a state."""
+def velocity_increment(scene, work, state, body, axis, step):
+    """Return the change of a velocity in a step at the force of a state."""
     force = work.force[state, body, axis]
     return step * scene.bodies[body].free * force / inertia(scene, body, axis)
 
 
 @attrs.frozen
 class VelocityVerlet(FixedStep):
-    """Fixed steps of ``step`` [s]: the plain explicit method, to compare with.
+    """Velocity Verlet: explicit, of order 2, with fixed steps and without error control.
 
-    Stable for steps below about 2/ω of the stiffest contact or the strongest damping.
+    Stable for steps below about 2/ω of the stiffest contact or the strongest damping. It serves as
+    a comparison.
+
+    Parameters
+    ----------
+    step : float
+        Size of each step [s], > 0.
+
+    Notes
+    -----
+    x₁ = x₀ + h v₀ + ½ h² a₀; v₁ = v₀ + ½ h (a₀ + a₁), where a₁ uses the predicted velocity v₀ + h
+    a₀. Contacts are located, and their modes set, at both ends of a step.
     """
 
     @staticmethod
     def attempt(scene, work, clock, step):
-        """Half a kick, a drift, half a kick: 0, or −1 where the motion is no longer finite."""
+        """Take one step; return 0, or −1 where the motion is no longer finite."""
         evaluate(scene, work, clock.time, NOW)
         kick_and_drift(scene, work, step)
         move_slips(scene, work, step)

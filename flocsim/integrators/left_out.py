@@ -1,10 +1,10 @@
-"""What is left out of an engine that a scene never reaches, to save what compiling it takes.
+"""Parts of the engine that a scene never reaches, and that are left out to save compile time.
 
-Of few bodies: the search among many, and sparse systems; of two, also the steps across switches
-that Implicit goes over to by itself. All pairs of few bodies are watched, their systems are dense
-(flocsim.state.work: ALL_PAIRS, DENSE), and two are not handed over in a System (backward_euler/
-method.py: FEWEST). Of forces: sums along outlines, and the numbers of shapes that slow flow asks
-for, where no force is of that kind: most scenes have neither.
+For few bodies: the search for near pairs among many, and sparse systems; all pairs of few bodies
+are watched, and their systems are dense (flocsim.state.work: ALL_PAIRS, DENSE). For two bodies of a
+System also backward Euler, which Implicit does not hand over to below FEWEST bodies
+(backward_euler/method.py). Where no force needs them: sums along outlines, sums over charges, the
+numbers of shapes that drag in a flow uses, and the resistance of water between bodies.
 """
 
 import math
@@ -26,70 +26,77 @@ from flocsim.state.work import DENSE
 
 
 def list_none(scene, work, cut):
-    """All pairs are listed from the start."""
+    """List no pairs: all are listed from the start."""
     return True
 
 
 def none_wandered(scene, work, state):
-    """No list can become too old."""
+    """Return no motion since the last list: the list of all pairs never expires."""
     return 0.0
 
 
-def never_wanders(scene, work, share):
-    """The time [s] for which the list of all pairs is good."""
+def never_wanders(scene, work, fraction):
+    """Return the time [s] for which the list of all pairs is valid."""
     return math.inf
 
 
 def factorise_none(scene, work, step, both):
-    """There are no sparse systems."""
+    """Return False: there are no sparse systems."""
     return False
 
 
 def solve_none(work, both):
-    """There are no sparse systems."""
+    """Solve nothing: there are no sparse systems."""
 
 
 def add_none(scene, work, time, state):
-    """No forces act along outlines."""
+    """Add nothing: no forces act along outlines."""
 
 
 def differentiate_none(scene, work, time):
-    """They have no derivatives."""
+    """Add no derivatives of forces along outlines."""
 
 
-def none_apart(scene, work, time, a, b, way):
-    """They push nothing apart."""
+def none_apart(scene, work, time, a, b, displacement):
+    """Return no repulsion [N]: no forces act along outlines."""
     return 0.0
 
 
 def left_out(
     bodies: float, *, outlines: bool, charges: bool, plain: bool, water: bool
 ) -> dict[Callable, Callable]:
-    """{hook: function} that leaves out what a scene does not need, for
-    flocsim.compiler.composer.compose: of so many bodies (inf: of any number), with forces along
-    ``outlines`` or without, some of them between ``charges``; ``plain``: whether no kernel reads
-    the numbers of shapes; with the resistance of ``water`` between two bodies, or without."""
-    found: dict[Callable, Callable] = {}
+    """Return {hook: function} that replaces what a scene does not need by functions that do
+    nothing.
+
+    For flocsim.compiler.composer.compose. ``bodies`` is their number, or inf for any number.
+    ``outlines`` and ``charges`` say if there are forces along outlines, and between charges;
+    ``plain`` if no kernel reads the numbers of shapes; ``water`` if two bodies resist each other
+    through it.
+    """
+    replaced: dict[Callable, Callable] = {}
+    # By forces.
     if plain:
-        found |= {views.body_view: views.plain_body_view}
+        replaced |= {views.body_view: views.plain_body_view}
     if not outlines:
-        found |= {
+        replaced |= {
             forces.add_outline_forces: add_none,
             jacobian.add_outline_derivatives: differentiate_none,
             outline_sum.outline_repulsion: none_apart,
         }
     if not charges:
-        found |= {charge_sum.sum_charges: charge_sum.no_charges}
+        replaced |= {charge_sum.sum_charges: charge_sum.no_charges}
     if not water:
-        found |= pair_resistance.LEFT_OUT
+        replaced |= pair_resistance.LEFT_OUT
+    # By the number of bodies. A hook replaced by itself stays empty, whatever the method fills it
+    # with.
     if bodies < FEWEST:
-        found |= {choose_method: choose_method, step_across: step_across}
+        replaced |= {choose_method: choose_method, step_across: step_across}
     if bodies <= DENSE:
-        found |= {
+        replaced |= {
             body_pairs.list_near: list_none,
             body_pairs.travelled_share: none_wandered,
             body_pairs.time_to_travel: never_wanders,
             elimination.factorise_sparse: factorise_none,
             elimination.solve_sparse: solve_none,
         }
-    return found
+    return replaced

@@ -1,7 +1,7 @@
-"""What methods are made of, one's own included: the pieces that ``attempt`` may call.
+"""Building blocks of integrators, also of a user's own: the functions that ``attempt`` may call.
 
-examples/own_integrator.py is a whole method in a few lines; flocsim.integrators.base.Integrator
-says what ``attempt`` is given and has to fill.
+examples/own_integrator.py is a complete method in a few lines. flocsim.integrators.base.Integrator
+specifies the input and output of ``attempt``.
 """
 
 import math
@@ -40,14 +40,28 @@ __all__ = [
 
 
 def evaluate(scene, work, time, state):
-    """Forces and torques in a state, from its motion and its tangential displacements."""
+    """Compute the forces and torques in a state.
+
+    Parameters
+    ----------
+    scene, work
+        As given to ``attempt``.
+    time : float
+        Time at which time-dependent forces are evaluated [s].
+    state : int
+        NOW or NEW. Motion and tangential displacements of that state are the input;
+        ``work.force[state]`` (n, 3) [N, N, N m] is the output.
+    """
     locate_with_slip_rates(scene, work, state)
     sum_forces(scene, work, time, state)
 
 
 def evaluate_as_they_lie(scene, work):
-    """Forces and torques of NOW where bodies have been put: all pairs are listed and flagged anew;
-    False where the list has no room."""
+    """Compute the forces of NOW for bodies that were placed by hand; return False without room.
+
+    All candidate pairs are listed and their modes set anew from the positions. False means that the
+    list of candidates is full.
+    """
     if not rebuild_list(scene, work):
         return False
     locate_contacts(scene, work, NOW)
@@ -58,18 +72,39 @@ def evaluate_as_they_lie(scene, work):
 
 
 def acceleration(scene, work, state, body, axis):
-    """Rate of change of a body's velocity (axis 0, 1) or spin (2) in an evaluated state; 0 where
-    the body is fixed."""
+    """Return the acceleration of a body in an evaluated state.
+
+    Parameters
+    ----------
+    scene, work
+        As given to ``attempt``.
+    state : int
+        A state that ``evaluate`` has been called for.
+    body : int
+        Index of the body.
+    axis : int
+        0 and 1: x and y [m/s²]; 2: rotation [rad/s²].
+
+    Returns
+    -------
+    float
+        Force over mass, or torque over moment of inertia; 0 for a fixed body.
+    """
     force = work.force[state, body, axis]
     return scene.bodies[body].free * force / inertia(scene, body, axis)
 
 
 def move_slips(scene, work, step):
-    """Contact geometry of NEW, and the tangential displacements there from the mean of their rates
-    at both ends of a fixed step whose start has been evaluated."""
+    """Advance the tangential displacements over a fixed step, from NOW to ``work.slip[NEW]``.
+
+    The motion of NEW must be known, and NOW evaluated. Contacts are located in NEW. The
+    displacement grows by the step times the mean of its rates at both ends (trapezoidal rule); a
+    contact that closed in the step has the rate at the end alone.
+    """
     locate_with_slip_rates(scene, work, NEW)
     slip = work.slip
     for row in range(work.tally.candidates):
+        # An open contact has no displacement.
         slip[NEW, row] = 0.0
         if work.candidates[row].contact_mode == 1:
             rate = tangential_rate(work, NEW, row)
@@ -79,6 +114,7 @@ def move_slips(scene, work, step):
 
 
 def all_finite(work, state):
+    """Return True if all positions and velocities of a state are finite."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             if not math.isfinite(work.place[state, body, axis]):
@@ -89,7 +125,10 @@ def all_finite(work, state):
 
 
 def locate_and_flag(scene, work, state):
-    """Fixed steps do not end at switches: every evaluation flags the pairs as they are."""
+    """Locate the contacts of a state and set their modes by the gaps there.
+
+    Fixed steps do not end at events: every evaluation sets the modes anew.
+    """
     locate_contacts(scene, work, state)
     set_closed(work, state)
     flag_near(scene, work, state, 0.0)
@@ -97,7 +136,17 @@ def locate_and_flag(scene, work, state):
 
 @attrs.frozen
 class FixedStep(Integrator):
-    """A method whose steps all have the size ``step`` [s]."""
+    """Base class of methods with steps of one fixed size.
+
+    Parameters
+    ----------
+    step : float
+        Size of each step [s], > 0.
+
+    Notes
+    -----
+    There is no error control: ``attempt`` returns 0, or −1 where the motion is no longer finite.
+    """
 
     step: float = quantity("s", above=0.0, default=1e-8)
 
@@ -115,5 +164,5 @@ class FixedStep(Integrator):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """Pairs are located and flagged at every evaluation."""
+        """{hook: function}: contacts are located and their modes set at every evaluation."""
         return {locate_acting: locate_and_flag}

@@ -65,15 +65,15 @@ UNSHIELDED = (1.0, 0.0, 1.0)
 
 
 MOST_FRAMES = 3
-"""Stages of an implicit step for which a Frame is stored."""
+"""Stages of an implicit step for which a body has a frame."""
 
 
 class Frame(Record):
-    """Rotation and shift of a body's contacts from the start of a step to one of its stages."""
+    """Corotational frame of a body at a stage of an implicit step (radau/contact_frames.py)."""
 
-    turn_cosine: float  # of the angle by which their normals turn
-    turn_sine: float
-    shift_x: float  # [m]
+    rotation_cosine: float  # of the rotation of the contact normals since the start of the step
+    rotation_sine: float
+    shift_x: float  # s, displacement of the contact point in the rotated frame [m]
     shift_y: float  # [m]
 
 

@@ -23,23 +23,24 @@ class ContactState(Record):
 
 
 class InteriorPoint(Record):
-    """Unknowns of a contact in backward Euler's interior-point iteration, and its law there.
+    """Unknowns and friction law of a contact in backward Euler's interior-point iteration.
 
-    All forces are divided by ``normal_stiffness`` and therefore lengths [m].
+    Forces are divided by ``normal_stiffness``, and are lengths [m] for that. Letters are those of
+    flocsim.integrators.backward_euler.interior.
     """
 
     overlap: float  # δ, complementary to the slack [m]
-    slack: float  # s, the remaining gap: gap = s − δ [m]
-    friction: float  # tangential force over its limit, from −1 to 1
-    slide_ahead: float  # sliding displacement along the tangent [m]
-    slide_behind: float  # sliding displacement against it [m]
-    normal_stiffness: float  # divisor of the other forces [N/m]
-    friction_limit: float  # largest tangential force that friction allows [m]
-    stick_force: float  # tangential force if the pair sticks [m]
-    stick_slope: float  # derivative of stick_force by the tangential velocity [s]
-    held_overlap: float  # overlap that limits friction, if frozen; 0: δ does [m]
-    step_share: float  # share of the step in which the pair is closed
-    fading_gap: float  # gap at which that share is 1/2 as the pair opens [m]
+    slack: float  # s = gap + δ [m]
+    friction_ratio: float  # f/L, from −1 to 1
+    slip_forward: float  # p, slip along the tangent [m]
+    slip_backward: float  # q, slip against the tangent [m]
+    normal_stiffness: float  # divides the forces below [N/m]
+    friction_limit: float  # L, largest friction; 0: there is no limit, or no friction [m]
+    sticking_force: float  # e, friction of a sticking contact [m]
+    sticking_slope: float  # derivative of e with respect to the tangential velocity [s]
+    frozen_overlap: float  # overlap that decides friction; 0: δ does [m]
+    closed_fraction: float  # fraction of the step in which the contact is closed
+    fade_length: float  # gap in which that fraction falls to half as the contact opens [m]
 
 
 class Candidate(Record):

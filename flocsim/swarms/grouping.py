@@ -19,7 +19,7 @@ from flocsim.geometry.contact.body_pairs import near_pairs
 from flocsim.geometry.contact.compounds import EDGE_OFFSET, EXCESS_RADIUS
 from flocsim.geometry.contact.points import nearest_displacement
 from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
-from flocsim.integrators.radau.contact_frames import unite
+from flocsim.integrators.radau.contact_frames import merge
 from flocsim.state.bodies import ANGLE, SPIN, VX, VY, X, Y
 
 
@@ -159,7 +159,7 @@ def find_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
         labels[body] = body
     for pair in range(total):
         if both_free(swarm, pairs[pair].later, pairs[pair].earlier):
-            unite(labels, pairs[pair].later, pairs[pair].earlier)
+            merge(labels, pairs[pair].later, pairs[pair].earlier)
     name_islands(labels)
     note_walls(swarm, span, reach, width, height, labels, walls, touches)
     return total
@@ -208,7 +208,7 @@ def join_islands(swarm, span, reach, width, height, pairs, labels, walls, touche
         a, b = pairs[pair].later, pairs[pair].earlier
         others = both_free(swarm, a, b) and labels[a] != labels[b]
         if others and have_met(swarm, a, b, reach, width, height):
-            unite(labels, a, b)
+            merge(labels, a, b)
     name_islands(labels)
     note_walls(swarm, span, reach, width, height, labels, walls, touches)
     return total

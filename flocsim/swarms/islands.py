@@ -107,7 +107,7 @@ def clear_body(work, body):
     kick.x = kick.y = kick.turn = 0.0
     for stage in range(MOST_FRAMES):
         frame = work.frames[body, stage]
-        frame.turn_cosine = frame.turn_sine = frame.shift_x = frame.shift_y = 0.0
+        frame.rotation_cosine = frame.rotation_sine = frame.shift_x = frame.shift_y = 0.0
 
 
 def put_state(swarm, work, members, first):

@@ -21,9 +21,9 @@ from flocsim.geometry.contact.points import contact_point, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, contact_force, has, law_table
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.events.first_event import set_closed
-from flocsim.integrators.exponential.series import write_at
+from flocsim.integrators.exponential.series import evaluate_at
 from flocsim.integrators.implicit import Implicit, Overdamped
-from flocsim.integrators.radau.collocation import cubic, stage_weights
+from flocsim.integrators.radau.collocation import interpolate, stage_weights
 from flocsim.integrators.radau.tableau import SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
@@ -227,7 +227,7 @@ def step_motion(
     terms = int(work.tally.series_terms)
     if terms > 0 and np.array_equal(motion_of(work, START), start):
         whole = float(clock.series_step)
-        write_at(work, START, terms, whole, (time - begin) / whole, TRIAL, 0, len(start))
+        evaluate_at(work, START, terms, whole, (time - begin) / whole, TRIAL, 0, len(start))
         return motion_of(work, TRIAL)
     stages = np.array(
         [motion_of(work, each) for each in (START, FIRST_STAGE, SECOND_STAGE, THIRD_STAGE)]
@@ -238,7 +238,7 @@ def step_motion(
     own = origin.has_stages and clock.stages_time == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
         return hermite(begin, end, start, motion_of(work, NOW), time)
-    return cubic(stage_weights((time - begin) / whole), *stages)
+    return interpolate(stage_weights((time - begin) / whole), *stages)
 
 
 def motion_at(times: np.ndarray, states: np.ndarray, time: float) -> np.ndarray:

@@ -5,8 +5,8 @@ from flocsim.compiler.composer import compose
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators import BackwardEuler
 from flocsim.integrators.backward_euler.contact_mean import flag_close
-from flocsim.integrators.backward_euler.newton import begin_step, evaluate_others
-from flocsim.integrators.backward_euler.path import search_afar, usual_sizes
+from flocsim.integrators.backward_euler.newton import begin_step, evaluate_other_forces
+from flocsim.integrators.backward_euler.path import search_cold, typical_sizes
 from flocsim.integrators.backward_euler.step import euler_step, solve_step
 from flocsim.integrators.loop.driver import accept, keep_lists, went_too_far
 from flocsim.integrators.radau.contact_frames import gather_clusters
@@ -22,11 +22,11 @@ def from_before(scene, work, clock, step):
 def from_anywhere(scene, work, clock, step):
     """One step of whose contacts nothing is known."""
     begin_step(work, clock)
-    evaluate_others(scene, work, clock.time, step)
+    evaluate_other_forces(scene, work, clock.time, step)
     flag_close(scene, work)
     gather_clusters(scene, work)
-    usual, way = usual_sizes(scene, work, step)
-    return search_afar(scene, work, clock, step, usual, way)
+    usual, way = typical_sizes(scene, work, step)
+    return search_cold(scene, work, clock, step, usual, way)
 
 
 def whole_step(scene, work, clock, counts, step):

@@ -1,4 +1,7 @@
 """Backward Euler with the contacts of the step's end, for beds whose contacts switch all the time.
 
-May import ``loop``, ``radau``, ``events`` and ``rhs``; a swarm chooses it for an island.
+``method``: the integrator, and the hand-over from Implicit.  ``step``: one step and its error.
+``path``: the search for its end.  ``interior``: the interior-point iteration.  ``newton``: the
+semismooth Newton method.  ``contact_mean``: the contact law over a step.  May import ``loop``,
+``radau``, ``events`` and ``rhs``.
 """

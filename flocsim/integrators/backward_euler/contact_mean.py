@@ -1,18 +1,18 @@
-"""A contact over a whole step: its law, of what is closed at the step's end.
+"""The contact law over a whole step that goes on across events.
 
-In a step from 0 to 1 that does not end at switches, with overlaps Δ⁺ = max(Δ, 0),
+In a step of size h from gap −Δ₀ to −Δ₁, with the overlaps Δ⁺ = max(Δ, 0),
 
-    N = N(Δ₁⁺, (Δ₁⁺ − Δ₀⁺)/h),   T = s T(ξ₁, v_t),   ξ₁ = ξ₀ + s h v_t, cut to |ξ₁| ≤ L(Δ₁⁺):
+    N = N(Δ₁⁺, (Δ₁⁺ − Δ₀⁺)/h),   T = s T(ξ₁, v_t),   ξ₁ = ξ₀ + s h v_t, cut to |ξ₁| ≤ L(Δ₁⁺).
 
-the spring is that of the end, as backward Euler has it, the dashpot gives the impulse that it gives
-in a step of which the contact is closed but for a part, and s is that part, as the gap goes along a
-line. All of it is continuous in the state at the end, whichever contacts close or open, and N of
-springs and dashpots is the derivative of a convex function of Δ₁: a step has one solution, as far
-as directions do not turn and friction does not slide. The cut is the return mapping of plasticity.
+The spring is that of the end (backward Euler). The dashpot gives the impulse over the part of the
+step in which the contact is closed. s is that part as a fraction, for a gap that changes linearly.
+So the law is continuous in the state at the end, whichever contacts close or open. N of springs and
+dashpots is the derivative of a convex function of Δ₁: without friction and rotation a step has
+exactly one solution. The cut is the return mapping of plasticity.
 
-Without a limit of friction a pair may open by T and close without it; then it ends just open, by
-the s with which it does neither. That s would fall to nothing within Δ₀, which may be next to
-nothing: a pair that opens is taken to be closed at the start by FADING of the tolerance at least.
+Without a friction limit a contact may open under T and close without it. It then ends just open,
+with the s that balances the two. That s would vanish within Δ₀, which may be arbitrarily small: so
+a contact that opens counts as closed at the start by at least FADE_FRACTION of the tolerance.
 """
 
 import math
@@ -36,55 +36,60 @@ from flocsim.integrators.rhs.views import (
 from flocsim.state.views import ContactView, moved_contact
 from flocsim.state.work import DAMPING, NEW, NOW, STIFFNESS, TRIAL
 
-FADING = 0.01
-"""The tangential force of a pair that opens falls to half within a gap of this share of the
-tolerance, or of its overlap at the start where that is more."""
+FADE_FRACTION = 0.01
+"""Gap, over the tolerance, within which the tangential force of an opening contact falls to half;
+its overlap at the start is used where that is larger."""
 
 
 def takes_part(work, row):
-    """Whether a pair is closed at the start of the step, TRIAL, or at its end, NOW."""
+    """Return True if a pair is closed at the start of the step (TRIAL) or at its end (NOW)."""
     return work.geometry[NOW, row].gap < 0.0 or work.geometry[TRIAL, row].gap < 0.0
 
 
-def closed_share(work, row):
-    """The part of the step for which a pair is closed, as its gap goes along a line."""
-    before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
-    if before < 0.0:
+def closed_part(work, row):
+    """Return the fraction s of the step in which a pair is closed, for a linearly changing gap."""
+    gap_start, gap_end = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
+    if gap_start < 0.0:
         return (
             1.0
-            if after <= 0.0
-            else work.interior[row].fading_gap / (work.interior[row].fading_gap + after)
+            if gap_end <= 0.0
+            else work.interior[row].fade_length / (work.interior[row].fade_length + gap_end)
         )
-    return after / (after - before) if after < 0.0 else 0.0
+    # It closes within the step.
+    return gap_end / (gap_end - gap_start) if gap_end < 0.0 else 0.0
 
 
-def share_slope(work, row):
-    """By how much that grows with the gap at the end [1/m]."""
-    before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
-    if before < 0.0 < after:
-        return -work.interior[row].fading_gap / (work.interior[row].fading_gap + after) ** 2
-    return -before / (after - before) ** 2 if after < 0.0 <= before else 0.0
+def closed_part_slope(work, row):
+    """Return the derivative of s with respect to the gap at the end [1/m]."""
+    gap_start, gap_end = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
+    if gap_start < 0.0 < gap_end:
+        return -work.interior[row].fade_length / (work.interior[row].fade_length + gap_end) ** 2
+    return -gap_start / (gap_end - gap_start) ** 2 if gap_end < 0.0 <= gap_start else 0.0
 
 
 def end_overlap(work, row):
-    """Δ₁⁺ of a pair, by its gap at the end [m]."""
+    """Return the overlap Δ₁⁺ of a pair at the end [m]."""
     return max(-work.geometry[NOW, row].gap, 0.0)
 
 
-def view_with(scene, work, row, step, after, slip, rate):
-    """The ContactView of a pair over the step, of an overlap ``after`` at its end [m]."""
+def step_view(scene, work, row, step, overlap_end, slip, rate):
+    """Return the ContactView of a pair over the step, for an overlap at its end [m]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    pressing = (after - max(-work.geometry[TRIAL, row].gap, 0.0)) / step
+    # The mean overlap rate over the step gives the dashpot's impulse.
+    pressing = (overlap_end - max(-work.geometry[TRIAL, row].gap, 0.0)) / step
     return ContactView(
-        after, pressing, slip, rate, effective_mass(scene, a, b),
+        overlap_end, pressing, slip, rate, effective_mass(scene, a, b),
         scene.bodies[a].radius, scene.bodies[b].radius, smaller_radius(scene, a, b),
     )  # fmt: skip
 
 
 def sticking_slopes(scene, view, limit, step):
-    """By how much the friction of a pair falls with ξ [N/m] and with v_t [N s/m] while it sticks,
-    by differences that are well below its ``limit`` [m]: that of a small load is tiny."""
+    """Return minus the derivatives of friction with respect to ξ [N/m] and v_t [N s/m], while
+    sticking.
+
+    By finite differences well below the ``limit`` of ξ [m], which is tiny for a small load.
+    """
     slip, rate = 0.5 * limit, 1e-3 * limit / step
     sheared = moved_contact(view, view.overlap, 0.0, slip, 0.0)
     dragged = moved_contact(view, view.overlap, 0.0, 0.0, rate)
@@ -92,54 +97,57 @@ def sticking_slopes(scene, view, limit, step):
     return by_slip, -contact_force(scene, dragged)[1] / rate
 
 
-def bearing_of(work, row):
-    """The overlap that the friction of a pair goes by [m]: its own, unless another one is held, and
-    PART with it."""
-    held = work.interior[row].held_overlap
-    return held if held > 0.0 else work.interior[row].overlap
+def friction_overlap(work, row):
+    """Return the overlap that decides the friction of a pair [m]: its own, or a frozen one."""
+    frozen = work.interior[row].frozen_overlap
+    return frozen if frozen > 0.0 else work.interior[row].overlap
 
 
 def friction_view(scene, work, row, step):
-    """The ContactView of a pair over the step of the overlap that its friction goes by; ξ₁ goes to
-    NEW, whether it slides to SLIDING."""
-    bearing, rate = bearing_of(work, row), tangential_rate(work, NOW, row)
-    slip, side = work.slip[NOW, row] + work.interior[row].step_share * step * rate, 0
+    """Return the ContactView of a pair over the step for its friction.
+
+    Writes ξ₁ to ``work.slip[NEW]`` and the direction of sliding to the candidate.
+    """
+    loading_overlap, rate = friction_overlap(work, row), tangential_rate(work, NOW, row)
+    slip, direction = work.slip[NOW, row] + work.interior[row].closed_fraction * step * rate, 0
+    # Return mapping: cut the sticking displacement to its limit.
     if has(scene, SLIP_LIMIT):
-        limit = slip_limit(scene, view_with(scene, work, row, step, bearing, 0.0, 0.0))
+        limit = slip_limit(scene, step_view(scene, work, row, step, loading_overlap, 0.0, 0.0))
         if abs(slip) > limit:
-            side = 1 if slip > 0.0 else -1
-            slip = side * limit
-    work.slip[NEW, row], work.candidates[row].slide_direction = slip, side
-    return view_with(scene, work, row, step, bearing, slip, rate)
+            direction = 1 if slip > 0.0 else -1
+            slip = direction * limit
+    work.slip[NEW, row], work.candidates[row].slide_direction = slip, direction
+    return step_view(scene, work, row, step, loading_overlap, slip, rate)
 
 
-def normal_force(scene, work, row, step, after):
-    """N of a pair of an overlap at the end [N]."""
-    return contact_force(scene, view_with(scene, work, row, step, after, 0.0, 0.0))[0]
+def normal_force(scene, work, row, step, overlap_end):
+    """Return the normal force N of a pair for an overlap at the end [N]."""
+    return contact_force(scene, step_view(scene, work, row, step, overlap_end, 0.0, 0.0))[0]
 
 
-def normal_stiffness(scene, work, row, step, after):
-    """dN/dΔ₁ of a pair of an overlap at the end [N/m]."""
-    found = contact_derivatives(scene, view_with(scene, work, row, step, after, 0.0, 0.0))
-    return found[2] + found[4] / step
+def normal_stiffness(scene, work, row, step, overlap_end):
+    """Return dN/dΔ₁ of a pair for an overlap at the end [N/m]."""
+    values = contact_derivatives(scene, step_view(scene, work, row, step, overlap_end, 0.0, 0.0))
+    return values[2] + values[4] / step
 
 
 def friction_force(scene, work, row, step):
-    """s T of a pair [N]; it is flagged where it slides."""
+    """Return the friction s T of a pair [N]; mark it if it slides."""
     return (
-        work.interior[row].step_share
+        work.interior[row].closed_fraction
         * contact_force(scene, friction_view(scene, work, row, step))[1]
     )
 
 
 @apart
 def add_mean_forces(scene, work, step):
-    """Add the forces of all contacts in the step to those in NOW; friction goes by the overlaps at
-    its end."""
+    """Add the forces of all contacts over the step to those of NOW."""
     for row in range(work.tally.candidates):
+        # Friction depends on the overlap at the end, and on s. With frozen friction s stays as it
+        # is.
         work.interior[row].overlap = end_overlap(work, row)
-        if work.interior[row].held_overlap == 0.0:
-            work.interior[row].step_share = closed_share(work, row)
+        if work.interior[row].frozen_overlap == 0.0:
+            work.interior[row].closed_fraction = closed_part(work, row)
         if takes_part(work, row):
             normal = normal_force(scene, work, row, step, work.interior[row].overlap)
             add_pair_force(work, NOW, row, normal, friction_force(scene, work, row, step))
@@ -148,18 +156,23 @@ def add_mean_forces(scene, work, step):
 
 
 @apart
-def add_held_friction(scene, work, step):
-    """Add to the loads what friction that goes by what is held lacks of that at the end."""
+def add_frozen_friction_residual(scene, work, step):
+    """Add to the loads the friction at the end minus the frozen friction that the step was solved
+    with.
+
+    The result enters the error estimate of the step.
+    """
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        held, part = work.interior[row].held_overlap, work.interior[row].step_share
-        if held > 0.0 and takes_part(work, row):
-            work.interior[row].held_overlap, work.interior[row].step_share = (
+        frozen, fraction = work.interior[row].frozen_overlap, work.interior[row].closed_fraction
+        # Evaluate friction twice: with the overlap at the end, and with the frozen one.
+        if frozen > 0.0 and takes_part(work, row):
+            work.interior[row].frozen_overlap, work.interior[row].closed_fraction = (
                 0.0,
-                closed_share(work, row),
+                closed_part(work, row),
             )
             missing = friction_force(scene, work, row, step)
-            work.interior[row].held_overlap, work.interior[row].step_share = held, part
+            work.interior[row].frozen_overlap, work.interior[row].closed_fraction = frozen, fraction
             missing -= friction_force(scene, work, row, step)
             a, b = candidate.vertex_body, candidate.edge_body
             of_a, of_b = tangent_rows(work, row)
@@ -168,9 +181,12 @@ def add_held_friction(scene, work, step):
                 work.loads[REAL, 3 * b + axis] += missing * of_b[axis]
 
 
-def add_slopes(scene, work, row, normal, tangential, coupled):
-    """Add to the system what the force of a contact falls by for a metre of the gap, and with the
-    rate along the tangent [N/m, N s/m]; and by how much friction falls for a metre of the gap."""
+def add_contact_slopes(scene, work, row, normal, tangential, coupled):
+    """Add the derivatives of a contact's force to the system.
+
+    ``normal`` and ``coupled`` are minus the derivatives of normal force and friction with respect
+    to the gap [N/m], ``tangential`` minus that of friction with respect to v_t [N s/m].
+    """
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     pair = candidate.pair
@@ -182,52 +198,59 @@ def add_slopes(scene, work, row, normal, tangential, coupled):
 
 
 def friction_slopes(scene, work, row, step):
-    """By how much the friction of a pair falls with v_t at the end [N s/m], and grows with its
-    overlap [N/m] and its part of the step [N]."""
+    """Return derivatives of the friction of a pair at the end.
+
+    Minus that with respect to v_t [N s/m], that with respect to the overlap [N/m], and to s [N].
+    """
     view = friction_view(scene, work, row, step)
-    found = contact_derivatives(scene, view)
-    part, side = work.interior[row].step_share, work.candidates[row].slide_direction
-    by_slip, by_rate, by_limit = -found[7], -found[9], 0.0
-    if side != 0:
-        by_limit = side * limit_slope(scene, work, NOW, row) * found[7]
+    values = contact_derivatives(scene, view)
+    fraction, direction = work.interior[row].closed_fraction, work.candidates[row].slide_direction
+    by_slip, by_rate, by_limit = -values[7], -values[9], 0.0
+    # Sliding: ξ follows the limit, which follows the overlap.
+    if direction != 0:
+        by_limit = direction * limit_slope(scene, work, NOW, row) * values[7]
         by_slip = 0.0
     elif has(scene, SLIP_LIMIT):
+        # Sticking with a limit: differences well below the limit, where the law does not cut
+        # friction.
         limit = slip_limit(scene, view)
         if 0.0 < limit < math.inf:
             by_slip, by_rate = sticking_slopes(scene, view, limit, step)
-    by_overlap = part * (found[3] + found[5] / step + by_limit)
-    by_part = found[1] - part * by_slip * step * tangential_rate(work, NOW, row)
-    return part * (by_rate + part * step * by_slip), by_overlap, by_part
+    # Chain rule, with ξ₁ = ξ₀ + s h v_t.
+    by_overlap = fraction * (values[3] + values[5] / step + by_limit)
+    by_part = values[1] - fraction * by_slip * step * tangential_rate(work, NOW, row)
+    return fraction * (by_rate + fraction * step * by_slip), by_overlap, by_part
 
 
 @apart
 def add_all_derivatives(scene, work, step):
-    """Add the derivatives of all contacts in the step by the places and velocities at its end."""
+    """Add the derivatives of all contacts with respect to positions and velocities at the end."""
     for row in range(work.tally.candidates):
         if takes_part(work, row):
-            after, stiffness = end_overlap(work, row), 0.0
+            overlap_end, stiffness = end_overlap(work, row), 0.0
             slope, by_overlap, by_part = friction_slopes(scene, work, row, step)
-            coupled = -share_slope(work, row) * by_part
-            if after > 0.0:
-                stiffness = normal_stiffness(scene, work, row, step, after)
+            # The gap changes friction through s, and through the overlap.
+            coupled = -closed_part_slope(work, row) * by_part
+            if overlap_end > 0.0:
+                stiffness = normal_stiffness(scene, work, row, step, overlap_end)
                 coupled += by_overlap
-            if work.interior[row].held_overlap > 0.0:
+            if work.interior[row].frozen_overlap > 0.0:
                 coupled = 0.0
-            add_slopes(scene, work, row, stiffness, slope, coupled)
-            force = normal_force(scene, work, row, step, after)
+            add_contact_slopes(scene, work, row, stiffness, slope, coupled)
+            force = normal_force(scene, work, row, step, overlap_end)
             add_geometric_stiffness(scene, work, row, force, friction_force(scene, work, row, step))
 
 
-CLOSE = 0.01
-"""Pairs nearer than this share of r_i + r_j are in the pattern of the systems, closed or not: most
-of those that close in a step need no other one."""
+CLOSE_GAP = 0.01
+"""Gap, over r_i + r_j, below which a pair is in the sparsity pattern of the systems. Most contacts
+that close in a step then need no new pattern."""
 
 
 def flag_close(scene, work):
-    """Flag, as closed, all pairs that are or may well be so in this step; none is taken back."""
+    """Mark as closed all pairs that are closed or close to it in this step; take none back."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         a, b = candidate.vertex_body, candidate.edge_body
-        near = CLOSE * (scene.bodies[a].radius + scene.bodies[b].radius)
+        near = CLOSE_GAP * (scene.bodies[a].radius + scene.bodies[b].radius)
         if work.geometry[NOW, row].gap < near or work.geometry[TRIAL, row].gap < 0.0:
             candidate.contact_mode = 1

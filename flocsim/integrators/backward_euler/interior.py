@@ -1,37 +1,40 @@
-"""The pairs of a step as an interior-point method sees them: what closes and slides, all at once.
+"""A primal-dual interior-point method for the contacts of a backward Euler step.
 
-With hard springs a step is all but a complementarity problem: of every pair, the overlap δ = Δ₁⁺
-that its force has and the gap s = g + δ that is left of it are not below 0, and one of them is 0.
-Newton's method (newton.py) finds which, a few pairs an iteration; here all pairs are followed at
-once along δ s = τ, τ falling to nothing (primal-dual, Wright 1997; as for contacts in Christensen
-et al. 1998). The systems are those of Newton's method, the stiffness of a pair being its part
-δ/(δ + s) that is at work. InteriorPoint holds δ as ``overlap``, s as ``slack``.
+With stiff springs a step is nearly a complementarity problem. For each contact, the overlap δ = Δ₁⁺
+that carries its force and the slack s = g + δ of its gap g are both ≥ 0, and one of them is 0.
+Newton's method (newton.py) finds out which, a few contacts an iteration. Here all contacts follow
+the central path δ s = τ, τ → 0, together (Wright, Primal-Dual Interior-Point Methods, 1997; for
+contacts Christensen et al. 1998). The systems are those of Newton's method, but a contact has only
+the fraction δ/(δ+s) of its stiffness. Linearised, with the change dg of the gap:
 
     (δ + s) dδ = τ − δ s + δ (s − g − δ) − δ dg
 
-So with friction, whose limit L goes by δ: what there is of it, f, what there would be if the pair
-stuck, e, and how far it slides ahead and behind, p and q, all over the normal stiffness [m], follow
-e − f = p − q, p (L − f) = τ, q (L + f) = τ, so that
+Friction f has a limit L(δ). With e, the friction of a sticking contact, and the forward and
+backward slips p, q ≥ 0, all divided by the normal stiffness [m]:
+
+    e − f = p − q,   p (L − f) = τ,   q (L + f) = τ,
 
     df = w (e − f − τ/(L − f) + τ/(L + f) + de) + w (p/(L − f) − q/(L + f)) dL,
     1/w = 1 + p/(L − f) + q/(L + f)
 
-Its ``friction`` is f/L. L follows δ within an iteration as well as from one to the next: p and q
-that do not follow it are soon far from where they belong, and half of all searches end nowhere.
-With L a system has no symmetry, and there may be no way to a solution (a pair wedged between others
-that slide), or none at all: iterations then go less and less far. There what friction goes by is
-held, ``held_overlap`` and ``step_share``: all of this is convex then, and a step has one end.
+InteriorPoint stores δ, s, f/L, p, q, L and e of each contact. L follows δ within an iteration, and
+p and q follow L. Where L was changed between iterations only, half of the searches in a pile of 450
+polygons failed.
 
-How far an iteration goes is bounded by the pair that would first leave where it belongs. Among
-hundreds one always does: begun near the last step's end, with most of them right, nothing moves
-then. There each pair goes as far as it itself may, and bodies go all the way (`change_pairs`): what
-is left of a pair no longer fits its gap, as in a search that begins where it does not (Wright, ch.
-6), and is mended by the next one. That takes a third of the systems, or leads astray, which shows
-within four; so it is how a search begins, and how it ends.
+With L(δ) the systems are not symmetric, and may lead to no solution (a contact wedged between
+sliding ones): the iterations then make ever shorter steps. In that case overlap and closed fraction
+that decide the friction are frozen (``frozen_overlap``, ``closed_fraction``): the problem is convex
+then, and has one solution. The difference to the true friction counts as an error of the step.
 
-Along the way a pair of such a limit counts as closed for the whole step if it was at its start:
-where it opens L is 0. By the gap, which is far from its end until δ and s are, it would be without
-friction nearly everywhere.
+The length of an iteration is limited by the contact that would first leave its domain, and among
+hundreds there is always one. So near a solution each contact makes a step of its own, and the
+bodies make a full one (`change_pairs`). Contacts then do not fit their gaps, as in an infeasible
+start (Wright, chapter 6), and the next iteration mends this. It takes a third of the systems, or
+diverges, which shows within four iterations. A search begins and ends like that.
+
+Before the end, a contact with a friction limit that was closed at the start counts as closed for
+the whole step. Its s would follow the gap, which is far from its final value, and friction would
+vanish nearly everywhere.
 """
 
 import math
@@ -39,39 +42,42 @@ import math
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.backward_euler.contact_mean import (
-    add_slopes,
-    bearing_of,
+    add_contact_slopes,
     friction_force,
+    friction_overlap,
     friction_slopes,
+    step_view,
     sticking_slopes,
-    view_with,
 )
 from flocsim.integrators.rhs.jacobian import add_geometric_stiffness, normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import add_pair_force, tangential_rate, view_without_slip
 from flocsim.state.work import CHANGE, NOW, TRIAL
 
-FAR_FROM_WALL = 0.99
-"""What is to stay above 0 goes so far towards it at most in an iteration."""
+BOUNDARY_FRACTION = 0.99
+"""Largest fraction of the distance to the boundary of its domain that a quantity may go in an
+iteration (the usual fraction-to-the-boundary rule)."""
 
-WITHIN = 0.9
-"""A pair that has brought iterations to a halt begins again at this share of its limit at most."""
+RESTART_RATIO = 0.9
+"""Largest |f/L| with which a contact that has blocked the iterations restarts."""
 
-NOTHING = 1e-14
-"""A pair of which less of its stiffness is at work stiffens nothing."""
+NEGLIGIBLE_FRACTION = 1e-14
+"""Fraction δ/(δ + s) of a contact's stiffness below which it is left out of the system."""
 
-LEAST_LIMIT = 1e-3
-"""Friction holds this share of what the spring alone would let it, at least: L stays above 0."""
+MIN_LIMIT = 1e-3
+"""Least friction limit, over that of the spring alone: L must stay positive where the dashpot
+pulls."""
 
-SMALL = 0.01
-"""What is off by this share of its parts is nearly right."""
+DECIDED_RATIO = 0.01
+"""Ratio of a small quantity to a large one, below which a contact counts as decided or feasible."""
 
 
-def in_play(work, row):
+def is_included(work, row):
+    # Pairs marked by flag_close take part in the iteration.
     return work.candidates[row].contact_mode == 1
 
 
-def rate_along(work, row, kind, entries):
-    """What velocities, or their change, come to along a direction of both bodies of a pair."""
+def relative_rate(work, row, kind, entries):
+    """Return the relative velocity, or its change, of both bodies of a pair along a direction."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     total = 0.0
@@ -81,305 +87,343 @@ def rate_along(work, row, kind, entries):
     return total
 
 
-def part_of_step(work, row, limited):
-    """The part of the step for which a pair is closed, by how much that grows with δ, and by how
-    much it falls with s [1/m]: at their ends contact_mean's."""
+def closed_part_slopes(work, row, limited):
+    """Return the fraction s of the step in which a pair is closed, ds/dδ, and minus ds/d(slack)
+    [1/m].
+
+    At the solution, it is that of contact_mean.
+    """
     contact = work.interior[row]
-    over, left, before = (
+    overlap, slack, gap_start = (
         contact.overlap,
         contact.slack,
         work.geometry[TRIAL, row].gap,
     )
-    if before >= 0.0:
-        return over / (over + before), before / (over + before) ** 2, 0.0
+    # It closes in the step.
+    if gap_start >= 0.0:
+        return overlap / (overlap + gap_start), gap_start / (overlap + gap_start) ** 2, 0.0
     if limited:
         return 1.0, 0.0, 0.0
-    held = over + contact.fading_gap
-    return held / (held + left), left / (held + left) ** 2, held / (held + left) ** 2
+    # It may open in the step.
+    faded = overlap + contact.fade_length
+    return faded / (faded + slack), slack / (faded + slack) ** 2, faded / (faded + slack) ** 2
 
 
-def press(scene, work, row, step, turns):
-    """(N of a pair of the overlap δ [N], how it grows with that [N/m]).
+def evaluate_law(scene, work, row, step, turns):
+    """Return N of a pair for the overlap δ [N], and dN/dδ [N/m]; write its friction law.
 
-    Writes the law of its friction into ``work.interior``, see InteriorPoint; the limit is 0 where
-    nothing limits it, or there is none. Along gaps that do not ``turns`` it is limited by springs
-    alone, which is smooth: together with dashpots they are clipped."""
+    The friction law goes to ``work.interior``; its limit is 0 where there is none. Along frozen
+    gaps (``turns`` False) springs alone limit friction, which is smooth: with the dashpots, N is
+    clipped at 0, and the kink costs a third more systems.
+    """
     contact = work.interior[row]
     overlap, rate = contact.overlap, tangential_rate(work, NOW, row)
-    view = view_with(scene, work, row, step, overlap, 0.0, 0.0)
-    found, limit = contact_derivatives(scene, view), 0.0
-    stiffness = hardness = found[2] + found[4] / step
-    spring, drag = -found[7], -found[9]
+    view = step_view(scene, work, row, step, overlap, 0.0, 0.0)
+    values, limit = contact_derivatives(scene, view), 0.0
+    stiffness = hardness = values[2] + values[4] / step
+    spring, dashpot = -values[7], -values[9]
     if has(scene, SLIP_LIMIT):
-        bearing = bearing_of(work, row)
+        loading_overlap = friction_overlap(work, row)
         if not hardness > 0.0:
-            # The law has clipped what pulls.
+            # A law without tension clips a pull: take the stiffness of the same overlap at rest.
             pressed = contact_derivatives(scene, view_without_slip(view, overlap, 0.0))
             hardness = pressed[2] + pressed[4] / step
-        borne = view_with(scene, work, row, step, bearing, 0.0, 0.0)
-        held = slip_limit(scene, borne)
-        if 0.0 < held < math.inf:
-            spring, drag = sticking_slopes(scene, borne, held, step)
-            limit = spring * held
+        # Stiffness while sticking, and the limit L over the normal stiffness.
+        friction_view = step_view(scene, work, row, step, loading_overlap, 0.0, 0.0)
+        slip_cut = slip_limit(scene, friction_view)
+        if 0.0 < slip_cut < math.inf:
+            spring, dashpot = sticking_slopes(scene, friction_view, slip_cut, step)
+            limit = spring * slip_cut
             if turns:
-                most = view_with(scene, work, row, step, bearing, held, abs(rate))
-                limit = max(-contact_force(scene, most)[1], LEAST_LIMIT * limit)
+                limit_view = step_view(scene, work, row, step, loading_overlap, slip_cut, abs(rate))
+                limit = max(-contact_force(scene, limit_view)[1], MIN_LIMIT * limit)
             limit /= hardness
-    if contact.held_overlap == 0.0:
-        contact.step_share, _, _ = part_of_step(work, row, limit > 0.0)
-    part = contact.step_share
+    # e = k_t (ξ₀ + s h v_t) + damping, over the normal stiffness.
+    if contact.frozen_overlap == 0.0:
+        contact.closed_fraction, _, _ = closed_part_slopes(work, row, limit > 0.0)
+    part = contact.closed_fraction
     contact.normal_stiffness, contact.friction_limit = hardness, limit
-    contact.stick_slope = (spring * part * step + drag) / hardness
-    contact.stick_force = spring / hardness * work.slip[NOW, row] + contact.stick_slope * rate
-    return found[0], stiffness
+    contact.sticking_slope = (spring * part * step + dashpot) / hardness
+    contact.sticking_force = spring / hardness * work.slip[NOW, row] + contact.sticking_slope * rate
+    return values[0], stiffness
 
 
 def mean_product(work):
-    """The mean of δ s, p (L − f) and q (L + f) over the pairs in play [m²]."""
+    """Return the mean of δ s, p (L − f) and q (L + f) over all contacts [m²]: the duality
+    measure."""
     total, count = 0.0, 0
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             contact = work.interior[row]
             total += contact.overlap * contact.slack
             count += 1
             if contact.friction_limit > 0.0:
-                ahead, behind = contact.slide_ahead, contact.slide_behind
-                both = ahead + behind + contact.friction * (behind - ahead)
-                total += contact.friction_limit * both
+                forward, backward = contact.slip_forward, contact.slip_backward
+                total_size = forward + backward + contact.friction_ratio * (backward - forward)
+                total += contact.friction_limit * total_size
                 count += 2
     return total / max(count, 1)
 
 
-def pull(work, row, target):
-    """By how much a pair's δ is to change where its gap stays [m]."""
+def overlap_correction(work, row, target):
+    """Return dδ at a constant gap [m], see the module."""
     contact = work.interior[row]
-    overlap, left = contact.overlap, contact.slack
-    off = left - work.geometry[NOW, row].gap - overlap
-    return (target - overlap * left + overlap * off) / (overlap + left)
+    overlap, slack = contact.overlap, contact.slack
+    # By how much the contact does not fit its gap.
+    misfit = slack - work.geometry[NOW, row].gap - overlap
+    return (target - overlap * slack + overlap * misfit) / (overlap + slack)
 
 
-def drag(work, row, target):
-    """(w, by how much a pair's friction f is to change where v_t and L stay [m], by how much it
-    grows with L)."""
+def friction_correction(work, row, target):
+    """Return w, df at constant v_t and L [m], and df/dL, see the module."""
     contact = work.interior[row]
     limit = contact.friction_limit
-    force = contact.friction * limit
+    force = contact.friction_ratio * limit
     above, below = limit - force, limit + force
-    ahead, behind = contact.slide_ahead / above, contact.slide_behind / below
-    weight = 1.0 / (1.0 + ahead + behind)
-    change = weight * (contact.stick_force - force - target / above + target / below)
-    return weight, change, weight * (ahead - behind)
+    forward, backward = contact.slip_forward / above, contact.slip_backward / below
+    weight = 1.0 / (1.0 + forward + backward)
+    change = weight * (contact.sticking_force - force - target / above + target / below)
+    return weight, change, weight * (forward - backward)
 
 
-def limit_by_overlap(work, row):
-    """By how much the limit of a pair's friction grows with δ; not at all where it is held."""
+def limit_per_overlap(work, row):
+    """Return dL/dδ; 0 where friction is frozen."""
     contact = work.interior[row]
-    if contact.held_overlap > 0.0:
+    if contact.frozen_overlap > 0.0:
         return 0.0
     return contact.friction_limit / contact.overlap
 
 
 def limited_friction(work, row, target):
-    """(s T, how it falls with v_t, how it grows with the gap) of a pair with a limit."""
+    """Return s T, minus its derivative by v_t, and that by the gap, of a contact with a friction
+    limit."""
     contact = work.interior[row]
-    both = contact.overlap + contact.slack
-    weight, change, by_limit = drag(work, row, target)
-    whole = contact.step_share * contact.normal_stiffness
-    by_limit *= limit_by_overlap(work, row)
-    force = contact.friction * contact.friction_limit + change
-    force += by_limit * pull(work, row, target)
-    falls = by_limit * contact.overlap / both
-    return -whole * force, whole * weight * contact.stick_slope, -whole * falls
+    total_size = contact.overlap + contact.slack
+    weight, change, by_limit = friction_correction(work, row, target)
+    scale = contact.closed_fraction * contact.normal_stiffness
+    by_limit *= limit_per_overlap(work, row)
+    # The linearised friction after this iteration, at the present gap and v_t.
+    force = contact.friction_ratio * contact.friction_limit + change
+    force += by_limit * overlap_correction(work, row, target)
+    falls = by_limit * contact.overlap / total_size
+    return -scale * force, scale * weight * contact.sticking_slope, -scale * falls
 
 
-def other_friction(scene, work, row, step, target):
-    """The same of one without."""
+def unlimited_friction(scene, work, row, step, target):
+    """Return s T, minus its derivative by v_t, and that by the gap, of a contact without a
+    limit."""
     contact = work.interior[row]
-    both = contact.overlap + contact.slack
+    total_size = contact.overlap + contact.slack
     force = friction_force(scene, work, row, step)
     slope, _, by_part = friction_slopes(scene, work, row, step)
-    if contact.held_overlap > 0.0:
+    if contact.frozen_overlap > 0.0:
         return force, slope, 0.0
-    _, grows, falls = part_of_step(work, row, False)
-    closing = pull(work, row, target)
-    leaving = closing - (contact.slack - work.geometry[NOW, row].gap - contact.overlap)
-    force += by_part * (grows * closing - falls * leaving)
+    # Without a limit, friction depends on δ and s through the closed fraction.
+    _, grows, falls = closed_part_slopes(work, row, False)
+    d_overlap = overlap_correction(work, row, target)
+    d_slack = d_overlap - (contact.slack - work.geometry[NOW, row].gap - contact.overlap)
+    force += by_part * (grows * d_overlap - falls * d_slack)
     return (
         force,
         slope,
-        by_part * (grows * contact.overlap + falls * contact.slack) / both,
+        by_part * (grows * contact.overlap + falls * contact.slack) / total_size,
     )
 
 
 @apart
 def write_forces(scene, work, step, target, turns):
-    """Forces and derivatives of the pairs in play, δ and f changed as far as their gaps and v_t are
-    not; if they turn, with what that does, which is too large before they fit, and can make systems
-    indefinite."""
+    """Add the linearised forces, and their derivatives, of all contacts to forces and system.
+
+    ``turns``: with the derivatives of rotation. Before contacts fit their gaps these are too large,
+    and may make the system indefinite.
+    """
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             contact = work.interior[row]
-            overlap, left = contact.overlap, contact.slack
-            normal, stiffness = press(scene, work, row, step, turns)
-            normal += stiffness * pull(work, row, target)
+            overlap, slack = contact.overlap, contact.slack
+            normal, stiffness = evaluate_law(scene, work, row, step, turns)
+            # Eliminate dδ and df: what remains depends on gap and v_t, that is, on the velocities.
+            normal += stiffness * overlap_correction(work, row, target)
             tangential, slope, coupled = 0.0, 0.0, 0.0
             if contact.friction_limit > 0.0:
                 tangential, slope, coupled = limited_friction(work, row, target)
-            elif contact.stick_slope > 0.0:
-                tangential, slope, coupled = other_friction(scene, work, row, step, target)
+            elif contact.sticking_slope > 0.0:
+                tangential, slope, coupled = unlimited_friction(scene, work, row, step, target)
             add_pair_force(work, NOW, row, normal, tangential)
-            works = overlap / (overlap + left)
-            if works > NOTHING:
-                add_slopes(scene, work, row, works * stiffness, slope, coupled)
+            # Only the fraction δ/(δ + s) of the stiffness resists a change of the gap.
+            active_fraction = overlap / (overlap + slack)
+            if active_fraction > NEGLIGIBLE_FRACTION:
+                add_contact_slopes(scene, work, row, active_fraction * stiffness, slope, coupled)
                 if turns:
                     add_geometric_stiffness(scene, work, row, normal, tangential)
 
 
-def room(share, size, change):
-    """The share of a change that keeps a size above 0, not above the one that is given."""
-    return min(share, -FAR_FROM_WALL * size / change) if change < 0.0 else share
+def keep_positive(fraction, size, change):
+    """Return the fraction of a change, at most the given one, that keeps a quantity positive."""
+    return min(fraction, -BOUNDARY_FRACTION * size / change) if change < 0.0 else fraction
 
 
-def change_friction(work, row, target, grown, share, go):
-    """The share of the changes of p, q and f that keeps them where they belong, not above the one
-    that is given; if they are to ``go``, they go that far. L is ``grown`` by so much [m]."""
+def change_friction(work, row, target, d_limit, fraction, apply):
+    """Return the fraction of the changes of p, q and f that keeps them in their domain.
+
+    At most the given one. With ``apply`` they are changed by the given fraction. L changes by
+    ``d_limit`` [m].
+    """
     contact = work.interior[row]
     limit = contact.friction_limit
-    weight, change, by_limit = drag(work, row, target)
-    rate = rate_along(work, row, CHANGE, tangent_rows(work, row))
-    stuck = contact.stick_slope * rate
-    change += weight * stuck + by_limit * grown
-    ahead, behind, force = (
-        contact.slide_ahead,
-        contact.slide_behind,
-        contact.friction * limit,
+    weight, change, by_limit = friction_correction(work, row, target)
+    # Add the part of df by the new v_t, and by the change of the limit.
+    rate = relative_rate(work, row, CHANGE, tangent_rows(work, row))
+    sticking_change = contact.sticking_slope * rate
+    change += weight * sticking_change + by_limit * d_limit
+    forward, backward, force = (
+        contact.slip_forward,
+        contact.slip_backward,
+        contact.friction_ratio * limit,
     )
     above, below = limit - force, limit + force
-    slides = contact.stick_force + stuck - force - change
-    # The nearer side of the limit is not divided by: next to nothing is left there.
+    slides = contact.sticking_force + sticking_change - force - change
+    # Linearise p (L − f) = τ or q (L + f) = τ on the side away from the limit, and take the other
+    # slip from e − f = p − q: dividing by the small distance would lose digits.
     if above > below:
-        more = (target - ahead * (grown - change)) / above - ahead
-        less = ahead + more - slides - behind
+        d_forward = (target - forward * (d_limit - change)) / above - forward
+        d_backward = forward + d_forward - slides - backward
     else:
-        less = (target - behind * (grown + change)) / below - behind
-        more = behind + less + slides - ahead
-    if go:
-        contact.stick_force += share * stuck
-        contact.friction_limit = limit + share * grown
-        contact.friction = (force + share * change) / contact.friction_limit
-        contact.slide_ahead += share * more
-        contact.slide_behind += share * less
-        return share
-    share = room(room(share, ahead, more), behind, less)
-    return room(room(share, above, grown - change), below, grown + change)
+        d_backward = (target - backward * (d_limit + change)) / below - backward
+        d_forward = backward + d_backward + slides - forward
+    if apply:
+        contact.sticking_force += fraction * sticking_change
+        contact.friction_limit = limit + fraction * d_limit
+        contact.friction_ratio = (force + fraction * change) / contact.friction_limit
+        contact.slip_forward += fraction * d_forward
+        contact.slip_backward += fraction * d_backward
+        return fraction
+    # p, q, L − f and L + f stay positive.
+    fraction = keep_positive(keep_positive(fraction, forward, d_forward), backward, d_backward)
+    return keep_positive(keep_positive(fraction, above, d_limit - change), below, d_limit + change)
 
 
-def change_pair(work, row, step, target, share, go):
-    """The same of δ and s, and of friction."""
+def change_pair(work, row, step, target, fraction, apply):
+    """Return the fraction of the changes of δ, s and friction that keeps them in their domain.
+
+    At most the given one. With ``apply`` they are changed by the given fraction.
+    """
     contact = work.interior[row]
-    overlap, left = contact.overlap, contact.slack
-    opening = step * rate_along(work, row, CHANGE, normal_rows(work, row))
-    closing = pull(work, row, target) - overlap / (overlap + left) * opening
-    leaving = opening + closing - (left - work.geometry[NOW, row].gap - overlap)
+    overlap, slack = contact.overlap, contact.slack
+    d_gap = step * relative_rate(work, row, CHANGE, normal_rows(work, row))
+    # dδ follows the change of the gap, and ds keeps s = g + δ.
+    d_overlap = overlap_correction(work, row, target) - overlap / (overlap + slack) * d_gap
+    d_slack = d_gap + d_overlap - (slack - work.geometry[NOW, row].gap - overlap)
     if contact.friction_limit > 0.0:
-        grown = closing * limit_by_overlap(work, row)
-        share = change_friction(work, row, target, grown, share, go)
-    if go:
-        contact.overlap += share * closing
-        contact.slack += share * leaving
-        return share
-    return room(room(share, overlap, closing), left, leaving)
+        d_limit = d_overlap * limit_per_overlap(work, row)
+        fraction = change_friction(work, row, target, d_limit, fraction, apply)
+    if apply:
+        contact.overlap += fraction * d_overlap
+        contact.slack += fraction * d_slack
+        return fraction
+    return keep_positive(keep_positive(fraction, overlap, d_overlap), slack, d_slack)
 
 
 @apart
 def change_pairs(work, step, target, own):
-    """Change all pairs in play as the velocities in CHANGE do, each as far as all of them may, or
-    as its ``own`` parts may: (the least share, the pair that has allowed no more, −1 for none)."""
-    share, first = 1.0, -1
+    """Change all contacts along with the velocities in CHANGE; return (smallest fraction, its
+    pair).
+
+    All contacts go the smallest fraction, or each its ``own`` one. The pair is −1 where all may go
+    the full way.
+    """
+    fraction, first = 1.0, -1
     for row in range(work.tally.candidates):
-        if in_play(work, row):
-            goes = change_pair(work, row, step, target, 1.0, False)
+        if is_included(work, row):
+            fraction_own = change_pair(work, row, step, target, 1.0, False)
             if own:
-                change_pair(work, row, step, target, goes, True)
-            if goes < share:
-                share, first = goes, row
+                change_pair(work, row, step, target, fraction_own, True)
+            if fraction_own < fraction:
+                fraction, first = fraction_own, row
     if not own:
+        # A common fraction keeps contacts and gaps consistent.
         for row in range(work.tally.candidates):
-            if in_play(work, row):
-                change_pair(work, row, step, target, share, True)
-    return share, first
+            if is_included(work, row):
+                change_pair(work, row, step, target, fraction, True)
+    return fraction, first
 
 
 @apart
-def let_open(work):
-    """Let the s of pairs follow their gaps where these have opened by more: next to δ = 0 it would
-    but double in an iteration."""
+def widen_slacks(work):
+    """Widen slacks to gaps that have opened further: near δ = 0 they would only double per
+    iteration."""
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             contact = work.interior[row]
             wide = work.geometry[NOW, row].gap + contact.overlap
             contact.slack = max(contact.slack, wide)
 
 
-def begin_friction(work, row, share, target):
-    """Let the friction of a pair begin at a share of its limit, with products τ."""
+def set_friction(work, row, fraction, target):
+    """Set the friction of a pair to a fraction of its limit, with products τ."""
     contact = work.interior[row]
     limit = contact.friction_limit
-    contact.friction = share
-    contact.slide_ahead = target / (limit * (1.0 - share))
-    contact.slide_behind = target / (limit * (1.0 + share))
+    contact.friction_ratio = fraction
+    contact.slip_forward = target / (limit * (1.0 - fraction))
+    contact.slip_backward = target / (limit * (1.0 + fraction))
 
 
 @apart
-def hold_friction(work, first):
-    """Hold what friction goes by from now on, and let the pair begin again that is in the way of
-    the others; False where there is none left to be held."""
+def freeze_friction(work, first):
+    """Freeze the overlap that decides friction in all contacts; return False if all are frozen
+    already.
+
+    The pair ``first``, which has blocked the iterations, restarts away from its limit.
+    """
     newly = False
     for row in range(work.tally.candidates):
         contact = work.interior[row]
-        rubs = contact.stick_slope > 0.0 and contact.held_overlap == 0.0
-        if in_play(work, row) and rubs:
-            contact.held_overlap, newly = contact.overlap, True
+        rubs = contact.sticking_slope > 0.0 and contact.frozen_overlap == 0.0
+        if is_included(work, row) and rubs:
+            contact.frozen_overlap, newly = contact.overlap, True
     if newly and work.interior[first].friction_limit > 0.0:
-        share = min(max(work.interior[first].friction, -WITHIN), WITHIN)
-        begin_friction(work, first, share, mean_product(work))
+        fraction = min(max(work.interior[first].friction_ratio, -RESTART_RATIO), RESTART_RATIO)
+        set_friction(work, first, fraction, mean_product(work))
     return newly
 
 
-def in_doubt(work, row, least):
-    """Whether a pair has neither δ nor s below a small share of both, or of a size [m]; or, closed,
-    neither how far it slides nor what is left until it does below that or a small share of L."""
+def is_undecided(work, row, least):
+    """Return True if it is not known yet whether a contact is closed, or, if closed, whether it
+    slides.
+
+    ``least`` [m] is a size below which nothing matters.
+    """
     contact = work.interior[row]
     limit = contact.friction_limit
-    both = contact.overlap + contact.slack
-    if min(contact.overlap, contact.slack) > SMALL * max(both, least):
+    total_size = contact.overlap + contact.slack
+    # Neither δ nor s is small.
+    if min(contact.overlap, contact.slack) > DECIDED_RATIO * max(total_size, least):
         return True
     if contact.overlap < contact.slack:
         return False
-    force, least = contact.friction * limit, min(least, SMALL * max(limit, least))
-    sides = max(min(contact.slide_ahead, limit - force), min(contact.slide_behind, limit + force))
+    # Closed: on each side, neither the slip nor the distance from the limit is small.
+    force, least = contact.friction_ratio * limit, min(least, DECIDED_RATIO * max(limit, least))
+    sides = max(min(contact.slip_forward, limit - force), min(contact.slip_backward, limit + force))
     return limit > 0.0 and sides > least
 
 
-def is_off(work, row, least):
-    """Whether the gap of a pair is not s − δ, or how far it slides not e − f, by far more than
-    their parts, or than a size [m]."""
+def is_infeasible(work, row, least):
+    """Return True if a contact does not fit its gap (s − δ ≠ g) or its slip (e − f ≠ p − q)."""
     contact = work.interior[row]
-    both = contact.overlap + contact.slack
-    off = contact.slack - work.geometry[NOW, row].gap - contact.overlap
-    if abs(off) > SMALL * max(both, SMALL * least):
+    total_size = contact.overlap + contact.slack
+    misfit = contact.slack - work.geometry[NOW, row].gap - contact.overlap
+    if abs(misfit) > DECIDED_RATIO * max(total_size, DECIDED_RATIO * least):
         return True
-    limit, ahead, behind = contact.friction_limit, contact.slide_ahead, contact.slide_behind
-    off = contact.stick_force - contact.friction * limit - ahead + behind
-    return limit > 0.0 and abs(off) > SMALL * max(limit + ahead + behind, least)
+    limit, forward, backward = contact.friction_limit, contact.slip_forward, contact.slip_backward
+    misfit = contact.sticking_force - contact.friction_ratio * limit - forward + backward
+    return limit > 0.0 and abs(misfit) > DECIDED_RATIO * max(limit + forward + backward, least)
 
 
 @apart
-def settled(work, least, fitting):
-    """Whether of all pairs it is known if they close and slide, by a size [m]; and, for
-    ``fitting``, if that fits their gaps and rates."""
+def is_decided(work, least, fitting):
+    """Return True if all contacts are decided and, with ``fitting``, feasible."""
     for row in range(work.tally.candidates):
-        open_question = in_doubt(work, row, least) or (fitting and is_off(work, row, least))
-        if open_question and in_play(work, row):
+        undecided = is_undecided(work, row, least) or (fitting and is_infeasible(work, row, least))
+        if undecided and is_included(work, row):
             return False
     return True

@@ -1,14 +1,14 @@
-"""One step of backward Euler: the velocities at its end, by a semismooth Newton method.
+"""One backward Euler step by a semismooth Newton method for the velocities at its end.
 
     M (v₁ − v₀)/h = F(x₀ + h v₁, v₁, contacts of the end)
 
-The derivatives are those of the contacts that are closed, stick and slide at the iterate, and
-follow it: with contacts as springs these are the active sets of the complementarity problem that
-hard contacts pose (Moreau 1988, Jean 1999; Christensen, Klarbring, Pang & Strömberg 1998 for the
-method). It finds the end alone from where the sets are known; interior.py leads there.
+The derivatives are those of the contacts that are closed, stick and slide at the iterate. With
+contacts as springs, these are the active sets of the complementarity problem that rigid contacts
+pose (Moreau 1988, Jean 1999; for the method Christensen, Klarbring, Pang & Strömberg 1998). It
+converges where the active sets are known; otherwise interior.py comes first.
 
-The iterate stands in NOW, the contacts that may close in it flagged as closed; the step's start
-meanwhile in START, its contacts in TRIAL; NOW keeps its displacements.
+The iterate is in NOW, with contacts that may close marked as closed. The start of the step is in
+START, and its contacts are in TRIAL. NOW keeps the tangential displacements of the start.
 """
 
 import math
@@ -18,7 +18,7 @@ from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import locate_acting, locate_contacts
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import (
-    FADING,
+    FADE_FRACTION,
     add_all_derivatives,
     add_mean_forces,
     flag_close,
@@ -36,25 +36,25 @@ from flocsim.state.bodies import X, Y
 from flocsim.state.contacts import CLOSED, OPEN
 from flocsim.state.work import CHANGE, NEW, NOW, START, TRIAL
 
-NEWTON_SHARE = 0.01
-"""Newton's method goes on until what is left is below this share of the tolerance."""
+NEWTON_TOLERANCE = 0.01
+"""Error that Newton's method may leave, as a fraction of the tolerance."""
 
-MOST_ITERATIONS = 8
-"""Iterations in which it has to find the end: where it does not by then, the sets are not known."""
+MAX_ITERATIONS = 8
+"""Iterations after which the active sets are taken to be unknown."""
 
 
 def begin_step(work, clock):
-    """Keep the start of the step."""
+    """Store the start of the step, and unmark all contacts."""
     save_start(work)
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
-        work.candidates[row].contact_mode, work.interior[row].held_overlap = OPEN, 0.0
-        least = FADING * clock.tolerance
-        work.interior[row].fading_gap = max(-work.geometry[NOW, row].gap, least)
+        work.candidates[row].contact_mode, work.interior[row].frozen_overlap = OPEN, 0.0
+        least = FADE_FRACTION * clock.tolerance
+        work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 
 
-def put_back(work):
-    """Go back to the motion at the start of the step."""
+def restore_start(work):
+    """Restore the motion at the start of the step."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             work.place[NOW, body, axis] = work.place[START, body, axis]
@@ -62,20 +62,19 @@ def put_back(work):
 
 
 def end_step(work):
-    """Make the iterate the new state, its contacts flagged that take part in the step, and its
-    start the current one again."""
+    """Move the iterate to NEW, mark the contacts that took part, and restore the start in NOW."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             work.place[NEW, body, axis] = work.place[NOW, body, axis]
             work.velocity[NEW, body, axis] = work.velocity[NOW, body, axis]
-    put_back(work)
+    restore_start(work)
     for row in range(work.tally.candidates):
         work.candidates[row].contact_mode = CLOSED if takes_part(work, row) else OPEN
         work.geometry[NOW, row] = work.geometry[TRIAL, row]
 
 
-def place_ends(work, step):
-    """Places at the end from the velocities there."""
+def update_positions(work, step):
+    """Compute the positions at the end from the velocities there."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             start = work.place[START, body, axis]
@@ -83,36 +82,38 @@ def place_ends(work, step):
 
 
 @apart
-def evaluate_others(scene, work, time, step):
-    """All forces at the end of the step but those of contacts, which are located."""
-    place_ends(work, step)
+def evaluate_other_forces(scene, work, time, step):
+    """Compute all forces at the end of the step except those of contacts, which are located."""
+    update_positions(work, step)
     locate_contacts(scene, work, NOW)
     if scene.surface_reach > 0.0:
         flag_near(scene, work, NOW, 0.0)
     sum_other_forces(scene, work, time + step, NOW)
 
 
-def evaluate_in_play(scene, work, time, step):
-    """The same, of the pairs alone that are in play located; of all where forces from further away
-    ask for them."""
+def evaluate_included(scene, work, time, step):
+    """Compute all forces at the end of the step except those of contacts; locate marked pairs only.
+
+    Surface forces need all pairs located.
+    """
     if scene.surface_reach > 0.0:
-        evaluate_others(scene, work, time, step)
+        evaluate_other_forces(scene, work, time, step)
         return
-    place_ends(work, step)
+    update_positions(work, step)
     locate_acting(scene, work, NOW)
     sum_other_forces(scene, work, time + step, NOW)
 
 
 def evaluate_end(scene, work, time, step):
-    """All forces at the end of the step; False where bodies are too deep in each other."""
-    evaluate_others(scene, work, time, step)
+    """Compute all forces at the end of the step; return False if bodies overlap too deeply."""
+    evaluate_other_forces(scene, work, time, step)
     if has(scene, CONTACT_FORCE):
         add_mean_forces(scene, work, step)
-    return not is_too_deep(scene, work)
+    return not exceeds_half_limit(scene, work)
 
 
-def is_too_deep(scene, work):
-    """Whether a pair overlaps by more than half of what the contact law takes."""
+def exceeds_half_limit(scene, work):
+    """Return True if a pair overlaps by more than half of the limit of the contact law."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         a, b = candidate.vertex_body, candidate.edge_body
@@ -123,20 +124,23 @@ def is_too_deep(scene, work):
 
 
 def momentum_change(scene, work, body, axis, step):
-    """Mass times acceleration in the step."""
+    """Return mass times acceleration over the step [N or N m]."""
     before = work.velocity[START, body, axis]
     return inertia(scene, body, axis) * (work.velocity[NOW, body, axis] - before) / step
 
 
-def unbalanced(scene, work, body, axis, step):
-    """Force less mass times acceleration."""
+def residual(scene, work, body, axis, step):
+    """Return force minus mass times acceleration [N or N m]."""
     force = work.force[NOW, body, axis]
     return force - momentum_change(scene, work, body, axis, step)
 
 
-def write_load(scene, work, step):
-    """What the forces do not balance, of a cluster as a whole in the rows of its first body: forces
-    and rates apart, so that what is mutual cancels."""
+def write_residual(scene, work, step):
+    """Write the residual to the loads, with the momentum balance of each cluster for its first
+    body.
+
+    Forces are summed apart from accelerations: mutual forces then cancel exactly.
+    """
     n = work.poses.shape[0]
     for body in range(n):
         cluster = work.clusters[body]
@@ -149,28 +153,30 @@ def write_load(scene, work, step):
         cluster.rate_y += momentum_change(scene, work, body, 1, step)
     for body in range(n):
         free = scene.bodies[body].free
-        x = unbalanced(scene, work, body, 0, step)
-        y = unbalanced(scene, work, body, 1, step)
+        x = residual(scene, work, body, 0, step)
+        y = residual(scene, work, body, 1, step)
+        # The first body of a cluster stands for the momentum balance of all.
         if work.cluster[body] == body:
             cluster = work.clusters[body]
             x, y = cluster.force_x - cluster.rate_x, cluster.force_y - cluster.rate_y
         work.loads[REAL, 3 * body] = free * x
         work.loads[REAL, 3 * body + 1] = free * y
-        work.loads[REAL, 3 * body + 2] = free * unbalanced(scene, work, body, 2, step)
+        work.loads[REAL, 3 * body + 2] = free * residual(scene, work, body, 2, step)
 
 
 @apart
-def assemble_rest(scene, work, clock, step):
-    """Derivatives of all forces at the end of the step but those of contacts."""
+def assemble_other_derivatives(scene, work, clock, step):
+    """Assemble the derivatives of all forces at the end of the step except those of contacts."""
     remaining = max(end_of_run(clock) - clock.time, step)
     assemble_without_contacts(scene, work, clock.time + step, remaining)
 
 
-def refresh(scene, work, clock, step):
-    """Factorise anew at the iterate; False where that fails."""
+def refactorise(scene, work, clock, step):
+    """Assemble and factorise the system at the iterate; return False if that fails."""
+    # Contacts that have come close extend the pattern and may join clusters.
     flag_close(scene, work)
     gather_clusters(scene, work)
-    assemble_rest(scene, work, clock, step)
+    assemble_other_derivatives(scene, work, clock, step)
     if has(scene, CONTACT_FORCE):
         add_all_derivatives(scene, work, step)
     return factorise_euler(scene, work, step)
@@ -178,8 +184,9 @@ def refresh(scene, work, clock, step):
 
 @apart
 def solve_change(scene, work, step):
-    """Newton's change of velocities into CHANGE; the largest that it makes in place [m]."""
-    write_load(scene, work, step)
+    """Write Newton's change of the velocities to CHANGE; return the largest resulting displacement
+    [m]."""
+    write_residual(scene, work, step)
     solve_real(work)
     work.tally.solves += 1
     largest = 0.0
@@ -188,37 +195,42 @@ def solve_change(scene, work, step):
         for axis in range(3):
             change = work.loads[REAL, 3 * body + axis].real * scene.bodies[body].free
             work.velocity[CHANGE, body, axis] = change
+            # The system was singular.
             if not abs(change) < math.inf:
                 return math.inf
             largest = max(largest, lever(scene, body, axis) * memory * abs(change))
     return largest
 
 
-def go_along(work, way):
-    """Add a share of the change to the velocities."""
+def apply_change(work, fraction):
+    """Add a fraction of the change to the velocities."""
     for body in range(work.poses.shape[0]):
         for axis in range(3):
-            work.velocity[NOW, body, axis] += way * work.velocity[CHANGE, body, axis]
+            work.velocity[NOW, body, axis] += fraction * work.velocity[CHANGE, body, axis]
 
 
-def goal_of(scene, work, clock, step):
-    """What a change may be at most where it is the last one [m]."""
-    return max(NEWTON_SHARE * clock.tolerance, rounding_error(scene, work, NOW, step))
+def final_tolerance(scene, work, clock, step):
+    """Return the largest displacement of a last change [m]: a fraction of the tolerance, or
+    rounding."""
+    return max(NEWTON_TOLERANCE * clock.tolerance, rounding_error(scene, work, NOW, step))
 
 
 @apart
 def solve_end(scene, work, clock, step):
-    """Find the end of the step, of which begin_step has kept the start, from velocities that are
-    near it; False where it is not found."""
-    for _ in range(MOST_ITERATIONS):
+    """Solve for the end of the step from velocities near it; return False if that fails.
+
+    begin_step has stored the start.
+    """
+    for _ in range(MAX_ITERATIONS):
         if not evaluate_end(scene, work, clock.time, step):
             return False
-        if not refresh(scene, work, clock, step):
+        if not refactorise(scene, work, clock, step):
             return False
         change = solve_change(scene, work, step)
         if not change < math.inf:
             return False
-        go_along(work, 1.0)
-        if change <= goal_of(scene, work, clock, step):
+        apply_change(work, 1.0)
+        # Newton converges quadratically here: the change after this one is negligible.
+        if change <= final_tolerance(scene, work, clock, step):
             return evaluate_end(scene, work, clock.time, step)
     return False

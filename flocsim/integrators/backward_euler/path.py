@@ -1,9 +1,13 @@
-"""The way of the interior-point method from the start of a step to near its end.
+"""The search for the end of a backward Euler step by the interior-point method.
 
-Bodies slide by far more in a step than contacts overlap, and along a corner their gaps then go by
-the square of that way, which is more than an overlap as well. So the contacts are followed with
-gaps and directions as they are where the step would end without them, and only when it is known
-which pairs close and slide, with those where they have come to.
+In a step bodies slide by far more than contacts overlap (1e-8 m against 1e-12 m), and along a
+corner the gaps change with the square of that, which is more than an overlap, too. So the contacts
+are first solved along frozen gaps and directions, those where the step would end without contacts.
+Only when it is known which contacts close and slide does the search follow the true gaps.
+
+A search starts warm, from the contacts at the start of the step, and where that fails cold. Tried
+and rejected: Newton's method first (hardly ever are all contacts those of the last step), and a
+predictor-corrector method (Mehrotra: a fifth fewer systems, but each is solved twice).
 """
 
 import math
@@ -12,28 +16,28 @@ from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, has
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
-    begin_friction,
     change_pairs,
-    hold_friction,
-    in_play,
-    let_open,
+    evaluate_law,
+    freeze_friction,
+    is_decided,
+    is_included,
     mean_product,
-    press,
-    rate_along,
-    settled,
+    relative_rate,
+    set_friction,
+    widen_slacks,
     write_forces,
 )
 from flocsim.integrators.backward_euler.newton import (
-    assemble_rest,
+    apply_change,
+    assemble_other_derivatives,
     evaluate_end,
-    evaluate_in_play,
-    evaluate_others,
-    go_along,
-    goal_of,
-    place_ends,
-    put_back,
+    evaluate_included,
+    evaluate_other_forces,
+    final_tolerance,
+    restore_start,
     solve_change,
     solve_end,
+    update_positions,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler
@@ -43,54 +47,57 @@ from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import CHANGE, NOW, START, TRIAL
 
-MOST_ITERATIONS, MOST_TURNING, MOST_KNOWN = 70, 45, 24
-"""Iterations at most: along gaps that are frozen, along true ones from then on, and along these
-where pairs are taken to close and slide as in the step before."""
+MAX_FROZEN, MAX_TRUE, MAX_WARM = 70, 45, 24
+"""Most iterations along frozen gaps, along true gaps after that, and along true gaps from a warm
+start."""
 
-FALLING, LEAST_WAY = 0.01, 0.7
-"""τ is that share of the mean of all products behind an iteration that went so far at least; …"""
+SIGMA_FAST, FULL_STEP = 0.01, 0.7
+"""Centring parameter: τ over the mean product, after an iteration that made at least FULL_STEP of
+its change."""
 
-STANDING, CAREFUL, CLOSER, APART = 0.03, 0.5, 0.2, 0.05
-"""… and behind others one of these: along gaps that are frozen, there where the first one has led
-nowhere, along true ones, and where each pair goes its own share."""
+SIGMA_FROZEN, SIGMA_CAREFUL, SIGMA_TRUE, SIGMA_OWN = 0.03, 0.5, 0.2, 0.05
+"""Centring parameters after shorter iterations: along frozen gaps, there in the second search,
+along true gaps, and where each contact makes a step of its own."""
 
-THAWS, LEAST_TARGET = 0.1, 1e-10
-"""Gaps are true ones from where the mean of all products is below this share of the square of a
-usual overlap; τ does not fall below the other one."""
+UNFREEZE, MIN_PRODUCT = 0.1, 1e-10
+"""Mean product, over the square of a typical overlap, below which gaps are no longer frozen; and
+the smallest τ, in the same unit."""
 
-FOUND = 0.01
-"""It is known whether a pair is open or closed where the smaller one of δ and s is below this share
-of a usual δ."""
+DECIDED_FRACTION = 0.01
+"""A contact is known to be open or closed where the smaller of δ and s is below this fraction of a
+typical δ."""
 
-NEAR_CHANGE = 10.0
-"""Newton's method finds the end, where all of that is known, from a change of so many times what it
-may leave itself."""
+NEWTON_RADIUS = 10.0
+"""Largest last change, over Newton's own tolerance, from which Newton's method finds the end once
+all contacts are decided."""
 
-STILL_CHANGE, WHOLE, CENTRED = 0.1, 0.9, 1e-4
-"""The end is there at a change of so many times that, which went so far at least, and a mean of all
-products below this share of the square of a usual overlap: what is not known moves nothing."""
+CONVERGED_CHANGE, CONVERGED_STEP, CONVERGED_PRODUCT = 0.1, 0.9, 1e-4
+"""The end is reached without Newton's method at a change below this multiple of its tolerance,
+after an iteration of at least this fraction, and at a mean product below this multiple of the
+square of a typical overlap: contacts that are still undecided then move nothing."""
 
-AWAY = 0.1
-"""What is to fall begins at this share of its usual size at least."""
+START_SIZE = 0.1
+"""Least initial value of δ, s and slips in a cold start, over their typical size."""
 
-SMALL_LIMIT = 1e-3
-"""A limit of friction counts as this share of a usual overlap at least there."""
+START_LIMIT = 1e-3
+"""Least friction limit in a cold start, over a typical overlap."""
 
-AS_BEFORE = 0.03
-"""Taken as in the step before, δ s begins at the square of this share of a usual overlap."""
+WARM_FRACTION = 0.03
+"""Square root of the initial products of a warm start, over a typical overlap."""
 
-ASTRAY = 30.0
-"""Where each pair goes its own share, a change of so many times the first one leads nowhere."""
+DIVERGED_RATIO = 30.0
+"""A search with individual steps has diverged at a change this many times the first one."""
 
-HALTING, SOON = 0.05, 2
-"""Iterations that go less far have come to a halt, after so many in a row."""
+STALLED_STEP, MAX_STALLED = 0.05, 2
+"""Iterations that make less than this fraction of their change are stalled; after this many in a
+row friction is frozen, or the search given up."""
 
-NOWHERE, NEAR, THERE = range(3)
-"""Where a search leads: Newton's method has to go on from NEAR."""
+FAILED, NEAR_END, AT_END = range(3)
+"""Outcome of a search: no end; near enough for Newton's method; at the end."""
 
 
-def usual_force(scene, work):
-    """How large forces are that stop, or hold, a body [N], in the mean."""
+def typical_force(scene, work):
+    """Return the mean force that acts on a free body [N]."""
     total, count = 0.0, 0
     for body in range(work.poses.shape[0]):
         if scene.bodies[body].free == 1.0:
@@ -100,215 +107,244 @@ def usual_force(scene, work):
     return total / max(count, 1)
 
 
-def usual_sizes(scene, work, step):
-    """(a usual δ, a usual s [m]); 0 where no pair is in play."""
-    count, stopped, way, deepest, stiffness = 0, 0.0, 0.0, 0.0, 0.0
+def typical_sizes(scene, work, step):
+    """Return a typical δ and a typical s [m]; (0, 0) where no pair is included."""
+    count, stopped, slack_scale, deepest, stiffness = 0, 0.0, 0.0, 0.0, 0.0
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             candidate = work.candidates[row]
             a, b = candidate.vertex_body, candidate.edge_body
-            speed = abs(rate_along(work, row, START, normal_rows(work, row)))
+            # Force that would stop the approach in this step, path in the step, and stiffness,
+            # summed.
+            speed = abs(relative_rate(work, row, START, normal_rows(work, row)))
             stopped += effective_mass(scene, a, b) * speed / step
-            way += step * speed
+            slack_scale += step * speed
             deepest = max(deepest, -work.geometry[NOW, row].gap)
             stiffness += normal_stiffness(scene, work, row, step, 1e-12)
             count += 1
     if count == 0 or not stiffness > 0.0:
         return 0.0, 0.0
-    usual = (stopped + count * usual_force(scene, work)) / stiffness
-    return usual, max(way / count, usual, AWAY * deepest)
+    overlap_scale = (stopped + count * typical_force(scene, work)) / stiffness
+    return overlap_scale, max(slack_scale / count, overlap_scale, START_SIZE * deepest)
 
 
-def begin_anywhere(scene, work, step, usual, way):
-    """δ, s and friction of all pairs in play to begin with, of which nothing is known, or held."""
+def start_cold(scene, work, step, overlap_scale, slack_scale):
+    """Set δ, s and friction of all contacts for a cold start."""
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             contact = work.interior[row]
             gap = work.geometry[NOW, row].gap
-            contact.overlap = max(-work.geometry[TRIAL, row].gap, AWAY * usual)
-            contact.slack = max(gap + contact.overlap, AWAY * way, -gap)
-            contact.held_overlap = 0.0
-            press(scene, work, row, step, False)
-            contact.friction = 0.0
-            slides = AWAY * usual * AWAY * way / max(contact.friction_limit, SMALL_LIMIT * usual)
-            contact.slide_ahead = max(contact.stick_force, slides)
-            contact.slide_behind = max(-contact.stick_force, slides)
+            # Well inside the domain, and consistent with the gaps.
+            contact.overlap = max(-work.geometry[TRIAL, row].gap, START_SIZE * overlap_scale)
+            contact.slack = max(gap + contact.overlap, START_SIZE * slack_scale, -gap)
+            contact.frozen_overlap = 0.0
+            evaluate_law(scene, work, row, step, False)
+            contact.friction_ratio = 0.0
+            slides = (
+                START_SIZE
+                * overlap_scale
+                * START_SIZE
+                * slack_scale
+                / max(contact.friction_limit, START_LIMIT * overlap_scale)
+            )
+            contact.slip_forward = max(contact.sticking_force, slides)
+            contact.slip_backward = max(-contact.sticking_force, slides)
 
 
-def begin_as_before(scene, work, step, usual):
-    """The same where pairs are closed and slide as at the start of the step."""
-    target = (AS_BEFORE * usual) ** 2
+def start_warm(scene, work, step, overlap_scale):
+    """Set δ, s and friction of all contacts as they were at the start of the step."""
+    target = (WARM_FRACTION * overlap_scale) ** 2
     for row in range(work.tally.candidates):
-        if in_play(work, row):
+        if is_included(work, row):
             geometry = work.geometry[NOW, row]
             contact = work.interior[row]
             before = work.geometry[TRIAL, row].gap
+            # Closed at the start, closing in the step, and open.
             if before < 0.0:
                 contact.overlap, contact.slack = -before, -target / before
             elif geometry.gap < 0.0:
-                contact.overlap, contact.slack = usual, target / usual
+                contact.overlap, contact.slack = overlap_scale, target / overlap_scale
             else:
-                contact.slack = max(geometry.gap, FOUND * usual)
+                contact.slack = max(geometry.gap, DECIDED_FRACTION * overlap_scale)
                 contact.overlap = target / contact.slack
-            press(scene, work, row, step, True)
+            evaluate_law(scene, work, row, step, True)
             limit, side = contact.friction_limit, work.candidates[row].slide_direction
             if limit > 0.0:
-                share = float(side) if side != 0 else contact.stick_force / limit
-                share = min(max(share, FOUND - 1.0), 1.0 - FOUND)
-                slides = side * (contact.stick_force - share * limit)
-                begin_friction(work, row, share, target)
+                # Sliding contacts begin near their limit.
+                fraction = float(side) if side != 0 else contact.sticking_force / limit
+                fraction = min(max(fraction, DECIDED_FRACTION - 1.0), 1.0 - DECIDED_FRACTION)
+                slides = side * (contact.sticking_force - fraction * limit)
+                set_friction(work, row, fraction, target)
                 if side > 0:
-                    contact.slide_ahead = max(contact.slide_ahead, slides)
+                    contact.slip_forward = max(contact.slip_forward, slides)
                 elif side < 0:
-                    contact.slide_behind = max(contact.slide_behind, slides)
+                    contact.slip_backward = max(contact.slip_backward, slides)
 
 
-def advance_gaps(work, share, step):
-    """Gaps after a share of the change of velocities, in the directions that they had."""
+def advance_gaps(work, fraction, step):
+    """Change the gaps by a fraction of the velocity change, along frozen directions."""
     for row in range(work.tally.candidates):
-        opening = rate_along(work, row, CHANGE, normal_rows(work, row))
-        work.geometry[NOW, row].gap += share * step * opening
+        opening = relative_rate(work, row, CHANGE, normal_rows(work, row))
+        work.geometry[NOW, row].gap += fraction * step * opening
 
 
 @apart
-def iterate(scene, work, clock, step, target, turns, own):
-    """One iteration towards products τ: (the share of the change that was gone, the pair that
-    allowed no more, the change [m]); −1 where it fails. Where each pair goes its ``own`` share,
-    that of its last one, and bodies go all the way."""
-    assemble_rest(scene, work, clock, step)
+def iterate_once(scene, work, clock, step, target, turns, own):
+    """Make one iteration towards products τ = ``target``; return (fraction made, blocking pair,
+    change [m]).
+
+    The fraction is −1 where the iteration fails. With ``own`` steps each contact goes its own
+    fraction, bodies go all the way, and the smallest fraction is returned.
+    """
+    # System and velocity change.
+    assemble_other_derivatives(scene, work, clock, step)
     write_forces(scene, work, step, target, turns)
     if not factorise_euler(scene, work, step):
         return -1.0, -1, math.inf
     change = solve_change(scene, work, step)
     if not change < math.inf:
         return -1.0, -1, math.inf
-    share, first = change_pairs(work, step, target, own)
-    go_along(work, 1.0 if own else share)
+    fraction, first = change_pairs(work, step, target, own)
+    apply_change(work, 1.0 if own else fraction)
+    # Follow true gaps by locating the contacts, or frozen ones by their linear change.
     if turns:
-        evaluate_in_play(scene, work, clock.time, step)
+        evaluate_included(scene, work, clock.time, step)
         if own:
-            let_open(work)
+            widen_slacks(work)
     else:
-        advance_gaps(work, share, step)
-        place_ends(work, step)
+        advance_gaps(work, fraction, step)
+        update_positions(work, step)
         sum_other_forces(scene, work, clock.time + step, NOW)
-    return share, first, change
+    return fraction, first, change
 
 
-def may_go_apart(scene, work):
-    """Whether each pair, all having begun, may go its own share of an iteration. Friction without a
-    limit goes by the part of the step for which a pair is closed, and so by δ and s themselves:
-    there the bodies' ends would be others than those that pairs know of, and steps are rejected."""
+def allows_own_steps(scene, work):
+    """Return True if each contact may make a step of its own.
+
+    Not where friction has no limit: it depends on the closed fraction, and so on δ and s
+    themselves. The bodies would end elsewhere than the contacts assume, and the step would be
+    rejected.
+    """
     if has(scene, SLIP_LIMIT):
         return True
     for row in range(work.tally.candidates):
-        if in_play(work, row) and work.interior[row].stick_slope > 0.0:
+        if is_included(work, row) and work.interior[row].sticking_slope > 0.0:
             return False
     return True
 
 
-def count_halts(work, halted, share, first):
-    """(How many iterations in a row have hardly gone any way, whether it makes sense to go on):
-    behind SOON of them friction is held, where it has not been; see hold_friction."""
-    if share >= HALTING:
+def count_stalls(work, stalled, fraction, first):
+    """Return (number of consecutive stalled iterations, whether to continue).
+
+    After MAX_STALLED of them friction is frozen, if it is not yet; see freeze_friction.
+    """
+    if fraction >= STALLED_STEP:
         return 0, True
-    if halted + 1 < SOON:
-        return halted + 1, True
-    return -SOON, hold_friction(work, first)
+    if stalled + 1 < MAX_STALLED:
+        return stalled + 1, True
+    # The frozen problem gets twice as many.
+    return -MAX_STALLED, freeze_friction(work, first)
 
 
 @apart
-def arrive(scene, work, clock, step, usual, most, own):
-    """Iterate along true gaps, with τ about as small as it is to be; where that leads to. Where
-    each pair goes its ``own`` way, it is given up if that leads further and further off."""
-    share, halted, first_change = 1.0, 0, math.inf
+def follow_true_gaps(scene, work, clock, step, overlap_scale, most, own):
+    """Iterate along true gaps, with τ near its final size; return the outcome.
+
+    A search with ``own`` steps is given up where its changes grow.
+    """
+    fraction, stalled, first_change = 1.0, 0, math.inf
     for _ in range(most):
+        # Choose τ by the success of the last iteration.
         mean = mean_product(work)
-        target = (FALLING if share >= LEAST_WAY else APART if own else CLOSER) * mean
-        target = max(target, LEAST_TARGET * usual * usual)
-        share, first, change = iterate(scene, work, clock, step, target, True, own)
-        if share < 0.0 or (own and change > ASTRAY * first_change):
-            return NOWHERE
+        target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA_OWN if own else SIGMA_TRUE) * mean
+        target = max(target, MIN_PRODUCT * overlap_scale * overlap_scale)
+        fraction, first, change = iterate_once(scene, work, clock, step, target, True, own)
+        if fraction < 0.0 or (own and change > DIVERGED_RATIO * first_change):
+            return FAILED
         first_change = change if first_change == math.inf else first_change
         if not own:
-            halted, goes_on = count_halts(work, halted, share, first)
+            stalled, goes_on = count_stalls(work, stalled, fraction, first)
             if not goes_on:
-                return NOWHERE
-        goal = goal_of(scene, work, clock, step)
-        near = share > LEAST_WAY and change <= NEAR_CHANGE * goal
-        if near and settled(work, FOUND * usual, True):
-            return NEAR
-        still = share > WHOLE and change <= STILL_CHANGE * goal
-        if still and mean <= CENTRED * usual * usual:
-            return THERE
-    return NOWHERE
+                return FAILED
+        goal = final_tolerance(scene, work, clock, step)
+        # All decided and feasible: Newton's method can finish.
+        near = fraction > FULL_STEP and change <= NEWTON_RADIUS * goal
+        if near and is_decided(work, DECIDED_FRACTION * overlap_scale, True):
+            return NEAR_END
+        # Nothing that is undecided moves a body.
+        converged = fraction > CONVERGED_STEP and change <= CONVERGED_CHANGE * goal
+        if converged and mean <= CONVERGED_PRODUCT * overlap_scale * overlap_scale:
+            return AT_END
+    return FAILED
 
 
 @apart
-def come_from_afar(scene, work, clock, step, usual, way, careful):
-    """Go to the end of the step from where nothing is known of it; where that leads to."""
-    put_back(work)
-    evaluate_others(scene, work, clock.time, step)
-    begin_anywhere(scene, work, step, usual, way)
-    share, halted, standing = 0.0, 0, CAREFUL if careful else STANDING
-    for _ in range(MOST_ITERATIONS):
-        target = (FALLING if share >= LEAST_WAY else standing) * mean_product(work)
-        share, first, _ = iterate(scene, work, clock, step, target, False, False)
-        if share < 0.0:
-            return NOWHERE
-        halted, goes_on = count_halts(work, halted, share, first)
+def follow_frozen_gaps(scene, work, clock, step, overlap_scale, slack_scale, careful):
+    """Search for the end of the step without knowledge of its contacts; return the outcome."""
+    # Freeze gaps and directions where the step would end without contacts.
+    restore_start(work)
+    evaluate_other_forces(scene, work, clock.time, step)
+    start_cold(scene, work, step, overlap_scale, slack_scale)
+    fraction, stalled, standing = 0.0, 0, SIGMA_CAREFUL if careful else SIGMA_FROZEN
+    for _ in range(MAX_FROZEN):
+        # Products are small: locate the contacts, and follow true gaps.
+        target = (SIGMA_FAST if fraction >= FULL_STEP else standing) * mean_product(work)
+        fraction, first, _ = iterate_once(scene, work, clock, step, target, False, False)
+        if fraction < 0.0:
+            return FAILED
+        stalled, goes_on = count_stalls(work, stalled, fraction, first)
         if not goes_on:
-            return NOWHERE
-        if share > LEAST_WAY and mean_product(work) <= THAWS * usual * usual:
-            evaluate_others(scene, work, clock.time, step)
-            own = not careful and may_go_apart(scene, work)
-            return arrive(scene, work, clock, step, usual, MOST_TURNING, own)
-    return NOWHERE
+            return FAILED
+        if fraction > FULL_STEP and mean_product(work) <= UNFREEZE * overlap_scale * overlap_scale:
+            evaluate_other_forces(scene, work, clock.time, step)
+            own = not careful and allows_own_steps(scene, work)
+            return follow_true_gaps(scene, work, clock, step, overlap_scale, MAX_TRUE, own)
+    return FAILED
 
 
-def leaves_out(work):
-    """Whether a pair has closed that was not in play."""
+def misses_contact(work):
+    """Return True if a pair has closed that was not included."""
     for row in range(work.tally.candidates):
-        if work.geometry[NOW, row].gap < 0.0 and not in_play(work, row):
+        if work.geometry[NOW, row].gap < 0.0 and not is_included(work, row):
             return True
     return False
 
 
-def ends(scene, work, clock, step, led):
-    """Whether the end of the step is there, or Newton's method finds it from where a search has
-    led."""
-    if led == THERE:
+def reaches_end(scene, work, clock, step, outcome):
+    """Return True if the end of the step has been reached, or Newton's method reaches it from
+    here."""
+    if outcome == AT_END:
         if not evaluate_end(scene, work, clock.time, step):
             return False
-        if not leaves_out(work):
+        if not misses_contact(work):
             return True
-    return led != NOWHERE and solve_end(scene, work, clock, step)
+    return outcome != FAILED and solve_end(scene, work, clock, step)
 
 
 @apart
-def search_afar(scene, work, clock, step, usual, way):
-    """Find the end of the step from where nothing is known of it; once more and more carefully
-    where that fails."""
+def search_cold(scene, work, clock, step, overlap_scale, slack_scale):
+    """Search for the end of the step from a cold start, a second time more carefully."""
     for careful in (False, True):
-        led = come_from_afar(scene, work, clock, step, usual, way, careful)
-        if ends(scene, work, clock, step, led):
+        outcome = follow_frozen_gaps(scene, work, clock, step, overlap_scale, slack_scale, careful)
+        if reaches_end(scene, work, clock, step, outcome):
             return True
     return False
 
 
 @apart
 def find_end(scene, work, clock, step):
-    """Find the end of the step, of which begin_step has kept the start; False where it is not
-    found."""
-    evaluate_others(scene, work, clock.time, step)
+    """Find the end of the step, whose start begin_step has stored; return False if that fails."""
+    # Where the step would end without contacts: which pairs may close there?
+    evaluate_other_forces(scene, work, clock.time, step)
     flag_close(scene, work)
     gather_clusters(scene, work)
-    usual, way = usual_sizes(scene, work, step)
-    if usual == 0.0:
+    overlap_scale, slack_scale = typical_sizes(scene, work, step)
+    if overlap_scale == 0.0:
         return solve_end(scene, work, clock, step)
-    begin_as_before(scene, work, step, usual)
-    if may_go_apart(scene, work):
-        led = arrive(scene, work, clock, step, usual, MOST_KNOWN, True)
-        if ends(scene, work, clock, step, led):
+    # Warm start first: in a bed at rest most contacts stay as they are.
+    start_warm(scene, work, step, overlap_scale)
+    if allows_own_steps(scene, work):
+        outcome = follow_true_gaps(scene, work, clock, step, overlap_scale, MAX_WARM, True)
+        if reaches_end(scene, work, clock, step, outcome):
             return True
-    return search_afar(scene, work, clock, step, usual, way)
+    return search_cold(scene, work, clock, step, overlap_scale, slack_scale)

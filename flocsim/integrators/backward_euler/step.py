@@ -1,30 +1,32 @@
-"""A step of backward Euler that goes on across switches, as the loop of all methods takes it.
+"""A backward Euler step across events, and its error estimate.
 
-Its steps are as long as the motion allows, however often contacts open and close in them. What they
-do not resolve they damp: bodies come to rest at the first touch, as they do by critical damping.
+The size of a step is limited by the motion, not by the number of contacts that open and close.
+Vibrations that it does not resolve are damped: bodies come to rest at their first touch, as they do
+under critical damping.
 
-What it is likely to be wrong by: to first order its end is off by ½ h times how much the rates have
-changed in it, whether smoothly or, where contacts have closed or opened somewhere in it, at once.
-As Hairer & Wanner (II, 1996, IV.8) have it, that is sent through the step's own matrix, which
-leaves of it what the step would not have damped: of a body that lands, what it goes on along the
-other body.
+Error: to first order the end is off by ½ h times the change of the rates, whether that is smooth
+or, where contacts have switched, sudden. As in Hairer & Wanner (II, 1996, section IV.8), it is
+filtered by the step's own matrix, which removes what the step would have damped. For a body that
+lands, the motion along the other body remains.
 
     e_v = (M/h + D + h K)⁻¹ ½ (M (a₀ − a₁) − h K (v₀ − v₁)),   e_x = ½ h (v₀ − v₁) + h e_v
 
-a₁ being the acceleration of the step and a₀ that of the last one: what the forces were before. The
-error of velocity is sent through once more, for what the next step leaves of it.
+with the accelerations a₁ of the step and a₀ of the last one. The velocity error is filtered once
+more, as the next step will do.
+
+Sources: Moreau (1988), Jean (1999), for contacts that are springs.
 """
 
 import math
 
 from flocsim.compiler.linker import apart
 from flocsim.hooks import CONTACT_FORCE, has
-from flocsim.integrators.backward_euler.contact_mean import add_held_friction, takes_part
+from flocsim.integrators.backward_euler.contact_mean import add_frozen_friction_residual, takes_part
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
 from flocsim.integrators.backward_euler.path import find_end
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.resolution import bounces
-from flocsim.integrators.radau.systems import solve_for_free
+from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.error import error_ratio
@@ -34,34 +36,36 @@ from flocsim.state.bodies import X, Y
 from flocsim.state.work import CHANGE, LAST_RATES, NOW, START, STEP_ERROR, STIFFNESS, TRIAL
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
-"""The next step is that much shorter than would just do; bounds of the change."""
+"""Safety factor of the next step's size, and bounds of its change."""
 
-SHORT = 0.5
-"""A step of less than this share of what it might have been has been cut short."""
+CUT_FRACTION = 0.5
+"""A step below this fraction of the planned size was cut short, and says nothing about the next
+one."""
 
-FIRST_SHARE = 0.1
-"""The first step with located switches behind one across them, over that."""
+FIRST_LOCATED_STEP = 0.1
+"""Size of the first step with located events after one across them, over that one."""
 
 
 def next_across(clock, step, ratio):
-    """The size of the step after one of that ratio: errors go with h² where motion is smooth, with
-    h where contacts switch."""
+    """Return the size [s] of the next step: errors scale as h² in smooth motion, and as h at
+    events."""
+    # An event may have caused the error, which then scales as h.
     if ratio > 1.0:
         return step * max(LEAST_SHARE, SAFETY / ratio)
-    longer = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
+    proposed = step * min(MOST_GROWTH, SAFETY / math.sqrt(max(ratio, 1e-4)))
     # A step cut short by the end of the window says nothing against a longer one.
-    return max(clock.step, longer) if step < clock.step and ratio <= 0.5 else longer
+    return max(clock.step, proposed) if step < clock.step and ratio <= 0.5 else proposed
 
 
 def solve_step(scene, work, clock, step):
-    """Find the end of the step; False where it is not found."""
+    """Find the end of the step; return False if that fails."""
     if has(scene, CONTACT_FORCE):
         return find_end(scene, work, clock, step)
     return solve_end(scene, work, clock, step)
 
 
-def speed_along(work, row, state):
-    """How fast the bodies of a pair came at each other in a state [m/s]."""
+def approach_speed(work, row, state):
+    """Return the speed at which the bodies of a pair approach each other in a state [m/s]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
@@ -70,18 +74,24 @@ def speed_along(work, row, state):
 
 
 @apart
-def fastest_bounce(scene, work, clock, lasting):
-    """ω0 [1/s] of the stiffest contact of the step from which bodies would fly apart again, by
-    more than is allowed; of those alone that have closed in it unless ``lasting``."""
+def fastest_bounce(scene, work, clock, all_contacts):
+    """Return ω0 [1/s] of the stiffest contact from which bodies would rebound noticeably; 0 without
+    any.
+
+    Noticeably: by more than the tolerance. With ``all_contacts`` of all in the step, otherwise of
+    those that closed in it.
+    """
     fastest = 0.0
     for row in range(work.tally.candidates):
         closed = work.geometry[TRIAL, row].gap >= 0.0 > work.geometry[NOW, row].gap
-        if closed or (lasting and takes_part(work, row)):
-            speed = speed_along(work, row, START)
-            if lasting:
-                speed = max(abs(speed), abs(speed_along(work, row, NOW)))
+        if closed or (all_contacts and takes_part(work, row)):
+            speed = approach_speed(work, row, START)
+            if all_contacts:
+                speed = max(abs(speed), abs(approach_speed(work, row, NOW)))
             if speed * velocity_lifetime_of(work, row) > clock.tolerance:
                 view = contact_view(scene, work, NOW, row)
+                # The step stops these bodies. With damping below critical they would rebound
+                # instead.
                 stiffness = secant_stiffness(scene, view, clock.tolerance)
                 if stiffness > 0.0:
                     frequency = math.sqrt(stiffness / view.effective_mass)
@@ -91,30 +101,32 @@ def fastest_bounce(scene, work, clock, lasting):
 
 
 @apart
-def euler_step(scene, work, clock, step, lasting):
-    """One step: (error over tolerance, −1 where it fails; see fastest_bounce)."""
+def euler_step(scene, work, clock, step, all_contacts):
+    """Take one step; return (error over tolerance or −1, ω0 of the fastest rebound; see
+    fastest_bounce)."""
     begin_step(work, clock)
-    found, bounce = solve_step(scene, work, clock, step), 0.0
-    if found:
-        estimate_step(scene, work, clock, step)
-        bounce = fastest_bounce(scene, work, clock, lasting)
+    converged, bounce = solve_step(scene, work, clock, step), 0.0
+    if converged:
+        estimate_euler_error(scene, work, clock, step)
+        bounce = fastest_bounce(scene, work, clock, all_contacts)
     end_step(work)
-    return (error_ratio(scene, work, clock, step) if found else -1.0), bounce
+    return (error_ratio(scene, work, clock, step) if converged else -1.0), bounce
 
 
 def note_rates(scene, work, clock, step):
-    """Write down what a step that has been accepted says of the next one."""
+    """Store the rates of an accepted step for the error estimate of the next one; count its
+    events."""
     # A short one, in which a pair has landed, says nothing of how rates go on.
-    clock.rates_known = 1.0 if step > SHORT * clock.step else 0.0
+    clock.rates_known = 1.0 if step > CUT_FRACTION * clock.step else 0.0
     if clock.rates_known == 1.0:
         write_rates(work, step)
     for row in range(work.tally.candidates):
-        before, after = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
-        clock.switches_since_check += 1.0 if (before < 0.0) != (after < 0.0) else 0.0
+        gap_start, gap_end = work.geometry[TRIAL, row].gap, work.geometry[NOW, row].gap
+        clock.switches_since_check += 1.0 if (gap_start < 0.0) != (gap_end < 0.0) else 0.0
 
 
-def go_across(clock, step):
-    """From now on, steps go on across switches; the size of the first one."""
+def start_across(clock, step):
+    """Let steps go on across events from now on, beginning with the given size [s]."""
     clock.across, clock.step = 1.0, step
     clock.rates_known = clock.stages_step = 0.0
     clock.feasible_step = math.inf
@@ -122,12 +134,14 @@ def go_across(clock, step):
 
 @apart
 def end_at_switches(scene, work, clock):
-    """From now on, steps end at switches, as pairs are flagged by gaps and displacements now."""
+    """Let steps end at events from now on; set the contact modes by the present gaps and
+    displacements."""
     clock.across, clock.step, clock.checked_at = (
         0.0,
-        FIRST_SHARE * clock.step,
+        FIRST_LOCATED_STEP * clock.step,
         math.inf,
     )
+    # Forget everything about earlier steps.
     clock.previous_step = clock.feasible_step = clock.step_after_switch = math.inf
     clock.switch_streak = 0.0
     for row in range(work.tally.candidates):
@@ -136,7 +150,7 @@ def end_at_switches(scene, work, clock):
 
 
 def write_rates(work, step):
-    """Write the accelerations of the step, which has begun in START, into LAST_RATES."""
+    """Write the accelerations of the step, which began in START, to LAST_RATES."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             change = work.velocity[NOW, body, axis] - work.velocity[START, body, axis]
@@ -145,26 +159,29 @@ def write_rates(work, step):
 
 @apart
 def solve_loads(scene, work, weight):
-    """The solution of the system for the loads less ``weight`` K CHANGE."""
+    """Solve the system for the loads minus ``weight`` K CHANGE."""
     subtract_product(work, STIFFNESS, weight)
-    solve_for_free(scene, work)
+    solve_prepared(scene, work)
 
 
 @apart
-def estimate_step(scene, work, clock, step):
-    """The error of the step, whose end stands in NOW, into STEP_ERROR."""
+def estimate_euler_error(scene, work, clock, step):
+    """Write the error of the step, whose end is in NOW, to STEP_ERROR."""
     loads = work.loads
+    # Without rates of an earlier step a₀ = a₁.
     if clock.rates_known == 0.0:
         write_rates(work, step)
+    # ½ M (a₀ − a₁), and v₀ − v₁ for its product with K.
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            less = work.velocity[START, body, axis] - work.velocity[NOW, body, axis]
-            slower = work.velocity[LAST_RATES, body, axis] + less / step
+            velocity_drop = work.velocity[START, body, axis] - work.velocity[NOW, body, axis]
+            slower = work.velocity[LAST_RATES, body, axis] + velocity_drop / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
-            work.place[CHANGE, body, axis] = less
+            work.place[CHANGE, body, axis] = velocity_drop
     if has(scene, CONTACT_FORCE):
-        add_held_friction(scene, work, step)
+        add_frozen_friction_residual(scene, work, step)
     solve_loads(scene, work, 0.5 * step)
+    # Error of the positions; load of the second filter.
     for body in range(work.place.shape[1]):
         free = scene.bodies[body].free
         for axis in range(3):

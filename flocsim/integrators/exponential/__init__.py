@@ -1,2 +1,2 @@
-"""Steps that solve linear forces exactly, as power series of the time, and collocate the rest:
-exponential collocation. What a contact does to bodies that hit each other is next to linear."""
+"""Exponential collocation: steps that solve linear forces exactly, as power series in time, and
+collocate the rest. The forces in an impact are nearly linear."""

@@ -1,28 +1,35 @@
-"""A step of exponential collocation: forces are what they are at Lobatto's points.
+"""A step of exponential collocation: linear forces exactly, the rest collocated at Lobatto's
+points.
 
-The motion is the power series of series.py. Its R, by which forces differ from those linearised at
-the start, is the cubic that is 0 there and right at the three points behind; it is found by
-iteration, as R changes little with what it does to the motion. Of order 6 where R is smooth, and
-exact for linear forces, however often they swing in the step (Hochbruck & Ostermann, Acta Numerica
-19 (2010), section 2.3).
+The motion is the power series of series.py. Its remainder
+
+    R = F − F₀ + K (x − x₀) + D (v − v₀),
+
+the difference between the forces and their linearisation at the start, is taken as a cubic: zero at
+the start, and exact at the three Lobatto points after it. It is found by fixed-point iteration,
+which converges fast, because R hardly changes the motion. The method is of order 6 where R is
+smooth, and exact for linear forces, however often they oscillate within the step. An impact takes a
+step and a half, where Radau IIA takes six.
+
+Source: Hochbruck & Ostermann, Acta Numerica 19 (2010), section 2.3.
 """
 
 import math
 
 from flocsim.compiler.linker import apart
 from flocsim.integrators.exponential.series import (
-    STIFFEST,
-    amend,
-    begin_change,
+    MAX_STIFFNESS,
+    add_change,
+    clear_change,
+    evaluate_at,
+    evaluate_change,
     expand,
-    write_at,
-    write_change,
 )
 from flocsim.integrators.radau.stages import (
-    change_of_forces,
-    expected_pace,
+    change_of_contacts,
+    expected_rate,
     locate_state,
-    slip_stages,
+    update_stage_slips,
 )
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.radau.tableau import NODES as RADAU
@@ -48,45 +55,50 @@ from flocsim.state.work import (
     STIFFNESS,
 )
 
+# √5, from which the Lobatto coefficients follow.
 ROOT = 5.0**0.5
 
 NODES = ((5.0 - ROOT) / 10.0, (5.0 + ROOT) / 10.0, 1.0)
-"""Lobatto's points behind 0."""
+"""Lobatto points after 0, as fractions of the step."""
 
 MATRIX = (
     ((25.0 - ROOT) / 120.0, (25.0 - 13.0 * ROOT) / 120.0, (-1.0 + ROOT) / 120.0),
     ((25.0 + 13.0 * ROOT) / 120.0, (25.0 + ROOT) / 120.0, (-1.0 - ROOT) / 120.0),
     (5.0 / 12.0, 5.0 / 12.0, 1.0 / 12.0),
 )
-"""Weights of the rates at the three points in the increments up to them, by the cubic through these
-and the one at 0 (Lobatto IIIA)."""
+"""Lobatto IIIA: weights of the rates at the three points in the increments up to them. The rate at
+0 is left out: the quantities that are integrated by these weights are zero there."""
 
-MOST_ITERATIONS = 6
+MAX_ITERATIONS = 6
 """Iterations before the step is left to Radau IIA."""
 
-ITERATION_SHARE = 1e-2
-"""Iterations go on until what is left is below this share of what a step may be wrong by."""
+ITERATION_TOLERANCE = 1e-2
+"""Error that the iteration may leave, as a fraction of the step's tolerance. With .05 the errors of
+consecutive steps have one sign, and runs become ten times less accurate."""
 
-LEAVES, LEAP = 0.5, 2.0
-"""Steps become too long for a series only where Radau IIA is likely to be wrong by no more than
-so many times what it may be, contacts taking most of that up; and by so many times at once."""
+RADAU_ERROR_RATIO, LONGEST_SERIES_GROWTH = 0.5, 2.0
+"""Steps may become too long for a series only if Radau IIA would have at most this error over the
+tolerance; then the limit of the series is raised by the second factor at once."""
 
-A_SWING = 1.0
-"""In a step so long, in terms of the fastest rate, nothing swings, so that it has one way; …"""
+NO_SWING_PHASE = 1.0
+"""Phase h ω [rad] of the fastest vibration below which nothing oscillates in a step: its path has
+one direction."""
 
-LEAST_ALONG = 0.1
-"""… it does not go the way of R where less than this share of what bodies do there is left."""
+MIN_ALIGNMENT = 0.1
+"""Least |R · Δx| over the sum of the absolute products. Below it the step does not move along R."""
 
 TINY = 1e-300
-"""Stands for no inertia."""
+"""Replaces an inertia of zero [kg or kg m²]."""
 
 
-def guess_remainder(work, clock, step, known):
-    """R as that of the last step goes on, if ``known``; else none."""
+def extrapolate_remainder(work, clock, step, known):
+    """Guess R by extrapolation of the last step's, if ``known``; otherwise start from zero."""
     staged, remainder = clock.stages_step, work.remainder
     scale = begin = 0.0
     if known and staged > 0.0:
         scale, begin = step / staged, (clock.time - clock.stages_time) / staged
+    # Shift the second and third coefficients to the new start, take over the first, and scale all
+    # to the size of the new step.
     for body in range(work.place.shape[1]):
         for axis in range(3):
             third = remainder[MOTION, 3, body, axis]
@@ -97,8 +109,8 @@ def guess_remainder(work, clock, step, known):
 
 
 def subtract_linear(work, stage, block, body, other):
-    """Subtract what a block makes of another body's motion to a point from the force on a body
-    there, in CHANGE."""
+    """Subtract the linear part of the force that another body's motion exerts on a body, in
+    CHANGE."""
     jacobian = work.jacobian
     for i in range(3):
         total = work.velocity[CHANGE, body, i]
@@ -111,9 +123,10 @@ def subtract_linear(work, stage, block, body, other):
 
 
 def write_remainder(work, stage):
-    """R at a point, in the columns of velocities of CHANGE."""
+    """Write R at a point to the velocity part of CHANGE."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
+            # F − F₀, minus the linear part with its sign: K and D are minus the derivatives.
             force = work.force[stage, body, axis] - work.force[NOW, body, axis]
             work.velocity[CHANGE, body, axis] = force
         subtract_linear(work, stage, body, body, body)
@@ -123,9 +136,12 @@ def write_remainder(work, stage):
         subtract_linear(work, stage, upper_block(work, pair), earlier, later)
 
 
-def effect_of(scene, work, step, stage, goal):
-    """What the changes of R at the points, in their rates, change at one of them in places, now and
-    later, and in overlaps, over what may be wrong of those, in terms of the goal [m]."""
+def effect_of_change(scene, work, step, stage, goal):
+    """Return the largest effect of the changes of R at one of the points, scaled to the goal [m].
+
+    The forces at the points hold these changes. They displace bodies, now and later, and change
+    overlaps.
+    """
     largest = 0.0
     one, two, three = MATRIX[stage]
     for body in range(work.place.shape[1]):
@@ -139,11 +155,13 @@ def effect_of(scene, work, step, stage, goal):
                 return math.inf
             work.velocity[CHANGE, body, axis] = speed
             largest = max(largest, lever(scene, body, axis) * memory * abs(speed))
-    return max(largest, change_of_forces(scene, work, step, stage, goal))
+    return max(largest, change_of_contacts(scene, work, step, stage, goal))
 
 
-def amend_remainder(work, body, axis, one, two, three):
-    """Add to R the cubic that is 0 at 0 and has three values behind it, and keep that."""
+def add_cubic_to_remainder(work, body, axis, one, two, three):
+    """Add to R the cubic that is 0 at 0 and has three given values at the points; store it as
+    CHANGED."""
+    # Divided differences of value/θ, which is a parabola; then its coefficients.
     by_one, by_two = one / NODES[0], two / NODES[1]
     first = (by_two - by_one) / (NODES[1] - NODES[0])
     second = (three - by_two) / (1.0 - NODES[1])
@@ -159,28 +177,31 @@ def amend_remainder(work, body, axis, one, two, three):
     remainder[MOTION, 3, body, axis] += third
 
 
-def remainder_at(work, share, body, axis):
+def remainder_at(work, fraction, body, axis):
+    # Horner's scheme.
     r, which = work.remainder, MOTION
-    cubic = r[which, 2, body, axis] + share * r[which, 3, body, axis]
-    return share * (r[which, 1, body, axis] + share * cubic)
+    cubic = r[which, 2, body, axis] + fraction * r[which, 3, body, axis]
+    return fraction * (r[which, 1, body, axis] + fraction * cubic)
 
 
 @apart
 def evaluate_points(scene, work, time, step):
-    """Forces at the three points."""
+    """Compute the forces at the three points."""
     for stage in range(3):
         locate_state(scene, work, FIRST_STAGE + stage)
-    slip_stages(scene, work, step, 0, MATRIX)
+    update_stage_slips(scene, work, step, 0, MATRIX)
     for stage in range(3):
         sum_forces(scene, work, time + NODES[stage] * step, FIRST_STAGE + stage)
 
 
-def iterate(scene, work, time, terms, step, goal):
-    """Amend R by the motion that it leads to; what changes by that (see effect_of)."""
+def iterate_once(scene, work, time, terms, step, goal):
+    """Correct R by the motion that it causes; return the effect of the correction [m]."""
+    # Motion and forces at the three points.
     for stage in range(3):
-        write_all_at(work, terms, step, NODES[stage], FIRST_STAGE + stage)
+        evaluate_all_at(work, terms, step, NODES[stage], FIRST_STAGE + stage)
     evaluate_points(scene, work, time, step)
     largest = 0.0
+    # Replace the force at each point, which is no longer needed, by the change of R there.
     for stage in range(3):
         write_remainder(work, FIRST_STAGE + stage)
         for body in range(work.place.shape[1]):
@@ -189,11 +210,12 @@ def iterate(scene, work, time, terms, step, goal):
                 change -= remainder_at(work, NODES[stage], body, axis)
                 # The force at the point is not needed any more.
                 work.force[FIRST_STAGE + stage, body, axis] = change
+    # Measure the change, then add it to R.
     for stage in range(3):
-        largest = max(largest, effect_of(scene, work, step, stage, goal))
+        largest = max(largest, effect_of_change(scene, work, step, stage, goal))
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            amend_remainder(
+            add_cubic_to_remainder(
                 work, body, axis, work.force[FIRST_STAGE, body, axis],
                 work.force[FIRST_STAGE + 1, body, axis],
                 work.force[FIRST_STAGE + 2, body, axis],
@@ -201,53 +223,61 @@ def iterate(scene, work, time, terms, step, goal):
     return largest
 
 
-def write_all_at(work, terms, step, share, state):
-    write_at(work, NOW, terms, step, share, state, 0, work.place.shape[1])
+def evaluate_all_at(work, terms, step, fraction, state):
+    evaluate_at(work, NOW, terms, step, fraction, state, 0, work.place.shape[1])
 
 
-def finish(scene, work, terms, step):
-    """The end of the step, and the tangential displacements there, are NEW; it began at START."""
+def finish_step(scene, work, terms, step):
+    """Write the end of the step to NEW, with tangential displacements; store its start in START."""
     save_start(work)
     last = FIRST_STAGE + 2
-    write_all_at(work, terms, step, 1.0, last)
+    evaluate_all_at(work, terms, step, 1.0, last)
     locate_state(scene, work, last)
-    slip_stages(scene, work, step, 2, MATRIX)
+    update_stage_slips(scene, work, step, 2, MATRIX)
     adopt_stage(work, last)
 
 
 @apart
 def solve_series(scene, work, clock, step, known):
-    """Find the motion of a step as a series; how many terms it has, 0 where the step is too long
-    for one, or R does not settle. ``known``: whether that of the last step is there."""
+    """Solve a step as a series; return its number of terms, or 0 if the step is too long for that.
+
+    ``known`` says that R of the last step can be extrapolated. 0 also where R does not converge.
+    """
     allowed = step_tolerance(work, clock)
+    # Give up at once where the series cannot end.
     for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = max(inertia(scene, body, axis), TINY)
             spring = abs(work.jacobian[STIFFNESS, body, axis, axis])
             damping = abs(work.jacobian[DAMPING, body, axis, axis])
-            if step * (step * spring + damping) > STIFFEST * mass:
+            if step * (step * spring + damping) > MAX_STIFFNESS * mass:
                 return 0
-    guess_remainder(work, clock, step, known)
-    expected, before = expected_pace(clock, step), math.inf
+    # First guess: the motion by the extrapolated R.
+    extrapolate_remainder(work, clock, step, known)
+    predicted, before = expected_rate(clock, step), math.inf
     terms = expand(scene, work, clock, step, allowed)
     if terms > 0:
+        # From here on the stages of Radau are overwritten.
         clock.stages_step = 0.0
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         if terms == 0:
             return 0
-        change = iterate(scene, work, clock.time, terms, step, ITERATION_SHARE * allowed)
-        goal = max(ITERATION_SHARE * allowed, rounding_error(scene, work, FIRST_STAGE + 2, step))
-        pace = expected if before == math.inf else change / before
-        if not (change < math.inf and pace < 1.0):
+        # As in Newton's method of Radau: the remaining error is about change · rate/(1 − rate).
+        change = iterate_once(scene, work, clock.time, terms, step, ITERATION_TOLERANCE * allowed)
+        goal = max(
+            ITERATION_TOLERANCE * allowed, rounding_error(scene, work, FIRST_STAGE + 2, step)
+        )
+        rate = predicted if before == math.inf else change / before
+        if not (change < math.inf and rate < 1.0):
             break
-        terms = amend(work, terms, step, allowed)
-        if terms > 0 and change * pace <= goal * (1.0 - pace):
-            finish(scene, work, terms, step)
+        terms = add_change(work, terms, step, allowed)
+        if terms > 0 and change * rate <= goal * (1.0 - rate):
+            finish_step(scene, work, terms, step)
             clock.stages_step, clock.stages_time = step, clock.time
             clock.series_step = step
-            clock.convergence_rate = 0.0 if before == math.inf else pace
+            clock.convergence_rate = 0.0 if before == math.inf else rate
             if before < math.inf:
-                clock.second_iteration_rate, clock.second_iteration_step = pace, step
+                clock.second_iteration_rate, clock.second_iteration_step = rate, step
             return terms
         before = change
     clock.second_iteration_rate = 0.0
@@ -255,17 +285,22 @@ def solve_series(scene, work, clock, step, known):
 
 
 def error_of_radau(scene, work, terms, step):
-    """What a step of Radau IIA would be wrong by in this motion [m], by its estimate
-    (radau/estimate.py) but for what contacts take up of that."""
+    """Return the error that Radau IIA would estimate for this motion [m].
+
+    By its embedded estimate (radau/estimate.py) of the power series, without the part that contacts
+    damp.
+    """
     series = work.series
     for body in range(work.place.shape[1]):
         for axis in range(3):
             work.place[STEP_ERROR, body, axis] = 0.0
             work.velocity[STEP_ERROR, body, axis] = 0.0
+    # The estimate vanishes for powers below 4 of θ, being of order 3.
     before, damped = 0.0, step / EIGENVALUES[REAL].real
     one, two = RADAU[0] ** 3, RADAU[1] ** 3
     for k in range(4, terms):
         one, two = one * RADAU[0], two * RADAU[1]
+        # Estimate of θ^k. Velocities have the power k − 1, whose estimate is that of the last turn.
         here = (ESTIMATE[0] * one + ESTIMATE[1] * two + ESTIMATE[2]) / step
         for body in range(work.place.shape[1]):
             for axis in range(3):
@@ -276,22 +311,24 @@ def error_of_radau(scene, work, terms, step):
     return largest_error(scene, work)
 
 
-def estimate(work, step):
-    """What leaving out the second point would change, in STEP_ERROR."""
+def write_estimate(work, step):
+    """Write the effect of leaving out the second Lobatto point to STEP_ERROR: the embedded
+    estimate."""
     remainder = work.remainder
     for body in range(work.place.shape[1]):
         for axis in range(3):
+            # Cubic minus parabola without that point: r₃ θ (θ − c₁)(θ − 1).
             cubic = remainder[MOTION, 3, body, axis]
             remainder[CHANGED, 0, body, axis] = 0.0
             remainder[CHANGED, 1, body, axis] = NODES[0] * cubic
             remainder[CHANGED, 2, body, axis] = -(1.0 + NODES[0]) * cubic
             remainder[CHANGED, 3, body, axis] = cubic
-    begin_change(work)
-    write_change(work, 1, step, 1.0, STEP_ERROR)
+    clear_change(work)
+    evaluate_change(work, 1, step, 1.0, STEP_ERROR)
 
 
 def add_last_term(work, step):
-    """Add the last term of the motion to its error: all that is left out comes to less."""
+    """Add the last term of the motion to its error, as a bound of the truncated terms."""
     last = work.tally.series_terms - 1
     for body in range(work.place.shape[1]):
         for axis in range(3):
@@ -301,44 +338,52 @@ def add_last_term(work, step):
 
 
 @apart
-def judge_series(scene, work, clock, step):
-    """Estimate the error of a step, in STEP_ERROR."""
-    longer = clock.longest_series / step
-    if longer < math.inf:
+def estimate_series_error(scene, work, clock, step):
+    """Estimate the error of the step, to STEP_ERROR; raise the limit of series where Radau would
+    do."""
+    # Its error scales as h⁴. Where it would be small at the longest series, longer steps may be
+    # Radau's.
+    growth = clock.longest_series / step
+    if growth < math.inf:
         error = error_of_radau(scene, work, work.tally.series_terms, step)
-        if error * longer**4 <= LEAVES * step_tolerance(work, clock):
-            clock.longest_series *= LEAP
-    estimate(work, step)
+        if error * growth**4 <= RADAU_ERROR_RATIO * step_tolerance(work, clock):
+            clock.longest_series *= LONGEST_SERIES_GROWTH
+    write_estimate(work, step)
     add_last_term(work, step)
 
 
 def nothing_swings(clock):
-    """Whether the step is so short that nothing swings in it."""
-    return clock.series_norm <= A_SWING
+    """Return True if the step is so short that nothing oscillates in it."""
+    return clock.series_norm <= NO_SWING_PHASE
 
 
-def errors_over_ways(work, share):
-    """How large the carried error is, at the start of a step and as CHANGE has it at its end, over
-    the way from there to here, both along what R is in the end: 0 where the step does not go that
-    way."""
-    before = after = along = every = 0.0
+def error_ratios_along_path(work, fraction):
+    """Return the propagated error over the path, both projected on R, at start and end of the step.
+
+    (0, 0) where the step does not move along R.
+    """
+    start = end = along = every = 0.0
     for body in range(work.place.shape[1]):
         for axis in range(3):
+            # Projections of path and errors on the remainder at the end of the step.
             force = remainder_at(work, 1.0, body, axis)
-            way = force * (work.place[NOW, body, axis] - work.place[START, body, axis])
-            along, every = along + way, every + abs(way)
-            before += force * work.place[PROPAGATED, body, axis]
-            after += force * work.place[CHANGE, body, axis]
-    if abs(along) <= LEAST_ALONG * every:
+            path = force * (work.place[NOW, body, axis] - work.place[START, body, axis])
+            along, every = along + path, every + abs(path)
+            start += force * work.place[PROPAGATED, body, axis]
+            end += force * work.place[CHANGE, body, axis]
+    if abs(along) <= MIN_ALIGNMENT * every:
         return 0.0, 0.0
-    return before * share / along, after * share / along
+    return start * fraction / along, end * fraction / along
 
 
-def begin_carrying(work, step, before, after):
-    """Write the first terms of the carried error, and what pushes it on besides: FORCING, and as
-    much as R changes with the way."""
+def write_error_terms(work, step, start, end):
+    """Write the first terms of the propagated error, and its source terms.
+
+    The source is FORCING, plus the change of R: an error along the path shifts the fraction θ at
+    which a body meets a force by δθ = start + (end − start) θ, and R by R'(θ) δθ.
+    """
     series, remainder = work.series, work.remainder
-    more = after - before
+    growth = end - start
     for body in range(work.place.shape[1]):
         for axis in range(3):
             series[CHANGED, 0, body, axis] = work.place[PROPAGATED, body, axis]
@@ -346,27 +391,29 @@ def begin_carrying(work, step, before, after):
             one = remainder[MOTION, 1, body, axis]
             two = 2.0 * remainder[MOTION, 2, body, axis]
             three = 3.0 * remainder[MOTION, 3, body, axis]
+            # Product of R'(θ) and δθ, by powers of θ.
             forcing = work.velocity[FORCING, body, axis]
-            remainder[CHANGED, 0, body, axis] = forcing + before * one
-            remainder[CHANGED, 1, body, axis] = before * two + more * one
-            remainder[CHANGED, 2, body, axis] = before * three + more * two
-            remainder[CHANGED, 3, body, axis] = more * three
+            remainder[CHANGED, 0, body, axis] = forcing + start * one
+            remainder[CHANGED, 1, body, axis] = start * two + growth * one
+            remainder[CHANGED, 2, body, axis] = start * three + growth * two
+            remainder[CHANGED, 3, body, axis] = growth * three
 
 
 @apart
-def carry_known(work, clock, step, share):
-    """Carry the error over a share of a step that is a series, into CHANGE: as what changes its
-    start changes its end, under what forces it besides.
+def propagate_with_series(work, clock, step, fraction):
+    """Propagate the error over a fraction of a step that is a series, to CHANGE.
 
-    As bodies come close their attraction gets steeper within a step, and an error of when they do
-    grows as their speed does: with R, as far as the error lies on their way.
+    The linearised motion propagates an error like any small change of the start. As bodies
+    approach, their attraction steepens within a step, and an error of the arrival time grows like
+    the speed. So R is included as far as the error lies along the path.
     """
-    begin_carrying(work, step, 0.0, 0.0)
-    write_change(work, 0, step, share, CHANGE)
+    write_error_terms(work, step, 0.0, 0.0)
+    evaluate_change(work, 0, step, fraction, CHANGE)
     if nothing_swings(clock):
+        # δθ at the end depends on the result: two iterations.
         for _ in range(2):
-            before, after = errors_over_ways(work, share)
-            if before == 0.0 and after == 0.0:
+            start, end = error_ratios_along_path(work, fraction)
+            if start == 0.0 and end == 0.0:
                 return
-            begin_carrying(work, step, before, before + (after - before) / share)
-            write_change(work, 0, step, share, CHANGE)
+            write_error_terms(work, step, start, start + (end - start) / fraction)
+            evaluate_change(work, 0, step, fraction, CHANGE)

@@ -1,5 +1,8 @@
-"""The cubic through the stages of a Radau IIA step: the motion in it, its end where something
-switches, the guess for the next."""
+"""The cubic through the start and the stages of a Radau IIA step.
+
+It is the dense output inside the step, gives the state where a step ends early at an event, and
+extrapolates the first guess of the next step's stages.
+"""
 
 import math
 
@@ -9,69 +12,73 @@ from flocsim.integrators.rhs.forces import save_start
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import DAMPING, FIRST_STAGE, NEW, NOW, START, STIFFNESS, TRIAL
 
-GOOD_CUBIC = 0.1
-"""A step whose error is at most this share of what is allowed may end anywhere on its cubic."""
+MAX_RATIO = 0.1
+"""Largest error ratio of a step that may end anywhere on its cubic, whose order is lower than that
+of the step's end."""
 
-STIFF = 25.0
-"""h² K/M + h D/M from which on a step is stiff: five times as long as its fastest motion takes."""
+STIFF_STEP = 25.0
+"""Largest h² K/M + h D/M of a step that may end on its cubic: five times its shortest time scale,
+squared. Beyond it, stiff forces balance at the stages only, and contacts would vibrate."""
 
 TINY = 1e-300
-"""Stands for no inertia."""
+"""Replaces an inertia of zero [kg or kg m²]."""
 
-SOFT = 10.0
-"""Accelerations last for a step that is so many times as short as velocities do."""
+RELAXATION_STEPS = 10.0
+"""Shortest relaxation time of drag, in steps, for which an acceleration is assumed constant over a
+step."""
 
-LONGEST_GUESS = 2.0
-"""The last step's cubic is carried on for a step that is at most so many times as long."""
+MAX_EXTRAPOLATION = 2.0
+"""Longest step, over the last one, for which the last cubic is extrapolated."""
 
 
-def basis(share, node):
-    """The cubic that is 1 at one of the nodes 0, c1, c2, 1 and 0 at the others, at a share."""
+def basis(fraction, node):
+    """Return the cubic at a fraction that is 1 at one of the nodes 0, c₁, c₂, 1 and 0 at the
+    others."""
     value = 1.0
     here = 0.0 if node == 0 else NODES[node - 1]
     for other in range(4):
         if other != node:
             there = 0.0 if other == 0 else NODES[other - 1]
-            value *= (share - there) / (here - there)
+            value *= (fraction - there) / (here - there)
     return value
 
 
-def stage_weights(share):
-    """Weights of START and of the stages in the cubic through them, at a share of the step."""
-    return basis(share, 0), basis(share, 1), basis(share, 2), basis(share, 3)
+def stage_weights(fraction):
+    """Return the weights of START and the three stages in the cubic at a fraction of the step."""
+    return basis(fraction, 0), basis(fraction, 1), basis(fraction, 2), basis(fraction, 3)
 
 
-def cubic(weights, start, one, two, three):
-    """The cubic through a value at the start and those at the stages."""
+def interpolate(weights, start, one, two, three):
+    """Return the cubic through the values at the start and at the three stages."""
     _, first, second, third = weights
-    # In changes, so that what does not move stays just where it is.
+    # The weights sum to 1. In differences, a coordinate at rest stays exactly where it is.
     change = first * (one - start)
     change += second * (two - start)
     return start + change + third * (three - start)
 
 
-def weighted(of, body, axis, weights):
-    """The cubic through START and the stages, ``of`` places or velocities."""
-    return cubic(
+def interpolate_axis(of, body, axis, weights):
+    """Return the cubic of one coordinate of the array ``of``, positions or velocities."""
+    return interpolate(
         weights, of[START, body, axis], of[FIRST_STAGE, body, axis],
         of[SECOND_STAGE, body, axis], of[THIRD_STAGE, body, axis],
     )  # fmt: skip
 
 
-def write_cubic(work, weights, state, body):
-    """Write a body's motion at a share of the step, of these weights, into a state."""
+def write_interpolated(work, weights, state, body):
+    """Write a body's motion on the cubic with these weights into a state."""
     for axis in range(3):
-        work.place[state, body, axis] = weighted(work.place, body, axis, weights)
-        work.velocity[state, body, axis] = weighted(work.velocity, body, axis, weights)
+        work.place[state, body, axis] = interpolate_axis(work.place, body, axis, weights)
+        work.velocity[state, body, axis] = interpolate_axis(work.velocity, body, axis, weights)
 
 
-def collocate(work, step, share, body):
-    """Write a body's motion at a share of the step into TRIAL: the cubic through the stages."""
-    write_cubic(work, stage_weights(share), TRIAL, body)
+def interpolate_stages(work, step, fraction, body):
+    """Write a body's motion at a fraction of the step into TRIAL."""
+    write_interpolated(work, stage_weights(fraction), TRIAL, body)
 
 
 def stiffness_of(scene, work, step):
-    """How stiff a step is: the largest h² K/M + h D/M of a coordinate."""
+    """Return the largest h² K/M + h D/M over all coordinates: how stiff a step is."""
     stiffest = 0.0
     for body in range(work.poses.shape[0]):
         if scene.bodies[body].free == 1.0:
@@ -83,32 +90,32 @@ def stiffness_of(scene, work, step):
     return stiffest
 
 
-def end_on_the_cubic(scene, work, step, ratio, share):
-    """Make the motion at a share of the step, on the cubic through the stages, the new state.
+def end_on_cubic(scene, work, step, ratio, fraction):
+    """Make the motion on the cubic at a fraction of the step the new state; return False if too
+    inexact.
 
-    Its error goes with h⁴ as the estimate of the step's does, and is at most .25 of that in smooth
-    motion (the largest of all shares, for x = t⁴), while the end of the step is far better than
-    estimated: only a step that is well within what is allowed may end so. Nor may a stiff one: only
-    at the stages is a stiff force at rest, and contacts would hum.
+    The error of the cubic scales as h⁴, like the estimate, and is at most .25 of it in smooth
+    motion (the maximum over all fractions, for x = t⁴); the end of a step is far better than its
+    estimate. So only a step well within the tolerance may end there, and no stiff step.
     """
-    if ratio > GOOD_CUBIC or any_grazes(work) or stiffness_of(scene, work, step) > STIFF:
+    if ratio > MAX_RATIO or any_grazes(work) or stiffness_of(scene, work, step) > STIFF_STEP:
         return False
-    weights = stage_weights(share)
+    weights = stage_weights(fraction)
     for body in range(work.place.shape[1]):
-        write_cubic(work, weights, NEW, body)
+        write_interpolated(work, weights, NEW, body)
     return True
 
 
-def keep_velocities(work):
-    """First guess: the velocities stay as they are."""
+def guess_constant_velocities(work):
+    """Guess that the velocities at all stages are those of the start."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             for stage in range(3):
                 work.velocity[FIRST_STAGE + stage, body, axis] = work.velocity[NOW, body, axis]
 
 
-def keep_accelerations(scene, work, step):
-    """First guess: the accelerations stay as they are."""
+def guess_constant_accelerations(scene, work, step):
+    """Guess that the accelerations at all stages are those of the start."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             mass = inertia(scene, body, axis)
@@ -119,8 +126,9 @@ def keep_accelerations(scene, work, step):
                 work.velocity[FIRST_STAGE + stage, body, axis] = speed
 
 
-def go_on_as_before(work, scale):
-    """First guess: the accelerations of the last step, which was so much shorter, as a mean."""
+def guess_mean_accelerations(work, scale):
+    """Guess the mean acceleration of the last step; ``scale`` is this step's size over that
+    one's."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
             speed = work.velocity[NOW, body, axis]
@@ -130,8 +138,9 @@ def go_on_as_before(work, scale):
                 work.velocity[FIRST_STAGE + stage, body, axis] = guess
 
 
-def is_soft(work, step):
-    """Whether no pair of features acts, and drag takes little of a velocity in a step."""
+def is_nonstiff(work, step):
+    """Return True if no contact or surface force acts, and drag hardly slows a body within a
+    step."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         if candidate.contact_mode + candidate.surface_active > 0:
@@ -139,36 +148,47 @@ def is_soft(work, step):
     shortest = math.inf
     for body in range(work.poses.shape[0]):
         shortest = min(shortest, work.errors[body].relaxation_time)
-    return shortest >= SOFT * step
+    return shortest >= RELAXATION_STEPS * step
 
 
-def carry_on(work, begin, scale):
-    """First guess: the cubic of the stages that are there, whose step began ``begin`` of it ago."""
+def extrapolate_cubic(work, begin, scale):
+    """Guess the stages by the cubic of the last step.
+
+    ``begin`` is the time from that step's start to this one's, and ``scale`` the size of this step,
+    both as multiples of the last step.
+    """
     one, two, three = NODES
     first = stage_weights(begin + one * scale)
     second = stage_weights(begin + two * scale)
     third = stage_weights(begin + three * scale)
+    # All three values are read before the first is written: they overwrite the stages they come
+    # from.
     for body in range(work.place.shape[1]):
         for axis in range(3):
             guesses = (
-                weighted(work.velocity, body, axis, first),
-                weighted(work.velocity, body, axis, second),
-                weighted(work.velocity, body, axis, third),
+                interpolate_axis(work.velocity, body, axis, first),
+                interpolate_axis(work.velocity, body, axis, second),
+                interpolate_axis(work.velocity, body, axis, third),
             )
             for stage in range(3):
                 work.velocity[FIRST_STAGE + stage, body, axis] = guesses[stage]
 
 
 def guess_stages(scene, work, clock, step):
-    """The stages' velocities to start from, and where this step starts."""
+    """Write a first guess of the stage velocities; store the start of the step."""
     staged = clock.stages_step
+    # The last step was a series: only its start is known, in START.
     if staged < 0.0:
-        go_on_as_before(work, -step / staged)
-    elif staged > 0.0 and step <= LONGEST_GUESS * staged:
-        carry_on(work, (clock.time - clock.stages_time) / staged, step / staged)
-    elif is_soft(work, step):
-        keep_accelerations(scene, work, step)
+        guess_mean_accelerations(work, -step / staged)
+    # The stages of the last step are known, and not too short for this one.
+    elif staged > 0.0 and step <= MAX_EXTRAPOLATION * staged:
+        extrapolate_cubic(work, (clock.time - clock.stages_time) / staged, step / staged)
+    # Nothing is known: constant accelerations suit free motion, constant velocities a stiff
+    # contact, whose acceleration soon ends.
+    elif is_nonstiff(work, step):
+        guess_constant_accelerations(scene, work, step)
     else:
-        keep_velocities(work)
+        guess_constant_velocities(work)
+    # From here on the stages belong to this step.
     save_start(work)
     clock.stages_step, clock.stages_time = step, clock.time

@@ -1,11 +1,14 @@
-"""How pairs that graze are held in an implicit step: how stiffly, and whether at all.
+"""Grazing contacts in an implicit step: whether they exist, and how stiff their dashpots are.
 
-What a tangential force does to the gap hangs on the other contacts, too: it is found by the step's
-own system, without what holds the gap. Where the force that a pair had as it parted drives the gap
-shut instead of open, the load drives it open, and the pair is apart.
+The tangential force of a grazing contact is an unknown of the step (rhs/friction.py). It acts as a
+dashpot on the rate of the gap, much stiffer than the rest of the system. How the gap responds to a
+tangential force depends on the other contacts as well: it follows from the step's own system
+without the dashpot. Where the force would close the gap instead of opening it, the load opens it,
+and the contact is open. The response of two free bodies is no substitute: it is wrong where a
+second contact holds them.
 """
 
-from flocsim.integrators.radau.systems import solve_for_free
+from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.friction import GRAZING_STIFFNESS_RATIO
 from flocsim.integrators.rhs.jacobian import normal_rows, tangent_rows
@@ -14,32 +17,34 @@ from flocsim.state.contacts import GRAZING, OPEN
 from flocsim.state.work import NOW
 
 LEAST_RESPONSE = 1e-3
-"""A tangential force lifts nothing that moves the gap by less than this share of what it moves its
-bodies along each other."""
+"""Smallest normal response, over the tangential response, of a contact that grazes. With less, the
+tangential force cannot lift the contact."""
 
 
-SHARE_OF_START = 0.1
-"""What taking the speed away with which it parted moves the bodies of a pair along each other may
-be this share of the tolerance, or it does not begin to graze."""
+MAX_START_DISPLACEMENT = 0.1
+"""Largest tangential displacement, over the tolerance, by the impulse that stops the opening of a
+contact which begins to graze. With more, it does not begin."""
 
 
 def any_grazes(work):
-    """Whether a pair grazes."""
+    """Return True if a contact grazes."""
     for row in range(work.tally.candidates):
         if work.candidates[row].contact_mode == GRAZING:
             return True
     return False
 
 
-def release_gaps(work):
-    """Hold no gap."""
+def clear_grazing_resistances(work):
+    """Remove the dashpots of all grazing contacts."""
     for row in range(work.tally.candidates):
         work.contacts[row].grazing_resistance = 0.0
 
 
-def response(scene, work, row):
-    """The rates of the gap, and along the tangent, for every newton along the tangent of a pair, by
-    the factorised system [m/(N s)]."""
+def tangential_response(scene, work, row):
+    """Return the gap rate and the tangential rate per tangential force of a pair [m/(N s)].
+
+    The factorised real system is solved for a unit force.
+    """
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     across, along = tangent_rows(work, row), normal_rows(work, row)
@@ -48,7 +53,8 @@ def response(scene, work, row):
     for axis in range(3):
         work.loads[REAL, 3 * a + axis] = across[0][axis]
         work.loads[REAL, 3 * b + axis] = across[1][axis]
-    solve_for_free(scene, work)
+    solve_prepared(scene, work)
+    # Project the velocities of both bodies on the normal and on the tangent.
     opening, sliding = 0.0, 0.0
     for axis in range(3):
         first, second = work.loads[REAL, 3 * a + axis].real, work.loads[REAL, 3 * b + axis].real
@@ -57,29 +63,36 @@ def response(scene, work, row):
     return opening, sliding
 
 
-def can_begin(work, clock, row, found, sliding):
-    """Whether the force of a pair that has just parted, with those responses to a newton, lifts it,
-    and can take its speed away without moving the bodies much."""
-    if found * work.contacts[row].grazing_force <= 0.0:
+def can_begin_grazing(work, clock, row, lifting, sliding):
+    """Return True if the force of a contact that just opened lifts it, and can stop the opening
+    gently.
+
+    ``lifting`` and ``sliding`` are its tangential_response.
+    """
+    if lifting * work.contacts[row].grazing_force <= 0.0:
         return False
-    way = abs(sliding * normal_rate(work, NOW, row)) * velocity_lifetime_of(work, row)
-    return way <= SHARE_OF_START * clock.tolerance * abs(found)
+    displacement = abs(sliding * normal_rate(work, NOW, row)) * velocity_lifetime_of(work, row)
+    return displacement <= MAX_START_DISPLACEMENT * clock.tolerance * abs(lifting)
 
 
-def hold_gaps(scene, work, clock):
-    """Say how stiffly the gaps of pairs that graze are held, by the system without that; let those
-    go that their own force does not lift. Whether any has been let go."""
+def set_grazing_resistances(scene, work, clock):
+    """Set the dashpots of all grazing contacts; open those that their own force does not lift.
+
+    Return True if one has been opened. The factors are those of the system without dashpots.
+    """
     opened = False
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         if candidate.contact_mode == GRAZING:
             contact = work.contacts[row]
-            found, sliding = response(scene, work, row)
-            weak = abs(found) <= LEAST_RESPONSE * abs(sliding)
-            fresh = contact.newly_grazing != 0.0
-            if weak or (fresh and not can_begin(work, clock, row, found, sliding)):
+            lifting, sliding = tangential_response(scene, work, row)
+            # Open where the response is too weak, or where grazing cannot begin.
+            weak = abs(lifting) <= LEAST_RESPONSE * abs(sliding)
+            is_new = contact.newly_grazing != 0.0
+            if weak or (is_new and not can_begin_grazing(work, clock, row, lifting, sliding)):
                 candidate.contact_mode, opened = OPEN, True
                 work.slip[NOW, row] = 0.0
             else:
-                contact.grazing_resistance = GRAZING_STIFFNESS_RATIO / found
+                # STIFFER times the resistance that the system itself has to a change of the gap.
+                contact.grazing_resistance = GRAZING_STIFFNESS_RATIO / lifting
     return opened

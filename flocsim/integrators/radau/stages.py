@@ -1,8 +1,12 @@
-"""The stages of a Radau IIA step: collocation of place, velocity and tangential displacement.
+"""The stages of a Radau IIA step, by a simplified Newton iteration.
 
-Unknown are the stages' velocities; places and displacements follow from them. Newton's method with
-the derivatives of the step's start, carried along with the contacts (contact_frames.py), solves one
-real and one complex system of 3n equations.
+    M A⁻¹ (V − v₀)/h = F(X, V),  X = x₀ + h A V
+
+for the velocities V at the three stages; positions X and tangential displacements follow from them.
+The iteration uses the derivatives of the step's start, transformed to the stages by the frames of
+contact_frames.py, and solves one real and one complex system of 3n equations.
+
+Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), section IV.8.
 """
 
 import math
@@ -10,8 +14,8 @@ import math
 from flocsim.compiler.linker import apart
 from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.collocation import guess_stages
-from flocsim.integrators.radau.contact_frames import follow_contacts
-from flocsim.integrators.radau.systems import solve_both, write_changes, write_loads
+from flocsim.integrators.radau.contact_frames import update_frames
+from flocsim.integrators.radau.systems import solve_both, write_residuals, write_stage_changes
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.error import rounding_error, step_tolerance
 from flocsim.integrators.rhs.forces import adopt_stage, locate_for_forces, sum_forces
@@ -27,42 +31,45 @@ from flocsim.integrators.rhs.views import lever, normal_component, velocity_life
 from flocsim.state.contacts import CLOSED, GRAZING
 from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
-MOST_ITERATIONS = 10
-"""Newton steps before a step is given up and made smaller."""
+MAX_ITERATIONS = 10
+"""Newton iterations before the step is rejected and repeated with a smaller size."""
 
-FIRST_PACE = 0.5
-"""What to expect of the second iteration when only one has been made."""
+ASSUMED_RATE = 0.5
+"""Convergence rate assumed for the first iteration where no earlier step has shown one; upper bound
+of the extrapolated rate."""
 
-NEWTON_SHARE, FREE_NEWTON_SHARE = 1e-3, 1e-2
-"""Newton's method goes on until what is left is below this share of what a step may be wrong by;
-and where nothing is near, which allows a hundred times less anyway."""
+NEWTON_TOLERANCE, FREE_NEWTON_TOLERANCE = 1e-3, 1e-2
+"""Error that Newton's method may leave, as a fraction of the step's tolerance; the second value
+holds where no body is near another, since the tolerance is a hundred times smaller there. With .01
+in contact, too, runs took 5 % less time, but errors of rolling and departing pairs were two to
+three times as large."""
 
-DOUBTED_PACE = 3.0
-"""The second iteration is expected to shrink the first one's change by so many times less than it
-did when it was last made, its pace going with the square of the step, …"""
+RATE_SAFETY = 3.0
+"""Safety factor on the Newton convergence rate extrapolated from the previous step (rate ∝ h²)."""
 
-OVERLAP_SHARE = 2e-3
-"""Overlaps are found to this share of themselves: what presses is decided by them, however far
-below the tolerance they are."""
+OVERLAP_TOLERANCE = 2e-3
+"""Relative tolerance of overlaps in Newton's method. Overlaps carry the loads, however far below
+the tolerance of positions they are. Without this, rounding in them was taken for an error of the
+step, and cost 20 times the steps."""
 
-SMOOTHING_SHARE = 2e-3
-"""Gaps through which surface forces act are found to this share of the length over which these
-change hands between pairs of features (surface_gap.py): what is left of a gap shakes bodies that
-lie flat in a well, however far below the tolerance it is."""
+SURFACE_GAP_TOLERANCE = 2e-3
+"""Tolerance of gaps with a surface force, as a fraction of the smoothing length over which the
+force passes from one feature pair to the next (rhs/surface_gap.py). Larger errors shake bodies that
+lie flat in an energy well."""
 
-GRAZING_SHARE, LEAST_EFFECT = 0.02, 0.1
-"""Forces of pairs that graze are found to this share of themselves, or until what they move is this
-share of what places are found to."""
+GRAZING_TOLERANCE, NEGLIGIBLE_EFFECT = 0.02, 0.1
+"""Relative tolerance of the tangential forces of grazing contacts; and the displacement by such a
+force, as a fraction of the tolerance of positions, below which its error is ignored."""
 
 TINY = 1e-300
 """Keeps a quotient finite."""
 
-LEAST_PACE = 1e-3
-"""… and to this share at least: what it is not needed for changes places by no more than the
-tolerance, so that a pace which is far worse than expected errs by little."""
+SMALLEST_RATE = 1e-3
+"""Lower bound of the extrapolated convergence rate. Where it decides, an unneeded second iteration
+would change positions by less than the tolerance. An optimistic rate does little harm there."""
 
 
-def place_stages(work, step):
+def update_stage_positions(work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             for stage in range(3):
@@ -75,27 +82,33 @@ def place_stages(work, step):
                 )
 
 
-def slip_stages(scene, work, step, first, matrix):
-    """Tangential displacements of the closed pairs in the stages from ``first`` on, which are
-    located."""
+def update_stage_slips(scene, work, step, first, matrix):
+    """Compute the tangential displacements of closed contacts in the stages from ``first`` on.
+
+    The stages have been located. ``matrix`` holds the weights of the rates at the three stages.
+    Most of ξ follows from the positions alone; only the effect of the changing gap is integrated.
+    """
     slip = work.slip
     for row in range(work.tally.candidates):
         if work.candidates[row].contact_mode == CLOSED:
             for stage in range(first, 3):
-                besides = slip_rate_of_gap_change(scene, work, FIRST_STAGE + stage, row)
-                work.slip_rate[FIRST_STAGE + stage, row] = besides
+                # Rates of the part of ξ that does not follow from the positions.
+                correction = slip_rate_of_gap_change(scene, work, FIRST_STAGE + stage, row)
+                work.slip_rate[FIRST_STAGE + stage, row] = correction
             for stage in range(first, 3):
+                # Collocate that part, add the part from the positions, and limit ξ where the
+                # contact slides.
                 one, two, three = matrix[stage]
                 mean = one * work.slip_rate[FIRST_STAGE, row]
                 mean += two * work.slip_rate[SECOND_STAGE, row]
                 mean += three * work.slip_rate[THIRD_STAGE, row]
                 state = FIRST_STAGE + stage
-                stuck = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
-                slip[state, row] = slip_in(scene, work, state, row, stuck)
+                sticking_slip = slip[NOW, row] + rolled(scene, work, state, row) + step * mean
+                slip[state, row] = slip_in(scene, work, state, row, sticking_slip)
 
 
 def locate_state(scene, work, state):
-    """Geometry of NOW, or of a stage, of the pairs through which forces act there."""
+    """Locate the contacts of NOW or of a stage that transmit forces there."""
     if state == NOW or scene.listed_reach <= 0.0:
         locate_for_forces(scene, work, state)
     else:
@@ -104,30 +117,37 @@ def locate_state(scene, work, state):
 
 @apart
 def evaluate_states(scene, work, time, step, first, last):
-    """Forces in the states from ``first`` to before ``last``; NOW or the stages."""
+    """Compute the forces in the states from ``first`` up to but excluding ``last``: NOW or the
+    stages."""
     for state in range(first, last):
         locate_state(scene, work, state)
+    # The displacements of a stage depend on all three of them.
     if first == FIRST_STAGE:
-        slip_stages(scene, work, step, 0, MATRIX)
+        update_stage_slips(scene, work, step, 0, MATRIX)
     for state in range(first, last):
         node = 0.0 if state == NOW else NODES[state - FIRST_STAGE]
         sum_forces(scene, work, time + node * step, state)
 
 
-def change_of_forces(scene, work, step, stage, goal):
-    """What the changes of a stage's velocities alter in the overlaps of pairs that touch, and in
-    the forces of those that graze, over what may be wrong of them, in terms of the goal for places
-    [m]."""
+def change_of_contacts(scene, work, step, stage, goal):
+    """Return the largest change of a contact by the last Newton correction, scaled to the goal [m].
+
+    Overlaps, grazing forces and gaps with surface forces have tolerances of their own. Each change
+    is multiplied by the goal of the positions over its own tolerance, to be tested with the
+    positions.
+    """
     largest, least, state = 0.0, at_least_rounding(work, NOW, 0.0), FIRST_STAGE + stage
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
         geometry = work.geometry[state, row]
+        # Pressed contact: relative tolerance of the overlap, but not below rounding.
         if candidate.contact_mode == CLOSED:
             change = step * abs(normal_component(work, row, work.velocity, CHANGE))
             overlap = abs(geometry.gap)
-            allowed = max(OVERLAP_SHARE * overlap, 0.1 * least)
+            allowed = max(OVERLAP_TOLERANCE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
         elif candidate.contact_mode == GRAZING:
+            # Grazing contact: relative tolerance of its tangential force, which is a dashpot's.
             resistance, memory = (
                 work.contacts[row].grazing_resistance,
                 velocity_lifetime_of(work, row),
@@ -136,86 +156,98 @@ def change_of_forces(scene, work, step, stage, goal):
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = GRAZING_STIFFNESS_RATIO / max(abs(resistance), TINY) * (step + memory)
-            allowed = max(GRAZING_SHARE * force, LEAST_EFFECT * goal / max(lever, TINY))
+            allowed = max(GRAZING_TOLERANCE * force, NEGLIGIBLE_EFFECT * goal / max(lever, TINY))
             largest = max(largest, goal * change / allowed)
         elif candidate.surface_active == 1 and geometry.force_share > 0.0:
+            # Surface force: fraction of its smoothing length.
             change = step * abs(normal_component(work, row, work.velocity, CHANGE))
             length = smoothing_length(scene, geometry.gap)
-            allowed = max(SMOOTHING_SHARE * length, 0.1 * least)
+            allowed = max(SURFACE_GAP_TOLERANCE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)
     return largest
 
 
 def correct_stages(scene, work, step, goal):
-    """Add the solutions to the stages' velocities; the largest change it makes in place [m]."""
+    """Add the solutions to the stage velocities; return the largest resulting displacement [m].
+
+    A velocity displaces its body over the step, and over the time for which it persists after.
+    """
     largest = 0.0
     for stage in range(3):
-        write_changes(scene, work, stage)
+        write_stage_changes(scene, work, stage)
         for body in range(work.place.shape[1]):
             memory = step + work.errors[body].velocity_lifetime
             for axis in range(3):
                 change = work.velocity[CHANGE, body, axis]
+                # Not finite: a system is nearly singular, or a force is not finite.
                 if not abs(change) < math.inf:
                     return math.inf
                 work.velocity[FIRST_STAGE + stage, body, axis] += change
                 largest = max(largest, lever(scene, body, axis) * memory * abs(change))
-        largest = max(largest, change_of_forces(scene, work, step, stage, goal))
+        largest = max(largest, change_of_contacts(scene, work, step, stage, goal))
     return largest
 
 
-def newton_step(scene, work, time, step, goal):
-    """One iteration; the largest change it makes in place [m]."""
-    place_stages(work, step)
+def newton_iteration(scene, work, time, step, goal):
+    """Make one Newton iteration; return the largest displacement of its correction [m]."""
+    update_stage_positions(work, step)
     evaluate_states(scene, work, time, step, FIRST_STAGE, FIRST_STAGE + 3)
-    follow_contacts(scene, work)
-    write_loads(scene, work, step)
+    # Transform the residuals to the start of the step, where the factors are.
+    update_frames(scene, work)
+    write_residuals(scene, work, step)
     solve_both(work)
     work.tally.solves += 1
     return correct_stages(scene, work, step, goal)
 
 
 def finish_stages(scene, work, step):
-    """Places and tangential displacements that go with the last correction; the end is NEW."""
-    place_stages(work, step)
+    """Compute positions and tangential displacements of the last correction; write the end to
+    NEW."""
+    update_stage_positions(work, step)
     locate_state(scene, work, THIRD_STAGE)
-    slip_stages(scene, work, step, 2, MATRIX)
+    update_stage_slips(scene, work, step, 2, MATRIX)
     adopt_stage(work, THIRD_STAGE)
 
 
-def expected_pace(clock, step):
-    """What to expect of the second iteration before it is made."""
+def expected_rate(clock, step):
+    """Return the convergence rate to be expected before a second iteration shows it (rate ∝ h²)."""
     if clock.second_iteration_rate == 0.0:
-        return FIRST_PACE
-    longer = max(step / clock.second_iteration_step, 1.0)
+        return ASSUMED_RATE
+    growth = max(step / clock.second_iteration_step, 1.0)
     return min(
-        max(DOUBTED_PACE * clock.second_iteration_rate * longer * longer, LEAST_PACE), FIRST_PACE
+        max(RATE_SAFETY * clock.second_iteration_rate * growth * growth, SMALLEST_RATE),
+        ASSUMED_RATE,
     )
 
 
 @apart
 def solve_stages(scene, work, clock, step):
-    """Find the stages' velocities; False where Newton's method does not converge."""
+    """Solve for the stage velocities; return False where Newton's method does not converge."""
     guess_stages(scene, work, clock, step)
-    expected = expected_pace(clock, step)
+    predicted = expected_rate(clock, step)
+    # Positions are solved to a fraction of the tolerance, but not below rounding.
     allowed = step_tolerance(work, clock)
-    share = NEWTON_SHARE if allowed == clock.tolerance else FREE_NEWTON_SHARE
-    # Turning makes every other iteration worse, so that the pace is taken over two of them.
-    before, earlier = math.inf, math.inf
-    for _ in range(MOST_ITERATIONS):
-        change = newton_step(scene, work, clock.time, step, share * allowed)
-        goal = max(share * allowed, rounding_error(scene, work, THIRD_STAGE, step))
-        pace = (change / earlier) ** 0.5 if earlier < math.inf else change / before
-        first = before == math.inf
+    fraction = NEWTON_TOLERANCE if allowed == clock.tolerance else FREE_NEWTON_TOLERANCE
+    # Rotation of the contacts makes every other iteration converge worse. So the rate is the
+    # geometric mean of two iterations.
+    previous, earlier = math.inf, math.inf
+    for _ in range(MAX_ITERATIONS):
+        change = newton_iteration(scene, work, clock.time, step, fraction * allowed)
+        goal = max(fraction * allowed, rounding_error(scene, work, THIRD_STAGE, step))
+        rate = (change / earlier) ** 0.5 if earlier < math.inf else change / previous
+        first = previous == math.inf
         if first:
-            pace = expected
-        if pace < 1.0 and change * pace <= goal * (1.0 - pace):
+            rate = predicted
+        # The remaining error is about change · rate/(1 − rate) (Hairer & Wanner, IV.8.10).
+        if rate < 1.0 and change * rate <= goal * (1.0 - rate):
             finish_stages(scene, work, step)
-            clock.convergence_rate = 0.0 if first else pace
+            clock.convergence_rate = 0.0 if first else rate
             if not first:
-                clock.second_iteration_rate, clock.second_iteration_step = pace, step
+                clock.second_iteration_rate, clock.second_iteration_step = rate, step
             return True
-        if not change < math.inf or (earlier < math.inf and pace > 1.0):
+        # Diverged: stop early.
+        if not change < math.inf or (earlier < math.inf and rate > 1.0):
             break
-        before, earlier = change, before
+        previous, earlier = change, previous
     clock.second_iteration_rate = 0.0
     return False

@@ -30,7 +30,7 @@ def test_radau_damps_what_is_infinitely_stiff():
 def test_radau_eigenvalues_and_their_vectors():
     real, pair = radau_tableau.EIGENVALUES
     assert real.imag == 0.0 and pair.imag > 0.0
-    to, back = np.array(radau_tableau.TO_VECTORS), np.array(radau_tableau.FROM_VECTORS)
+    to, back = np.array(radau_tableau.TO_EIGENBASIS), np.array(radau_tableau.FROM_EIGENBASIS)
     inverse = np.linalg.inv(RADAU)
     for which, value in enumerate((real, pair)):
         assert to[which] @ inverse == pytest.approx(value * to[which], rel=1e-12)

@@ -8,7 +8,7 @@ from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
-from flocsim.integrators.radau.carried_error import carry_error
+from flocsim.integrators.radau.carried_error import propagate_error
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs import stated_error
@@ -58,7 +58,7 @@ def carried(forces, place, speed, until, steps):
     work.place[PROPAGATED, 0, 0], work.velocity[PROPAGATED, 0, 0] = place, speed
     clock = stepped(scene, work, until / steps)
     for _ in range(steps):
-        carry_error(scene, work, clock, until / steps)
+        propagate_error(scene, work, clock, until / steps)
     return np.array([work.place[PROPAGATED, 0, 0], work.velocity[PROPAGATED, 0, 0]])
 
 
