@@ -258,15 +258,14 @@ def view_of(index: int, plain: bool) -> Any:
 
 
 @functools.cache
-def signature(index: int, plain: bool) -> Any:
-    """The numba signature of a law."""
+def given_to(index: int, plain: bool) -> Any:
+    """The numba types of a law's arguments."""
     from numba import types
 
-    number, view, count = types.float64, view_of(index, plain), NUMBERS[index]
-    returned = number if count == 1 else types.UniTuple(number, count)
+    number, view = types.float64, view_of(index, plain)
     more = (types.int64,) if index == CONTACT_EVENT else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
-    return returned(given, types.CPointer(number), *more)
+    return given, types.CPointer(number), *more
 
 
 def signature_text(index: int, plain: bool) -> str:
@@ -286,7 +285,7 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     calls: dict[Callable, Callable] = {has: has_address}
     for index, law in enumerate(LAWS):
         more = ", which" if index == CONTACT_EVENT else ""
-        call = Intrinsic(signature_text(index, plain), functools.partial(call_of, index, plain))
+        call = Intrinsic(signature_text(index, plain), functools.partial(call_of_law, index, plain))
         names: dict[str, Any] = {"call": call, "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
@@ -297,12 +296,17 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     return calls
 
 
-@functools.cache
-def call_of(index, plain):
-    """What calls a law by its address, for numba."""
-    from flocsim.compiler.numba_internals import call_by_address
+def call_of_law(index, plain):
+    """Return what calls a law by its address, for numba."""
+    from flocsim.compiler.table_types import call_of
 
-    return call_by_address(signature(index, plain))
+    view, _, *more = given_to(index, plain)
+
+    def target(given):
+        assert given[1] == view and list(given[3:]) == more, f"{LAWS[index]} is given {given}"
+        return "", "d" * NUMBERS[index]
+
+    return call_of(("address", "view", "parameters", "which")[: 3 + len(more)], target)
 
 
 def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False) -> Any:
@@ -315,8 +319,8 @@ def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False)
         return tuple(functions.get(name) for name in LAWS)
     addresses = [
         compile_law(
-            functions[name], signature_text(index, plain),
-            functools.partial(signature, index, plain),
+            functions[name], signature_text(index, plain), NUMBERS[index],
+            functools.partial(given_to, index, plain),
         )
         if name in functions
         else 0
