@@ -112,7 +112,7 @@ def compiled(entry: Callable, *, allocates: bool = False, what: str = "its kerne
 def is_on_disk(driver: Any) -> bool:
     """Return True if a composed driver has been compiled on this machine, for some types of
     arguments."""
-    return disk_cache.has([driver.name])
+    return disk_cache.has(driver.name)
 
 
 def compile_law(law: Callable, told: str, numbers: int, given: Callable[[], Any]) -> int:

@@ -17,7 +17,7 @@ import secrets
 import stat
 import time
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 from flocsim.compiler.processor import shared_kind
@@ -105,13 +105,10 @@ def read(name: str, key: str) -> bytes | None:
     return None
 
 
-def has(names: Iterable[str]) -> bool:
-    """Return True if something was written under each name; also where nothing can be kept."""
-    found = {
-        path.name.partition("-")[0]
-        for folder in folders_to_read() for path in folder.glob(f"*{SUFFIX}")
-    }  # fmt: skip
-    return found.issuperset(names) or not any(map(is_writable, folders()))
+def has(name: str) -> bool:
+    """Return True if something was written under a name; also where nothing can be kept."""
+    found = any(any(folder.glob(f"{name}-*{SUFFIX}")) for folder in folders_to_read())
+    return found or not any(map(is_writable, folders()))
 
 
 def content_of(path):

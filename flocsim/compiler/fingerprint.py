@@ -173,6 +173,7 @@ def lines_of(function: Any) -> tuple[list[str], dict[str, Any]]:
     return lines, called
 
 
+@functools.lru_cache(maxsize=4096)
 def tell(entry: Any) -> Told:
     """Return all that a function does, but for functions that are compiled apart from it, which it
     knows by name.
@@ -202,36 +203,9 @@ def tell(entry: Any) -> Told:
     return Told(lines, functions, calls)
 
 
-class Unit(NamedTuple):
-    """The ``name`` of a unit's file, by what it does up to the units that it ``calls`` {name:
-    function}; the ``functions`` in it."""
-
-    name: str
-    calls: dict[str, Callable]
-    functions: list[Callable]
-
-
-@functools.lru_cache(maxsize=4096)
-def unit_of(function: Callable, options: str) -> Unit:
-    """Return the unit that begins with a function, compiled in a certain way."""
-    found = tell(function)
-    return Unit(f"flocsim_unit_{hashed(found.lines, options)}", found.calls, found.functions)
-
-
-def units_of(entry: Callable, options: str, whole: bool = True) -> dict[str, Unit]:
-    """Return {name: unit} of a function and of all that it reaches and that is compiled apart;
-    without ``whole``, stand-ins for what is postponed."""
-    found, pending = {}, [("", entry)]
-    for name, function in pending:  # grows
-        if name not in found:
-            found[name] = unit_of(made_of(function, whole), options)
-            pending += found[name].calls.items()
-    return found
-
-
-def made_of(function: Callable, whole: bool) -> Callable:
-    """Return what is compiled of a function: its stand-in, where that is all that is needed."""
-    return function if whole else getattr(function, "stand_in", function)
+def unit_name(function: Callable, options: str) -> str:
+    """Return the name of the file of a unit, by what it does up to the units that it calls."""
+    return f"flocsim_unit_{hashed(tell(function).lines, options)}"
 
 
 def hashed(lines: Iterable[str], options: str) -> str:
@@ -248,9 +222,13 @@ def fingerprint(
 
     KernelError, with the kernel's file and line and the name, for what no hash can follow.
     """
-    units = units_of(linked or Linker(fillings).link(entry), options)
+    units, pending = {}, {"": linked or Linker(fillings).link(entry)}
+    while pending:
+        name, function = pending.popitem()
+        units[name] = tell(function)
+        pending |= {x: y for x, y in units[name].calls.items() if x not in units}
     refuse_extensions({each for unit in units.values() for each in unit.functions})
-    return hashed([f"{name}={unit.name}" for name, unit in sorted(units.items())], options)
+    return hashed([f"{name}={units[name].lines}" for name in sorted(units)], options)
 
 
 def refuse_extensions(functions: Iterable[Any]) -> None:

@@ -154,7 +154,7 @@ class Linker:
     """Clones functions, with others in the place of hooks.
 
     Parameters: ``fillings``, {hook: function}; ``finish(clone)`` compiles or not;
-    ``replace(value)`` returns what stands for a value, None for a function that is cloned.
+    ``replace(value)`` returns what stands for a value or a function; None: itself, or its clone.
     """
 
     def __init__(
@@ -169,16 +169,17 @@ class Linker:
     def link(self, value: Any) -> Any:
         """Return the clone of a function, all that it calls linked as well; other values as they
         are, or replaced."""
-        filled = self.fillings.get(value, value) if isinstance(value, types.FunctionType) else value
-        if (other := self.replace(filled)) is not None:
-            return other
-        if not isinstance(filled, types.FunctionType) or is_library(filled):
-            return value
+        if not isinstance(value, types.FunctionType) or is_library(value):
+            other = self.replace(value)
+            return value if other is None else other
+        filled = self.fillings.get(value, value)
         if filled not in self.clones:
-            clone = self.clone(filled)
-            if hasattr(value, "apart"):  # what fills a hook goes by its name
-                clone.apart = value.apart
-            self.clones[filled] = self.finish(clone)
+            if (other := self.replace(filled)) is None:
+                other = self.clone(filled)
+                if hasattr(value, "apart"):  # what fills a hook goes by its name
+                    other.apart = value.apart
+                other = self.finish(other)
+            self.clones[filled] = other
         return self.clones[filled]
 
     def clone(self, function: Any) -> Any:

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import accelerator, disk_cache
-from flocsim.compiler.fingerprint import Intrinsic, made_of, unit_of
+from flocsim.compiler.fingerprint import Intrinsic, tell, unit_name
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import LENT, Called, ObjectCode, load, object_of
 from flocsim.compiler.processor import compiled_for
@@ -84,7 +84,6 @@ class Engine:
         self.linker = Linker({}, self.inner, self.replace)
         self.units: dict[str, ObjectCode] = {}
         self.calls: dict[str, Called] = {}
-        self.stubs: dict[Callable, Any] = {}
         self.parts: list[Any] = []
         self.known: dict[str, Any] = {}
 
@@ -109,11 +108,9 @@ class Engine:
         symbol = f"flocsim_{hashlib.blake2b(repr((name, words)).encode()).hexdigest()[:24]}"
         if symbol in self.units:
             return symbol, self.units[symbol]
-        made = made_of(function, self.whole)
-        file = (
-            self.name if function is self.entry else unit_of(made, self.options).name,
-            repr((words, compiled_for(hasattr(made, "loops")))),
-        )
+        made = function if self.whole else getattr(function, "stand_in", function)
+        file_name = self.name if function is self.entry else unit_name(made, self.options)
+        file = file_name, repr((words, compiled_for(hasattr(made, "loops"))))
         code = self.from_disk(made, *file)
         if code is None:
             if function is not self.entry and given is None:
@@ -132,8 +129,7 @@ class Engine:
             return None
         code = ObjectCode.unpacked(data)
         for each in code.calls:
-            called = unit_of(function, self.options).calls[each.function]
-            _, found = self.unit(called, each.types)
+            _, found = self.unit(tell(function).calls[each.function], each.types)
             if found is None or found.returned != each.returned:
                 return None
         return code
@@ -173,10 +169,10 @@ class Engine:
         letters = letters_of(returned[-1])
         if letters is None:
             raise KernelError(f"a compiled function returns {returned[-1]}: let it return numbers")
-        entry = made.native_name
-        code, lacking = object_of(made.inspect_llvm(), entry, hasattr(function, "loops"))
-        calls = tuple(self.calls[each] for each in sorted(lacking) if each in self.calls)
-        return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in lacking), calls)
+        entry, loops = made.native_name, hasattr(function, "loops")
+        code, missing = object_of(made.inspect_llvm(), entry, loops)
+        calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
+        return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in missing), calls)
 
     def begin(self) -> None:
         """Prepare for compiling, until all units are there."""
@@ -206,21 +202,15 @@ class Engine:
             return self.inner(value.make())
         if not hasattr(value, "apart") or self.allocates or not accelerator.by_units():
             return None
-        if value not in self.stubs:
-            self.stubs[value] = self.stub(value)
-        return self.stubs[value]
-
-    def stub(self, function: Any) -> Any:
-        """Return a function for compiled code that calls one which is compiled apart."""
         from flocsim.compiler.table_types import call_of
 
         def target(given):
             words = tuple(map(str, given))
-            symbol, code = self.unit(function, words, given)
-            self.calls[symbol] = Called(symbol, function.apart, words, code.returned)
+            symbol, code = self.unit(value, words, given)
+            self.calls[symbol] = Called(symbol, value.apart, words, code.returned)
             return symbol, code.returned
 
-        return self.inner(call_of(argument_names(function), target))
+        return self.inner(call_of(argument_names(value), target))
 
 
 @contextlib.contextmanager

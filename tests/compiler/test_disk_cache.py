@@ -125,10 +125,10 @@ def test_what_came_with_the_package_is_used_and_never_copied(folder, shipped, mo
 
 def test_what_came_for_another_kind_of_processor_is_left_alone(folder, shipped, monkeypatch):
     name = only_file(shipped).name.partition("-")[0]
-    assert disk_cache.has([name])
+    assert disk_cache.has(name)
     for kind in ("system-other kind", ""):
         monkeypatch.setattr(disk_cache, "shared_kind", lambda found=kind: found)
-        assert not disk_cache.has([name])
+        assert not disk_cache.has(name)
     assert answer() == 7.0
     assert len(list(folder.iterdir())) == 1
 
