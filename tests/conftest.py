@@ -2,7 +2,6 @@
 
 import compileall
 import gc
-import math
 import os
 import sys
 from pathlib import Path

@@ -100,10 +100,10 @@ def reads(function: Any) -> dict[tuple[str, ...], Any]:
     Raises KernelError for what a module lacks, and for a module that is used as a value, since
     nobody knows then which of its attributes are read.
     """
-    known = {**vars(builtins), **function.__globals__}
-    found = {}
+    known, found = function.__globals__, {}
     for chain in chains(function.__code__):
-        value, used = known.get(chain[0], MISSING), 1
+        name, used = chain[0], 1
+        value = known[name] if name in known else getattr(builtins, name, MISSING)
         while isinstance(value, types.ModuleType) and used < len(chain):
             name, used = value.__name__, used + 1
             value = getattr(value, chain[used - 1], MISSING)

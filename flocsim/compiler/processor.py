@@ -71,32 +71,34 @@ def has_svml() -> bool:
     return llvm.targets.has_svml()
 
 
+@functools.cache
+def host() -> tuple[str, str, Any]:
+    """Return LLVM's name of the system, of this processor, and what it can do."""
+    import llvmlite.binding as llvm
+
+    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features()
+
+
 def target(loops: bool = False) -> tuple[str, str]:
     """Return LLVM's name of the processor to compile for, and its features: what is set, the
     baseline, or this very processor; the latter also for ``loops`` over many numbers."""
-    import llvmlite.binding as llvm
-
-    known = llvm.get_host_cpu_features()
+    _, name, known = host()
     named = [os.environ.get(name, "") for name in SETTINGS[:2]]
     if any(named) or loops or not all(known.get(name) for name in OF_BASELINE):
         features = named[1] or (known.flatten() if not named[0] else "")
-        return named[0] or llvm.get_host_cpu_name(), features
+        return named[0] or name, features
     return BASELINE, ""
 
 
 def shared_kind() -> str:
     """Return the kind of machine, system and processor, that others can share engines with, as the
     name of a folder; "" where engines are for this very processor."""
-    import llvmlite.binding as llvm
-
-    return f"{llvm.get_process_triple()}-{BASELINE}" if target() == (BASELINE, "") else ""
+    return f"{host()[0]}-{BASELINE}" if target() == (BASELINE, "") else ""
 
 
 def compiled_for(loops: bool = False) -> str:
     """Return what of the machine the machine code of a function depends on."""
-    import llvmlite.binding as llvm
-
-    return repr((llvm.get_process_triple(), target(loops), settings(), loops and has_svml()))
+    return repr((host()[0], target(loops), settings(), loops and has_svml()))
 
 
 def cpu_kind() -> dict:
@@ -107,7 +109,6 @@ def cpu_kind() -> dict:
     ``numpy``: the instructions that numpy uses, NPY_DISABLE_CPU_FEATURES heeded; ``libm``: the C
     library, which computes exp and log; what was set for it and for the linear algebra.
     """
-    import llvmlite.binding as llvm
     import numpy
 
     name, features = target(loops=True)
@@ -117,7 +118,7 @@ def cpu_kind() -> dict:
     for each in ("GLIBC_TUNABLES", "OPENBLAS_CORETYPE"):
         libm += [os.environ[each]] if os.environ.get(each) else []
     return {
-        "cpu": llvm.get_host_cpu_name(),
+        "cpu": host()[1],
         "compiled_for": name,
         "features": sorted(each[1:] for each in features.split(",") if each.startswith("+")),
         "numpy": [*simd.get("baseline", []), *simd.get("found", [])],

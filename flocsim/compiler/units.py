@@ -83,6 +83,7 @@ class Engine:
         self.options = options_text(allocates)
         self.linker = Linker({}, self.inner, self.replace)
         self.units: dict[str, ObjectCode] = {}
+        self.addresses: dict[str, int] = {}
         self.calls: dict[str, Called] = {}
         self.parts: list[Any] = []
         self.known: dict[str, Any] = {}
@@ -90,14 +91,17 @@ class Engine:
     def load(self) -> tuple[int, str]:
         """Return the address of the machine code, and the letters (struct) of its answer."""
         with _one_at_a_time, contextlib.ExitStack() as self.stack:
-            _, code = self.unit(self.entry, (self.words,))
+            symbol, code = self.unit(self.entry, (self.words,))
         assert code is not None
-        return self.link(code), code.returned
+        return self.link(symbol), code.returned
 
-    def link(self, code: ObjectCode) -> int:
+    def link(self, symbol: str) -> int:
         """Return the address of a unit, loaded after those that it calls."""
-        called = {each.symbol: self.link(self.units[each.symbol]) for each in code.calls}
-        return load(code, called)
+        if symbol not in self.addresses:
+            code = self.units[symbol]
+            called = {each.symbol: self.link(each.symbol) for each in code.calls}
+            self.addresses[symbol] = load(code, called)
+        return self.addresses[symbol]
 
     def unit(
         self, function: Callable, words: tuple[str, ...], given: Any = None
