@@ -273,15 +273,14 @@ def view_of(index: int, plain: bool) -> Any:
 
 
 @functools.cache
-def signature(index: int, plain: bool) -> Any:
-    """Return the numba signature of a law."""
+def argument_types(index: int, plain: bool) -> Any:
+    """Return the numba types of a law's arguments."""
     from numba import types
 
-    number, view, count = types.float64, view_of(index, plain), NUMBERS[index]
-    returned = number if count == 1 else types.UniTuple(number, count)
+    number, view = types.float64, view_of(index, plain)
     more = (types.int64,) if index == CONTACT_EVENT else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
-    return returned(given, types.CPointer(number), *more)
+    return given, types.CPointer(number), *more
 
 
 def signature_text(index: int, plain: bool) -> str:
@@ -304,7 +303,7 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     # Numba needs a function of fixed arity for each law, so they are generated.
     for index, law in enumerate(LAWS):
         more = ", which" if index == CONTACT_EVENT else ""
-        call = Intrinsic(signature_text(index, plain), functools.partial(call_of, index, plain))
+        call = Intrinsic(signature_text(index, plain), functools.partial(call_of_law, index, plain))
         names: dict[str, Any] = {"call": call, "__name__": __name__}
         exec(
             f"def {law}(scene, view{more}):\n"
@@ -315,12 +314,17 @@ def compiled_calls(plain: bool) -> dict[Callable, Callable]:
     return calls
 
 
-@functools.cache
-def call_of(index, plain):
-    """Return the numba intrinsic that calls a law by its address."""
-    from flocsim.compiler.numba_internals import call_by_address
+def call_of_law(index, plain):
+    """Return the function by which compiled code calls a law by its address."""
+    from flocsim.compiler.table_types import call_of
 
-    return call_by_address(signature(index, plain))
+    view, _, *more = argument_types(index, plain)
+
+    def target(given):
+        assert given[1] == view and list(given[3:]) == more, f"{LAWS[index]} is given {given}"
+        return "", "d" * NUMBERS[index]
+
+    return call_of(("address", "view", "parameters", "which")[: 3 + len(more)], target)
 
 
 def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False) -> Any:
@@ -334,8 +338,8 @@ def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False)
     # Addresses of compiled laws; 0 where the scene has none.
     addresses = [
         compile_law(
-            functions[name], signature_text(index, plain),
-            functools.partial(signature, index, plain),
+            functions[name], signature_text(index, plain), NUMBERS[index],
+            functools.partial(argument_types, index, plain),
         )
         if name in functions
         else 0

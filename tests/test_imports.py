@@ -46,10 +46,9 @@ INNER_ROWS = {
     "compiler": [
         ["composer"],
         ["units"],
-        ["fingerprint"],
-        ["numba_internals"],
-        ["by_pointer", "disk_cache", "linker"],
-        ["processor"],
+        ["fingerprint", "table_types"],
+        ["accelerator", "by_pointer", "disk_cache", "object_code"],
+        ["linker", "processor"],
     ],
     "geometry": [["fit"], ["contact"], ["shapes"]],
     "state": [

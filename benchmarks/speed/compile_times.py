@@ -5,7 +5,7 @@
 Each figure is of a process of its own that imports flocsim, makes two bodies with forces and takes
 its first steps; cold ones start with an empty cache folder, all others with what the ones before
 have compiled. ``--private`` also shows what a cold start costs without each private part of numba
-that flocsim leans on (flocsim.compiler.numba_internals). ``--against`` starts the flocsim of
+that flocsim leans on (flocsim.compiler.accelerator). ``--against`` starts the flocsim of
 another commit beside this one, each scene twice and in both orders: the smaller CPU time counts.
 It also runs commands that compile nothing, each six times, in turn: the least CPU time counts.
 """

@@ -10,67 +10,68 @@ compile an engine.
 What goes to disk is named by a hash of all that was reached: bytecode, constants, Python, numba and
 numpy versions. An edited kernel therefore has another name; new parameter values, which are
 arguments, do not.
-
-Kernels must be plain functions that capture nothing: a closure's variables are invisible to
-numba's symbol table, where two of them can collide and silently return each other's answers.
 """
 
 import functools
-import itertools
+import os
 from collections.abc import Callable
 from typing import Any
 
 from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import (
-    argument_at,
-    table_of,
-    told_kinds,
-    type_of,
-    types_within,
-    words_in,
-)
-from flocsim.compiler.disk_cache import function_at
+from flocsim.compiler.by_pointer import kinds_text, table_of
 from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.units import Code, argument_names, options_text
+from flocsim.compiler.object_code import function_at
+from flocsim.compiler.units import Engine, argument_names, options_text
+from flocsim.errors import KernelError
 
 _composed: dict = {}
 
 
 class Compiled:
-    """A Code that is compiled at its first call, or loaded from the disk; once more for arguments
-    of other types. Without what is postponed, unless it is ``complete``."""
+    """A linked function that is compiled at its first call, or loaded from the disk; once more for
+    arguments of other types. Without what is postponed, unless it is ``complete``."""
 
-    def __init__(self, code, complete=False):
-        self.code, self.complete = code, complete
+    def __init__(self, linked, name, allocates, what, complete=False):
+        self.linked, self.name, self.allocates, self.what = linked, name, allocates, what
+        self.complete = complete
         self.functions = {}
 
     @functools.cached_property
     def whole(self):
         """The same with what is postponed."""
-        return Compiled(self.code, True)
+        return Compiled(self.linked, self.name, self.allocates, self.what, True)
 
     def __call__(self, *arguments):
         table, kinds = table_of(arguments)
         if kinds not in self.functions:
-            self.functions[kinds] = self.function_for(kinds, arguments)
+            typed = functools.partial(self.typed, kinds)
+            engine = Engine(
+                self.linked, self.name, kinds_text(kinds), typed, self.allocates, self.complete,
+                self.what,
+            )  # fmt: skip
+            self.functions[kinds] = function_at(*engine.load())
         return self.functions[kinds](table.__array_interface__["data"][0])
 
-    def function_for(self, kinds, arguments):
-        """The function of a table's address for arguments of such types."""
-        code = self.code
+    def typed(self, kinds):
+        """Return the numba type of a table's address, {argument: function that reads it there} and
+        {text: numba type} of all that is in it."""
+        from flocsim.compiler.table_types import (
+            Elements,
+            argument_at,
+            type_from,
+            types,
+            types_within,
+            words_in,
+        )
 
-        def typed():
-            from numba import int64
-
-            found = [type_of(each, arrays=code.allocates) for each in arguments]
-            places = itertools.accumulate(map(words_in, found), initial=0)
-            readers = dict(
-                zip(argument_names(code.entry), map(argument_at, found, places), strict=False)
-            )
-            return (int64,), readers, types_within(found)
-
-        return function_at(*code.loaded(told_kinds(kinds), typed, self.complete))
+        more, at, found, readers = iter(kinds), 0, [], {}
+        for name in argument_names(self.linked):
+            found.append(kind := type_from(more))
+            whole = self.allocates and isinstance(kind, Elements)
+            readers[name] = argument_at(kind, at, whole)
+            at += words_in(kind)
+        return (types.int64,), readers, types_within(found)
 
 
 def compose(
@@ -81,7 +82,7 @@ def compose(
     allocates: bool = False,
     what: str = "its kernels",
 ) -> Callable:
-    """The driver ``entry`` with its hooks filled, as one function.
+    """Return the driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
@@ -89,38 +90,54 @@ def compose(
     for who waits while it is compiled.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
+    # Cloned at once: what is reached later, compiled or not, is what it is now.
+    linked = Linker(fillings).link(entry)
     if jit:
-        refuse_interpreter(entry, fillings)
-    key = (fingerprint(entry, fillings, options_text(allocates)), jit)
+        refuse_interpreter(linked)
+        refuse_no_compiler()
+    key = (fingerprint(entry, fillings, options_text(allocates), linked), jit)
     if key not in _composed:
-        # Cloned at once: what is reached later, compiled or not, is what it is now.
-        linked = Linker(fillings).link(entry)
         name = f"flocsim_scene_{key[0]}"
-        _composed[key] = Compiled(Code(linked, name, allocates, what)) if jit else linked
+        _composed[key] = Compiled(linked, name, allocates, what) if jit else linked
     return _composed[key]
 
 
 @functools.cache
 def compiled(entry: Callable, *, allocates: bool = False, what: str = "its kernels") -> Callable:
-    """The same of a function without hooks, looked at once: what it reaches is what it was then."""
+    """Return the same of a function without hooks, looked at once: what it reaches is what it was
+    then."""
     return compose(entry, {}, allocates=allocates, what=what)
 
 
 def is_on_disk(driver: Any) -> bool:
-    """Whether a composed driver has been compiled on this machine, for some types of arguments."""
-    return disk_cache.has(driver.code.name)
+    """Return True if a composed driver has been compiled on this machine, for some types of
+    arguments."""
+    return disk_cache.has(driver.name)
 
 
-def compile_law(law: Callable, told: str, signature: Callable[[], Any]) -> int:
-    """The address [int] at which an engine calls a plain function, compiled for a numba signature,
-    of which ``told`` tells all.
+def compile_law(law: Callable, told: str, numbers: int, given: Callable[[], Any]) -> int:
+    """Return the address [int] at which an engine calls a plain function that returns so many
+    numbers, compiled for ``given()`` numba types, of which ``told`` tells all.
 
     Raises KernelError for what captures variables, reads globals that may change, or cannot be
     compiled. The compiled function lives as long as the process.
     """
-    refuse_interpreter(law)
-    key = (fingerprint(law, {}, options_text(False)), told)
+    linked = Linker({}).link(law)
+    refuse_interpreter(linked)
+    refuse_no_compiler()
+    key = (fingerprint(law, {}, options_text(False), linked), told)
     if key not in _composed:
-        code = Code(law, f"flocsim_law_{key[0]}")
-        _composed[key], _ = code.loaded(told, lambda: (signature().args, {}, {}))
+        name = f"flocsim_law_{key[0]}"
+        typed = lambda: (given(), {}, {})  # noqa: E731
+        engine = Engine(linked, name, told, typed, what="", returns="d" * numbers)
+        _composed[key], _ = engine.load()
     return _composed[key]
+
+
+def refuse_no_compiler():
+    """Raise KernelError where numba is told to compile nothing."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        raise KernelError(
+            "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs "
+            "compiled code only: unset it (in Python, jit=False runs a scene uncompiled)"
+        )

@@ -1,17 +1,15 @@
 """What a function does, as a hash of bytecode, constants and all that it reaches through globals;
 and what a kernel may not do, as its code shows before it is compiled, with file and line.
 
-The hash names what the composer files on disk: an edited kernel has another name, whoever calls it.
-Whatever reaches machine code has to be in its hash. Numbers, texts, tuples of them, enums of them
-and named tuples are told by value; what Python, numpy and numba have is told by name, for their
-versions are in the hash. All else is refused by name: what could change without another hash would
-be computed with today and be stale tomorrow.
+The hash names what is filed on disk: an edited kernel has another name, whoever calls it. Whatever
+reaches machine code has to be in its hash. Numbers, texts, tuples of them, enums of them and named
+tuples are told by value; what Python, numpy and numba have is told by name, for their versions are
+in the hash. All else is refused by name: what could change without another hash would be computed
+with today and be stale tomorrow.
 
-A kernel may not call Python, for kernels run without the interpreter's lock. Inner functions have
-no environment in which numba's ``print`` finds what it needs of Python: it fails while it holds the
-lock, never gives it back, and the process hangs with all of its threads, deaf to signals. Nor may
-it return None on some of its ways, or make arrays: samples never reach every branch, and what they
-leave out numba would compile to a None or refuse in words of its own.
+A kernel may not call Python, for kernels run without the interpreter's lock. Nor may it return None
+on some of its ways, or make arrays: samples never reach every branch, and numba would refuse what
+they leave out in words of its own.
 """
 
 import builtins
@@ -20,53 +18,43 @@ import enum
 import functools
 import hashlib
 import inspect
+import operator
 import sys
 import types
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from flocsim.compiler.accelerator import taught
 from flocsim.compiler.linker import (
-    ATTRIBUTE_LOADS,
-    PACKAGE,
-    chains,
+    Linker,
+    codes_in,
+    is_library,
     is_versioned,
-    module_reads,
-    reached,
+    names_in,
+    reads,
     refuse_closure,
     where,
 )
-from flocsim.compiler.processor import compilers, numba_settings
+from flocsim.compiler.processor import compilers
 from flocsim.errors import KernelError
 
+# Types whose values are told by ``repr``.
 LITERALS = (bool, int, float, complex, str, bytes, type(None))
-"""Types whose values are told by ``repr``."""
 
-RANDOM = ("random", "numpy.random")
-"""Modules whose numbers are others in each run."""
+# Modules whose numbers are others in each run.
+RANDOM = ("random", "numpy.random", "_random")
 
-OF_NUMBA = ("prange", "literally", "literal_unroll")
-"""What a kernel may call of numba itself, beside its types as conversions."""
+# Instructions that make what Python allocates, and its name.
+CONTAINERS = {"BUILD_LIST": "a list", "BUILD_SET": "a set", "BUILD_MAP": "a dict"}
 
-OBJECT_MODE = "objmode"
-"""numba's name for a way back into Python."""
-
-CONTAINERS = {
-    "BUILD_LIST": "a list", "BUILD_SET": "a set", "BUILD_MAP": "a dict",
-    "BUILD_CONST_KEY_MAP": "a dict", "LIST_APPEND": "a list", "SET_ADD": "a set",
-    "MAP_ADD": "a dict",
-}  # fmt: skip
-"""Instructions that make what Python allocates, and its name."""
-
-ARRAY_MAKERS = {
-    "arange", "array", "asanyarray", "asarray", "ascontiguousarray", "asfortranarray",
-    "atleast_1d", "atleast_2d", "column_stack", "concatenate", "copy", "cross", "diag",
-    "dstack", "empty", "empty_like", "eye", "fromiter", "full", "full_like", "geomspace",
-    "hstack", "identity", "linspace", "logspace", "meshgrid", "ndarray", "ones", "ones_like",
-    "outer", "repeat", "stack", "tile", "vstack", "zeros", "zeros_like",
-}  # fmt: skip
-"""Functions of numpy that give an array whatever they are given."""
+# Functions of numpy that return an array whatever they are given.
+ARRAY_MAKERS = (
+    "arange array asarray concatenate copy cross diag empty empty_like eye full full_like identity "
+    "linspace logspace ones ones_like outer repeat stack zeros zeros_like"
+)
 
 
 class Intrinsic(NamedTuple):
@@ -81,335 +69,246 @@ class Untold(Exception):
 
 
 def told(value: Any) -> str:
-    """One line that tells a value wholly; Untold where there is none."""
-    if type(value) in LITERALS:
+    """Return one line that tells a value wholly; Untold where there is none."""
+    kind = type(value)
+    if kind in LITERALS:
         return repr(value)
     if isinstance(value, Intrinsic):
         return f"intrinsic {value.name}"
-    if type(value) is tuple:
+    if kind is tuple:
         return f"({', '.join(map(told, value))})"
-    if isinstance(value, type):
-        return told_class(value)
     if isinstance(value, enum.Enum):
-        return f"{value.name} of {told_class(type(value))}"
-    if is_named_tuple(type(value)):
-        return f"{told_class(type(value))}({', '.join(map(told, value))})"
+        return f"{value.name} of {told(kind)}"
+    if is_named_tuple(kind):
+        return f"{told(kind)}({', '.join(map(told, value))})"
     if isinstance(value, np.number | np.bool_):
         return f"{value.dtype.str} {value.tobytes().hex()}"
-    line = told_by_name(value) or told_of_numba(value)
-    if line is None:
-        raise Untold(complaint(value))
-    return line
+    if is_named_tuple(value):
+        return f"class {value.__name__}{value._fields} {told_items(value._field_defaults)}"
+    if isinstance(value, type) and issubclass(value, enum.Enum):
+        members = {name: each.value for name, each in value.__members__.items()}
+        return f"class {value.__name__}{value.__bases__} {told_items(members)}"
+    # What is raised ends a run: no number hangs on its class.
+    if isinstance(value, type) and issubclass(value, BaseException):
+        return f"class {value.__name__}"
+    module, name = getattr(value, "__module__", None), getattr(value, "__name__", None)
+    if isinstance(module, str) and isinstance(name, str) and module not in RANDOM:
+        for owner in (module, module.partition(".")[0]):
+            known = sys.modules.get(owner)
+            if getattr(known, name, None) is value and is_versioned(known) and owner != "__main__":
+                return f"{owner}.{name}"
+    raise Untold(complaint(value))
+
+
+def told_items(items: Mapping[str, Any]) -> str:
+    """Return the line of values with names."""
+    return ", ".join(f"{name}={told(value)}" for name, value in items.items())
 
 
 def is_named_tuple(kind):
-    """Whether a class is a named tuple as Python makes them, without more to it."""
-    return kind.__mro__[1:] == (tuple, object) and hasattr(kind, "_fields")
-
-
-def told_class(kind):
-    """The line of a class; Untold for one that is no named tuple, enum or exception."""
-    if is_named_tuple(kind):
-        defaults = ", ".join(f"{name}={told(v)}" for name, v in kind._field_defaults.items())
-        return f"class {kind.__name__}{kind._fields} {defaults}"
-    if issubclass(kind, enum.Enum):
-        bases = [base.__name__ for base in kind.__mro__[1:]]
-        members = ", ".join(f"{name}={told(m.value)}" for name, m in kind.__members__.items())
-        return f"class {kind.__name__}{bases} {members}"
-    # What is raised ends a run; which numbers come before that does not hang on its class.
-    if issubclass(kind, BaseException):
-        return f"class {kind.__name__}"
-    line = told_by_name(kind)
-    if line is None:
-        raise Untold(
-            f"the class {kind.__name__}, which no hash follows; make what it holds a parameter, a "
-            "named tuple, an enum of numbers or a module constant"
-        )
-    return line
-
-
-def told_by_name(value):
-    """The line of what Python or numpy have under a name of their own; None for anything else."""
-    module, name = getattr(value, "__module__", None), getattr(value, "__name__", None)
-    if not isinstance(module, str) or not isinstance(name, str) or module in RANDOM:
-        return None
-    for owner in (module, module.partition(".")[0]):
-        known = sys.modules.get(owner)
-        if getattr(known, name, None) is value and owner != "__main__" and is_versioned(known):
-            return f"{owner}.{name}"
-    return None
-
-
-def told_of_numba(value):
-    """The line of a type of numba's, or of the few of its functions that a kernel may call."""
-    numba = sys.modules.get("numba")
-    if numba is None:
-        return None
-    if isinstance(value, numba.types.Type) and getattr(numba.types, str(value), None) == value:
-        return f"numba {value}"
-    for name in OF_NUMBA:
-        if getattr(numba, name) is value:
-            return f"numba {name}"
-    return None
+    """Return True for a class of named tuples as Python makes them, without more to it."""
+    return getattr(kind, "__mro__", ())[1:] == (tuple, object) and hasattr(kind, "_fields")
 
 
 def complaint(value):
-    """What a value is that cannot be told, and what to do about it."""
-    kind = type(value).__name__
-    module = getattr(value, "__module__", None) or ""
-    owner = getattr(value, "__self__", None)
-    if module in RANDOM or type(owner).__module__.partition(".")[0] in ("random", "_random"):
+    """Return what a value is that cannot be told, and what to do about it."""
+    kind, owner = type(value), type(getattr(value, "__self__", None))
+    modules = getattr(value, "__module__", None) or "", kind.__module__, owner.__module__
+    if any(each in RANDOM or each.startswith("numpy.random") for each in modules):
         return "which draws random numbers: no run could be repeated; leave them out"
-    makers = (type(value).__module__ or "").partition("._")[0], type(owner).__name__
-    if makers[0] in RANDOM or makers[1] == "RandomState":
-        return "which draws random numbers: no run could be repeated; leave them out"
-    if module.partition(".")[0] == "numba" and not callable(value):
-        return f"a {kind} of numba, which no hash follows; leave it out"
     if callable(value):
+        what = f"the class {value.__name__}" if isinstance(value, type) else f"a {kind.__name__}"
         return (
-            f"a {kind}, whose code no hash follows; write a plain function with `def`, or put "
-            "@numba.njit above it"
+            f"{what}, whose code no hash follows; write a plain function with `def`, a named tuple "
+            "or an enum of numbers"
         )
-    return f"a {kind} that can change; make it a parameter, a number or a tuple of numbers"
+    return f"a {kind.__name__} that can change; make it a parameter or a tuple of numbers"
 
 
-def code_digest(code):
-    """A hash of what the code does; docstrings, line numbers and file names do not matter."""
-    constants = [constant_text(each) for each in code.co_consts]
-    if has_docstring(code):
-        constants[0] = "docstring"
+@functools.lru_cache(maxsize=4096)
+def code_text(code, docstring=None):
+    """Return what the code does; docstrings, line numbers and file names do not matter."""
+    constants = [
+        code_text(each) if inspect.iscode(each)
+        else sorted(map(repr, each)) if isinstance(each, frozenset)  # in any order otherwise
+        else repr(each)
+        for each in code.co_consts if each != docstring
+    ]  # fmt: skip
     counts = (code.co_argcount, code.co_kwonlyargcount, code.co_posonlyargcount, code.co_flags)
     names = (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
-    parts = (code.co_code, constants, *names, *counts, getattr(code, "co_exceptiontable", b""))
-    return hashlib.blake2b(repr(parts).encode(), digest_size=16).hexdigest()
-
-
-def constant_text(value):
-    """A constant of the code as text that is the same in every process."""
-    if isinstance(value, types.CodeType):
-        return code_digest(value)
-    if isinstance(value, frozenset):
-        return f"set {sorted(map(constant_text, value))}"
-    return repr(value)
-
-
-def has_docstring(code):
-    """Whether the first constant of the code is its docstring."""
-    if sys.version_info >= (3, 13):
-        return bool(code.co_flags & inspect.CO_HAS_DOCSTRING)
-    # Before, that place was None without one.
-    return bool(code.co_consts) and isinstance(code.co_consts[0], str)
-
-
-@functools.cache
-def compiler_text() -> str:
-    """What compiles: Python, numba, LLVM, numpy and numba's settings."""
-    return f"{compilers()}\n{numba_settings()}"
-
-
-def globals_read(function: Any) -> Iterable[tuple[str, Any]]:
-    """(name, value) of all that a function reads, attributes of modules by their dotted names."""
-    for name, value in reached(function).items():
-        if not isinstance(value, types.ModuleType):
-            yield name, value
-    for chain, value in module_reads(function).items():
-        yield ".".join(chain), value
-
-
-def told_defaults(function):
-    """The line of a function's default arguments; KernelError for one that could change."""
-    defaults = {"": function.__defaults__ or (), **(function.__kwdefaults__ or {})}
-    try:
-        return " ".join(f"{name}={told(value)}" for name, value in defaults.items())
-    except Untold as error:
-        raise KernelError(f"kernel {where(function)} has a default argument, {error}") from None
+    return repr((code.co_code, constants, *names, *counts, code.co_exceptiontable))
 
 
 class Told(NamedTuple):
-    """What a function does, in ``lines``, the ``functions`` that it reaches and what they ``read``;
-    ``calls`` {name: function} what of that is compiled apart, where that is left out."""
+    """What a function does, in ``lines``; the ``functions`` that it reaches; ``calls`` {name:
+    function}: what of that is compiled apart, which is left out."""
 
     lines: list[str]
     functions: list[Callable]
-    read: list[Any]
     calls: dict[str, Callable]
 
 
-def tell(entry: Any, fillings: dict[Callable, Callable], *, within: bool = False) -> Told:
-    """All that a function does; ``within``: but for functions that are compiled apart from it,
-    which it knows by name.
+@functools.lru_cache(maxsize=4096)
+def lines_of(function: Any) -> tuple[list[str], dict[str, Any]]:
+    """Return what a function's own code does, in lines, and {name: function} that it calls."""
+    refuse_closure(function)
+    doc = function.__doc__
+    lines = [f"{function.__qualname__} {code_text(function.__code__, doc)}"]
+    try:
+        lines.append(told_items({"": function.__defaults__, **(function.__kwdefaults__ or {})}))
+    except Untold as error:
+        raise KernelError(f"kernel {where(function)} has a default argument, {error}") from None
+    called = {}
+    for chain, value in reads(function).items():
+        name = ".".join(chain)
+        if isinstance(value, types.FunctionType) and not is_library(value):
+            called[name] = value
+            continue
+        try:
+            lines.append(f"{name}={told(value)}")
+        except Untold as error:
+            raise KernelError(
+                f"kernel {where(function)} reads the global {name!r}, {error}"
+            ) from None
+    return lines, called
+
+
+@functools.lru_cache(maxsize=4096)
+def tell(entry: Any) -> Told:
+    """Return all that a function does, but for functions that are compiled apart from it, which it
+    knows by name.
 
     KernelError, with the kernel's file and line and the name, for what cannot be told.
     """
     lines: list[str] = []
-    seen: dict[Callable, int] = {}
-    read: list[Any] = []
-    calls: dict[str, Callable] = {}
-
-    def visit(function):
-        function = fillings.get(function, function)
-        if function in seen:
-            return seen[function]
-        seen[function] = len(seen)
+    functions, calls = [entry], {}
+    numbers = {entry: 0}
+    for function in functions:  # grows
         if not isinstance(function, types.FunctionType):
             raise KernelError(
                 f"{function!r} is no plain function; write one with `def` and leave @njit out"
             )
-        refuse_closure(function)
-        lines.append(f"{function.__qualname__} {code_digest(function.__code__)}")
-        lines.append(told_defaults(function))
-        for name, value in globals_read(function):
-            if within and hasattr(value, "apart"):
+        own, called = lines_of(function)
+        lines += own
+        for name, value in called.items():
+            if hasattr(value, "apart"):
                 lines.append(f"{name}->{value.apart}")
                 calls[value.apart] = value
                 continue
-            if isinstance(value, types.FunctionType):
-                # Two functions may share a name, so that a number has to tell which is called.
-                lines.append(f"{name}->{visit(value)}")
-                continue
-            try:
-                line = told(value)
-            except Untold as error:
-                if "." in name or any(chain[0] == name for chain in chains(function.__code__)):
-                    raise KernelError(
-                        f"kernel {where(function)} reads the global {name!r}, {error}"
-                    ) from None
-                line = "an attribute of that name is read, not the global"
-            lines.append(f"{name}={line}")
-            read.append(value)
-        return seen[function]
-
-    visit(entry)
-    return Told(lines, list(seen), read, calls)
+            if value not in numbers:
+                numbers[value] = len(functions)
+                functions.append(value)
+            # Two functions may share a name, so that a number has to tell which is called.
+            lines.append(f"{name}->{numbers[value]}")
+    return Told(lines, functions, calls)
 
 
-def fingerprint(entry: Any, fillings: dict[Callable, Callable], options: str = "") -> str:
-    """A hash of everything that the composed function does, and of how it is compiled.
-
-    KernelError, with the kernel's file and line and the name, for what no hash can follow.
-    """
-    from flocsim.compiler.numba_internals import refuse_extensions
-
-    found = tell(entry, fillings)
-    refuse_extensions(found.functions, found.read)
-    return hashed(found.lines, options)
+def unit_name(function: Callable, options: str) -> str:
+    """Return the name of the file of a unit, by what it does up to the units that it calls."""
+    return f"flocsim_unit_{hashed(tell(function).lines, options)}"
 
 
 def hashed(lines: Iterable[str], options: str) -> str:
-    """The hash of what lines tell, and of how it is compiled."""
-    text = "\n".join([compiler_text(), options, *lines])
+    """Return the hash of what lines tell, and of how it is compiled."""
+    text = "\n".join([compilers(), options, *lines])
     return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()
 
 
-@functools.lru_cache(maxsize=4096)
-def instructions(code: types.CodeType) -> tuple[tuple[str, Any, int], ...]:
-    """(name, argument, line) of every instruction of a code and of the codes in it; kept, for
-    disassembly takes longer than a short run."""
-    found = [(each.opname, each.argval, line_of(each, code)) for each in dis.get_instructions(code)]
-    nested = [each for each in code.co_consts if isinstance(each, types.CodeType)]
-    return tuple(found) + sum(map(instructions, nested), ())
+def fingerprint(
+    entry: Callable, fillings: dict[Callable, Callable], options: str = "", linked: Any = None
+) -> str:
+    """Return a hash of everything that a function does with its hooks filled, and of how it is
+    compiled. ``linked``: that function, where it is known.
+
+    KernelError, with the kernel's file and line and the name, for what no hash can follow.
+    """
+    units, pending = {}, {"": linked or Linker(fillings).link(entry)}
+    while pending:
+        name, function = pending.popitem()
+        units[name] = tell(function)
+        pending |= {x: y for x, y in units[name].calls.items() if x not in units}
+    refuse_extensions({each for unit in units.values() for each in unit.functions})
+    return hashed([f"{name}={units[name].lines}" for name in sorted(units)], options)
 
 
-def line_of(instruction, code):
-    """The line of an instruction, or of its code."""
-    line = instruction.positions.lineno if instruction.positions else None
-    return line or code.co_firstlineno
+def refuse_extensions(functions: Iterable[Any]) -> None:
+    """Raise KernelError where numba was taught what these functions use. A function of the user's
+    own is compiled as it stands, whatever numba was taught for it."""
+    if not (extensions := taught()):
+        return
+    names = set().union(*(names_in(each.__code__) for each in functions))
+    for key, function in extensions:
+        what = key if isinstance(key, str) else getattr(key, "__name__", "")
+        is_operator = getattr(operator, what, None) is key and what
+        if not inspect.isfunction(key) and (what in names or is_operator):
+            raise KernelError(
+                f"{where(function)} teaches numba another {what!r}, which the kernels use and no "
+                "hash follows; call a plain function of another name"
+            )
+
+
+def reached_by(entry: Any, fillings: Mapping[Callable, Callable]) -> list[types.FunctionType]:
+    """Return a function and all plain functions that it reaches, its hooks filled."""
+    found: dict[Any, None] = {}
+    pending = [entry]
+    for value in pending:  # grows
+        function = fillings.get(value, value)
+        if function not in found and not is_library(function):
+            found[function] = None
+            called = reads(function).values()
+            pending += [each for each in called if isinstance(each, types.FunctionType)]
+    return list(found)
 
 
 def refuse_interpreter(entry: Any, fillings: Mapping[Callable, Callable] | None = None) -> None:
-    """KernelError where a function, or one that it reaches, calls Python while it runs compiled.
-
-    ``fillings`` {hook: function}: what stands in the place of hooks.
-    """
-    numba = sys.modules.get("numba")  # where it is not loaded, nothing of it can be called
-    forbidden = [print, getattr(numba, OBJECT_MODE, print)]
-    fillings = fillings or {}
-    pending, seen = [entry], set()
-    while pending:
-        function = pending.pop()
-        function = fillings.get(function, function)
-        if function in seen or not isinstance(function, types.FunctionType):
-            continue
-        seen.add(function)
-        pending += [each for each in reached(function).values() if callable(each)]
-        if function.__code__.co_filename.startswith(PACKAGE):
-            continue  # flocsim's own do not, and are many
-        for opname, name, line in instructions(function.__code__):
-            calls = opname in ATTRIBUTE_LOADS and name == OBJECT_MODE
-            if opname in ("LOAD_GLOBAL", "LOAD_NAME"):
-                value = function.__globals__.get(name, getattr(builtins, name, None))
-                calls = any(value is each for each in forbidden)
-            if calls:
+    """Raise KernelError where a function, or one that it reaches, calls ``print``: Python, while it
+    runs compiled. ``fillings`` {hook: function}: what stands in the place of hooks."""
+    for function in reached_by(entry, fillings or {}):
+        for chain, value in reads(function).items():
+            if value is builtins.print:
                 raise KernelError(
-                    f"kernel {where(function)} calls {name} in line {line}: compiled code cannot "
-                    "call Python while it runs; take it out (to look into a kernel, call it from "
-                    "Python)"
+                    f"kernel {where(function)} calls {'.'.join(chain)}: compiled code cannot call "
+                    "Python while it runs; take it out (to look into a kernel, call it from Python)"
                 )
-
-
-def parts_left(instruction):
-    """How many parts an instruction leaves to be returned: 0 for None, 1 for one number that is
-    computed or written there, k for a tuple of k; None where only a call could tell."""
-    if instruction.opname == "BUILD_TUPLE":
-        return instruction.arg
-    if instruction.opname in ("BINARY_OP", "UNARY_NEGATIVE", "COMPARE_OP"):
-        return 1
-    value = instruction.argval
-    if instruction.opname not in ("LOAD_CONST", "RETURN_CONST"):
-        return None
-    if value is None or isinstance(value, tuple):
-        return len(value or ())
-    return 1 if isinstance(value, (int, float)) else None
 
 
 @functools.lru_cache(maxsize=1024)
 def wrong_return(kernel: types.FunctionType, parts: int | None) -> str:
-    """What a kernel returns somewhere in place of ``parts`` numbers (None: any tuple of them), in
-    words; "" where nothing wrong shows."""
-    code, before = kernel.__code__, None
-    for each in dis.get_instructions(code):
-        last = {"RETURN_CONST": each, "RETURN_VALUE": before}.get(each.opname)
-        count = parts_left(last) if last else None
-        place = f"{code.co_filename}:{line_of(each, code)}"
+    """Return what a kernel returns somewhere in place of ``parts`` numbers (None: any tuple of
+    them), in words; "" where nothing wrong shows. Only a call could tell what other calls give."""
+    code = kernel.__code__
+    for before, last in pairwise(dis.get_instructions(code)):
+        if last.opname not in ("RETURN_VALUE", "RETURN_CONST"):
+            continue
+        each, count = before if last.opname == "RETURN_VALUE" else last, None
+        if each.opname in ("LOAD_CONST", "RETURN_CONST"):
+            value = each.argval
+            count = 1 if isinstance(value, (int, float)) else count
+            count = len(value or ()) if value is None or isinstance(value, tuple) else count
+        elif each.opname == "BUILD_TUPLE":
+            count = each.arg
+        elif each.opname in ("BINARY_OP", "UNARY_NEGATIVE", "COMPARE_OP"):
+            count = 1
+        place = f"{code.co_filename}:{last.positions.lineno or code.co_firstlineno}"
         if count == 0:
             return f"returns None on the way that ends in {place}"
         if count is not None and parts is not None and count != parts:
-            what = "one number" if count == 1 else f"{count} numbers"
-            return f"returns {what} in {place}"
-        before = each
+            return f"returns {'one number' if count == 1 else f'{count} numbers'} in {place}"
     return ""
-
-
-def made_in(function: types.FunctionType) -> Iterator[tuple[str, int]]:
-    """(what, line) of every container or array that a function's own code makes."""
-    alone = [((name,), value) for name, value in reached(function).items()]
-    makers = {
-        chain[-1]: ".".join(chain)
-        for chain, value in [*module_reads(function).items(), *alone]
-        if getattr(value, "__name__", "") in ARRAY_MAKERS
-        and (getattr(value, "__module__", None) or "numpy").startswith("numpy")
-    }
-    for opname, argument, line in instructions(function.__code__):
-        if opname in CONTAINERS:
-            yield CONTAINERS[opname], line
-        elif opname.startswith("LOAD") and argument in makers:
-            yield f"an array ({makers[argument]})", line
 
 
 @functools.lru_cache(maxsize=1024)
 def made_by(kernel: Callable) -> str:
-    """ "makes an array (np.zeros) in file:line" of a kernel or of a helper of its; "" where none
-    does. Numpy's functions, which compiled code has in its own way, and Python's are no helpers."""
-    pending, seen = [kernel], set()
-    while pending:
-        function = pending.pop()
-        if not isinstance(function, types.FunctionType) or function in seen:
-            continue
-        seen.add(function)
-        module = sys.modules.get(function.__module__ or "")
-        if module is not None and module.__name__ != "__main__" and is_versioned(module):
-            continue
-        for what, line in made_in(function):
-            return f"makes {what} in {function.__code__.co_filename}:{line}"
-        pending += [*reached(function).values(), *module_reads(function).values()]
+    """Return "makes an array (np.zeros) in file:line" of a kernel or of a helper of its; "" where
+    none does."""
+    for function in reached_by(kernel, {}):
+        file, line = function.__code__.co_filename, function.__code__.co_firstlineno
+        for chain, value in reads(function).items():
+            module = getattr(value, "__module__", None) or "numpy"
+            if chain[-1] in ARRAY_MAKERS.split() and module.startswith("numpy"):
+                return f"makes an array ({'.'.join(chain)}) in {file}:{line}"
+        for code in codes_in(function.__code__):
+            for each in dis.get_instructions(code):
+                if (what := CONTAINERS.get(each.opname)) is not None:
+                    return f"makes {what} in {file}:{each.positions.lineno or line}"
     return ""

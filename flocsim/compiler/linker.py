@@ -7,7 +7,6 @@ import functools
 import inspect
 import os
 import sys
-import sysconfig
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -15,23 +14,23 @@ from typing import Any
 
 from flocsim.errors import KernelError
 
+# Where the files of flocsim's own functions lie.
 PACKAGE = str(Path(__file__).parents[1]) + os.sep
-"""Where the files of flocsim's own functions lie."""
-
-KNOWN_PACKAGES = {"numpy", "numba"}
-"""Packages whose version is part of the hash, as Python's own is."""
 
 ATTRIBUTE_LOADS = ("LOAD_ATTR", "LOAD_METHOD")
 
+MISSING = object()
+
 
 def where(function: Any) -> str:
-    """ "name (file:line)" of a function, for messages."""
+    """Return "name (file:line)" of a function, for messages."""
     code = function.__code__
     return f"{function.__qualname__} ({code.co_filename}:{code.co_firstlineno})"
 
 
 def refuse_closure(function: Any) -> None:
-    """KernelError where the function captures variables."""
+    """Raise KernelError where the function captures variables: numba does not tell two functions
+    apart that differ in those alone."""
     if function.__closure__:
         captured = ", ".join(function.__code__.co_freevars)
         raise KernelError(
@@ -40,38 +39,37 @@ def refuse_closure(function: Any) -> None:
         )
 
 
+def codes_in(code: types.CodeType) -> list[types.CodeType]:
+    """Return the code and all that is nested in it."""
+    nested = filter(inspect.iscode, code.co_consts)
+    return [code, *(each for one in nested for each in codes_in(one))]
+
+
 def names_in(code: types.CodeType) -> set[str]:
-    """Names of globals and attributes that the code reads, those of nested code included."""
-    names = set(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            names |= names_in(constant)
-    return names
+    """Return the names of globals and attributes that the code reads."""
+    return {name for each in codes_in(code) for name in each.co_names}
 
 
-def is_versioned(module: Any) -> bool:
-    """Whether a module is Python's own, numpy's or numba's: its version is part of the hash.
-
-    A file of the user's that has the name of one of Python's modules is the user's.
-    """
+def is_versioned(module: types.ModuleType) -> bool:
+    """Return True for modules of Python, numpy and numba, whose versions are part of the hash; a
+    file of the user's that has the name of one of Python's modules is the user's."""
     root = module.__name__.partition(".")[0]
-    if root in KNOWN_PACKAGES:
+    if root in ("numpy", "numba"):
         return True
-    file = getattr(module, "__file__", None)
-    return root in sys.stdlib_module_names and (file is None or is_in_library(file))
+    file = getattr(module, "__file__", None) or os.__file__
+    of_python = file.startswith(os.path.dirname(os.__file__)) and "-packages" not in file
+    return root in sys.stdlib_module_names and of_python
 
 
-@functools.cache
-def is_in_library(file: str) -> bool:
-    """Whether a file belongs to Python's own library."""
-    folders = [os.path.realpath(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib")]
-    place = os.path.realpath(file)
-    within = any(place.startswith(folder + os.sep) for folder in folders)
-    return within and "site-packages" not in place and "dist-packages" not in place
+def is_library(function: Any) -> bool:
+    """Return True for functions of Python, numpy and numba, which have their own way in compiled
+    code."""
+    module = sys.modules.get(function.__module__ or "")
+    return module is not None and module.__name__ != "__main__" and is_versioned(module)
 
 
 def plain(value: Any) -> Any:
-    """The Python function behind one of @njit, which is compiled anew; anything else as it is."""
+    """Return the Python function behind one of @njit; anything else as it is."""
     if not hasattr(value, "py_func"):
         return value
     from numba.extending import is_jitted
@@ -79,63 +77,48 @@ def plain(value: Any) -> Any:
     return value.py_func if is_jitted(value) else value
 
 
-def reached(function: Any) -> dict[str, Any]:
-    """The globals that a function reads: {name: value}."""
-    known = function.__globals__
-    names = sorted({chain[0] for chain in chains(function.__code__)})
-    return {name: plain(known[name]) for name in names if name in known}
-
-
 @functools.lru_cache(maxsize=4096)
 def chains(code: types.CodeType) -> tuple[tuple[str, ...], ...]:
-    """Every read of a global with the attributes that follow: ``a.b.c`` gives ("a", "b", "c")."""
-    found = []
-    chain: list[str] = []
-    for instruction in dis.get_instructions(code):
-        if instruction.opname == "EXTENDED_ARG":
-            continue
-        if chain and instruction.opname in ATTRIBUTE_LOADS:
-            chain.append(instruction.argval)
-            continue
-        found.append(tuple(chain))
-        chain = [instruction.argval] if instruction.opname == "LOAD_GLOBAL" else []
-    nested = [each for each in code.co_consts if inspect.iscode(each)]
-    return tuple(each for each in found if each) + sum(map(chains, nested), ())
+    """Return each read of a global with the attributes that follow: ("a", "b") of ``a.b``."""
+    found: list[list[str]] = []
+    for each in codes_in(code):
+        follows = False
+        for instruction in dis.get_instructions(each):
+            if instruction.opname == "LOAD_GLOBAL":
+                found.append([instruction.argval])
+                follows = True
+            elif follows and instruction.opname in ATTRIBUTE_LOADS:
+                found[-1].append(instruction.argval)
+            elif instruction.opname != "EXTENDED_ARG":
+                follows = False
+    return tuple(dict.fromkeys(map(tuple, found)))
 
 
-def module_reads(function: Any) -> dict[tuple[str, ...], Any]:
-    """What a function reads of modules: {("module", …, "name"): value}.
+def reads(function: Any) -> dict[tuple[str, ...], Any]:
+    """Return all globals that a function reads: {("name",) or ("module", …, "name"): value}.
 
-    A chain ends at the first value that is no module of the user's. Raises KernelError for one that
-    the module has not, and for a module that is used as a value, since nobody knows then which of
-    its attributes are read.
+    Raises KernelError for what a module lacks, and for a module that is used as a value, since
+    nobody knows then which of its attributes are read.
     """
-    modules = {
-        name: value for name, value in reached(function).items()
-        if isinstance(value, types.ModuleType)
-    }  # fmt: skip
-    found: dict[tuple[str, ...], Any] = {}
-    if not modules:
-        return found
+    known, found = function.__globals__, {}
     for chain in chains(function.__code__):
-        if chain[0] not in modules:
-            continue
-        value: Any = modules[chain[0]]
-        used = 1
+        name, used = chain[0], 1
+        value = known[name] if name in known else getattr(builtins, name, MISSING)
         while isinstance(value, types.ModuleType) and used < len(chain):
-            if not hasattr(value, chain[used]):
+            name, used = value.__name__, used + 1
+            value = getattr(value, chain[used - 1], MISSING)
+            if value is MISSING:
                 raise KernelError(
-                    f"kernel {where(function)} reads {'.'.join(chain[: used + 1])}, but "
-                    f"module {value.__name__} has no attribute {chain[used]}"
+                    f"kernel {where(function)} reads {'.'.join(chain[:used])}, but module {name} "
+                    f"has no attribute {chain[used - 1]}"
                 )
-            value = plain(getattr(value, chain[used]))
-            used += 1
         if isinstance(value, types.ModuleType):
             raise KernelError(
                 f"kernel {where(function)} uses the module {'.'.join(chain[:used])!r} as a value; "
                 "write module.name where a name of it is needed"
             )
-        found[chain[:used]] = value
+        if value is not MISSING:
+            found[chain[:used]] = plain(value)
     return found
 
 
@@ -156,8 +139,9 @@ def loops_apart(function: Callable) -> Callable:
 
 
 def postponed(stand_in: Callable) -> Callable:
-    """Mark a function that few runs reach, and that fills a hook which is compiled apart: until it
-    is reached, ``stand_in`` is called, which tells so (flocsim.state.clock: NOT_COMPILED)."""
+    """Mark a function that few runs reach, and that fills a hook which is compiled apart: until a
+    run reaches it, ``stand_in`` is called, which reports that (flocsim.state.clock:
+    NOT_COMPILED)."""
 
     def mark(function: Callable) -> Callable:
         function.stand_in = stand_in  # type: ignore[attr-defined]
@@ -167,68 +151,47 @@ def postponed(stand_in: Callable) -> Callable:
 
 
 class Linker:
-    """Clones functions, with others in the place of hooks."""
+    """Clones functions, with others in the place of hooks.
+
+    Parameters: ``fillings``, {hook: function}; ``finish(clone)`` compiles or not;
+    ``replace(value)`` returns what stands for a value or a function; None: itself, or its clone.
+    """
 
     def __init__(
         self,
         fillings: dict[Callable, Callable],
-        transform: Callable[[Any], Any] = lambda clone: clone,
-        made: Callable[[Any], Any] = lambda value: value,
-        called: Callable[[Any], Any] | None = None,
+        finish: Callable[[Any], Any] = lambda clone: clone,
+        replace: Callable[[Any], Any] = lambda value: None,
     ) -> None:
-        """``fillings`` {hook: function}; ``transform(clone)`` compiles or not; ``made(value)``:
-        what stands for what is no function; ``called(function)``: what stands for one that is
-        compiled apart and called by another."""
-        self.fillings = fillings
-        self.transform = transform
-        self.made = made
-        self.called = called
+        self.fillings, self.finish, self.replace = fillings, finish, replace
         self.clones: dict[Callable, Any] = {}
 
-    def link(self, function: Callable) -> Any:
-        """The clone of a function, all that it calls linked as well."""
-        filled = self.fillings.get(function, function)
+    def link(self, value: Any) -> Any:
+        """Return the clone of a function, all that it calls linked as well; other values as they
+        are, or replaced."""
+        if not isinstance(value, types.FunctionType) or is_library(value):
+            other = self.replace(value)
+            return value if other is None else other
+        filled = self.fillings.get(value, value)
         if filled not in self.clones:
-            refuse_closure(filled)
-            if self.called and hasattr(filled, "apart"):
-                self.clones[filled] = self.called(filled)
-            else:
-                clone = self.clone(filled)
-                if hasattr(function, "apart"):  # what fills a hook goes by its name
-                    clone.apart = function.apart
-                self.clones[filled] = self.transform(clone)
+            if (other := self.replace(filled)) is None:
+                other = self.clone(filled)
+                if hasattr(value, "apart"):  # what fills a hook goes by its name
+                    other.apart = value.apart
+                other = self.finish(other)
+            self.clones[filled] = other
         return self.clones[filled]
 
-    def first(self, function: Callable) -> Any:
-        """The clone of the function that a unit begins with, though others call it by its name."""
+    def clone(self, function: Any) -> Any:
+        """Return a copy of the function whose globals are its own, linked: what the user's module
+        is given later, or has compiled before, is not seen."""
         refuse_closure(function)
-        return self.transform(self.clone(function))
-
-    def linked_value(self, value):
-        """A function linked, anything else as it is, or as numba is to see it."""
-        return self.link(value) if isinstance(value, types.FunctionType) else self.made(value)
-
-    def put(self, names, chain, value):
-        """Put ``module.name`` among a clone's globals: in a module that has what is read alone.
-
-        What the user's module is given later, or has compiled before, is not seen then.
-        """
-        *modules, name = chain
-        for each in modules:
-            known = names.get(each)
-            if not isinstance(known, types.ModuleType):
-                names[each] = known = types.ModuleType(each)
-            names = vars(known)
-        names[name] = value
-
-    def clone(self, function):
-        """A copy of the function whose globals are its own, linked."""
         linked = {"__builtins__": builtins, "__name__": function.__module__}
-        for name, value in reached(function).items():
-            if not isinstance(value, types.ModuleType) or is_versioned(value):
-                linked[name] = self.linked_value(value)
-        for chain, value in module_reads(function).items():
-            self.put(linked, chain, self.linked_value(value))
+        for (*modules, name), value in reads(function).items():
+            names: dict[str, Any] = linked
+            for each in modules:  # stand-ins for modules, with what is read alone
+                names = vars(names.setdefault(each, types.ModuleType(each)))
+            names[name] = self.link(value)
         copy = types.FunctionType(
             function.__code__, linked, function.__name__, function.__defaults__
         )

@@ -9,316 +9,235 @@ compiled, with all that it alone reaches, when a run first gets there: until the
 its name.
 
 A unit's file is named by a hash of what it does up to the units that it calls, and of the types
-that it is given; it says what these have to return. The engine's, named by a hash of everything,
-lists them all.
+that it is given; it says what these have to return. The first unit's is named by a hash of
+everything that the engine does.
 """
 
 import contextlib
 import functools
 import hashlib
-import json
 import re
 import sys
-import types
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import types_within
-from flocsim.compiler.disk_cache import Called, ObjectCode, link
-from flocsim.compiler.fingerprint import Intrinsic, hashed, tell
+from flocsim.compiler import accelerator, disk_cache
+from flocsim.compiler.fingerprint import Intrinsic, tell, unit_name
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.processor import compiled_for, numba_settings
+from flocsim.compiler.object_code import LENT, Called, ObjectCode, load, object_of
+from flocsim.compiler.processor import compiled_for
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.process import COMPILING, lacking
 
+# Functions of less bytecode [bytes] are always inlined; of the others LLVM decides. Up to 1,200
+# would gain 7 % of throughput for 1.5 times the compile time.
 INLINED_SIZE = 400
-"""Functions of less bytecode [bytes] are always inlined; of the others LLVM decides."""
 
-MADE = re.compile(r"<flocsim_(scene|law|unit)_[0-9a-f]+>$")
-"""Code that is made here, and says nothing to a user."""
+# Seconds after which a line says what is compiled.
+WORTH_SAYING = 3.0
 
+# Nothing is said: in processes of which another one speaks.
+quiet = False
 
-def run_of(module, entry, **readers):
-    """The function of a module that numba compiles, and keeps: ``run``, which calls the ``driver``
-    of its globals with the same arguments, or with those that ``readers`` find in a table by its
-    address (by_pointer)."""
-    names = argument_names(entry)
-    taken = "address" if readers else ", ".join(names)
-    handed = ", ".join(f"read_{name}(address)" if readers else name for name in names)
-    source = (
-        f'"""Made by flocsim from {entry.__module__}.{entry.__qualname__}."""\n\n\n'
-        f"def run({taken}):\n    return driver({handed})\n"
-    )
-    known = vars(module) | {f"read_{name}": each for name, each in readers.items()}
-    exec(compile(source, f"<{module.__name__}>", "exec"), known)
-    return known["run"]
+_one_at_a_time = threading.RLock()
 
 
-def argument_names(function):
-    """The names of a function's arguments."""
+def argument_names(function: Any) -> tuple[str, ...]:
+    """Return the names of a function's arguments."""
     return function.__code__.co_varnames[: function.__code__.co_argcount]
-
-
-class Code:
-    """A linked entry and how it is compiled: as module ``name``; ``what`` it is in words;
-    ``allocates``, whether it makes arrays for itself."""
-
-    def __init__(self, entry, name, allocates=False, what="its kernels"):
-        self.entry, self.name, self.allocates, self.what = entry, name, allocates, what
-        if numba_settings()["DISABLE_JIT"] != "0":
-            raise KernelError(
-                "NUMBA_DISABLE_JIT is set, so that numba compiles nothing, and flocsim runs "
-                "compiled code only: unset it (in Python, jit=False runs a scene uncompiled)"
-            )
-
-    def loaded(self, told, typed, whole=False):
-        """(address of its machine code, what it returns), from the disk or compiled, ``whole`` or
-        without what is postponed; ``told`` tells all that ``typed()`` follows from: the signature,
-        the readers of arguments (see run_of) and {words: numba type} of what is in them."""
-        begun = key_of(told, self.entry)
-        key = f"whole {begun}" if whole else begun
-        if (data := disk_cache.read(self.name, key)) is not None:
-            # What fails was written by this code, and yet is of no use: it is compiled anew.
-            with contextlib.suppress(Exception):
-                head, packed = data.split(b"\n", 1)
-                code = ObjectCode.unpacked(packed)
-                units = {
-                    symbol: ObjectCode.unpacked(disk_cache.read(*file) or b"")
-                    for symbol, file in json.loads(head).items()
-                }
-                return link(code, units), code.returned
-        build = Build(self, whole)
-        code = build.entry(*typed(), disk_cache.read(self.name, begun) if whole else None)
-        if build.lasts:
-            head = json.dumps(build.files).encode()
-            disk_cache.write(self.name, key, head + b"\n" + code.packed())
-        return link(code, build.units), code.returned
-
-
-def key_of(told, function):
-    """What the machine code of a function depends on beside the name: types, processor."""
-    return repr((told, compiled_for(hasattr(function, "loops"))))
-
-
-class Build:
-    """An engine while it is compiled, unit after unit: ``units`` {symbol: ObjectCode} and ``files``
-    {symbol: (name, key)} on the disk; ``lasts``: whether another process can use all of them;
-    ``known`` {words: numba type} of arguments. Functions of several units are lowered once.
-    ``whole``: with what is postponed."""
-
-    def __init__(self, code, whole=False):
-        from flocsim.compiler import numba_internals as internals
-
-        self.code, self.whole = code, whole
-        # Without the interpreter's lock, dividing by zero as numpy does.
-        self.options = {"nogil": True, "error_model": "numpy", **internals.UNWRAPPED}
-        self.options |= {} if code.allocates else internals.NO_COUNTING
-        self.for_inner, self.for_entry, self.for_loops = internals.compilers()
-        by_units = self.for_entry and not code.allocates
-        self.linker = Linker({}, self.inner, made, self.called if by_units else None)
-        self.units: dict[str, ObjectCode] = {}
-        self.files: dict[str, tuple[str, str]] = {}
-        self.calls: dict[str, Called] = {}
-        self.lasts = True
-        self.known: dict[str, Any] = {}
-        self.parts: list[Any] = []
-
-    def entry(self, signature, readers, known, begun=None):
-        """The ObjectCode of the first unit, all others made or found; KernelError where one cannot
-        be compiled. ``begun``: of the engine without what is postponed, as the disk has it."""
-        from numba import NumbaError
-
-        from flocsim.compiler import numba_internals as internals
-
-        if text := lacking(COMPILING, "compiling"):
-            raise FlocsimError(text)  # LLVM ends the process where it gets no memory
-        code = self.code
-        try:
-            missing = to_compile(code.entry, self.whole)
-            what = f"the rest of {code.what}" if self.whole else code.what
-            with compiling(what, missing), internals.quick_typing():
-                self.known |= known
-                found = self.completed(code.entry, begun.split(b"\n", 1)[1]) if begun else None
-                return found or self.compiled(code.entry, code.name, signature, readers)
-        except NumbaError as error:
-            raise KernelError(compiler_complaint(str(error))) from None
-        finally:
-            internals.forget(self.parts)
-
-    def inner(self, clone):
-        """What numba is to compile of a function, and to put into those that call it."""
-        import numba
-
-        from flocsim.compiler import numba_internals as internals
-
-        clone.__module__ = self.code.name
-        clone.__qualname__ = f"{clone.__qualname__}_{len(self.parts)}"
-        small = len(clone.__code__.co_code) < INLINED_SIZE
-        found = numba.njit(clone, **self.options, **self.for_inner, forceinline=small)
-        self.parts.append(internals.typed_once(found))
-        return self.parts[-1]
-
-    def called(self, function):
-        """What calls a function that is compiled apart."""
-        from flocsim.compiler import numba_internals as internals
-
-        def unit_for(given):
-            symbol, unit = self.unit(function, given)
-            types = list(map(str, given))
-            self.calls[symbol] = Called(symbol, function.apart, types, unit.returned)
-            return symbol, unit.returned
-
-        return internals.call_of_unit(argument_names(function), unit_for)
-
-    def compiled(self, entry, name, signature, readers):
-        """The ObjectCode of the unit that begins with a function."""
-        from flocsim.compiler import numba_internals as internals
-
-        module = types.ModuleType(name)
-        sys.modules[name] = module  # where numba looks for its name
-        try:
-            run = run_of(module, entry, **readers)
-            run.__globals__["driver"] = self.linker.first(entry)
-            kind = self.for_loops if hasattr(entry, "loops") else self.for_entry
-            options = {**self.options, **kind}
-            code, missing, lasts = internals.object_code(run, signature, options)
-        finally:
-            del sys.modules[name]
-        self.lasts &= lasts
-        return code._replace(
-            calls=tuple(self.calls[each] for each in missing if each in self.calls)
-        )
-
-    def unit(self, function, given):
-        """(symbol, ObjectCode) of a function marked @apart for arguments of such numba types."""
-        self.known |= types_within(given)
-        told = list(map(str, given))
-        words = " ".join([function.apart, *told])
-        symbol = f"flocsim_{hashlib.blake2b(words.encode(), digest_size=12).hexdigest()}"
-        function = made_of(function, self.whole)
-        if symbol not in self.units:
-            name, key = unit_of(function).name, key_of(told, function)
-            data = disk_cache.read(name, key)
-            code = self.completed(function, data) if data else None
-            if code is None:
-                code = self.compiled(function, name, given, {})
-                if self.lasts:
-                    disk_cache.write(name, key, code.packed())
-            self.units[symbol], self.files[symbol] = code, (name, key)
-        return symbol, self.units[symbol]
-
-    def completed(self, function, data):
-        """The ObjectCode of a unit as the disk has it, if what it calls returns what it expects;
-        of that, what is not on the disk is compiled."""
-        code, calls = ObjectCode.unpacked(data), unit_of(function).calls
-        for each in code.calls:
-            if not self.known.keys() >= set(each.types):
-                return None
-            given = tuple(self.known[words] for words in each.types)
-            if self.unit(calls[each.function], given)[1].returned != each.returned:
-                return None
-        return code
-
-
-SECONDS_OF_A_FUNCTION = 0.035
-"""Seconds that one function of an engine takes (benchmarks/speed/compile_times.py): of some 400."""
-
-WORTH_SAYING = 2.0
-"""Seconds below which nothing is said: the laws of a scene and the parts of a fit take less."""
-
-
-@contextlib.contextmanager
-def one_line(text: str) -> Iterator[None]:
-    """A line on stderr: how a library waits. A command puts another in its place."""
-    print(f"flocsim: {text}", file=sys.stderr, flush=True)
-    yield
-
-
-silent = contextlib.nullcontext
-"""Nothing is said: for processes of which another one speaks."""
-
-shown: Callable[[str], Any] = one_line
-"""How the line is shown: a context that lasts as long as the compiler works."""
-
-
-def show_by(way: Callable[[str], Any]) -> None:
-    """From now on show the line in this way."""
-    global shown
-    shown = way
-
-
-def compiling(what: str, functions: int) -> Any:
-    """A context in which so many functions are compiled; ``what`` they are, together."""
-    seconds = SECONDS_OF_A_FUNCTION * functions
-    if seconds < WORTH_SAYING:
-        return contextlib.nullcontext()
-    about = max(5, 5 * round(seconds / 5))
-    return shown(f"first run: compiling {what}, about {about} s, once")
-
-
-class Unit(NamedTuple):
-    """The ``name`` of a unit's file, by what it does up to the units that it ``calls`` {name:
-    function}; its ``functions``."""
-
-    name: str
-    calls: dict[str, Callable]
-    functions: list[Callable]
-
-
-@functools.lru_cache(maxsize=4096)
-def unit_of(function: Callable) -> Unit:
-    """The Unit that begins with a function."""
-    found = tell(function, {}, within=True)
-    name = f"flocsim_unit_{hashed(found.lines, options_text(False))}"
-    return Unit(name, found.calls, found.functions)
-
-
-def made_of(function, whole):
-    """What is compiled of a function: its stand-in, where that is all that is asked for."""
-    return function if whole else getattr(function, "stand_in", function)
-
-
-def to_compile(entry, whole=False):
-    """How many functions there are in an engine's units that are not on the disk; that of the entry
-    is, where ``whole`` is what follows."""
-    units, more = {entry}, [entry]
-    for each in more:  # grows
-        new = {made_of(called, whole) for called in unit_of(each).calls.values()} - units
-        units |= new
-        more += new
-    found = [unit_of(each) for each in units if each is not entry]
-    missing = [unit for unit in found if not disk_cache.has(unit.name)]
-    missing += [] if whole else [unit_of(entry)]
-    return len(set().union(*(unit.functions for unit in missing)))
-
-
-def made(value):
-    """What numba is to see in the place of a value."""
-    return value.make() if isinstance(value, Intrinsic) else value
-
-
-def compiler_complaint(text):
-    """ "file:line: what is wrong" from numba's many lines: the innermost place of a kernel."""
-    words, complaint = "", ""
-    for line in text.splitlines():
-        found = re.match(r'\s*File "(.+)", line (\d+)', line)
-        if found and not (MADE.search(found[1]) or words.startswith("During:")):
-            complaint = f"{found[1]}:{found[2]}: {words}"
-        elif line.strip():
-            words = line.strip()
-    complaint = complaint or text.strip().splitlines()[0]
-    return f"a kernel cannot be compiled: {complaint[:300]}; use plain arithmetic on scalars"
 
 
 @functools.cache
 def options_text(allocates: bool) -> str:
-    """How functions are compiled, for the hash: options, and the code that says how."""
-    from flocsim.compiler import by_pointer, numba_internals
+    """Return how functions are compiled, for the hash: the code that says how."""
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    digest = hashlib.blake2b(b"".join(each.read_bytes() for each in files), digest_size=8)
+    return f"{allocates} {digest.hexdigest()}"
 
-    source = b"".join(
-        Path(str(each.__file__)).read_bytes() for each in (by_pointer, numba_internals)
-    )
-    digest = hashlib.blake2b(source, digest_size=8).hexdigest()
-    return f"{INLINED_SIZE} {allocates} {digest}"
+
+class Engine:
+    """A linked function with all units that it calls, found on the disk or compiled.
+
+    Parameters: ``entry``, the function, in the file called ``name``; ``words``, which tell the
+    types of its arguments; ``typed()`` returns these: numba types, those of the words of a table at
+    an address, or of others where ``readers`` {argument: function of an address} is {}.
+    ``allocates``: it makes arrays for itself. ``whole``: with what is postponed. ``what`` it is,
+    for who waits. ``returns``: the letters (struct) of its answer, else as numba infers them.
+    """
+
+    def __init__(
+        self,
+        entry: Callable,
+        name: str,
+        words: str,
+        typed: Callable[[], tuple[tuple[Any, ...], dict[str, Any], dict[str, Any]]],
+        allocates: bool = False,
+        whole: bool = False,
+        what: str = "its kernels",
+        returns: str | None = None,
+    ) -> None:
+        self.entry, self.name, self.words, self.typed = entry, name, words, typed
+        self.allocates, self.whole, self.what, self.returns = allocates, whole, what, returns
+        self.options = options_text(allocates)
+        self.linker = Linker({}, self.inner, self.replace)
+        self.units: dict[str, ObjectCode] = {}
+        self.addresses: dict[str, int] = {}
+        self.calls: dict[str, Called] = {}
+        self.parts: list[Any] = []
+        self.known: dict[str, Any] = {}
+
+    def load(self) -> tuple[int, str]:
+        """Return the address of the machine code, and the letters (struct) of its answer."""
+        with _one_at_a_time, contextlib.ExitStack() as self.stack:
+            symbol, code = self.unit(self.entry, (self.words,))
+        assert code is not None
+        return self.link(symbol), code.returned
+
+    def link(self, symbol: str) -> int:
+        """Return the address of a unit, loaded after those that it calls."""
+        if symbol not in self.addresses:
+            code = self.units[symbol]
+            called = {each.symbol: self.link(each.symbol) for each in code.calls}
+            self.addresses[symbol] = load(code, called)
+        return self.addresses[symbol]
+
+    def unit(
+        self, function: Callable, words: tuple[str, ...], given: Any = None
+    ) -> tuple[str, ObjectCode | None]:
+        """Return the symbol and the code of a unit for arguments of types of such names; None where
+        it has to be compiled, and the types are not known."""
+        name = getattr(function, "apart", "")
+        symbol = f"flocsim_{hashlib.blake2b(repr((name, words)).encode()).hexdigest()[:24]}"
+        if symbol in self.units:
+            return symbol, self.units[symbol]
+        made = function if self.whole else getattr(function, "stand_in", function)
+        file_name = self.name if function is self.entry else unit_name(made, self.options)
+        file = file_name, repr((words, compiled_for(hasattr(made, "loops"))))
+        code = self.from_disk(made, *file)
+        if code is None:
+            if function is not self.entry and given is None:
+                self.known = self.known or self.typed()[2]
+                if not self.known.keys() >= set(words):
+                    return symbol, None
+                given = [self.known[each] for each in words]
+            code = self.compiled(made, given)
+            disk_cache.write(*file, code.packed())
+        self.units[symbol] = code
+        return symbol, code
+
+    def from_disk(self, function: Callable, name: str, key: str) -> ObjectCode | None:
+        """Return a unit as the disk has it, if what it calls returns what it expects."""
+        if (data := disk_cache.read(name, key)) is None:
+            return None
+        code = ObjectCode.unpacked(data)
+        for each in code.calls:
+            _, found = self.unit(tell(function).calls[each.function], each.types)
+            if found is None or found.returned != each.returned:
+                return None
+        return code
+
+    def compiled(self, function: Callable, given: Any) -> ObjectCode:
+        """Return the code of a unit, compiled."""
+        if not self.parts:
+            self.begin()
+        import numba
+
+        from flocsim.compiler.table_types import answer_to, letters_of, types_within
+
+        readers: dict[str, Any] = {}
+        if function is self.entry:
+            given, readers, within = self.typed()
+            self.known |= within
+        self.known |= types_within(given)
+        names = argument_names(function)
+        taken = "address" if readers else ", ".join(names)
+        handed = ", ".join(f"read_{name}(address)" if readers else name for name in names)
+        returned: list[Any] = []
+        driver = self.inner(self.linker.clone(function))
+        put = answer_to(returned.append, self.returns if function is self.entry else None)
+        known = {f"read_{name}": each for name, each in readers.items()}
+        known |= {"driver": driver, "put": put}
+        exec(
+            f"def run(answer, {taken}):\n    try:\n        put(answer, driver({handed}))\n"
+            "    except Exception:\n        return 1\n    return 0\n",
+            known,
+        )
+        options = accelerator.options(True, self.allocates)
+        kind = numba.types.int64(numba.types.int64, *given)
+        try:
+            made = numba.cfunc(kind, error_model="numpy", **options)(known["run"])
+        except numba.errors.NumbaError as error:
+            raise KernelError(compiler_complaint(str(error))) from None
+        letters = letters_of(returned[-1])
+        if letters is None:
+            raise KernelError(f"a compiled function returns {returned[-1]}: let it return numbers")
+        entry, loops = made.native_name, hasattr(function, "loops")
+        code, missing = object_of(made.inspect_llvm(), entry, loops)
+        calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
+        return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in missing), calls)
+
+    def begin(self) -> None:
+        """Prepare for compiling, until all units are there."""
+        if text := lacking(COMPILING, "compiling"):
+            raise FlocsimError(text)  # LLVM ends the process where it gets no memory
+        import numba  # noqa: F401  (takes its time, before that is counted)
+
+        self.stack.enter_context(announced(self.what))
+        self.stack.enter_context(accelerator.quick_typing())
+        self.stack.callback(accelerator.forget, self.parts)
+
+    def inner(self, clone: Any) -> Any:
+        """Return what numba is to compile of a function, and to put into those that call it."""
+        import numba
+
+        small = len(clone.__code__.co_code) < INLINED_SIZE
+        options = accelerator.options(False, self.allocates)
+        # Dividing by zero gives what it does in numpy.
+        made = numba.njit(clone, error_model="numpy", forceinline=small, **options)
+        self.parts.append(accelerator.inner(made))
+        return made
+
+    def replace(self, value: Any) -> Any:
+        """Return what numba is to see in the place of an intrinsic, or of a function that is
+        compiled apart; None for others."""
+        if isinstance(value, Intrinsic):
+            return self.inner(value.make())
+        if not hasattr(value, "apart") or self.allocates or not accelerator.by_units():
+            return None
+        from flocsim.compiler.table_types import call_of
+
+        def target(given):
+            words = tuple(map(str, given))
+            symbol, code = self.unit(value, words, given)
+            self.calls[symbol] = Called(symbol, value.apart, words, code.returned)
+            return symbol, code.returned
+
+        return self.inner(call_of(argument_names(value), target))
+
+
+@contextlib.contextmanager
+def announced(what: str) -> Iterator[None]:
+    """Say on stderr what is compiled inside, if it takes more than a moment; nothing of ""."""
+    text = f"flocsim: first run: compiling {what}, once (up to a minute)"
+    timer = threading.Timer(WORTH_SAYING, print, [text], {"file": sys.stderr, "flush": True})
+    timer.daemon = True
+    if what and not quiet:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def compiler_complaint(text: str) -> str:
+    """Return "file:line: what is wrong" from numba's many lines: the innermost place of a
+    kernel."""
+    # Without colours; errors inside of others are quoted.
+    text = re.sub(r"(\x1b|\\x1b)\[[0-9;]*m", "", text).replace("\\n", "\n")
+    lines = [each.strip() for each in text.splitlines() if each.strip()]
+    words = next((each for each in lines if not each.startswith("Failed in nopython")), lines[0])
+    place = re.search(r"During: .* at ([^<\n].*) \((\d+)\)", text)
+    where = f"{place[1]}:{place[2]}: " if place else ""
+    return f"a kernel cannot be compiled: {where}{words[:300]}; use plain arithmetic on scalars"

@@ -225,7 +225,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.parent is None and not arguments.dry_run:  # a parent says how it goes on
         INTERRUPTION.command = continuing(ranks)
     if arguments.quiet:
-        units.show_by(units.silent)
+        units.quiet = True
     return guarded(comm, arguments)
 
 

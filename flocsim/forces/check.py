@@ -16,8 +16,8 @@ import attrs
 import numpy as np
 
 from flocsim.body import Fluid
-from flocsim.compiler.fingerprint import globals_read, made_by, tell, wrong_return
-from flocsim.compiler.linker import names_in, refuse_closure, where
+from flocsim.compiler.fingerprint import made_by, tell, wrong_return
+from flocsim.compiler.linker import names_in, reads, refuse_closure, where
 from flocsim.errors import KernelError, closest
 from flocsim.forces.base import BodyForce, ContactForce, Force, PairForce
 from flocsim.state.views import BodyView, ContactView, OrientedView, OutlineView, PairView
@@ -106,7 +106,7 @@ def require_plain(force, kernel):
 def unhashable_reason(kernel):
     """Return why the inputs of a kernel cannot be hashed (stale caches); "" if they can."""
     try:
-        tell(kernel, {})
+        tell(kernel)
     except KernelError as error:
         return str(error)
     return ""
@@ -274,7 +274,7 @@ def fields_read(force: Force, fluid: Fluid, kernel: Callable) -> set[str]:
         function = pending.pop()
         known.add(function)
         names |= names_in(function.__code__)
-        called = [value for _, value in globals_read(function) if inspect.isfunction(value)]
+        called = [value for value in reads(function).values() if inspect.isfunction(value)]
         pending += [each for each in called if each not in known]
     watched = [RecordingView(view) for view in samples_of(force)]
     for _ in results(force, kernel, watched, kernel_arguments(force, fluid, kernel)):

@@ -81,7 +81,7 @@ def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> st
 
 def plain_warnings(silent: bool = False) -> None:
     """Show warnings, and what is compiled, as one line on stderr from now on, or not at all."""
-    units.show_by(units.silent if silent else units.one_line)
+    units.quiet = silent
 
     def show(message, category, filename, lineno, file=None, line=None):
         if not silent:

@@ -6,6 +6,7 @@ import pytest
 from flocsim.compiler import composer, disk_cache, units
 from flocsim.compiler.composer import compose
 from flocsim.compiler.linker import apart, postponed
+from flocsim.errors import KernelError
 
 
 @apart
@@ -76,14 +77,14 @@ def made(monkeypatch, tmp_path):
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
     monkeypatch.setattr(composer, "_composed", {})
     names = []
-    real = units.Build.compiled
+    real = units.Engine.compiled
 
     def compiled(self, entry, *more):
         code = real(self, entry, *more)
         names.append(entry.__name__)
         return code
 
-    monkeypatch.setattr(units.Build, "compiled", compiled)
+    monkeypatch.setattr(units.Engine, "compiled", compiled)
     return names
 
 
@@ -156,10 +157,10 @@ def test_a_unit_that_is_missing_or_damaged_is_compiled_anew(
     assert len(made) == count
 
 
-def test_what_a_unit_raises_comes_through(made):
+def test_what_a_unit_raises_ends_what_calls_it(made):
     driver = compose(drive_checked, {})
     assert (driver(2.0), driver(0.5)) == (2.0, -0.5)
-    with pytest.raises(ValueError, match="below zero"):
+    with pytest.raises(KernelError, match="a kernel has raised an exception"):
         driver(-1.0)
 
 

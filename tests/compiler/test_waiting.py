@@ -1,54 +1,37 @@
 """What is said while something is compiled."""
 
+import time
+
 import pytest
 
 from flocsim.compiler import units
-from flocsim.compiler.composer import compose
 from flocsim.io import terminal
 
 
-def halved(x):
-    return 0.5 * x
-
-
-def doubled(x):
-    return 2.0 * halved(4.0 * x)
-
-
 @pytest.fixture
-def cold(tmp_path, monkeypatch):
-    """Nothing is compiled yet, and all compiling is worth a line."""
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("flocsim.compiler.composer._composed", {})
+def speaking(monkeypatch):
+    """All compiling is worth a line; what is said is not changed for other tests."""
     monkeypatch.setattr(units, "WORTH_SAYING", 0.0)
-    monkeypatch.setattr(units, "shown", units.one_line)
+    monkeypatch.setattr(units, "quiet", False)
 
 
-def test_the_first_run_says_what_is_compiled_and_the_next_nothing(cold, capsys, monkeypatch):
-    assert compose(doubled, {}, what="a product")(1.5) == 6.0
-    assert capsys.readouterr() == ("", "flocsim: first run: compiling a product, about 5 s, once\n")
-    monkeypatch.setattr("flocsim.compiler.composer._composed", {})
-    assert compose(doubled, {}, what="a product")(1.5) == 6.0
-    assert capsys.readouterr() == ("", "")
+def said(capsys):
+    """Return what is said of half a second of compiling."""
+    with units.announced("a product"):
+        time.sleep(0.5)
+    return capsys.readouterr().err
 
 
-@pytest.mark.parametrize("functions, seconds", [(60, 5), (215, 10), (430, 15), (600, 20)])
-def test_the_time_grows_with_the_number_of_functions(cold, capsys, functions, seconds):
-    with units.compiling("it", functions):
-        pass
-    assert f"about {seconds} s" in capsys.readouterr().err
+def test_what_is_compiled_is_said_once(speaking, capsys):
+    assert said(capsys) == "flocsim: first run: compiling a product, once (up to a minute)\n"
 
 
-def test_short_work_is_not_worth_a_line(capsys, monkeypatch):
-    monkeypatch.setattr(units, "WORTH_SAYING", 2.0)
-    with units.compiling("it", 40):
-        pass
-    assert capsys.readouterr() == ("", "")
+def test_short_work_is_not_worth_a_line(speaking, capsys, monkeypatch):
+    monkeypatch.setattr(units, "WORTH_SAYING", 60.0)
+    assert said(capsys) == ""
 
 
-def test_quiet_commands_and_other_ranks_say_nothing(cold, capsys):
-    for silent, said in ((True, 0), (False, 1)):
+def test_quiet_commands_and_other_ranks_say_nothing(speaking, capsys):
+    for silent, lines in ((True, 0), (False, 1)):
         terminal.plain_warnings(silent)
-        with units.compiling("it", 100):
-            pass
-        assert capsys.readouterr().err.count("\n") == said
+        assert said(capsys).count("\n") == lines

@@ -1,0 +1,135 @@
+"""Machine code as an object file: made of what numba compiles, loaded by LLVM alone.
+
+Loading numba, and all that it registers, takes longer than a short run; a function that allocates
+nothing needs no more of it than an object file and the name of its entry.
+
+A compiled function is called as a C function that is given the address at which its answer goes,
+then its arguments; it returns 0, or 1 where it has raised an exception.
+"""
+
+import ctypes
+import hashlib
+import json
+import struct
+import threading
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from flocsim.compiler.processor import target
+from flocsim.errors import KernelError
+
+# How names begin of what numba lends to compiled code, once it is loaded itself.
+LENT = "numba_", "NRT_", "Py", "_Py", "__svml"
+
+_lock = threading.Lock()
+_engines: list[Any] = []
+_loaded: dict[tuple[Any, ...], int] = {}
+
+
+class Called(NamedTuple):
+    """A unit that another one calls: its ``symbol``, the name of its ``function``, the ``types`` of
+    its arguments as text, and the letters (struct) of what it is to have ``returned``."""
+
+    symbol: str
+    function: str
+    types: tuple[str, ...]
+    returned: str
+
+
+class ObjectCode(NamedTuple):
+    """``code``, an object file; ``entry``, its symbol; ``returned``, the letters (struct) of its
+    answer; ``borrows``, whether it calls what only numba has; the units that it ``calls``."""
+
+    code: bytes
+    entry: str
+    returned: str
+    borrows: bool
+    calls: tuple[Called, ...] = ()
+
+    def packed(self) -> bytes:
+        """Return it as bytes."""
+        return json.dumps(self[1:]).encode() + b"\n" + self.code
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> "ObjectCode":
+        """Return what was packed."""
+        head, code = data.split(b"\n", 1)
+        *more, calls = json.loads(head)
+        called = (Called(symbol, name, tuple(types), was) for symbol, name, types, was in calls)
+        return cls(code, *more, tuple(called))
+
+
+def compiler(machine: Any) -> Any:
+    """Return LLVM's context of a process, ready to make and load object files."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(**machine)
+
+
+def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
+    """Return the object file of a module of LLVM, optimised, and the symbols that it lacks;
+    ``loops``: it takes several turns of a loop at once."""
+    import llvmlite.binding as llvm
+
+    cpu, features = target(loops)
+    machine = compiler({
+        "cpu": cpu, "features": features, "opt": 3, "reloc": "static", "codemodel": "jitdefault",
+        "jit": True,
+    })  # fmt: skip
+    module = llvm.parse_assembly(text)
+    # Nothing but the entry is called from outside: LLVM may do what it likes with the others, as
+    # with a C program of one file.
+    for each in module.functions:
+        if not each.is_declaration and each.name != entry:
+            each.linkage = "internal"
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = loops
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return machine.emit_object(module), {x.name for x in module.functions if x.is_declaration}
+
+
+def load(code: ObjectCode, called: Mapping[str, int]) -> int:
+    """Return the address of an entry; ``called`` {symbol: address} of the units that it calls. The
+    code stays as long as the process lives, and is loaded once."""
+    import llvmlite.binding as llvm
+
+    key = hashlib.blake2b(code.code, digest_size=16).digest(), *called.items()
+    if code.borrows and key not in _loaded:
+        import numba
+
+        numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
+    with _lock:
+        if key in _loaded:
+            return _loaded[key]
+        machine = compiler({})
+        # For the process as a whole, and yet for this file: those before are linked already.
+        for symbol, address in called.items():
+            llvm.add_symbol(symbol, address)
+        # One of its own: symbols of two object files may have the same names.
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code.code))
+        engine.finalize_object()
+        _engines.append(engine)
+        _loaded[key] = engine.get_function_address(code.entry)
+        return _loaded[key]
+
+
+def function_at(entry: int, returned: str) -> Callable[[int], Any]:
+    """Return the entry at an address as a function of an address, which runs without the
+    interpreter's lock; ``returned`` as in ObjectCode."""
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)(entry)
+    layout = struct.Struct(f"@{returned}")
+
+    def function(address):
+        answer = ctypes.create_string_buffer(layout.size or 8)
+        if call(ctypes.addressof(answer), address):
+            raise KernelError(
+                "a kernel has raised an exception (run uncompiled, with jit=False, it says which)"
+            )
+        numbers = layout.unpack_from(answer)
+        return numbers if len(numbers) > 1 else next(iter(numbers), None)
+
+    return function
