@@ -46,3 +46,6 @@ LARGEST_BIAS = 0.03
 SHALLOWEST_TOUCH = 1e-12
 """[m], a hundredth of an atom: bodies that graze each other less deeply do not touch. Scenes that
 graze by construction (δ = δ_max) would otherwise hang on the rounding of their numbers."""
+
+TINY = 1e-300
+"""Takes the place of a divisor that is zero, so that a quotient stays finite."""

@@ -15,6 +15,7 @@ from flocsim.integrators.rhs.forces import adopt_stage, locate_with_slip_rates, 
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, STEP_ERROR
 
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
@@ -70,7 +71,7 @@ def combine_slips(scene, work, weights, stages, step, end):
     """Write the tangential displacements of closed contacts, by the weighted rates, to state
     ``end``."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             total = 0.0
             for stage in range(stages):
                 total += weights[stage] * work.slip_rate[state_of(stage), row]

@@ -21,6 +21,7 @@ from flocsim.integrators.rhs.friction import limit_slips
 from flocsim.integrators.rhs.jacobian import weigh_velocities
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, tangential_rate
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 
 __all__ = [
@@ -106,7 +107,7 @@ def move_slips(scene, work, step):
     for row in range(work.tally.candidates):
         # An open contact has no displacement.
         slip[NEW, row] = 0.0
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             rate = tangential_rate(work, NEW, row)
             if work.geometry[NOW, row].gap < 0.0:
                 rate = 0.5 * (rate + tangential_rate(work, NOW, row))

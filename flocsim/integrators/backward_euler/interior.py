@@ -51,6 +51,7 @@ from flocsim.integrators.backward_euler.contact_mean import (
 )
 from flocsim.integrators.rhs.jacobian import add_geometric_stiffness, normal_rows, tangent_rows
 from flocsim.integrators.rhs.views import add_pair_force, tangential_rate, view_without_slip
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import CHANGE, NOW, TRIAL
 
 BOUNDARY_FRACTION = 0.99
@@ -73,7 +74,7 @@ DECIDED_RATIO = 0.01
 
 def is_included(work, row):
     # Pairs marked by flag_close take part in the iteration.
-    return work.candidates[row].contact_mode == 1
+    return work.candidates[row].contact_mode == CLOSED
 
 
 def relative_rate(work, row, kind, entries):

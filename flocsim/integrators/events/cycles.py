@@ -15,6 +15,7 @@ at its end scatter for the same reason; if they do no more than that, they are l
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.grazes import chatters, touched_recently
@@ -56,9 +57,6 @@ RELATIVE_ANGLE, PAIR_MOTION = 2, 9
 y)."""
 
 COORDINATES = 12
-
-TINY = 1e-300
-"""Keeps a quotient finite."""
 
 
 def mass_fraction_of_second(scene):

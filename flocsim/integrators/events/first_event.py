@@ -86,7 +86,7 @@ def first_kink_share(scene, work, share):
     """Return the fraction of the step at which the first contact passes a kink, at most
     ``share``."""
     for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             for which in range(scene.events):
                 share = min(share, kink_share(scene, work, row, which))
     return share
@@ -99,7 +99,7 @@ def first_slip_share(scene, work, share, step, resolution):
     A violation of less than ``resolution`` [m] at the end of the step does not count.
     """
     for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             distance, share_there = slip_transition(scene, work, row, step)
             if distance > resolution:
                 share = min(share, share_there)

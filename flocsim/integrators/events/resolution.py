@@ -6,6 +6,7 @@ damping until g past its end is wrong by that force's acceleration times g/speed
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.integrators.rhs.stated_error import normal_force_at, secant_stiffness
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
@@ -30,9 +31,6 @@ NEARLY = 0.99
 COARSEST_ROUNDING = 2e-15
 """Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
 numbers."""
-
-TINY = 1e-300
-"""Keeps a quotient finite."""
 
 
 def bounces(scene, view, speed, frequency):

@@ -17,6 +17,7 @@ Source: Hochbruck & Ostermann, Acta Numerica 19 (2010), section 2.3.
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import TINY
 from flocsim.integrators.exponential.series import (
     MAX_STIFFNESS,
     add_change,
@@ -86,9 +87,6 @@ one direction."""
 
 MIN_ALIGNMENT = 0.1
 """Least |R · Δx| over the sum of the absolute products. Below it the step does not move along R."""
-
-TINY = 1e-300
-"""Replaces an inertia of zero [kg or kg m²]."""
 
 
 def extrapolate_remainder(work, clock, step, known):

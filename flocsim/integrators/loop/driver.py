@@ -111,7 +111,7 @@ def adopt_new_state(work):
     for row in range(work.tally.candidates):
         work.geometry[NOW, row] = work.geometry[NEW, row]
         # Open pairs have no displacement; grazing ones keep that with which they parted.
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             work.slip[NOW, row] = work.slip[NEW, row]
 
 

@@ -11,6 +11,7 @@ closed instead, since the forces are new.
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
 from flocsim.hooks import first_step, next_step
 from flocsim.integrators.events.first_event import (
@@ -81,9 +82,6 @@ switches closer together than that count as simultaneous."""
 
 RESOLVED = 0.02
 """A step of this fraction of 1/ω0 resolves a vibration."""
-
-TINY = 1e-300
-"""Keeps the quotient by the mass finite where inertia is left out (Overdamped)."""
 
 IMMINENT = 0.05
 """A touch expected within this fraction of the step gets a step of its own."""

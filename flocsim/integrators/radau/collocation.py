@@ -6,6 +6,7 @@ extrapolates the first guess of the next step's stages.
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.forces import save_start
@@ -19,9 +20,6 @@ of the step's end."""
 STIFF_STEP = 25.0
 """Largest h² K/M + h D/M of a step that may end on its cubic: five times its shortest time scale,
 squared. Beyond it, stiff forces balance at the stages only, and contacts would vibrate."""
-
-TINY = 1e-300
-"""Replaces an inertia of zero [kg or kg m²]."""
 
 RELAXATION_STEPS = 10.0
 """Shortest relaxation time of drag, in steps, for which an acceleration is assumed constant over a

@@ -12,6 +12,7 @@ Source: Hairer & Wanner, Solving Ordinary Differential Equations II (1996), sect
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.constants import TINY
 from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import update_frames
@@ -60,9 +61,6 @@ lie flat in an energy well."""
 GRAZING_TOLERANCE, NEGLIGIBLE_EFFECT = 0.02, 0.1
 """Relative tolerance of the tangential forces of grazing contacts; and the displacement by such a
 force, as a fraction of the tolerance of positions, below which its error is ignored."""
-
-TINY = 1e-300
-"""Keeps a quotient finite."""
 
 SMALLEST_RATE = 1e-3
 """Lower bound of the extrapolated convergence rate. Where it decides, an unneeded second iteration

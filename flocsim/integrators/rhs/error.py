@@ -12,6 +12,7 @@ bounding radius.
 
 import math
 
+from flocsim.constants import TINY
 from flocsim.geometry.contact.points import least_listed_gap, length_of
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.bodies import ANGLE, X, Y
@@ -19,9 +20,6 @@ from flocsim.state.work import DAMPING, NEW, NOW, STEP_ERROR
 
 ROUNDING = 1e-15
 """Relative rounding of a coordinate: a few units in the last place."""
-
-TINY = 1e-300
-"""Keeps the reciprocal of a rate finite."""
 
 FREE_MOTION_FRACTION = 0.01
 """Fraction of the tolerance allowed while no gap is below it. Free motion is cheap to follow, and

@@ -50,6 +50,7 @@ from flocsim.integrators.rhs.views import (
     view_without_slip,
 )
 from flocsim.state.bodies import ANGLE
+from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 
 AT_LIMIT = 1.0 - 1e-9
@@ -159,7 +160,7 @@ def set_sliding(scene, work):
     if has(scene, SLIP_LIMIT):
         for row in range(work.tally.candidates):
             candidate = work.candidates[row]
-            side = sliding_direction(scene, work, row) if candidate.contact_mode == 1 else 0
+            side = sliding_direction(scene, work, row) if candidate.contact_mode == CLOSED else 0
             changed = changed or candidate.slide_direction != side
             candidate.slide_direction = side
     return changed
@@ -173,7 +174,7 @@ def limit_slips(scene, work):
     if not has(scene, SLIP_LIMIT):
         return
     for row in range(work.tally.candidates):
-        if work.candidates[row].contact_mode == 1:
+        if work.candidates[row].contact_mode == CLOSED:
             limit = slip_limit_at(scene, work, NEW, row)
             work.slip[NEW, row] = min(max(work.slip[NEW, row], -limit), limit)
 
