@@ -97,7 +97,7 @@ class Disc(Record):
     x: float  # centre at the start [m]
     y: float
     way_x: float  # its displacement [m]
-    direction_y: float
+    way_y: float
     reach: float  # its radius with a margin [m]
     moves: float  # 1 if it moves, 0 if fixed: two fixed ones are never a pair
     left: float  # its left end, along all of the displacement, within the box [m]
