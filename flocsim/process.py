@@ -38,6 +38,26 @@ def blocked(signals: Iterable[int]) -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextlib.contextmanager
+def deferred(number: int) -> Iterator[None]:
+    """Answer a signal at the end of the block if it comes inside, whichever thread receives it.
+
+    Blocking it in this thread would not do: the system hands it to another one then, of a library
+    of linear algebra for example, and Python calls its handler here all the same.
+    """
+    if threading.current_thread() is not threading.main_thread():  # handlers are not called here
+        yield
+        return
+    received: list[int] = []
+    before = signal.signal(number, lambda number, _: received.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
+        if received:
+            signal.raise_signal(number)
+
+
 STOPPED = 75
 """Exit code of a run that was stopped early and can be resumed."""
 

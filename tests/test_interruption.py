@@ -3,10 +3,12 @@
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
+from flocsim.process import deferred
 from tests.helpers.tiers import rest_slow
 from tests.helpers.waiting import PATIENCE
 
@@ -117,3 +119,20 @@ def test_a_kernel_that_never_ends_is_ended_by_a_signal(jit):
     process.send_signal(signal.SIGTERM)
     _, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")
+
+
+def test_a_deferred_signal_waits_for_the_end_of_the_block_whichever_thread_receives_it():
+    ended = False
+    with pytest.raises(KeyboardInterrupt), deferred(signal.SIGINT):
+        other = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))
+        other.start()
+        other.join()
+        ended = True
+    assert ended
+
+
+def test_without_a_signal_nothing_is_raised_and_the_handler_is_as_before():
+    before = signal.getsignal(signal.SIGINT)
+    with deferred(signal.SIGINT):
+        pass
+    assert signal.getsignal(signal.SIGINT) is before

@@ -16,7 +16,7 @@ from typing import Any
 import attrs
 
 from flocsim.errors import FlocsimError
-from flocsim.process import blocked, end_with_parent
+from flocsim.process import deferred, end_with_parent
 
 Map = Callable[[Callable[[Any], Any], Sequence[Any]], Iterator[Any]]
 
@@ -80,7 +80,7 @@ def until_a_death(
     """Yield the results of tasks in order, from one pool, until one of its processes dies."""
     with contextlib.suppress(BrokenProcessPool), new_pool(jobs) as pool:
         # Ctrl-C waits: a process that is just being started would not be known, nor ended.
-        with blocked({signal.SIGINT}):
+        with deferred(signal.SIGINT):
             futures = [pool.submit(attempt, function, task) for task in tasks]
         for future in futures:
             yield future.result()
