@@ -18,7 +18,6 @@ import enum
 import functools
 import hashlib
 import inspect
-import operator
 import sys
 import types
 from collections.abc import Callable, Iterable, Mapping
@@ -27,13 +26,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flocsim.compiler.accelerator import taught
 from flocsim.compiler.linker import (
     Linker,
     codes_in,
     is_library,
     is_versioned,
-    names_in,
     reads,
     refuse_closure,
     where,
@@ -227,24 +224,7 @@ def fingerprint(
         name, function = pending.popitem()
         units[name] = tell(function)
         pending |= {x: y for x, y in units[name].calls.items() if x not in units}
-    refuse_extensions({each for unit in units.values() for each in unit.functions})
     return hashed([f"{name}={units[name].lines}" for name in sorted(units)], options)
-
-
-def refuse_extensions(functions: Iterable[Any]) -> None:
-    """Raise KernelError where numba was taught what these functions use. A function of the user's
-    own is compiled as it stands, whatever numba was taught for it."""
-    if not (extensions := taught()):
-        return
-    names = set().union(*(names_in(each.__code__) for each in functions))
-    for key, function in extensions:
-        what = key if isinstance(key, str) else getattr(key, "__name__", "")
-        is_operator = getattr(operator, what, None) is key and what
-        if not inspect.isfunction(key) and (what in names or is_operator):
-            raise KernelError(
-                f"{where(function)} teaches numba another {what!r}, which the kernels use and no "
-                "hash follows; call a plain function of another name"
-            )
 
 
 def reached_by(entry: Any, fillings: Mapping[Callable, Callable]) -> list[types.FunctionType]:
