@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flocsim.compiler.fingerprint import refuse_interpreter
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.draw import exact_method
 from flocsim.ensembles.collision.encounter import Encounter
@@ -129,8 +129,8 @@ def check_laws(pair: Encounter) -> None:
     system = pair.system
     kicks_of(system.forces, system.bodies, system.fluid)
     for law in system.pieces.laws.values():
-        refuse_interpreter(law)
-    refuse_interpreter(advance, system.fillings(OBSERVER))
+        fingerprint(law, {})
+    fingerprint(advance, system.fillings(OBSERVER))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
     views = close_views(system)
