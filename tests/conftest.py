@@ -18,7 +18,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 # Compiled code of the tests is kept apart from the user's, for all checkouts of this machine: a
 # file of it is named by all that it is made of.
-CACHE = disk_cache.own_folder() / "tests"
+CACHE = disk_cache.cache_folder() / "tests"
 if not disk_cache.is_writable(CACHE):
     CACHE = Path(__file__).parents[1] / ".pytest_cache" / "flocsim"
 os.environ.setdefault("FLOCSIM_CACHE", str(CACHE))

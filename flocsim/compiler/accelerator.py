@@ -6,11 +6,9 @@
 2. ``typed_once``: a function is not compiled anew for every constant that it is called with.
 3. ``quick_typing``: while numba compiles, it remembers what it has inferred, garbage waits, nobody
    is notified of every call of LLVM, and variables are listed by a shorter way.
-4. ``taught``: what the user has taught numba (@overload and its kin), which no hash of a kernel
-   could follow, is found.
 
 A numba without one of these parts, or FLOCSIM_ACCELERATOR=0, turns all of it off. Cold starts then
-take several times as long, and nothing is found that the user has taught numba.
+take several times as long.
 Measured: benchmarks/speed/compile_times.py --private.
 """
 
@@ -20,11 +18,8 @@ import functools
 import gc
 import inspect
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
-
-from flocsim.compiler.linker import PACKAGE
 
 # Names of what to leave out, to measure what it gains: compilers, typed_once, quick_typing.
 WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
@@ -57,7 +52,6 @@ def is_on() -> bool:
             whole = numba.cfunc("f8(f8)", **pipelines(True, True))
             text = whole(lambda x: twice(x) + twice(1.0)).inspect_llvm()
         forget([twice])
-        registries()
         return text.count("\ndefine") >= 3  # the unit, its wrapper and what it calls
     except Exception:
         return False
@@ -261,40 +255,3 @@ def quick_typing() -> Any:
     """Return a context in which numba compiles quicker."""
     on = is_on() and "quick_typing" not in WITHOUT
     return replacements() if on else contextlib.nullcontext()
-
-
-def registries() -> tuple[Any, Any]:
-    """Return numba's lists of typing rules and of lowerings."""
-    from numba.core.imputils import builtin_registry as lowering
-    from numba.core.typing.templates import builtin_registry as typing
-
-    return (*typing.functions, *typing.attributes), (*lowering.functions, *lowering.getattrs)
-
-
-def is_users(function: Any) -> bool:
-    """Return True for a function that neither numba, flocsim nor another package has brought."""
-    import numba
-
-    if not inspect.isfunction(function):
-        return False
-    file, known = function.__code__.co_filename, (PACKAGE, os.path.dirname(numba.__file__), "<")
-    return not file.startswith(known) and "-packages" not in file
-
-
-def taught() -> list[tuple[Any, Callable]]:
-    """Return (for what, function) of all that the user has taught numba; the first is a function,
-    or the name of an attribute."""
-    if "numba" not in sys.modules or not is_on():
-        return []
-    templates, lowered = registries()
-    found = [
-        (getattr(template, "_attr", None) or getattr(template, "key", None), function)
-        for template in templates
-        for each in vars(template).values()
-        if is_users(function := getattr(each, "__func__", each))
-    ]
-    return found + [
-        (key, behind)
-        for function, key, _ in lowered
-        if is_users(behind := inspect.unwrap(function))
-    ]

@@ -19,7 +19,7 @@ from typing import Any
 
 from flocsim.compiler import disk_cache
 from flocsim.compiler.by_pointer import kinds_text, table_of
-from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import function_at
 from flocsim.compiler.units import Engine, argument_names, options_text
@@ -92,14 +92,13 @@ def compose(
     """
     # Cloned at once: what is reached later, compiled or not, is what it is now.
     linked = Linker(fillings).link(entry)
-    if jit:
-        refuse_interpreter(linked)
-        refuse_no_compiler()
-    key = (fingerprint(entry, fillings, options_text(allocates), linked), jit)
-    if key not in _composed:
-        name = f"flocsim_scene_{key[0]}"
-        _composed[key] = Compiled(linked, name, allocates, what) if jit else linked
-    return _composed[key]
+    if not jit:
+        return linked
+    refuse_no_compiler()
+    name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(allocates), linked)}"
+    if name not in _composed:
+        _composed[name] = Compiled(linked, name, allocates, what)
+    return _composed[name]
 
 
 @functools.cache
@@ -123,7 +122,6 @@ def compile_law(law: Callable, told: str, numbers: int, given: Callable[[], Any]
     compiled. The compiled function lives as long as the process.
     """
     linked = Linker({}).link(law)
-    refuse_interpreter(linked)
     refuse_no_compiler()
     key = (fingerprint(law, {}, options_text(False), linked), told)
     if key not in _composed:

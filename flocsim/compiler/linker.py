@@ -9,13 +9,9 @@ import os
 import sys
 import types
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from flocsim.errors import KernelError
-
-# Where the files of flocsim's own functions lie.
-PACKAGE = str(Path(__file__).parents[1]) + os.sep
 
 ATTRIBUTE_LOADS = ("LOAD_ATTR", "LOAD_METHOD")
 

@@ -90,12 +90,6 @@ def target(loops: bool = False) -> tuple[str, str]:
     return BASELINE, ""
 
 
-def shared_kind() -> str:
-    """Return the kind of machine, system and processor, that others can share engines with, as the
-    name of a folder; "" where engines are for this very processor."""
-    return f"{host()[0]}-{BASELINE}" if target() == (BASELINE, "") else ""
-
-
 def compiled_for(loops: bool = False) -> str:
     """Return what of the machine the machine code of a function depends on."""
     return repr((host()[0], target(loops), settings(), loops and has_svml()))

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from flocsim.compiler import accelerator, disk_cache
-from flocsim.compiler.fingerprint import Intrinsic, tell, unit_name
+from flocsim.compiler.fingerprint import Intrinsic, describe, hashed
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import LENT, Called, ObjectCode, load, object_of
 from flocsim.compiler.processor import compiled_for
@@ -34,6 +34,11 @@ from flocsim.process import COMPILING, lacking
 # Functions of less bytecode [bytes] are always inlined; of the others LLVM decides. Up to 1,200
 # would gain 7 % of throughput for 1.5 times the compile time.
 INLINED_SIZE = 400
+
+# How names of functions begin that allocate memory.
+ALLOCATORS = "NRT_MemInfo", "NRT_Allocate"
+
+SCALARS_ONLY = "use plain arithmetic on scalars, without arrays and lists"
 
 # Seconds after which a line says what is compiled.
 WORTH_SAYING = 3.0
@@ -113,7 +118,9 @@ class Engine:
         if symbol in self.units:
             return symbol, self.units[symbol]
         made = function if self.whole else getattr(function, "stand_in", function)
-        file_name = self.name if function is self.entry else unit_name(made, self.options)
+        file_name = self.name
+        if function is not self.entry:
+            file_name = f"flocsim_unit_{hashed(describe(made).lines, self.options)}"
         file = file_name, repr((words, compiled_for(hasattr(made, "loops"))))
         code = self.from_disk(made, *file)
         if code is None:
@@ -133,7 +140,7 @@ class Engine:
             return None
         code = ObjectCode.unpacked(data)
         for each in code.calls:
-            _, found = self.unit(tell(function).calls[each.function], each.types)
+            _, found = self.unit(describe(function).calls[each.function], each.types)
             if found is None or found.returned != each.returned:
                 return None
         return code
@@ -175,6 +182,9 @@ class Engine:
             raise KernelError(f"a compiled function returns {returned[-1]}: let it return numbers")
         entry, loops = made.native_name, hasattr(function, "loops")
         code, missing = object_of(made.inspect_llvm(), entry, loops)
+        # Without the accelerator, numba compiles kernels that make arrays or lists.
+        if not self.allocates and any(x.startswith(ALLOCATORS) for x in missing):
+            raise KernelError(f"a kernel cannot be compiled: {SCALARS_ONLY}")
         calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
         return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in missing), calls)
 
@@ -238,6 +248,8 @@ def compiler_complaint(text: str) -> str:
     text = re.sub(r"(\x1b|\\x1b)\[[0-9;]*m", "", text).replace("\\n", "\n")
     lines = [each.strip() for each in text.splitlines() if each.strip()]
     words = next((each for each in lines if not each.startswith("Failed in nopython")), lines[0])
-    place = re.search(r"During: .* at ([^<\n].*) \((\d+)\)", text)
+    # The first place that is no file of a package; errors of `return` name it in other words.
+    place = re.search(r"During: .* at (?!.*-packages)([^<\n].*) \((\d+)\)", text)
+    place = place or re.search(r'File "([^<\n"]+)", line (\d+)', text)
     where = f"{place[1]}:{place[2]}: " if place else ""
-    return f"a kernel cannot be compiled: {where}{words[:300]}; use plain arithmetic on scalars"
+    return f"a kernel cannot be compiled: {where}{words[:300]}; {SCALARS_ONLY}"

@@ -12,13 +12,10 @@ NEIGHBOURS = {
     "deeper": "K = @\n",
     "colorsys": "LIST = [@]\n",
     "beside": """\
-import enum, numba
+import numba
 import deeper
 K = @
 LIST = [@]
-class Mode(enum.Enum):
-    A = @
-    B = 9
 def helper(x):
     return @ * x
 @numba.njit

@@ -6,12 +6,11 @@ import stat
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
 
-from flocsim.compiler import composer, disk_cache, units
+from flocsim.compiler import composer
 from flocsim.compiler.composer import compose
 from flocsim.compiler.disk_cache import file_name, read, write
 from tests.helpers.waiting import PATIENCE
@@ -23,10 +22,8 @@ NOBODY = 65534
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """The cache folder, which is made when it is first needed; the user's own lies beside it."""
+    """The cache folder, which is made when it is first needed."""
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(disk_cache, "own_folder", lambda: tmp_path / "own")
-    monkeypatch.setattr(disk_cache, "_warned", set())
     monkeypatch.chdir(tmp_path)
     return tmp_path / "cache"
 
@@ -103,60 +100,6 @@ def test_damaged_code_is_compiled_anew_and_replaced(folder, damage):
     assert not Path("ran").exists()
 
 
-@pytest.fixture
-def shipped(folder, tmp_path, monkeypatch):
-    """The folder of what came with the package, a compiled function; the cache is empty."""
-    assert answer() == 7.0
-    place = tmp_path / "package" / "shipped" / "system-kind"
-    place.mkdir(parents=True)
-    path = only_file(folder)
-    path.rename(place / path.name)
-    monkeypatch.setattr(disk_cache, "SHIPPED", place.parent)
-    monkeypatch.setattr(disk_cache, "shared_kind", lambda: "system-kind")
-    return place
-
-
-def test_what_came_with_the_package_is_used_and_never_copied(folder, shipped, monkeypatch):
-    monkeypatch.setattr(units.Engine, "compiled", None)
-    assert answer() == 7.0
-    assert list(folder.iterdir()) == []
-    assert composer.is_on_disk(compose(entry, {}))
-
-
-def test_what_came_for_another_kind_of_processor_is_left_alone(folder, shipped, monkeypatch):
-    name = only_file(shipped).name.partition("-")[0]
-    assert disk_cache.has(name)
-    for kind in ("system-other kind", ""):
-        monkeypatch.setattr(disk_cache, "shared_kind", lambda found=kind: found)
-        assert not disk_cache.has(name)
-    assert answer() == 7.0
-    assert len(list(folder.iterdir())) == 1
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_damage_to_what_came_is_told_and_compiled_anew(folder, shipped, damage):
-    path = only_file(shipped)
-    path.write_bytes(DAMAGES[damage](path.read_bytes()))
-    before = path.read_bytes()
-    with pytest.warns(UserWarning, match=f"{shipped} is damaged, .* install flocsim again") as got:
-        assert answer() == 7.0
-    assert len(said(got)) == 1 and path.read_bytes() == before
-    assert only_file(folder).name == path.name
-    assert answer() == 7.0  # by the cache, which is asked first
-    assert not Path("ran").exists()
-
-
-def test_what_others_can_have_put_into_the_package_is_not_used(folder, shipped):
-    path = only_file(shipped)
-    path.chmod(0o666)
-    assert answer() == 7.0
-    assert only_file(folder).name == path.name
-
-
-def said(caught):
-    return [str(each.message) for each in caught]
-
-
 @only_root
 def test_what_belongs_to_others_is_refused(folder):
     write("law", "key", b"code")
@@ -183,27 +126,11 @@ def test_a_file_that_others_can_write_and_a_link_are_replaced(folder, tmp_path):
     assert (tmp_path / "elsewhere").read_bytes() == before
 
 
-def test_a_shared_folder_that_can_only_be_read_is_used_and_new_code_goes_to_ones_own(
-    folder, tmp_path, monkeypatch
-):
-    write("law", "key", b"code")
-    allowed = os.access
-    # The superuser may write anywhere: only the question is answered as for anybody else.
-    monkeypatch.setattr(
-        os, "access", lambda path, how: str(path) != str(folder) and allowed(path, how)
-    )
-    assert read("law", "key") == b"code"
-    write("law", "new", b"more")
-    assert len(list(folder.iterdir())) == 1
-    assert len(list((tmp_path / "own").iterdir())) == 1
-    assert read("law", "new") == b"more"
-
-
 def full_disk(folder, monkeypatch):
     def full(*words, **more):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(disk_cache, "replace", full)
+    monkeypatch.setattr(os, "replace", full)
 
 
 def file_in_the_way(folder, monkeypatch):
@@ -220,10 +147,10 @@ def test_a_folder_that_cannot_be_written_is_one_line_and_costs_no_result(
     folder, monkeypatch, trouble
 ):
     trouble(folder, monkeypatch)
-    with pytest.warns(UserWarning, match="no compiled code is kept") as caught:
-        assert answer() == answer() == 7.0
-        write("law", "key", b"code")
-    assert len(said(caught)) == 1 and str(folder) in said(caught)[0]
+    with pytest.warns(UserWarning, match=f"compiled code is not stored: .* {folder}") as caught:
+        assert answer() == 7.0
+    assert len(caught) == 1
+    assert not list(folder.glob(".*"))  # nothing half written is left
 
 
 def test_many_writers_at_once_leave_one_whole_file(folder):
@@ -235,16 +162,6 @@ def test_many_writers_at_once_leave_one_whole_file(folder):
         each.join()
     assert read("law", "key") == data
     assert only_file(folder).name == file_name("law", "key")
-
-
-def test_what_killed_writers_have_left_is_removed_in_the_end(folder):
-    folder.mkdir()
-    old, new = (folder / f".{name}{disk_cache.UNFINISHED}" for name in ("old", "new"))
-    for path in (old, new):
-        path.write_bytes(b"half")
-    os.utime(old, (0, time.time() - 2 * disk_cache.ABANDONED))
-    write("law", "key", b"code")
-    assert new.exists() and not old.exists()
 
 
 RUN = """\

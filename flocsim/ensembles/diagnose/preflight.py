@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from flocsim.compiler.fingerprint import refuse_interpreter
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.ensembles.collision.encounter import Encounter
 from flocsim.ensembles.collision.equivalent import kinds, sphere_pairs
@@ -80,8 +80,8 @@ def check_laws(pair: Encounter) -> None:
     system = pair.system
     kick_parameters(system.forces, system.bodies, system.fluid)
     for law in system.pieces.laws.values():
-        refuse_interpreter(law)
-    refuse_interpreter(advance, system.fillings(OBSERVER))
+        fingerprint(law, {})
+    fingerprint(advance, system.fillings(OBSERVER))
     if any(type(force).__module__.partition(".")[0] != "flocsim" for force in system.forces):
         system.laws()
     # Colliding bodies come through all gaps that samples have, a gap of 0 among them: a pole there

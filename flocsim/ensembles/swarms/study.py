@@ -16,7 +16,7 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.compiler.composer import is_on_disk
-from flocsim.compiler.fingerprint import fingerprint, refuse_interpreter
+from flocsim.compiler.fingerprint import fingerprint
 from flocsim.ensembles.collision.flocs import Floc, FlocPool, load_flocs, nearest_in_ratio, pool_of
 from flocsim.ensembles.collision.pairings import drawing_weights, quantile, within_limits
 from flocsim.ensembles.config.schema import Config, ShapesConfig
@@ -115,8 +115,8 @@ class SwarmStudy(StudyKind):
     def prepare(self) -> None:
         """Raise the FlocsimError that the first swarm, or the laws of its forces, would meet."""
         for law in self.first.system.pieces.laws.values():
-            refuse_interpreter(law)
-        refuse_interpreter(run_islands, self.first.fillings())
+            fingerprint(law, {})
+        fingerprint(run_islands, self.first.fillings())
 
     def doubts(self) -> list[str]:
         """Return lines on what is implausible."""
