@@ -44,8 +44,9 @@ def value_text(value: Any) -> str:
         return f"intrinsic {value.name}"
     if isinstance(value, np.number | np.bool_):
         return f"{value.dtype.str} {value.tobytes().hex()}"
-    # A class of named tuples as typing makes it, with no other base.
-    if getattr(value, "__mro__", ())[1:] == (tuple, object) and hasattr(value, "_fields"):
+    if is_named_tuple(kind):
+        return f"{value_text(kind)}({', '.join(map(value_text, value))})"
+    if is_named_tuple(value):
         defaults = value_text(tuple(value._field_defaults.items()))
         return f"class {value.__name__}{value._fields} {defaults}"
     module, name = getattr(value, "__module__", None), getattr(value, "__name__", None)
@@ -55,6 +56,11 @@ def value_text(value: Any) -> str:
             if getattr(known, name, None) is value and is_versioned(known) and owner != "__main__":
                 return f"{owner}.{name}"
     raise TypeError(refusal(value))
+
+
+def is_named_tuple(kind: Any) -> bool:
+    """Return True for a class of named tuples as typing makes it, with no other base."""
+    return getattr(kind, "__mro__", ())[1:] == (tuple, object) and hasattr(kind, "_fields")
 
 
 def refusal(value: Any) -> str:

@@ -22,6 +22,10 @@ TOLD = {
     "sign of zero": "import math\ndef kernel(x):\n    return math.atan2((@ - 3) * 0.0, -x)\n",
     "set in the code": "def kernel(x):\n    return x if 2 in {@, 7} else 0.0\n",
     "default": "def kernel(x, k=@):\n    return k * x\n",
+    "named tuple": (
+        "from typing import NamedTuple\nclass P(NamedTuple):\n    k: float\n    m: float = 1.0\n"
+        "p = P(@)\ndef kernel(x):\n    return p.k * x\n"
+    ),
     "default of a named tuple": (
         "from typing import NamedTuple\nclass P(NamedTuple):\n    k: float\n    m: float = @\n"
         "def kernel(x):\n    return P(x).m * x\n"
@@ -152,7 +156,7 @@ def test_what_no_hash_follows_is_refused_by_file_line_and_name(load, name):
 
 @pytest.mark.parametrize(
     "name",
-    ["numpy number", "njit that reads a global",
+    ["named tuple", "numpy number", "njit that reads a global",
      "module's njit", "module's plain function", "module's function that reads another module",
      "star import", "module of a module"],
 )  # fmt: skip
