@@ -233,7 +233,7 @@ def replacements() -> Iterator[None]:
         Function.get_call_type, lambda f, context, given, more: (id(f), given, *more.items())
     )
     sized = remembering(BaseContext.get_abi_sizeof, lambda context, kind: str(kind))
-    others = (
+    others: tuple[tuple[Any, str, Any], ...] = (
         (Function, "get_call_type", typed), (BaseContext, "get_abi_sizeof", sized),
         (Inst, "_rec_list_vars", listed),
         (event, "start_event", lambda *_, **__: None), (event, "end_event", lambda *_, **__: None),

@@ -126,7 +126,10 @@ def compile_law(law: Callable, told: str, numbers: int, given: Callable[[], Any]
     key = (fingerprint(law, {}, options_text(False), linked), told)
     if key not in _composed:
         name = f"flocsim_law_{key[0]}"
-        typed = lambda: (given(), {}, {})  # noqa: E731
+
+        def typed() -> tuple[Any, dict[str, Any], dict[str, Any]]:
+            return given(), {}, {}
+
         engine = Engine(linked, name, told, typed, what="", returns="d" * numbers)
         _composed[key], _ = engine.load()
     return _composed[key]

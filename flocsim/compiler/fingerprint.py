@@ -52,7 +52,7 @@ def value_text(value: Any) -> str:
     module, name = getattr(value, "__module__", None), getattr(value, "__name__", None)
     if isinstance(module, str) and isinstance(name, str) and "random" not in module:
         for owner in (module, module.partition(".")[0]):
-            known = sys.modules.get(owner)
+            known: Any = sys.modules.get(owner)
             if getattr(known, name, None) is value and is_versioned(known) and owner != "__main__":
                 return f"{owner}.{name}"
     raise TypeError(refusal(value))

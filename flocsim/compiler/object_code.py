@@ -54,9 +54,9 @@ class ObjectCode(NamedTuple):
     def unpacked(cls, data: bytes) -> "ObjectCode":
         """Return what was packed."""
         head, code = data.split(b"\n", 1)
-        *more, calls = json.loads(head)
+        entry, returned, borrows, calls = json.loads(head)
         called = (Called(symbol, name, tuple(types), was) for symbol, name, types, was in calls)
-        return cls(code, *more, tuple(called))
+        return cls(code, entry, returned, borrows, tuple(called))
 
 
 def compiler(machine: Any) -> Any:

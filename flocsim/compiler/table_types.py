@@ -110,10 +110,16 @@ class PartModel(models.StructModel):
         super().__init__(manager, kind, [("of", kind.of), ("before", types.intp)])
 
 
+def parts_of(kind: Any) -> list[Any]:
+    """Return the types in the tuple that a numba type is; of any other, that type alone."""
+    given: Any = kind  # numba has no annotations
+    return list(given.types) if isinstance(kind, types.BaseTuple) else [kind]
+
+
 def words_in(kind: Any) -> int:
     """Return how many words of a table hold a value of a numba type."""
     if isinstance(kind, types.BaseTuple):
-        return sum(map(words_in, kind.types))
+        return sum(words_in(each) for each in parts_of(kind))
     return getattr(kind, "words", 1)
 
 
@@ -242,7 +248,7 @@ PLAIN = types.float64, types.int64
 
 def indices_in(kind: Any, index: Any) -> int:
     """Return how many whole numbers an index of an array or a part is; 0 where it is another."""
-    parts = index.types if isinstance(index, types.BaseTuple) else (index,)
+    parts = parts_of(index)
     whole = all(isinstance(each, types.Integer) for each in parts)
     return len(parts) if isinstance(kind, Elements | Part) and whole else 0
 
@@ -381,9 +387,8 @@ def as_array(elements):
 def letters_of(kind: Any) -> str | None:
     """Return the letters (struct) of numbers that are returned; None for what is neither a number
     nor a tuple of numbers."""
-    parts = kind.types if isinstance(kind, types.BaseTuple) else [kind]
     known = {each: letter for letter, each in LETTERS.items()}
-    found = [known.get(types.unliteral(each)) for each in parts]
+    found = [known.get(types.unliteral(each)) for each in parts_of(kind)]
     return None if None in found else "".join(map(str, found))
 
 
@@ -406,7 +411,10 @@ def argument_at(kind: Any, at: int, whole: bool) -> Any:
 
         return kind(address), generate
 
-    return njit(lambda address: as_array(read(address))) if whole else read
+    if not whole:
+        return read
+    call: Any = read  # inside compiled code it takes no typing context
+    return njit(lambda address: as_array(call(address)))
 
 
 def answer_to(note: Callable[[Any], None], letters: str | None = None) -> Any:
