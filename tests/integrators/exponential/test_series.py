@@ -142,7 +142,7 @@ def test_an_error_grows_as_an_attraction_gets_steeper():
         scene.clock.time = time = time + step
         work.place[STEP_ERROR] = work.velocity[STEP_ERROR] = 0.0
         sums = work.errors[0]
-        sums.place += step * sums.speed
+        sums.displacement += step * sums.velocity
         scene.call(propagate_vector, scene.clock, step)
     place = pulled(1e-5, time)
     true = pulled(1e-5 + nudge, time) - place
