@@ -1,7 +1,7 @@
 """Hash of what a function does: its bytecode, its constants and all that it reaches by globals.
 
 The hash names a file of machine code, so it has to cover all that the machine code depends on.
-Numbers, texts, tuples of them and classes of named tuples enter by value; functions of Python,
+Numbers, texts, tuples of them, enums and named tuples enter by value; functions of Python,
 numpy and numba enter by name, as the versions of these are in the hash. Anything else is refused
 with file, line and name: it could change, and the stored machine code would then be stale.
 
@@ -9,6 +9,7 @@ Kernels run without the interpreter's lock, so that a kernel that prints is refu
 """
 
 import builtins
+import enum
 import functools
 import hashlib
 import inspect
@@ -44,6 +45,11 @@ def value_text(value: Any) -> str:
         return f"intrinsic {value.name}"
     if isinstance(value, np.number | np.bool_):
         return f"{value.dtype.str} {value.tobytes().hex()}"
+    if isinstance(value, enum.Enum):
+        return f"{value.name} of {value_text(kind)}"
+    if isinstance(value, type) and issubclass(value, enum.Enum):
+        members = tuple((name, each.value) for name, each in value.__members__.items())
+        return f"class {value.__name__}{value.__bases__} {value_text(members)}"
     if is_named_tuple(kind):
         return f"{value_text(kind)}({', '.join(map(value_text, value))})"
     if is_named_tuple(value):
@@ -71,7 +77,10 @@ def refusal(value: Any) -> str:
         return "which draws random numbers: no run could be repeated; leave them out"
     if callable(value):
         what = f"the class {value.__name__}" if isinstance(value, type) else f"a {kind.__name__}"
-        return f"{what}, whose code no hash follows; write a plain function with `def`"
+        return (
+            f"{what}, whose code no hash follows; write a plain function with `def`, a named tuple "
+            "or an enum of numbers"
+        )
     return f"a {kind.__name__} that can change; make it a parameter or a tuple of numbers"
 
 

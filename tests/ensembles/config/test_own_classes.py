@@ -373,7 +373,8 @@ def first_identity(tmp_path_factory):
         (
             {
                 "largest_step = 1e-7": "largest_step = 1e-7\n\n    def fresh_clock(self):\n        "
-                "return 1.0 + VelocityVerlet.fresh_clock(self)"
+                "clock = VelocityVerlet.fresh_clock(self)\n        clock.step += 1.0\n        "
+                "return clock"
             },
             "the initial values of the integrator have changed",
         ),
