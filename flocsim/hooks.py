@@ -9,7 +9,7 @@ Laws are the few functions that a scene's forces add up to, at most one of each 
 of all forces of that kind (codegen.py). The engine around them is compiled once for all scenes. A
 law is compiled by itself, in a tenth of a second, and called by its address, so a new force does
 not compile the engine anew. A scene without forces of a kind has no law for it, and ``has`` says
-so: the only way in which physics is left out.
+so: its part of the work is left out.
 
 ``scene.laws`` is an array of addresses (0: none) in the compiled engine, and a tuple of plain
 functions (None: none) where it runs uncompiled, for debugging and as a reference.

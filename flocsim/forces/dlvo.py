@@ -177,8 +177,8 @@ class DoubleLayer(PairForce):
         1/κ [m].
     permittivity : float
         ε_r [-].
-    gap, cut, depth
-        As for VanDerWaals; bodies in contact count as d = 0.
+    gap, cut, depth : see VanDerWaals
+        Bodies in contact count as d = 0.
     law : "spheres" or "outline"
         "outline" superposes the double layers of both outlines; plates then repel with the pressure
         2ε κ² φ_i φ_j exp(−κ d).

@@ -139,7 +139,7 @@ class Work(NamedTuple):
     elimination: Elimination  # sparse systems of many bodies
     candidates: np.ndarray  # (capacity,) of Candidate
     geometry: np.ndarray  # (states, capacity) of VertexAtEdge
-    kept: np.ndarray  # (capacity,) of KeptContact
+    kept: np.ndarray  # (capacity,) of SavedContact
     near: NearPieces
     listed: Listed
     feet: np.ndarray  # (MOST_FEET,): parameters of the feet on a piece: rhs.outline_nodes

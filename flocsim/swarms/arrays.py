@@ -36,7 +36,7 @@ ERROR_COLUMNS = 6
 ) = range(6)
 
 SLIP_COLUMNS = 5
-"""Columns of ``slips``, of the same contacts: ``slip`` to ``flights`` of KeptContact."""
+"""Columns of ``slips``, of the same contacts: ``slip`` to ``short_flights`` of SavedContact."""
 
 # Columns of ``costs``, of every island.
 (

@@ -164,7 +164,7 @@ def swollen_run_distance(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
 
 
 def swollen_radii(scene, work, row):
-    """Replace points.row_radii: the spheroradii of the parts of the vertex and the edge [m]."""
+    """Replace points.contact_radii: the spheroradii of the parts of the vertex and the edge [m]."""
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     point, start = candidate.vertex, candidate.edge_start

@@ -33,6 +33,7 @@ from flocsim.integrators.rhs.views import (
     smaller_radius,
     tangential_rate,
 )
+from flocsim.state.contacts import CLOSED
 from flocsim.state.views import ContactView, moved_contact
 from flocsim.state.work import DAMPING, NEW, NOW, STIFFNESS, TRIAL
 
@@ -253,4 +254,4 @@ def flag_close(scene, work):
         a, b = candidate.vertex_body, candidate.edge_body
         near = CLOSE_GAP * (scene.bodies[a].radius + scene.bodies[b].radius)
         if work.geometry[NOW, row].gap < near or work.geometry[TRIAL, row].gap < 0.0:
-            candidate.contact_mode = 1
+            candidate.contact_mode = CLOSED

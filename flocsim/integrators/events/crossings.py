@@ -30,7 +30,7 @@ NEVER = 2.0
 """The fraction of the step at which a switch happens that does not happen in it: anything above
 1."""
 
-MOST_TRIALS = 60
+MOST_ITERATIONS = 60
 """Evaluations in the search for one switch."""
 
 
@@ -148,7 +148,7 @@ def locate_crossing(scene, work, step, row, high, at_high, resolution):
     at_high += target
     side = 0
     share = high
-    for _ in range(MOST_TRIALS):
+    for _ in range(MOST_ITERATIONS):
         share = (low * at_high - high * at_low) / (at_high - at_low)
         # Rounding: bisect.
         if not low < share < high:

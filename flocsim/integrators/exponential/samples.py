@@ -174,8 +174,8 @@ def first_too_deep(scene, work):
     none."""
     for stage in range(2):
         for row in range(work.tally.candidates):
-            any_touching = work.candidates[row].contact_mode == CLOSED
-            if any_touching and is_too_deep(scene, work, FIRST_STAGE + stage, row):
+            closed = work.candidates[row].contact_mode == CLOSED
+            if closed and is_too_deep(scene, work, FIRST_STAGE + stage, row):
                 return NODES[stage]
     return 1.0
 
