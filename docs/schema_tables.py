@@ -59,6 +59,13 @@ def config_parts() -> dict[str, str]:
 def about(documented, name):
     """The docstring as Markdown, without the name of the table that is in the heading."""
     text = inspect.getdoc(documented).removeprefix(f"[{name}]: ").replace("``", "`")
+    # Of the sections of a numpydoc docstring, exceptions are for those who write Python.
+    summary, *rest = re.split(r"\n+(\w+)\n-{3,}\n", text)
+    sections = dict(zip(rest[::2], rest[1::2], strict=True))
+    entries = [each.split("\n") for each in re.split(r"\n(?=\S)", sections.get("Parameters", ""))]
+    meanings = [f"- `{head.partition(' :')[0]}`: {' '.join(map(str.strip, lines))}"
+                for head, *lines in entries if lines]  # fmt: skip
+    text = "\n\n".join(filter(None, [summary, "\n".join(meanings), sections.get("Notes")]))
     return text[0].upper() + text[1:] + "\n"
 
 

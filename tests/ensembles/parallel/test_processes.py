@@ -78,7 +78,7 @@ def test_a_study_knows_which_engines_the_disk_has(tmp_path, monkeypatch):
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
     assert study.uncompiled(study.kinds) == study.kinds
     (tmp_path / "cache").mkdir()
-    name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).code.name
+    name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
     assert study.uncompiled(study.kinds) == study.kinds[1:]
     monkeypatch.setattr(composer.disk_cache, "is_writable", lambda folder: False)
@@ -90,7 +90,7 @@ def test_a_study_of_swarms_knows_whether_the_disk_has_its_engine(tmp_path, monke
     monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
     (tmp_path / "cache").mkdir()
     assert study.uncompiled(study.kinds) == study.kinds
-    name = study.first.begin(1.0).runner.driver.code.name
+    name = study.first.begin(1.0).runner.driver.name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
     assert study.uncompiled(study.kinds) == []
 
