@@ -4,6 +4,7 @@ import compileall
 import gc
 import math
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -74,3 +75,12 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_small(tmp_path, vertices="[1]")
     return tmp_path
+
+
+@pytest.fixture
+def interruptible():
+    """SIGINT raises KeyboardInterrupt, also in what a shell has started in the background, which
+    ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

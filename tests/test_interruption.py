@@ -121,7 +121,7 @@ def test_a_kernel_that_never_ends_is_ended_by_a_signal(jit):
     assert (process.returncode, errors) == (75, "flocsim: stopped by SIGTERM\n")
 
 
-def test_a_deferred_signal_waits_for_the_end_of_the_block_whichever_thread_receives_it():
+def test_a_deferred_signal_waits_for_the_end_of_the_block_whoever_receives_it(interruptible):
     ended = False
     with pytest.raises(KeyboardInterrupt), deferred(signal.SIGINT):
         other = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))

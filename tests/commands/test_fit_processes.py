@@ -155,7 +155,7 @@ def slow(_):
 
 
 @needs_fork
-def test_an_interrupt_ends_the_processes_at_once():
+def test_an_interrupt_ends_the_processes_at_once(interruptible):
     with pytest.raises(KeyboardInterrupt), workers(2, lambda: None) as mapped:
         found = mapped(slow, range(2))
         threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()

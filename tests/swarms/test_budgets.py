@@ -3,7 +3,6 @@ and can be left at any time without a trace."""
 
 import _thread
 import functools
-import signal
 import threading
 import time
 
@@ -87,15 +86,10 @@ def test_looks_change_no_bit(monkeypatch):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_an_interrupt_is_answered_within_a_window(threads):
+def test_an_interrupt_is_answered_within_a_window(interruptible, threads):
     slow().begin(1e-8).advance(1e-8)  # compiled
     timer = threading.Timer(0.5, _thread.interrupt_main)
-    # What a shell starts in the background ignores interrupts.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
-            slow().run(LONG, threads=threads, max_steps=10**12)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        slow().run(LONG, threads=threads, max_steps=10**12)
     assert not timer.is_alive()
