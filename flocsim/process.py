@@ -18,24 +18,8 @@ import stat
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
-
-
-@contextlib.contextmanager
-def blocked(signals: Iterable[int]) -> Iterator[None]:
-    """Let signals wait until the end of the block, where the system can.
-
-    A process that is forked inside inherits the block, and keeps it.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextlib.contextmanager

@@ -22,7 +22,7 @@ import numpy as np
 from flocsim.errors import FileError, visible
 from flocsim.io import hdf5_child
 from flocsim.io.seals import CHANGED, check_seal, end_of, open_file
-from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING, blocked
+from flocsim.process import BLAS_THREADS, LAUNCHER_RANKS, SIGNALS, WAITING
 
 MPI_VARIABLES = ("PMI", "OMPI_", "MPI")
 """How names of variables begin that make a process a rank, which a child of a rank is not."""
@@ -164,7 +164,9 @@ def describe_forked(data: BinaryIO) -> bytes:
 
     reading, writing = os.pipe()
     # Signals of a terminal go to both processes: this one answers them. None comes in between.
-    with blocked(SIGNALS):
+    # The child is forked with all of them blocked, and stays so.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
         with warnings.catch_warnings():
             # Python counts the threads of numpy's libraries, too, which are idle.
             warnings.simplefilter("ignore", DeprecationWarning)
@@ -172,6 +174,8 @@ def describe_forked(data: BinaryIO) -> bytes:
         if child == 0:
             run_forked(data.fileno(), writing)
         os.close(writing)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
     with open(reading, "rb") as pipe:
         try:
             return pipe.read()

@@ -94,7 +94,5 @@ def test_a_reduced_swarm_runs(examples):
     words = ["--set", "scene.number=24", "--set", "scene.duration=0.2", "--quiet"]
     done = run_command(examples, SWARM.name, *words)
     assert (done.returncode, done.stdout, problems(done.stderr)) == (0, "", [])
-    assert swarm_file.SWARMS.read(examples / "swarm.h5").groups["ends"]["finished"].tolist() == [
-        1,
-        1,
-    ]
+    ends = swarm_file.SWARMS.read(examples / "swarm.h5").groups["ends"]
+    assert ends["finished"].tolist() == [1, 1]

@@ -196,7 +196,7 @@ def further_of_kinds(flipped: np.ndarray, checked: np.ndarray, exposed: np.ndarr
         for part, *of_kind in zip(found, flipped, checked, exposed, strict=True):
             f, c, u = (each[at] for each in of_kind)
             more = further_flips(f, c, u)
-            # Of a kind that nobody has looked at all may flip, but not where nothing is known.
+            # All replicates of a kind without second runs may flip; without any, nothing is known.
             if np.any(checked[:, *np.index_exp[at]]):
                 more = np.where(np.isnan(more[0]), [np.ceil(u), u, np.zeros(u.shape)], more)
             part[:, *np.index_exp[at]] = more
