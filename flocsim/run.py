@@ -97,7 +97,7 @@ class Run:
 
     def row_now(self) -> np.ndarray:
         """Return the present time and state as one row of a record."""
-        return np.concatenate([[self.clock.time], motion_of(self.work, NOW).ravel()])[None]
+        return np.array([[self.clock.time, *motion_of(self.work, NOW).ravel()]])
 
     def advance(self, steps: int | None = None) -> Status:
         """Advance by so many steps; return PAUSED, or the Status with which the run has ended for

@@ -7,7 +7,6 @@ address; a tuple is what is in it, one after the other; a number is one word. Wh
 makes of a table: flocsim.compiler.table_types.
 """
 
-import contextlib
 import ctypes
 import functools
 import struct
@@ -15,44 +14,72 @@ import weakref
 from collections.abc import Sequence
 from typing import Any, get_type_hints
 
+import attrs
 import numpy as np
 
 from flocsim.errors import KernelError
 
-# {types of the arguments: format of struct.pack for their table}
-LAYOUTS: dict[tuple[Any, ...], str] = {}
 
-# {id of a tuple: (the tuple, its words, their types)}; see `keep`.
-KEPT: dict[int, tuple[Any, list[Any], list[Any]]] = {}
+@attrs.define
+class Kept:
+    """What is remembered of a tuple of arrays and records; see `keep`."""
 
-
-def address_of(value):
-    """Return the address of an array's data, or of a record; KernelError unless it lies in C
-    order.
-
-    By the buffer protocol, which takes a fifth of the time of numpy's own attributes; of records
-    these would describe all fields, for 50 µs.
-    """
-    if isinstance(value, np.record):
-        return np.frombuffer(value, np.uint8).ctypes.data
-    if value.size:
-        with contextlib.suppress(TypeError, ValueError, BufferError):  # read-only, not in C order
-            plain = value if value.dtype.names is None else value.view(np.uint8)
-            return ctypes.addressof(ctypes.c_char.from_buffer(plain))
-    if not value.flags.c_contiguous:
-        raise KernelError(f"an array (shape {value.shape}) does not lie in C order")
-    return value.ctypes.data
+    value: tuple[Any, ...]
+    words: list[Any]  # its part of a table
+    kinds: list[Any]  # the types of these
+    arrays: list[Any] | None = None  # those that `clear` clears, once it has done so
 
 
-def keep(value: tuple, owner: Any) -> None:
-    """Remember the words of a tuple while its owner lives: tables of it are then made in a fraction
-    of the time. Its arrays may not be exchanged meanwhile."""
+KEPT: dict[int, Kept] = {}
+"""{id of a tuple: what is remembered of it}."""
+
+
+def as_plain(value: Any) -> Any:
+    """Return an array, or a record that is alone in its array (Record.one), as an array without
+    fields; KernelError unless it is, and lies in C order."""
+    array = value.base if isinstance(value, np.void) else value
+    if array is not value and (array is None or array.size != 1):
+        raise KernelError(f"a {type(value).__name__} is not alone in its array: take a copy")
+    if not array.flags.c_contiguous:
+        raise KernelError(f"an array (shape {array.shape}) does not lie in C order")
+    return array if array.dtype.names is None else array.view(np.uint8)
+
+
+def address_of(value: Any) -> int:
+    """Return the address of the data of such an array or record."""
+    plain = as_plain(value)
+    if plain.size and plain.flags.writeable:
+        # By the buffer protocol, which takes a fifth of the time.
+        return ctypes.addressof(ctypes.c_char.from_buffer(plain))
+    return int(plain.ctypes.data)
+
+
+def written(value: Any) -> list[Any]:
+    """Return each record in a value, and each array that may be written, as `as_plain` does."""
+    if isinstance(value, tuple):
+        return [array for each in value for array in written(each)]
+    arrays = [as_plain(value)] if isinstance(value, np.ndarray | np.void) else []
+    return [array for array in arrays if array.size and array.flags.writeable]
+
+
+def keep(value: tuple[Any, ...], owner: Any) -> None:
+    """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
+    the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
         words: list[Any] = []
         kinds: list[Any] = []
         flatten(value, words, kinds)
-        KEPT[id(value)] = value, words, kinds
+        KEPT[id(value)] = Kept(value, words, kinds)
         weakref.finalize(owner, KEPT.pop, id(value), None)
+
+
+def clear(value: tuple[Any, ...]) -> None:
+    """Set all records of a kept tuple, and all arrays that may be written, to zero."""
+    kept = KEPT[id(value)]
+    if kept.arrays is None:
+        kept.arrays = written(value)
+    for array in kept.arrays:
+        array.fill(0)
 
 
 def flatten(value, words, kinds):
@@ -61,13 +88,13 @@ def flatten(value, words, kinds):
         words.append(address_of(value))
         words.extend(value.shape)
         kinds.append((value.dtype if value.dtype.names else value.dtype.char, value.ndim))
-    elif isinstance(value, np.record):
+    elif isinstance(value, np.void):
         words.append(address_of(value))
         kinds.append(value.dtype)
     elif isinstance(value, tuple):
         if (kept := KEPT.get(id(value))) is not None:
-            words += kept[1]
-            kinds += kept[2]
+            words += kept.words
+            kinds += kept.kinds
             return
         kinds.append((type(value), len(value)))
         for each in value:
@@ -82,17 +109,19 @@ def flatten(value, words, kinds):
                      or isinstance(value, np.bool_) else "q")  # fmt: skip
 
 
-def table_of(arguments: Sequence[Any]) -> tuple[np.ndarray, tuple[Any, ...]]:
-    """Return the arguments as a table (words,), and their types as a flat tuple: a tuple is (its
-    class, its length) before its items, an array (its dtype, its dimensions)."""
+def table_of(arguments: Sequence[Any]) -> tuple[list[Any], tuple[Any, ...]]:
+    """Return the arguments as the words of a table, and their types as a flat tuple: a tuple is
+    (its class, its length) before its items, an array (its dtype, its dimensions)."""
     words: list[Any] = []
-    found: list[Any] = []
+    kinds: list[Any] = []
     for each in arguments:
-        flatten(each, words, found)
-    kinds = tuple(found)
-    if kinds not in LAYOUTS:
-        LAYOUTS[kinds] = "".join("d" if isinstance(each, float) else "q" for each in words)
-    return np.frombuffer(struct.pack(LAYOUTS[kinds], *words), np.int64), kinds
+        flatten(each, words, kinds)
+    return words, tuple(kinds)
+
+
+def layout_of(words: Sequence[Any]) -> struct.Struct:
+    """Return what packs words of such types."""
+    return struct.Struct("@" + "".join("d" if isinstance(each, float) else "q" for each in words))
 
 
 @functools.cache

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import kinds_text, table_of
+from flocsim.compiler.by_pointer import kinds_text, layout_of, table_of
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.linker import Linker
 from flocsim.compiler.object_code import function_at
@@ -43,15 +43,15 @@ class Compiled:
         return Compiled(self.linked, self.name, self.allocates, self.what, True)
 
     def __call__(self, *arguments):
-        table, kinds = table_of(arguments)
+        words, kinds = table_of(arguments)
         if kinds not in self.functions:
             typed = functools.partial(self.typed, kinds)
             engine = Engine(
                 self.linked, self.name, kinds_text(kinds), typed, self.allocates, self.complete,
                 self.what,
             )  # fmt: skip
-            self.functions[kinds] = function_at(*engine.load())
-        return self.functions[kinds](table.__array_interface__["data"][0])
+            self.functions[kinds] = function_at(*engine.load(), layout_of(words))
+        return self.functions[kinds](words)
 
     def typed(self, kinds):
         """Return the numba type of a table's address, {argument: function that reads it there} and

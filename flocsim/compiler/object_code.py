@@ -12,7 +12,7 @@ import hashlib
 import json
 import struct
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from flocsim.compiler.processor import target
@@ -117,15 +117,17 @@ def load(code: ObjectCode, called: Mapping[str, int]) -> int:
         return _loaded[key]
 
 
-def function_at(entry: int, returned: str) -> Callable[[int], Any]:
-    """Return the entry at an address as a function of an address, which runs without the
-    interpreter's lock; ``returned`` as in ObjectCode."""
-    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)(entry)
+def function_at(
+    entry: int, returned: str, table: struct.Struct
+) -> Callable[[Sequence[Any]], Any]:  # fmt: skip
+    """Return the entry at an address as a function of the words of a table, which runs without the
+    interpreter's lock; ``table`` packs them, ``returned`` is the format of the answer."""
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_char_p)(entry)
     layout = struct.Struct(f"@{returned}")
 
-    def function(address):
+    def function(words):
         answer = ctypes.create_string_buffer(layout.size or 8)
-        if call(ctypes.addressof(answer), address):
+        if call(ctypes.addressof(answer), table.pack(*words)):
             raise KernelError(
                 "a kernel has raised an exception (run uncompiled, with jit=False, it says which)"
             )

@@ -338,7 +338,8 @@ class Study(StudyKind):
         """
         name, vertices, share = condition
         try:
-            row = self.run(self.scene.names.index(name), vertices, share, replicate, halted)
+            place = [each.name for each in self.pairings].index(name)
+            row = self.run(place, vertices, share, replicate, halted)
         except MemoryError:
             raise
         except Exception as error:

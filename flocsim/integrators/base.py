@@ -6,10 +6,9 @@ from collections.abc import Callable
 from enum import IntEnum
 
 import attrs
-import numpy as np
 
 from flocsim import hooks
-from flocsim.state.clock import Clock, Counts
+from flocsim.state.clock import NEVER, Clock, Counts
 
 
 class Status(IntEnum):
@@ -145,23 +144,19 @@ class Integrator(ABC):
 
     def fresh_clock(self) -> Clock:
         """Return the clock of a run that starts at time zero."""
-        clock = Clock.one()
-        clock.until = math.inf
-        clock.step = self.first_step
-        clock.tolerance = self.tolerance
-        clock.largest_step = self.largest_step
-        clock.estimate_share = self.estimate_share
         # No step has been taken: nothing limits the first one but ``first_step``.
-        clock.previous_step = math.inf
-        clock.feasible_step = math.inf
-        clock.step_after_switch = math.inf
-        clock.across = float(self.across)
-        return clock
+        return Clock.one(
+            until=math.inf,
+            step=self.first_step,
+            tolerance=self.tolerance,
+            largest_step=self.largest_step,
+            estimate_share=self.estimate_share,
+            previous_step=math.inf,
+            feasible_step=math.inf,
+            step_after_switch=math.inf,
+            across=self.across,
+        )
 
     def fresh_counts(self, max_steps: int) -> Counts:
         """Return the counters of a run with a budget of steps, tried ones included."""
-        counts = Counts.one()
-        counts.max_steps = max_steps
-        # Never pause.
-        counts.pause_at = np.iinfo(np.int64).max
-        return counts
+        return Counts.one(max_steps=max_steps, pause_at=NEVER)

@@ -71,6 +71,10 @@ class Clock(Record):
     cycle_error: float  # stated error at the end of the last cycle [m]
 
 
+NEVER = 2**63 - 1
+"""A number of steps that no run reaches."""
+
+
 class Counts(Record):
     """Counters of a run, and its budgets."""
 

@@ -138,8 +138,10 @@ class FieldNode(Record):
 
 @cache
 def gauss_rules() -> np.ndarray:
-    """Return nodes and weights of the Gauss–Legendre rules on [−1, 1], by number of nodes."""
+    """Return nodes and weights of the Gauss–Legendre rules on [−1, 1], by number of nodes,
+    read-only: all runs share them."""
     rules = np.zeros((MOST_ORDER + 1, 2, MOST_ORDER))
     for order in range(1, MOST_ORDER + 1):
         rules[order, :, :order] = np.polynomial.legendre.leggauss(order)
+    rules.flags.writeable = False
     return rules

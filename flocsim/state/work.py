@@ -9,6 +9,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from flocsim.compiler.by_pointer import clear
 from flocsim.state.bodies import MOST_FRAMES, BodyErrors, Cluster, Disc, Frame, Kick, KickTime, Pose
 from flocsim.state.clock import BLOCKS_FULL, NOTHING_FULL, PAIRS_FULL, Tally
 from flocsim.state.contacts import (
@@ -28,7 +29,7 @@ from flocsim.state.outlines import (
     gauss_rules,
     nodes_of,
 )
-from flocsim.state.records import clear, copied
+from flocsim.state.records import copied
 from flocsim.state.scene import Scene
 
 # States: rows of ``place``, ``velocity``, ``force``, ``geometry`` and ``slip`` in Work.
@@ -284,16 +285,15 @@ def begin(
 
 
 def begin_anew(work: Work, scene: Scene, position: np.ndarray, velocity: np.ndarray) -> None:
-    """Reset work arrays to those of work_of for a scene of as many bodies, faster than new ones."""
-    for name in Work._fields:
-        if name not in ("elimination", "rules"):
-            clear(getattr(work, name))
+    """Reset kept work arrays (by_pointer.keep) to those of work_of for a scene of as many bodies,
+    faster than new ones."""
+    clear(work)
     begin(work, scene, position, velocity)
 
 
 def motion_of(work: Work, state: int) -> np.ndarray:
     """Return a copy of positions and velocities in a state (n, 6: x, y, angle, vx, vy, spin)."""
-    return np.hstack([work.place[state], work.velocity[state]])
+    return np.concatenate([work.place[state], work.velocity[state]], axis=1)
 
 
 def put_motion(work: Work, state: int, motion: np.ndarray) -> None:

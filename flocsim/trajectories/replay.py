@@ -29,6 +29,7 @@ from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.run import Run
+from flocsim.state.clock import NEVER
 from flocsim.state.scene import NO_WATER, Scene
 from flocsim.state.work import (
     FIRST_STAGE,
@@ -124,7 +125,7 @@ class Replay:
 
     def __init__(self, origin: Origin) -> None:
         self.origin, self.run, self.leg = origin, origin.begin(), 0
-        self.run.counts.max_steps = np.iinfo(np.int64).max
+        self.run.counts.max_steps = NEVER
         self.run.clock.until = origin.legs[0][1]
         self.scene = self.scene_of(origin.forces)
 

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.compiler.by_pointer import keep
@@ -81,9 +82,22 @@ class Encounter(abc.ABC):
     width [m], β₂ [m²/s], β₃ [m³/s]; β₂ and β₃ of spheres without forces; and β₂/(W/2)² [1/s]."""
 
     def __attrs_post_init__(self):
-        motions = [terminal_motion(self.system, body) for body in self.system.bodies]
+        motions = [self.alone(body) for body in self.system.bodies]
         object.__setattr__(self, "settling", tuple(motions))
         self.refuse()
+
+    def alone(self, body: Body) -> tuple[np.ndarray, float]:
+        """Return the velocity (2,) [m/s] and mobility [s/kg] of one of the bodies without the
+        other."""
+        key = body.shape, body.fixed
+        if key not in self.motions:
+            self.motions[key] = terminal_motion(self.system, body)
+        return self.motions[key]
+
+    @functools.cached_property
+    def motions(self) -> dict[tuple[Shape, bool], tuple[np.ndarray, float]]:
+        """{(shape, whether it is fixed): motion alone}, of all encounters under one config."""
+        return self.first.motions if self.first else {}
 
     @abc.abstractmethod
     def refuse(self) -> None:

@@ -232,8 +232,9 @@ def grouped_charges(shape: Shape, kappa: float) -> Charges:
 def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
     """Return the Charges of bodies of these shapes at κ [1/m]; for κ = 0, of bodies without
     charges."""
-    none = Charges(ChargeGroup.rows(0), np.zeros(2, np.int64), Charge.rows(0))
-    found = [grouped_charges(shape, kappa) if kappa > 0.0 else none for shape in shapes]
+    if not kappa > 0.0:
+        return Charges(ChargeGroup.rows(0), np.zeros(len(shapes) + 1, np.int64), Charge.rows(0))
+    found = [grouped_charges(shape, kappa) for shape in shapes]
     groups = np.concatenate([each.groups for each in found])
     sizes = [len(each.groups) for each in found]
     before = np.cumsum([0, *[len(each.charges) for each in found[:-1]]])
@@ -396,12 +397,14 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     Sums run over the charges of the smaller body in the field of the larger one, so of two bodies
     only the larger is tabulated.
     """
+    if not kappa > 0.0:
+        return Field(Grid.rows(len(shapes)), np.zeros(0, np.int64), FieldNode.rows(0))
     bounds = [shape.bounding_radius for shape in shapes]
     # The earlier one of two that are as large: outline_sum.outline_forces_at.
     asked = {bounds.index(max(bounds))} if len(shapes) == 2 else set(range(len(shapes)))
     none = Field(Grid.rows(1), np.zeros(0, np.int64), FieldNode.rows(0))
     found = [
-        field_of_shape(shape, kappa) if kappa > 0.0 and body in asked else none
+        field_of_shape(shape, kappa) if body in asked else none
         for body, shape in enumerate(shapes)
     ]
     grids = np.concatenate([each.grids for each in found])

@@ -154,12 +154,12 @@ class Shape:
         """Centroid of the swept area in the frame of the given core (2,) [m]."""
         return self.swept.centroid
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         """Parts of one or more rings each, around the centroid of the whole."""
         return (Part((self.vertices,), self.radius),)
 
-    @property
+    @cached_property
     def is_compound(self) -> bool:
         """True if the core has more than one ring: holes, or parts."""
         return is_compound(self.parts)
@@ -193,7 +193,7 @@ class Shape:
         """r_eq = √(A/π) [m]."""
         return float(np.sqrt(self.area / np.pi))
 
-    @property
+    @cached_property
     def bounding_radius(self) -> float:
         """R, the largest distance from the centroid to the outline [m]."""
         # The farthest core point of each part, plus the radius of its disk.

@@ -5,6 +5,7 @@ al. 2014, section 2.2, eq. 1). A wall is a segment. A Composite is one rigid bod
 """
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -79,7 +80,7 @@ class SpheroPolygon(Shape):
         # Faults of a polygon are reported when it is made, not when it is used.
         self.__dict__["swept"] = swept_parts([Part((self.core, *self.holes), self.radius)])
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         return self.swept.parts
 
@@ -167,7 +168,7 @@ class Composite(Shape):
         made.__dict__.update(given=swept.parts, swept=swept)
         return made
 
-    @property
+    @cached_property
     def parts(self) -> Parts:
         return self.swept.parts
 
