@@ -404,8 +404,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     asked = {bounds.index(max(bounds))} if len(shapes) == 2 else set(range(len(shapes)))
     none = Field(Grid.rows(1), np.zeros(0, np.int64), FieldNode.rows(0))
     found = [
-        field_of_shape(shape, kappa) if body in asked else none
-        for body, shape in enumerate(shapes)
+        field_of_shape(shape, kappa) if body in asked else none for body, shape in enumerate(shapes)
     ]
     grids = np.concatenate([each.grids for each in found])
     known = [each for each in found if len(each.field)]
