@@ -80,14 +80,14 @@ def compose(
     *,
     jit: bool = True,
     allocates: bool = False,
-    what: str = "its kernels",
+    what: str = "",
 ) -> Callable:
     """Return the driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
     function}; ``jit=False`` links the plain Python functions, for debugging and reference;
     ``allocates``, whether any of the functions makes an array, for itself; ``what`` it is in words,
-    for who waits while it is compiled.
+    for who waits while it is compiled; "": nothing is said.
     Raises KernelError for kernels that capture variables or read globals that may change.
     """
     # Cloned at once: what is reached later, compiled or not, is what it is now.
@@ -102,7 +102,7 @@ def compose(
 
 
 @functools.cache
-def compiled(entry: Callable, *, allocates: bool = False, what: str = "its kernels") -> Callable:
+def compiled(entry: Callable, *, allocates: bool = False, what: str = "") -> Callable:
     """Return the same of a function without hooks, looked at once: what it reaches is what it was
     then."""
     return compose(entry, {}, allocates=allocates, what=what)

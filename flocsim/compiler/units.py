@@ -46,6 +46,7 @@ WORTH_SAYING = 3.0
 # Nothing is said: in processes of which another one speaks.
 quiet = False
 
+_said: set[str] = set()
 _one_at_a_time = threading.RLock()
 
 
@@ -80,7 +81,7 @@ class Engine:
         typed: Callable[[], tuple[tuple[Any, ...], dict[str, Any], dict[str, Any]]],
         allocates: bool = False,
         whole: bool = False,
-        what: str = "its kernels",
+        what: str = "",
         returns: str | None = None,
     ) -> None:
         self.entry, self.name, self.words, self.typed = entry, name, words, typed
@@ -227,13 +228,20 @@ class Engine:
         return self.inner(call_of(argument_names(value), target))
 
 
+def say(what: str) -> None:
+    """Say on stderr what is compiled."""
+    _said.add(what)
+    text = f"flocsim: first run: compiling {what}, once (up to a minute)"
+    print(text, file=sys.stderr, flush=True)
+
+
 @contextlib.contextmanager
 def announced(what: str) -> Iterator[None]:
-    """Say on stderr what is compiled inside, if it takes more than a moment; nothing of ""."""
-    text = f"flocsim: first run: compiling {what}, once (up to a minute)"
-    timer = threading.Timer(WORTH_SAYING, print, [text], {"file": sys.stderr, "flush": True})
+    """Say on stderr what is compiled inside, if it takes more than a moment and has not been said;
+    nothing of ""."""
+    timer = threading.Timer(WORTH_SAYING, say, [what])
     timer.daemon = True
-    if what and not quiet:
+    if what and not quiet and what not in _said:
         timer.start()
     try:
         yield

@@ -13,6 +13,7 @@ def speaking(monkeypatch):
     """All compiling is worth a line; what is said is not changed for other tests."""
     monkeypatch.setattr(units, "WORTH_SAYING", 0.0)
     monkeypatch.setattr(units, "quiet", False)
+    units._said.clear()
 
 
 def said(capsys):
@@ -24,6 +25,7 @@ def said(capsys):
 
 def test_what_is_compiled_is_said_once(speaking, capsys):
     assert said(capsys) == "flocsim: first run: compiling a product, once (up to a minute)\n"
+    assert said(capsys) == ""
 
 
 def test_short_work_is_not_worth_a_line(speaking, capsys, monkeypatch):

@@ -26,7 +26,7 @@ import numpy as np
 from flocsim.compiler import composer
 from flocsim.geometry.shapes.cores import is_near
 
-compiled = functools.partial(composer.compiled, allocates=True)
+compiled = functools.partial(composer.compiled, allocates=True, what="the search for polygons")
 """A kernel of a fit, compiled on first use and kept on disk."""
 
 BARRED = 2**40
