@@ -69,9 +69,8 @@ def test_the_path_of_a_new_user(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["strip.png", "study.toml"]
 
 
-def test_flocsim_ensemble_is_the_ensemble_command(tmp_path, monkeypatch, capsys):
-    write_small(tmp_path, vertices="[1]")
-    monkeypatch.chdir(tmp_path)
+def test_flocsim_ensemble_is_the_ensemble_command(in_tmp, capsys):
+    write_small(in_tmp, vertices="[1]")
     assert entry.main(["ensemble", "small.toml", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
     assert entry.main(["info", "small.h5"]) == 0

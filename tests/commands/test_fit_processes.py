@@ -26,15 +26,14 @@ JOBS = [1, pytest.param(2, marks=needs_fork)]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp):
     """The current folder with three pictures of one floc each."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "frames").mkdir()
+    (in_tmp / "frames").mkdir()
     for number, name in enumerate("abc"):
         grey = np.full((120, 120), 200, np.uint8)
         grey[20 : 40 + number, 15:45] = 40
-        Image.fromarray(grey).save(tmp_path / f"frames/{name}.png")
-    return tmp_path
+        Image.fromarray(grey).save(in_tmp / f"frames/{name}.png")
+    return in_tmp
 
 
 def fit(jobs=1, *more):

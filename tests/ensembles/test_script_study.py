@@ -173,9 +173,8 @@ def test_a_stopped_run_is_an_error_of_its_own():
 
 
 @pytest.mark.slow
-def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    study = flocsim.Study(write_small(tmp_path)).with_(
+def test_a_quiet_run_still_warns(in_tmp):
+    study = flocsim.Study(write_small(in_tmp)).with_(
         {"shapes.vertices": [1], "fluid.viscosity": "0.5 Pa s", "replicates": 1}
     )
     with pytest.warns(PlausibilityWarning, match="viscosity") as found:

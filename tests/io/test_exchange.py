@@ -155,9 +155,8 @@ def test_without_gsd_one_line_says_what_to_install(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_writes_what_a_file_of_motion_holds(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_what_a_file_of_motion_holds(in_tmp, capsys):
     hoomd = pytest.importorskip("gsd.hoomd", reason="needs flocsim[formats]")
-    monkeypatch.chdir(tmp_path)
     times, position, velocity = motion()
     write_trajectory("m.h5", times, position, velocity, SHAPES, {"steps": 6})
     assert main(["export", "gsd", "m.h5"]) == 0

@@ -38,10 +38,9 @@ def written(tmp_path_factory):
 
 
 @pytest.fixture
-def two(written, tmp_path, monkeypatch):
+def two(written, in_tmp):
     """Copies of them in the current folder, of which the first is to be replaced by the other."""
-    monkeypatch.chdir(tmp_path)
-    return tuple(shutil.copy(path, tmp_path / path.name) for path in written)
+    return tuple(shutil.copy(path, in_tmp / path.name) for path in written)
 
 
 @pytest.mark.parametrize("name", LATER)

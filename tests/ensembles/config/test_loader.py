@@ -147,9 +147,8 @@ def test_settings_lie_over_the_file_and_are_kept(tmp_path):
         ("stop.half_width=0.7", "stop.half_width must be a finite number above 0 and at most 0.5"),
     ],
 )
-def test_a_wrong_setting_is_one_line(tmp_path, monkeypatch, capsys, setting, said):
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path)
+def test_a_wrong_setting_is_one_line(in_tmp, capsys, setting, said):
+    write_small(in_tmp)
     assert main(["ensemble", "small.toml", "--set", setting]) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert said in line

@@ -74,9 +74,8 @@ def test_a_dry_run_compiles_nothing(tmp_path, monkeypatch, kind):
     assert not cache.exists()
 
 
-def test_a_pilot_is_for_dry_runs(tmp_path, monkeypatch, capsys):
-    write_small(tmp_path, vertices="[1]")
-    monkeypatch.chdir(tmp_path)
+def test_a_pilot_is_for_dry_runs(in_tmp, capsys):
+    write_small(in_tmp, vertices="[1]")
     assert main(["ensemble", "small.toml", "--pilot"]) == 2
     assert capsys.readouterr().err == "flocsim: --pilot is for --dry-run: leave it out\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+    assert [path.name for path in in_tmp.iterdir()] == ["small.toml"]

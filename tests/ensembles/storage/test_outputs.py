@@ -148,14 +148,13 @@ def test_damaged_results_are_set_aside_on_request(finished, capsys):
     assert same_data(finished / "r.h5", finished / "whole.h5") == []
 
 
-def test_the_results_have_the_name_of_the_config(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    path = write_small(tmp_path, vertices="[1]", name="weather.toml")
+def test_the_results_have_the_name_of_the_config(in_tmp, capsys):
+    path = write_small(in_tmp, vertices="[1]", name="weather.toml")
     path.write_text(path.read_text().partition("[output]")[0])
     for folder in ("", "sub/"):
-        (tmp_path / folder).mkdir(exist_ok=True)
-        path = path.replace(tmp_path / folder / "weather.toml")
+        (in_tmp / folder).mkdir(exist_ok=True)
+        path = path.replace(in_tmp / folder / "weather.toml")
         assert main(["ensemble", f"{folder}weather.toml", "--quiet", "--overwrite"]) == 0
-    assert {each.name for each in tmp_path.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
+    assert {each.name for each in in_tmp.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
     assert main(["ensemble", "sub/weather.toml", "-o", "sub/other.h5", "--quiet"]) == 0
-    assert (tmp_path / "sub/other.h5").exists()
+    assert (in_tmp / "sub/other.h5").exists()

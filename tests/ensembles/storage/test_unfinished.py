@@ -71,9 +71,8 @@ def test_the_counts_are_those_of_the_rows_there_are(tmp_path):
     journal.release()
 
 
-def test_info_and_plot_of_results_that_are_not_there_yet(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    journal = write_journal(tmp_path / "r.h5.journal")  # and locked by this job
+def test_info_and_plot_of_results_that_are_not_there_yet(in_tmp, capsys):
+    journal = write_journal(in_tmp / "r.h5.journal")  # and locked by this job
     for name in ("r.h5", "r.h5.journal"):
         assert main(["info", name]) == 0
         told = capsys.readouterr().out

@@ -173,13 +173,11 @@ def start(folder, *words):
     ("number", "jobs"),
     [pytest.param(signal.SIGKILL, 2, marks=pytest.mark.slow), (signal.SIGTERM, 1)],
 )
-def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
-    finished, tmp_path, monkeypatch, capsys, number, jobs
-):
-    write_swarm_study(tmp_path)
-    with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
+def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, in_tmp, capsys, number, jobs):
+    write_swarm_study(in_tmp)
+    with start(in_tmp, "--set", "scene.checkpoint=1e-3") as process:
         until = time.monotonic() + PATIENCE
-        journal = tmp_path / "swarm.h5.journal"
+        journal = in_tmp / "swarm.h5.journal"
         while time.monotonic() < until and process.poll() is None:
             if any(each["name"] == "state" for each in records_in(journal, PART)):
                 process.send_signal(number)
@@ -189,13 +187,12 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
     assert journal.exists(), said
     if number == signal.SIGTERM:
         assert process.returncode == 75 and said.endswith(" --resume\n")
-    monkeypatch.chdir(tmp_path)
     assert main(["info", "swarm.h5"]) == 0
     assert re.search(r"unfinished: \d of 8 snapshots so far", capsys.readouterr().out)
     assert main(["swarm", "swarm.toml", "--resume", "--jobs", str(jobs)]) == 0
     said = capsys.readouterr()
     assert "left out" not in said.out + said.err
-    assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
+    assert same(finished / "swarm.h5", in_tmp / "swarm.h5")
     assert not journal.exists()
 
 
@@ -227,38 +224,35 @@ def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
     assert (finished / "swarm.h5").read_bytes() == before
 
 
-def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, monkeypatch):
+def test_more_replicates_leave_the_first_ones_as_they_are(finished, in_tmp):
     """And are those of a study of as many from the start; of flocs with other numbers of points."""
-    monkeypatch.chdir(tmp_path)
-    write_swarm_study(tmp_path)
-    shutil.copy(finished / "swarm.h5", tmp_path / "swarm.h5")
+    write_swarm_study(in_tmp)
+    shutil.copy(finished / "swarm.h5", in_tmp / "swarm.h5")
     more = ["--replicates", "3", "--quiet"]
     assert main(["swarm", "swarm.toml", "--resume", *more]) == 0
     assert main(["swarm", "swarm.toml", "-o", "fresh.h5", *more]) == 0
-    assert same(tmp_path / "swarm.h5", tmp_path / "fresh.h5")
-    before, after = (columns_of(each / "swarm.h5") for each in (finished, tmp_path))
+    assert same(in_tmp / "swarm.h5", in_tmp / "fresh.h5")
+    before, after = (columns_of(each / "swarm.h5") for each in (finished, in_tmp))
     for name, values in before.items():
         assert after[name][: len(values)].tobytes() == values.tobytes()
-    assert SWARMS.read(tmp_path / "swarm.h5").run["sessions"] == 2
+    assert SWARMS.read(in_tmp / "swarm.h5").run["sessions"] == 2
 
 
-def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_all_that_reads_the_file(finished, in_tmp, capsys):
     file = str(finished / "swarm.h5")
     assert main(["info", file]) == 0
     said = capsys.readouterr().out
     assert "2 of 12 bodies, 2 were completed" in said and "means over 2 swarms" in said
     assert main(["plot", file, "--animation", "s.gif"]) == 0
-    names = {path.name for path in tmp_path.iterdir()}
+    names = {path.name for path in in_tmp.iterdir()}
     assert names == {
         "swarm-snapshots.png", "swarm-clusters.png", "swarm-sizes.png", "swarm-speed.png", "s.gif",
     }  # fmt: skip
 
 
-def test_a_dry_run_runs_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    write_swarm_study(tmp_path)
+def test_a_dry_run_runs_nothing(in_tmp, capsys):
+    write_swarm_study(in_tmp)
     assert main(["swarm", "swarm.toml", "--dry-run"]) == 0
     said = capsys.readouterr().out
     assert "2 swarms of 12 bodies" in said and "bodies cover 0.2000" in said
-    assert [path.name for path in tmp_path.iterdir()] == ["swarm.toml"]
+    assert [path.name for path in in_tmp.iterdir()] == ["swarm.toml"]
