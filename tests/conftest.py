@@ -98,6 +98,12 @@ def own_cache(tmp_path, environment):
 
 
 @pytest.fixture
+def at_once(monkeypatch):
+    """Nobody waits for another job that writes to a journal, which might just be ending."""
+    monkeypatch.setattr("flocsim.io.journal.LOCK_SECONDS", 0.1)
+
+
+@pytest.fixture
 def interruptible():
     """SIGINT raises KeyboardInterrupt, also in what a shell has started in the background, which
     ignores it."""
