@@ -104,6 +104,27 @@ def at_once(monkeypatch):
 
 
 @pytest.fixture
+def stopping(monkeypatch):
+    """A signal has come that asks this process to stop."""
+    monkeypatch.setattr("flocsim.process.INTERRUPTION.signal", signal.SIGTERM)
+
+
+@pytest.fixture
+def uninstalled(monkeypatch):
+    """``uninstalled(name)``: Python does not find this library any more."""
+    return lambda name: monkeypatch.setitem(sys.modules, name, None)
+
+
+@pytest.fixture
+def one_figure():
+    """Of the figures of pairs, only the fourth of Tang et al. (2014) is drawn."""
+    from flocsim.io.plots.results import FIGURES
+
+    with mock.patch.dict(FIGURES, {"4": FIGURES["4"]}, clear=True):
+        yield
+
+
+@pytest.fixture
 def interruptible():
     """SIGINT raises KeyboardInterrupt, also in what a shell has started in the background, which
     ignores it."""

@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from flocsim import __main__ as entry
-from flocsim.errors import ConfigError, FileError, FlocsimError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import command, run_command, write_small
@@ -34,24 +33,6 @@ def test_wrong_usage_ends_with_2(capsys, words):
         entry.main(words)
     assert caught.value.code == 2
     assert "error: " in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (ConfigError("a.toml:3: wrong"), 2, "flocsim: a.toml:3: wrong\n"),
-        (FileError("full"), 74, "flocsim: full\n"),
-        (FlocsimError("odd"), 70, "flocsim: odd\n"),
-        (KeyboardInterrupt(), 130, "flocsim: interrupted\n"),
-    ],
-)
-def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, said):
-    def fail(arguments):
-        raise error
-
-    monkeypatch.setattr("flocsim.commands.info.run", fail)
-    assert entry.main(["info", "x.h5"]) == code
-    assert capsys.readouterr() == ("", said)
 
 
 @pytest.mark.slow

@@ -148,8 +148,8 @@ def test_ovito_reads_places_and_shapes(tmp_path):
         assert 2.0 * types[1].radius == pytest.approx(4.0)
 
 
-def test_without_gsd_one_line_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "gsd", None)
+def test_without_gsd_one_line_says_what_to_install(tmp_path, uninstalled):
+    uninstalled("gsd")
     with pytest.raises(UsageError, match=r"gsd is not installed: pip install 'flocsim\[formats\]'"):
         write_gsd(tmp_path / "m.gsd", *motion(), SHAPES)
     assert not list(tmp_path.iterdir())

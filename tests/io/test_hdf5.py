@@ -173,9 +173,9 @@ except FileError as error:
 
 
 @pytest.fixture
-def mpi(monkeypatch):
+def mpi(environment):
     """Look like a rank of an MPI job."""
-    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    environment["OMPI_COMM_WORLD_RANK"] = "0"
     return contextlib.nullcontext()
 
 
@@ -261,13 +261,13 @@ READERS = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_all_that_flocsim_writes_is_read(tmp_path, name, monkeypatch):
+def test_all_that_flocsim_writes_is_read(tmp_path, name, environment):
     """By a forked process, and by one that is started anew."""
     valid = getattr(hostile_files, f"valid_{name}")(tmp_path)
     path = hostile_files.written(tmp_path, "v.h5", seal(valid))
     read = READERS.get(name, read_results)
     forked = read(path)
-    monkeypatch.setenv("PMI_RANK", "0")
+    environment["PMI_RANK"] = "0"
     started = read(path)
     assert type(forked) is type(started)
     assert open_hdf5(path).kind.startswith("flocsim")

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import signal
 import threading
 import time
 
@@ -161,8 +160,7 @@ def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, left, whole, mode):
     assert names(tmp_path) == ["r.h5"]
 
 
-def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, monkeypatch):
-    monkeypatch.setattr(INTERRUPTION, "signal", signal.SIGTERM)
+def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, stopping):
     ended = go_on(tmp_path, NEW)
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, "no replicate was finished")
     assert names(tmp_path) == []

@@ -2,6 +2,7 @@
 the file."""
 
 import json
+import os
 import re
 import shutil
 import signal
@@ -108,10 +109,16 @@ def moments_in(parts):
     return [data for name, data in parts if name.startswith("moment")]
 
 
-def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
+@pytest.fixture
+def often(monkeypatch):
+    """A swarm is looked at, and said to be where it is, all the time."""
+    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
+
+
+def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, often):
     config = swarm_config(tmp_path)
     whole, _ = run_parts(config)
-    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
     parts, left, times = [], None, 0
     while True:
         found, ended = run_parts(config, halts=range(2, 10**9) if times < 6 else (), left=left)
@@ -124,10 +131,8 @@ def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_p
     assert moments_in(whole) == moments_in(parts)
 
 
-def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys):
+def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, often, capsys):
     """In whole lines where no terminal is; within windows, too."""
-    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
-    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
     path = write_swarm_study(tmp_path)
     assert main(["swarm", str(path), "-o", str(tmp_path / "told.h5")]) == 0
     output = capsys.readouterr().out
@@ -209,8 +214,8 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
         assert moments_in([*first, *rest]) == moments_in(whole)
 
 
-def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
-    monkeypatch.chdir(finished)
+def test_what_is_there_is_left_alone(finished, in_tmp, capsys):
+    os.chdir(finished)
     before = (finished / "swarm.h5").read_bytes()
     assert main(["swarm", "swarm.toml"]) == UsageError.exit_code
     assert main(["swarm", "swarm.toml", "--resume", "--seed", "9"]) == UsageError.exit_code
