@@ -5,6 +5,7 @@ import pytest
 
 import flocsim
 from flocsim.__main__ import main
+from flocsim.hydrodynamics import encounters
 from flocsim.io.results.file import read_results
 from tests.helpers.kernel_study import kernel_text
 from tests.helpers.results_files import same_data
@@ -86,8 +87,10 @@ def test_a_mechanism_without_a_factor_is_named(folder, capsys):
         lambda meeting, sizes, known: False,
     ),
 )  # fmt: skip
-def test_equivalent_spheres_are_known_in_water(folder, capsys, meeting, sizes, known):
-    """``known``: alpha of quartz in water at 10 1/s."""
+def test_equivalent_spheres_are_known_in_water(folder, monkeypatch, capsys, meeting, sizes, known):
+    """``known``: alpha of quartz in water at 10 1/s; by steps as long as 2 % allow."""
+    monkeypatch.setattr(encounters, "STEP", 3.0 * encounters.STEP)
+    monkeypatch.setattr(encounters, "SMOOTHNESS", 3.0 * encounters.SMOOTHNESS)
     changes = {"more": "[forces]\ndouble_layer = false", "meeting": meeting, "sizes": sizes}
     (folder / "kernel.toml").write_text(kernel_text(**SHEAR | changes), "utf-8")
     assert main(["kernel", "kernel.toml", "--quiet"]) == 0
