@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from hypothesis import settings
@@ -67,13 +68,60 @@ type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def environment():
+    """The environment, as it was before once the test is over."""
+    with mock.patch.dict(os.environ):
+        yield os.environ
+
+
+@pytest.fixture
+def in_tmp(tmp_path, monkeypatch):
+    """A temporary folder, which is the current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def folder(in_tmp):
     """The current folder, with the small config in it, spheres only."""
     from tests.helpers.small_study import write_small
 
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path, vertices="[1]")
-    return tmp_path
+    write_small(in_tmp, vertices="[1]")
+    return in_tmp
+
+
+@pytest.fixture
+def own_cache(tmp_path, environment):
+    """A cache of compiled code that is empty at first."""
+    environment["FLOCSIM_CACHE"] = str(tmp_path / "cache")
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Nobody waits for another job that writes to a journal, which might just be ending."""
+    monkeypatch.setattr("flocsim.io.journal.LOCK_SECONDS", 0.1)
+
+
+@pytest.fixture
+def stopping(monkeypatch):
+    """A signal has come that asks this process to stop."""
+    monkeypatch.setattr("flocsim.process.INTERRUPTION.signal", signal.SIGTERM)
+
+
+@pytest.fixture
+def uninstalled(monkeypatch):
+    """``uninstalled(name)``: Python does not find this library any more."""
+    return lambda name: monkeypatch.setitem(sys.modules, name, None)
+
+
+@pytest.fixture
+def one_figure():
+    """Of the figures of pairs, only the fourth of Tang et al. (2014) is drawn."""
+    from flocsim.io.plots.results import FIGURES
+
+    with mock.patch.dict(FIGURES, {"4": FIGURES["4"]}, clear=True):
+        yield
 
 
 @pytest.fixture

@@ -35,10 +35,9 @@ LONG = {
 
 
 @pytest.mark.parametrize("kind", rest_slow(OF_RESULTS, lambda kind: kind == "results"))
-def test_commands_end_with_plain_lines(tmp_path, monkeypatch, capfd, kind):
-    monkeypatch.chdir(tmp_path)
+def test_commands_end_with_plain_lines(in_tmp, capfd, kind):
     for number in range(2 if kind == "results" else 20):
-        path = str(made(kind, number, tmp_path))
+        path = str(made(kind, number, in_tmp))
         lines = [["info", path], ["compare", path, path], ["export", "csv", path, "-o", "out.csv"]]
         if kind != "results":
             lines += [[name, path, *more] for name, more in LONG.items()]

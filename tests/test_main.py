@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from flocsim import __main__ as entry
-from flocsim.errors import ConfigError, FileError, FlocsimError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import command, run_command, write_small
@@ -36,24 +35,6 @@ def test_wrong_usage_ends_with_2(capsys, words):
     assert "error: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (ConfigError("a.toml:3: wrong"), 2, "flocsim: a.toml:3: wrong\n"),
-        (FileError("full"), 74, "flocsim: full\n"),
-        (FlocsimError("odd"), 70, "flocsim: odd\n"),
-        (KeyboardInterrupt(), 130, "flocsim: interrupted\n"),
-    ],
-)
-def test_errors_are_one_line_and_an_exit_code(capsys, monkeypatch, error, code, said):
-    def fail(arguments):
-        raise error
-
-    monkeypatch.setattr("flocsim.commands.info.run", fail)
-    assert entry.main(["info", "x.h5"]) == code
-    assert capsys.readouterr() == ("", said)
-
-
 @pytest.mark.slow
 def test_the_path_of_a_new_user(tmp_path):
     for words in (
@@ -69,9 +50,8 @@ def test_the_path_of_a_new_user(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["strip.png", "study.toml"]
 
 
-def test_flocsim_ensemble_is_the_ensemble_command(tmp_path, monkeypatch, capsys):
-    write_small(tmp_path, vertices="[1]")
-    monkeypatch.chdir(tmp_path)
+def test_flocsim_ensemble_is_the_ensemble_command(in_tmp, capsys):
+    write_small(in_tmp, vertices="[1]")
     assert entry.main(["ensemble", "small.toml", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
     assert entry.main(["info", "small.h5"]) == 0

@@ -6,6 +6,7 @@
 import ast
 import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,17 +24,16 @@ RUN_PY = Path(__file__).resolve().parents[1] / "run.py"
 class Stage:
     """A folder with a run.py in it whose commands are noted, not run."""
 
-    def __init__(self, folder, monkeypatch):
-        spec = importlib.util.spec_from_file_location("run_py", RUN_PY)
+    def __init__(self, folder):
+        shutil.copy(RUN_PY, folder)
+        spec = importlib.util.spec_from_file_location("run_py", folder / "run.py")
         self.run_py = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(self.run_py)
         self.commands, self.exit_codes = [], {}
         self.folder, self.stamp = folder, folder / ".venv" / "installed-by-run.txt"
         (folder / "pyproject.toml").write_text("[project]")
-        doubles = {"call": self.call, "usable": self.usable, "HERE": folder, "WINDOWS": False}
-        for name, double in doubles.items():
-            monkeypatch.setattr(self.run_py, name, double)
-        monkeypatch.chdir(folder)
+        # Of this copy, which nobody else imports.
+        vars(self.run_py).update(call=self.call, usable=self.usable, WINDOWS=False)
 
     def call(self, *command):
         """The double of run.py's call."""
@@ -60,10 +60,10 @@ class Stage:
 
 
 @pytest.fixture
-def stage(tmp_path, monkeypatch):
-    folder = tmp_path / "a folder"
+def stage(in_tmp):
+    folder = in_tmp / "a folder"
     folder.mkdir()
-    return Stage(folder.resolve(), monkeypatch)
+    return Stage(folder.resolve())
 
 
 def real(*arguments, cwd=None):
@@ -179,8 +179,8 @@ def test_failing_pip_is_one_line_and_keeps_what_was_there(stage, capsys):
 
 
 @pytest.mark.parametrize("missing", ["venv", "ensurepip"])
-def test_python_without_venv_names_the_package_to_install(stage, monkeypatch, capsys, missing):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: name != missing)
+def test_python_without_venv_names_the_package_to_install(stage, uninstalled, capsys, missing):
+    uninstalled(missing)
     with pytest.raises(SystemExit) as stopped:
         stage.run("demo")
     assert stopped.value.code == 70 and not stage.commands

@@ -22,10 +22,9 @@ from tests.helpers.synthetic_results import make_results
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp):
     """The current folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+    return in_tmp
 
 
 def exported(capsys, *words):

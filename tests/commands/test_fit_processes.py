@@ -26,15 +26,14 @@ JOBS = [1, pytest.param(2, marks=needs_fork)]
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp):
     """The current folder with three pictures of one floc each."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "frames").mkdir()
+    (in_tmp / "frames").mkdir()
     for number, name in enumerate("abc"):
         grey = np.full((120, 120), 200, np.uint8)
         grey[20 : 40 + number, 15:45] = 40
-        Image.fromarray(grey).save(tmp_path / f"frames/{name}.png")
-    return tmp_path
+        Image.fromarray(grey).save(in_tmp / f"frames/{name}.png")
+    return in_tmp
 
 
 def fit(jobs=1, *more):
@@ -46,18 +45,23 @@ def ids(path="s.h5"):
     return [entry.floc_id for entry in read_library(path)]
 
 
-def spoiled(monkeypatch, name, harm, function="find_flocs"):
-    """Let a task of this picture come to harm."""
-    original = getattr(fit_pictures, function)
+@pytest.fixture
+def spoil(monkeypatch):
+    """``spoil(name, harm, function)`` lets a task of this picture come to harm."""
 
-    def run(task):
-        if name in str(task[0]):
-            harm()
-        return original(task)
+    def spoil(name, harm, function="find_flocs"):
+        original = getattr(fit_pictures, function)
 
-    # Processes that are forked have it too; it is found by its name where it is unpickled.
-    run.__module__, run.__qualname__ = original.__module__, original.__qualname__
-    monkeypatch.setattr(fit_pictures, function, run)
+        def run(task):
+            if name in str(task[0]):
+                harm()
+            return original(task)
+
+        # Processes that are forked have it too; it is found by its name where it is unpickled.
+        run.__module__, run.__qualname__ = original.__module__, original.__qualname__
+        monkeypatch.setattr(fit_pictures, function, run)
+
+    return spoil
 
 
 def die():
@@ -72,10 +76,8 @@ def use_up_memory():
 @pytest.mark.parametrize(
     "function", rest_slow(["find_flocs", "fit_region"], lambda name: name == "fit_region")
 )
-def test_a_picture_that_kills_its_process_is_lost_and_no_other(
-    folder, monkeypatch, capsys, function
-):
-    spoiled(monkeypatch, "b.png", die, function)
+def test_a_picture_that_kills_its_process_is_lost_and_no_other(folder, spoil, capsys, function):
+    spoil("b.png", die, function)
     assert fit(2) == 70
     assert ids() == ["a.png#1", "c.png#1"]
     errors = capsys.readouterr().err.splitlines()
@@ -86,13 +88,13 @@ def test_a_picture_that_kills_its_process_is_lost_and_no_other(
 
 
 @needs_fork
-def test_a_process_that_is_killed_once_costs_nothing(folder, monkeypatch, capsys):
+def test_a_process_that_is_killed_once_costs_nothing(folder, spoil, capsys):
     def die_once():
         if not (folder / "died").exists():
             (folder / "died").touch()
             die()
 
-    spoiled(monkeypatch, "b.png", die_once)
+    spoil("b.png", die_once)
     assert fit(2) == 0
     assert ids() == ["a.png#1", "b.png#1", "c.png#1"]
     assert capsys.readouterr().err == ""
@@ -103,16 +105,16 @@ def test_a_process_that_is_killed_once_costs_nothing(folder, monkeypatch, capsys
     "function", rest_slow(["find_flocs", "fit_region"], lambda name: name == "fit_region")
 )
 def test_a_picture_too_large_for_the_memory_is_lost_and_no_other(
-    folder, monkeypatch, capsys, jobs, function
+    folder, spoil, capsys, jobs, function
 ):
-    spoiled(monkeypatch, "b.png", use_up_memory, function)
+    spoil("b.png", use_up_memory, function)
     assert fit(jobs) == 70
     assert ids() == ["a.png#1", "c.png#1"]
     assert "b.png was not fitted: not enough memory" in capsys.readouterr().err
 
 
-def test_where_all_are_lost_there_is_no_library(folder, monkeypatch):
-    spoiled(monkeypatch, ".png", use_up_memory)
+def test_where_all_are_lost_there_is_no_library(folder, spoil):
+    spoil(".png", use_up_memory)
     assert fit() == 70
     assert not (folder / "s.h5").exists()
 

@@ -15,8 +15,7 @@ TAKES_SHAPES = [kind for kind in KINDS if kind != "spheres"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_what_is_written_can_be_run(kind, in_tmp, capsys):
     own = ["--shapes", str(SHIPPED)] if kind == "pictures" else []
     assert main(["init", f"1-{kind}.toml", "--kind", kind, *own]) == 0
     told = capsys.readouterr().out
@@ -28,11 +27,10 @@ def test_what_is_written_can_be_run(kind, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_commented_values_are_those_of_the_preset(kind, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_commented_values_are_those_of_the_preset(kind, in_tmp):
     own = ["--shapes", str(SHIPPED)] if kind == "pictures" else []
     assert main(["init", "s.toml", "--kind", kind, *own]) == 0
-    text = (tmp_path / "s.toml").read_text("utf-8")
+    text = (in_tmp / "s.toml").read_text("utf-8")
     plain, table = load_any_config("s.toml"), ""
     lines, checked = text.split("\n"), 0
     for number, line in enumerate(lines):
@@ -47,7 +45,7 @@ def test_commented_values_are_those_of_the_preset(kind, tmp_path, monkeypatch):
             changed = [
                 each for k, each in enumerate(changed) if each != f"[{table}]" or k == number
             ]
-            (tmp_path / "t.toml").write_text("\n".join(changed))
+            (in_tmp / "t.toml").write_text("\n".join(changed))
             found = load_any_config("t.toml")
             for part in ("scene", "shapes", "bodies", "fluid", "forces", "zone", "integrator"):
                 assert repr(getattr(found, part)) == repr(getattr(plain, part)), line
@@ -56,15 +54,14 @@ def test_commented_values_are_those_of_the_preset(kind, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", TAKES_SHAPES)
-def test_a_library_is_written_in(kind, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.h5").write_bytes(SHIPPED.read_bytes())
-    (tmp_path / "studies").mkdir()
+def test_a_library_is_written_in(kind, in_tmp, capsys):
+    (in_tmp / "mine.h5").write_bytes(SHIPPED.read_bytes())
+    (in_tmp / "studies").mkdir()
     line = ["init", "studies/s.toml", "--kind", kind, "--shapes", "mine.h5"]
     assert main(line) == 0
     assert "24 flocs of mine.h5" in capsys.readouterr().out
     shapes = load_any_config("studies/s.toml").shapes
-    assert (tmp_path / str(shapes.file)).resolve() == tmp_path / "mine.h5"
+    assert (in_tmp / str(shapes.file)).resolve() == in_tmp / "mine.h5"
     assert set(shapes.vertices) <= {1, 4, 8, 16, 32, 64, 128}
 
 
@@ -80,21 +77,19 @@ def test_a_library_is_written_in(kind, tmp_path, monkeypatch, capsys):
         ),
     ],
 )
-def test_what_has_no_flocs_is_refused_in_a_line(line, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "mine.h5").write_bytes(SHIPPED.read_bytes())
-    (tmp_path / "damaged.h5").write_bytes(SHIPPED.read_bytes()[:-100])
+def test_what_has_no_flocs_is_refused_in_a_line(line, said, in_tmp, capsys):
+    (in_tmp / "mine.h5").write_bytes(SHIPPED.read_bytes())
+    (in_tmp / "damaged.h5").write_bytes(SHIPPED.read_bytes()[:-100])
     assert main(line.split()) != 0
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
-    assert not (tmp_path / "study.toml").exists()
+    assert not (in_tmp / "study.toml").exists()
 
 
-def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_the_sweep_that_is_written_is_one(in_tmp, capsys):
     assert main(["init", "s.toml", "--kind", "sweep"]) == 0
     over = ["--over", 'forces.van_der_waals.hamaker="1 zJ","10 zJ","100 zJ"']
-    assert f"""'{'"1 zJ"'}'""" in (tmp_path / "s.toml").read_text()
+    assert f"""'{'"1 zJ"'}'""" in (in_tmp / "s.toml").read_text()
     capsys.readouterr()
     assert main(["sweep", "s.toml", *over, "--dry-run"]) == 0
     assert len(capsys.readouterr().out.splitlines()) == 3
@@ -102,8 +97,7 @@ def test_the_sweep_that_is_written_is_one(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", rest_slow(["kernel", "brownian"], lambda kind: kind == "kernel"))
-def test_few_spheres_of_it_come_to_results(kind, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_few_spheres_of_it_come_to_results(kind, in_tmp, capsys):
     assert main(["init", "s.toml", "--kind", kind]) == 0
     few = ["--replicates", "8", "--set", "shapes.vertices=[1]"]
     assert main([COMMANDS.get(kind, "ensemble"), "s.toml", *few]) == 0

@@ -21,10 +21,9 @@ SHEAR = {
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "kernel.toml").write_text(kernel_text(**SHEAR), "utf-8")
-    return tmp_path
+def folder(in_tmp):
+    (in_tmp / "kernel.toml").write_text(kernel_text(**SHEAR), "utf-8")
+    return in_tmp
 
 
 def test_a_study_is_run_described_drawn_and_exported(folder, capsys):
@@ -172,14 +171,13 @@ def test_a_replicate_can_be_looked_at(folder, capsys):
 
 
 @pytest.fixture
-def cut_short(tmp_path, monkeypatch):
+def cut_short(in_tmp):
     """The current folder, with a study that has too few steps to decide anything."""
-    monkeypatch.chdir(tmp_path)
     about = {"preset": "tang2014", "meeting": '["shear"]', "scene": 'rate = "10 1/s"',
              "sizes": '["5 um", "8 um"]', "more": "[integrator]\nmax_steps = 15",
              "replicates": 8, "scrambles": 2}  # fmt: skip
-    (tmp_path / "kernel.toml").write_text(kernel_text(**about), "utf-8")
-    return tmp_path
+    (in_tmp / "kernel.toml").write_text(kernel_text(**about), "utf-8")
+    return in_tmp
 
 
 @pytest.mark.slow

@@ -35,20 +35,19 @@ class Spring(CentreForce):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp):
     """The current folder: a config with a library and a force of one's own, and pictures."""
-    monkeypatch.chdir(tmp_path)
-    path = write_small(tmp_path, vertices="[1, 4]")
+    path = write_small(in_tmp, vertices="[1, 4]")
     text = path.read_text().replace("pool = 2", 'source = "library"\nfile = "lib.h5"')
     path.write_text(text + '[forces.mine]\nclass = "spring_of_mine:Spring"\n')
-    (tmp_path / "spring_of_mine.py").write_text(FORCE)
-    write_star_library(tmp_path / "lib.h5")
-    (tmp_path / "thesis.txt").write_text("Chapter 1")
+    (in_tmp / "spring_of_mine.py").write_text(FORCE)
+    write_star_library(in_tmp / "lib.h5")
+    (in_tmp / "thesis.txt").write_text("Chapter 1")
     grey = np.full((60, 60), 200, np.uint8)
     grey[20:40, 15:45] = 40
     for name in ("frame.png", "photo.png"):
-        Image.fromarray(grey).save(tmp_path / name)
-    return tmp_path
+        Image.fromarray(grey).save(in_tmp / name)
+    return in_tmp
 
 
 def content(folder):

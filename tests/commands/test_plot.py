@@ -59,11 +59,10 @@ def test_all_figures_are_drawn_into_a_new_folder(study, monkeypatch, capsys, tmp
 
 
 @pytest.mark.slow
-def test_chosen_figures_go_to_the_current_folder(study, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_chosen_figures_go_to_the_current_folder(study, capsys, in_tmp):
     assert call("plot", "study.h5", "--figures", "overview, 8,8") == 0
     assert capsys.readouterr().out == "study-overview.png\nstudy-figure-8.png\n"
-    assert (tmp_path / "study-overview.png").read_bytes().startswith(b"\x89PNG")
+    assert (in_tmp / "study-overview.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("figures", ["7", "4,figure", "", ","])

@@ -61,12 +61,10 @@ def write_made_up(path):
 
 
 @pytest.fixture
-def made_up(tmp_path, monkeypatch):
+def made_up(in_tmp, one_figure):
     """The folder of made-up results; their page has one figure."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(drawings, "FIGURES", {"4": FIGURES["4"]})
     write_made_up("r.h5")
-    return tmp_path
+    return in_tmp
 
 
 FEW = ("4", "overview", "size")

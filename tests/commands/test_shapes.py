@@ -25,13 +25,12 @@ def entry(name, radius, pixel=1e-6, spheroradius=1.0, counts=(1, 4)):
 
 
 @pytest.fixture
-def libraries(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def libraries(in_tmp):
     one = [entry("a.png#1", 5.0), entry("a.png#2", 10.0), entry("b,c.png#1", 20.0)]
     write_library("one.h5", one, {"method": "pattern", "inscribed": False})
     two = [entry("a.png#1", 6.0, 2e-6), entry("d.png#1", 7.0, 2e-6)]
     write_library("two.h5", two, {"method": "even", "inscribed": False})
-    return tmp_path
+    return in_tmp
 
 
 def names(path):

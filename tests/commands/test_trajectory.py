@@ -13,11 +13,10 @@ from tests.helpers.tiers import rest_slow
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp):
     """The current folder, with the small config in it."""
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path)
-    return tmp_path
+    write_small(in_tmp)
+    return in_tmp
 
 
 def call(capsys, *words):

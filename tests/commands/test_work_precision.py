@@ -13,10 +13,9 @@ WORDS = ["work-precision", "small.toml", "--set", "shapes.vertices=[4]"]
 
 
 @pytest.fixture
-def implicit_alone(monkeypatch, tmp_path):
+def implicit_alone(in_tmp, monkeypatch):
     """The small config; only the method that is compiled already, at two rungs."""
-    write_small(tmp_path)
-    monkeypatch.chdir(tmp_path)
+    write_small(in_tmp)
     monkeypatch.setattr(work_precision, "DormandPrince54", Implicit)
     monkeypatch.setattr(work_precision, "DECADES", 2)
 

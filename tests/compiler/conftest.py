@@ -29,9 +29,15 @@ def through(x):
 
 
 @pytest.fixture
-def load(tmp_path, monkeypatch):
+def new_process(own_cache):
+    """``new_process()`` forgets what this process has compiled, but for what is on the disk."""
+    composer._composed.clear()
+    return composer._composed.clear
+
+
+@pytest.fixture
+def load(new_process, tmp_path, monkeypatch):
     """``load(text, number)`` writes a module and its neighbours and imports them afresh."""
-    monkeypatch.setattr(composer, "_composed", {})
 
     def write(text, number):
         loaded = None

@@ -13,7 +13,7 @@ import pytest
 from numba.core import types
 
 import flocsim
-from flocsim.compiler import accelerator, composer
+from flocsim.compiler import accelerator
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.linker import apart
 from flocsim.errors import KernelError
@@ -41,10 +41,8 @@ GIVEN = types.float64, types.CPointer(types.float64)
 
 
 @pytest.fixture
-def fresh(monkeypatch, tmp_path):
+def fresh(new_process, monkeypatch):
     """Nothing compiled before is at hand."""
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
-    monkeypatch.setattr(composer, "_composed", {})
     accelerator.is_on.cache_clear()
     yield monkeypatch
     accelerator.is_on.cache_clear()
@@ -54,29 +52,20 @@ def test_this_numba_has_all_parts():
     assert accelerator.is_on()
 
 
-def without_a_part(patch):
-    """As a numba would be that has moved one."""
-    accelerator.pipelines.cache_clear()
-    patch.delattr("numba.core.codegen.JITCodeLibrary")
-
-
-ABSENT = {
-    "turned off": lambda patch: patch.setenv("FLOCSIM_ACCELERATOR", "0"),
-    "another numba": without_a_part,
-}
-
-
-@pytest.mark.parametrize("absent", ABSENT)
-def test_without_the_accelerator_everything_works(fresh, absent):
+@pytest.mark.parametrize("absent", ["turned off", "another numba"])
+def test_without_the_accelerator_everything_works(fresh, environment, new_process, absent):
     parameters = np.ones(2)
     expected = compose(root, {})(3.0, parameters)
-    composer._composed.clear()
     accelerator.is_on.cache_clear()
-    fresh.setenv("FLOCSIM_CACHE", os.environ["FLOCSIM_CACHE"] + "/other")
-    ABSENT[absent](fresh)
+    environment["FLOCSIM_CACHE"] += "/other"
+    if absent == "turned off":
+        environment["FLOCSIM_ACCELERATOR"] = "0"
+    else:  # one that has moved a part
+        accelerator.pipelines.cache_clear()
+        fresh.delattr("numba.core.codegen.JITCodeLibrary")
     assert not accelerator.is_on()
     for _ in range(2):  # compiled, then from the disk
-        composer._composed.clear()
+        new_process()
         assert compose(root, {})(3.0, parameters) == expected == root(3.0, parameters)
     assert compile_law(law, "law", 1, lambda: GIVEN) != 0
     with pytest.raises(KernelError, match=r"test_accelerator\.py:\d+: .*colour"):

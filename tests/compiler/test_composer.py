@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from flocsim import Body, Sphere, System
-from flocsim.compiler import composer
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.table_types import call_of
@@ -64,13 +63,11 @@ def as_law(kernels):
 
 @pytest.mark.parametrize("text, answer", [(SCALED, as_function), (SCALED_LAW, as_law)])
 def test_edited_code_returns_the_new_physics_from_a_warm_cache(
-    load, tmp_path, monkeypatch, text, answer
+    load, own_cache, new_process, text, answer
 ):
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-
     def answer_of(number):
-        monkeypatch.setattr(composer, "_composed", {})
-        return answer(load(text, number)), len(list((tmp_path / "cache").rglob("*.code")))
+        new_process()
+        return answer(load(text, number)), len(list(own_cache.rglob("*.code")))
 
     assert answer_of(2.0) == answer_of(2.0) == (6.0, 1)
     assert answer_of(2.5) == answer_of(2.5) == (7.5, 2)

@@ -1,7 +1,9 @@
 """Compiled code on disk: taken only where it is whole and nobody else can have put it there."""
 
+import contextlib
 import os
 import pickle
+import resource
 import stat
 import subprocess
 import sys
@@ -21,11 +23,9 @@ NOBODY = 65534
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(in_tmp, own_cache):
     """The cache folder, which is made when it is first needed."""
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path / "cache"
+    return own_cache
 
 
 def only_file(folder):
@@ -126,28 +126,34 @@ def test_a_file_that_others_can_write_and_a_link_are_replaced(folder, tmp_path):
     assert (tmp_path / "elsewhere").read_bytes() == before
 
 
-def full_disk(folder, monkeypatch):
-    def full(*words, **more):
-        raise OSError(28, "No space left on device")
+@contextlib.contextmanager
+def full_disk(folder):
+    """As one is that has 64 bytes left for each file."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
-    monkeypatch.setattr(os, "replace", full)
 
-
-def file_in_the_way(folder, monkeypatch):
+def file_in_the_way(folder):
     # It stops even the superuser, whom no permission bits would.
     folder.write_text("")
+    return contextlib.nullcontext()
 
 
-def name_that_is_too_long(folder, monkeypatch):
-    monkeypatch.setenv("FLOCSIM_CACHE", str(folder / ("x" * 300)))
+def name_that_is_too_long(folder):
+    os.environ["FLOCSIM_CACHE"] = str(folder / ("x" * 300))
+    return contextlib.nullcontext()
 
 
 @pytest.mark.parametrize("trouble", [full_disk, file_in_the_way, name_that_is_too_long])
-def test_a_folder_that_cannot_be_written_is_one_line_and_costs_no_result(
-    folder, monkeypatch, trouble
-):
-    trouble(folder, monkeypatch)
-    with pytest.warns(UserWarning, match=f"compiled code is not stored: .* {folder}") as caught:
+def test_a_folder_that_cannot_be_written_is_one_line_and_costs_no_result(folder, trouble):
+    with (
+        trouble(folder),
+        pytest.warns(UserWarning, match=f"compiled code is not stored: .* {folder}") as caught,
+    ):
         assert answer() == 7.0
     assert len(caught) == 1
     assert not list(folder.glob(".*"))  # nothing half written is left

@@ -163,21 +163,15 @@ def test_what_no_hash_follows_is_refused_by_file_line_and_name(load, name):
      "module's njit", "module's plain function", "module's function that reads another module",
      "star import", "module of a module"],
 )  # fmt: skip
-def test_what_is_accepted_computes_compiled_what_it_does_in_python(
-    load, name, tmp_path, monkeypatch
-):
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+def test_what_is_accepted_computes_compiled_what_it_does_in_python(load, name):
     for number in (2, 3):
         kernel = load(TOLD[name], number).kernel
         assert compose(kernel, {})(1.5) == pytest.approx(kernel(1.5))
         assert compose(kernel, {}, jit=False)(1.5) == pytest.approx(kernel(1.5))
 
 
-def test_a_module_changed_between_linking_and_compiling_does_not_reach_the_machine_code(
-    load, tmp_path, monkeypatch
-):
+def test_a_module_changed_between_linking_and_compiling_does_not_reach_the_machine_code(load):
     """Neither what is given to it later nor what it had compiled before."""
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
     kernels = load(TOLD["module's njit"], 2)
     assert kernels.beside.fast(1.0) == 2.0
     kernels.beside.K = 5

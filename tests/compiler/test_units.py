@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flocsim.compiler import composer, disk_cache, units
+from flocsim.compiler import disk_cache, units
 from flocsim.compiler.composer import compose
 from flocsim.compiler.linker import apart, postponed
 from flocsim.errors import KernelError
@@ -72,10 +72,8 @@ VALUES = np.array([1.0, 2.0, 3.0])
 
 
 @pytest.fixture
-def made(monkeypatch, tmp_path):
+def made(new_process, monkeypatch):
     """Names of the functions with which compiled units begin, in the order in which they end."""
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
-    monkeypatch.setattr(composer, "_composed", {})
     names = []
     real = units.Engine.compiled
 
@@ -92,18 +90,18 @@ def files(folder):
     return {path.name: path.read_bytes() for path in folder.glob(f"*{disk_cache.SUFFIX}")}
 
 
-def test_each_marked_function_is_a_unit_that_computes_what_python_does(made, tmp_path):
+def test_each_marked_function_is_a_unit_that_computes_what_python_does(made, own_cache):
     assert compose(drive, {})(VALUES, 2.0) == drive(VALUES, 2.0)
     assert made == ["law", "energy", "drive"]
-    assert sum(name.startswith("flocsim_unit_") for name in files(tmp_path)) == 2
+    assert sum(name.startswith("flocsim_unit_") for name in files(own_cache)) == 2
 
 
-def test_two_engines_share_their_units(made, tmp_path):
+def test_two_engines_share_their_units(made, own_cache):
     compose(drive, {})(VALUES, 2.0)
-    before = files(tmp_path)
+    before = files(own_cache)
     assert compose(watched, {})(VALUES, 2.0) == watched(VALUES, 2.0)
     assert made == ["law", "energy", "drive", "watched"]
-    after = files(tmp_path)
+    after = files(own_cache)
     assert len(after) == len(before) + 1 and before.items() <= after.items()
 
 
@@ -124,13 +122,13 @@ def test_a_unit_that_returns_other_types_has_its_callers_compiled_anew(made):
 
 
 def test_an_engine_whose_unit_was_compiled_for_another_one_since_is_compiled_anew(
-    made, monkeypatch
+    made, new_process
 ):
     compose(drive, {})(VALUES, 2.0)
     compose(drive, {law: whole})(
         VALUES, 2.0
     )  # the sum's file is now of one that adds whole numbers
-    monkeypatch.setattr(composer, "_composed", {})
+    new_process()
     assert compose(drive, {})(VALUES, 2.0) == drive(VALUES, 2.0)
     assert compose(drive, {law: whole})(VALUES, 2.0) == (15.0, 4.0)
 
@@ -138,21 +136,21 @@ def test_an_engine_whose_unit_was_compiled_for_another_one_since_is_compiled_ane
 @pytest.mark.parametrize("again", [drive, watched])
 @pytest.mark.parametrize("harm", ["removed", "cut", "exchanged"])
 def test_a_unit_that_is_missing_or_damaged_is_compiled_anew(
-    made, tmp_path, monkeypatch, again, harm
+    made, own_cache, new_process, again, harm
 ):
     compose(drive, {})(VALUES, 2.0)
-    found = sorted(tmp_path.glob("flocsim_unit_*"))
+    found = sorted(own_cache.glob("flocsim_unit_*"))
     if harm == "exchanged":
         content = [path.read_bytes() for path in found]
         for path, other in zip(found, reversed(content), strict=True):
             path.write_bytes(other)
     for path in found[:1] if harm != "exchanged" else []:
         path.unlink() if harm == "removed" else path.write_bytes(path.read_bytes()[:-9])
-    monkeypatch.setattr(composer, "_composed", {})
+    new_process()
     assert compose(again, {})(VALUES, 2.0) == again(VALUES, 2.0)
     assert len(made) > 3
     count = len(made)
-    monkeypatch.setattr(composer, "_composed", {})
+    new_process()
     assert compose(again, {})(VALUES, 2.0) == again(VALUES, 2.0)
     assert len(made) == count
 
@@ -164,14 +162,16 @@ def test_what_a_unit_raises_ends_what_calls_it(made):
         driver(-1.0)
 
 
-def test_what_is_postponed_is_compiled_where_it_is_asked_for_and_nothing_else_anew(made):
+def test_what_is_postponed_is_compiled_where_it_is_asked_for_and_nothing_else_anew(
+    made, new_process
+):
     function = compose(drive_rarely, {common: rare})
     assert function(2.0) == (2.0, -1.0)
     assert made == ["not_there", "drive_rarely"]
     assert function.whole(2.0) == (2.0, 104.0)
     assert made == ["not_there", "drive_rarely", "law", "rare"]
     assert function(2.0) == (2.0, -1.0)
-    composer._composed.clear()
+    new_process()
     again = compose(drive_rarely, {common: rare})
     assert again.whole(2.0) == (2.0, 104.0)
     assert again(2.0) == (2.0, -1.0)
@@ -179,8 +179,9 @@ def test_what_is_postponed_is_compiled_where_it_is_asked_for_and_nothing_else_an
     assert compose(drive_rarely, {common: rare}, jit=False)(2.0) == (2.0, 104.0)
 
 
-def test_what_is_postponed_is_compiled_also_where_nothing_can_be_kept(made, monkeypatch):
-    monkeypatch.setattr(disk_cache, "write", lambda *words: None)
-    function = compose(drive_rarely, {common: rare})
-    assert function(2.0) == (2.0, -1.0)
-    assert function.whole(2.0) == (2.0, 104.0)
+def test_what_is_postponed_is_compiled_also_where_nothing_can_be_kept(own_cache, new_process):
+    own_cache.write_text("")  # no folder, whoever asks
+    with pytest.warns(UserWarning, match="compiled code is not stored"):
+        function = compose(drive_rarely, {common: rare})
+        assert function(2.0) == (2.0, -1.0)
+        assert function.whole(2.0) == (2.0, 104.0)

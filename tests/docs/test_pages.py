@@ -143,14 +143,13 @@ RUN = [page for page in PAGES if blocks(page) and page not in NOT_RUN]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
-def test_every_block_runs_as_pasted_in_an_empty_folder(page, tmp_path, monkeypatch, capsys):
+def test_every_block_runs_as_pasted_in_an_empty_folder(page, in_tmp, capsys):
     if page == "docs/formats.md":
         pytest.importorskip("gsd")
     if page in ("docs/library.md", "docs/kernels.md", "docs/results.md"):
         pytest.importorskip("xarray")
         pytest.importorskip("pandas")
-    monkeypatch.chdir(tmp_path)
-    give(page, tmp_path)
+    give(page, in_tmp)
     capsys.readouterr()
     names = {"__name__": "page"}
     for language, line, text in blocks(page):
@@ -164,9 +163,9 @@ def test_every_block_runs_as_pasted_in_an_empty_folder(page, tmp_path, monkeypat
                 expected = (0, 1) if words[0] == "check" else (0,)
                 assert main(globbed) in expected, (line, command, capsys.readouterr().err)
         elif language == "toml":
-            load_any_config(config_of(text, tmp_path))
+            load_any_config(config_of(text, in_tmp))
         elif text == (EXAMPLES / "steric_brush.py").read_text("utf-8"):
-            (tmp_path / "steric_brush.py").write_text(text, "utf-8")
+            (in_tmp / "steric_brush.py").write_text(text, "utf-8")
         else:
             if "vtkmodules" in text:
                 pytest.importorskip("vtkmodules.vtkIOHDF")
@@ -177,7 +176,7 @@ def test_every_block_runs_as_pasted_in_an_empty_folder(page, tmp_path, monkeypat
         said = capsys.readouterr().out
         flocs = re.search(r"shapes.h5: (\d+) flocs", said)
         assert said.count(f"{flocs[1]} flocs of shapes.h5 · preset tang2014 · flocsim") >= 3
-        assert len(list(tmp_path.glob("study-*.png"))) == 12
+        assert len(list(in_tmp.glob("study-*.png"))) == 12
 
 
 def give(page, folder):

@@ -24,13 +24,12 @@ def test_the_notebook_is_the_page():
 
 
 @pytest.mark.slow
-def test_every_cell_runs(tmp_path, monkeypatch):
+def test_every_cell_runs(tmp_path, environment):
     nbformat = pytest.importorskip("nbformat", reason="needs flocsim[docs]")
     nbclient = pytest.importorskip("nbclient", reason="needs flocsim[docs]")
     pytest.importorskip("ipykernel", reason="needs flocsim[docs]")
     # `!flocsim` has to be that of this Python.
-    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent),
-                                                os.environ["PATH"]]))  # fmt: skip
+    environment["PATH"] = str(Path(sys.executable).parent) + os.pathsep + environment["PATH"]
     whole = nbformat.read(DOCS / "tutorial.ipynb", as_version=4)
     nbformat.validate(whole)
     client = nbclient.NotebookClient(

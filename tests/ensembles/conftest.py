@@ -3,7 +3,15 @@
 import pytest
 
 import flocsim
+from tests.helpers import parts_here
 from tests.helpers.small_study import write_small
+
+
+@pytest.fixture
+def one_process():
+    """Parts of sweeps, and studies of scripts, are run in this process."""
+    with parts_here.used():
+        yield
 
 
 @pytest.fixture(scope="session")

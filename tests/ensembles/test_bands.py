@@ -11,7 +11,6 @@ from flocsim.ensembles.runner import run
 from flocsim.ensembles.storage.identity import differences, identity_of
 from flocsim.ensembles.study import Study
 from flocsim.errors import ConfigError
-from flocsim.io.plots import results as figures
 from flocsim.io.shape_library import read_library, write_library
 from tests.helpers.small_study import load_text, problem_lines, star_fit, write_star_library
 from tests.helpers.tiers import rest_slow
@@ -76,9 +75,7 @@ def test_first_runs_are_those_of_a_study_without(folder):
     assert np.all(other["closer_outcome"] == 255)
 
 
-def test_the_error_is_printed_stored_and_drawn(folder, capsys, monkeypatch):
-    monkeypatch.chdir(folder)
-    monkeypatch.setattr(figures, "FIGURES", {"overview": figures.FIGURES["overview"]})
+def test_the_error_is_printed_stored_and_drawn(folder, in_tmp, one_figure, capsys):
     (folder / "study.toml").write_text(STUDY.format(outlines="band", scene=SCENES["measured"]))
     assert main(["ensemble", "study.toml"]) == 0
     printed = capsys.readouterr().out

@@ -77,10 +77,9 @@ def refused(folder, **changes):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.toml").write_text(text_of(), "utf-8")
-    return tmp_path
+def folder(in_tmp):
+    (in_tmp / "study.toml").write_text(text_of(), "utf-8")
+    return in_tmp
 
 
 @pytest.mark.parametrize(

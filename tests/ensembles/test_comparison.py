@@ -165,11 +165,10 @@ def test_aggregations_per_approach_count_those_that_never_touched(files, tmp_pat
     "identity",
     rest_slow(['{"seed": 1e999}', '{"seed": 99999999999999999999}', "["], lambda each: each == "["),
 )
-def test_what_no_flocsim_wrote_is_refused_in_one_line(tmp_path, monkeypatch, capsys, identity):
-    monkeypatch.chdir(tmp_path)
+def test_what_no_flocsim_wrote_is_refused_in_one_line(in_tmp, capsys, identity):
     made = make_results(vertices=(1, 4), delta=(0.0, 1.0), count=12)
-    write_results(tmp_path / "a.h5", attrs.evolve(made, run=made.run | {"identity": identity}))
-    write_results(tmp_path / "b.h5", made)
+    write_results(in_tmp / "a.h5", attrs.evolve(made, run=made.run | {"identity": identity}))
+    write_results(in_tmp / "b.h5", made)
     assert main(["compare", "a.h5", "b.h5"]) == 74
     [line] = capsys.readouterr().err.splitlines()
     assert "a.h5 has no readable results: run/identity cannot be read" in line

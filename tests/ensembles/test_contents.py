@@ -1,6 +1,5 @@
 """StudyResults: tables, Datasets and DataFrames hold the file's numbers; replicates come again."""
 
-import importlib
 import json
 
 import numpy as np
@@ -60,15 +59,8 @@ def test_the_table_and_figures_are_the_commands(synthetic, tmp_path):
 
 
 @pytest.mark.parametrize("library", ["xarray", "pandas"])
-def test_what_is_not_installed_is_told_in_a_line(synthetic, monkeypatch, library):
-    real = importlib.import_module
-
-    def without(name, package=None):
-        if name == library:
-            raise ImportError(name)
-        return real(name, package)
-
-    monkeypatch.setattr(importlib, "import_module", without)
+def test_what_is_not_installed_is_told_in_a_line(synthetic, uninstalled, library):
+    uninstalled(library)
     with pytest.raises(UsageError, match=rf"{library} is not installed: pip install 'flocsim\["):
         getattr(flocsim.open(synthetic[0]), f"to_{library}")()
 

@@ -1,5 +1,6 @@
 """Every config in examples/ loads, can be run, and means what its comments say."""
 
+import os
 import shutil
 
 import pytest
@@ -60,14 +61,14 @@ LEAST = {"kernel": 8, "settling_kernel": 8}
     rest_slow(EXAMPLES, lambda path: path.stem == "quickstart"),
     ids=lambda path: path.stem,
 )
-def test_a_reduced_example_runs(path, examples, monkeypatch, capsys):
+def test_a_reduced_example_runs(path, examples, in_tmp, capsys):
     whole, reduced = REDUCED.get(path.stem, ("", ""))
     assert whole in path.read_text("utf-8")
     text = path.read_text("utf-8").replace(whole, reduced)
     (examples / path.name).write_text(text, "utf-8")
     count = LEAST.get(path.stem, 2)
     words = ["--replicates", str(count), "--output", "out.h5", "--quiet"]
-    monkeypatch.chdir(examples)
+    os.chdir(examples)
     assert main(["ensemble", path.name, *words]) == 0
     said = capsys.readouterr()
     assert (said.out, problems(said.err)) == ("", [])

@@ -40,19 +40,18 @@ def members(group):
                ("Study.run", SWARM)], lambda name, text: name == "sweep" and text is PAIRS),
     ids=["sweep", "sweep of swarms", "Study.run", "Study.run of swarms"],
 )  # fmt: skip
-def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
-    monkeypatch.chdir(tmp_path)
+def test_nobody_is_left_and_the_rest_is_run(in_tmp, name, text):
     # As many as take longer than it is until the first are seen.
     few, more = ("= 6", "= 1000") if text is PAIRS else ("= 2", "= 40")
     assert f"replicates {few}\n" in text
     changed = text.replace(f"replicates {few}\n", f"replicates {more}\n")
-    (tmp_path / "study.toml").write_text(changed, "utf-8")
+    (in_tmp / "study.toml").write_text(changed, "utf-8")
     first, shows, then = RUNS[name]
     running = subprocess.Popen(
         first, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     try:
-        path = tmp_path / shows
+        path = in_tmp / shows
         # Looked at first: once there are rows, a quick machine may soon be done with all.
         assert wait_until(lambda: len(members(running.pid)) > 1)
         assert wait_until(lambda: has_begun(path))
@@ -64,4 +63,4 @@ def test_nobody_is_left_and_the_rest_is_run(tmp_path, monkeypatch, name, text):
             os.kill(each, signal.SIGKILL)
     done = subprocess.run([*first, *then], capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "new.h5").exists()
+    assert (in_tmp / "new.h5").exists()

@@ -163,8 +163,7 @@ def study(cell):
 
 
 def swept(cell):
-    with pytest.MonkeyPatch.context() as patch:
-        parts_here.use(patch)
+    with parts_here.used():
         return swept_here(cell)
 
 
@@ -214,16 +213,14 @@ CELLS = rest_slow(product(ABILITIES, KINDS), is_quick)
 
 
 @pytest.mark.parametrize(("ability", "kind"), CELLS)
-def test_every_kind_has_every_ability(home, tmp_path, monkeypatch, ability, kind):
-    shutil.copytree(home, tmp_path / "here")
-    monkeypatch.chdir(tmp_path / "here")
+def test_every_kind_has_every_ability(home, in_tmp, ability, kind):
+    shutil.copytree(home, in_tmp, dirs_exist_ok=True)
     assert not ABILITIES[ability](Cell(KINDS[kind], f"{kind}.h5"))
 
 
 @pytest.mark.parametrize("kind", ["pairs", "rates", "swarms"])
-def test_the_origin_of_rows_is_recorded(home, tmp_path, monkeypatch, kind):
-    shutil.copytree(home, tmp_path / "here")
-    monkeypatch.chdir(tmp_path / "here")
+def test_the_origin_of_rows_is_recorded(home, in_tmp, kind):
+    shutil.copytree(home, in_tmp, dirs_exist_ok=True)
     cell, file = Cell(KINDS[kind], f"{kind}.h5"), f"{kind}.h5"
     run = cell.kind.read(file).run
     assert run["processor"] and run["identity"] and run["history"] == "[]"

@@ -144,9 +144,8 @@ def test_the_identity_knows_how_flocs_are_drawn(folder):
     assert differences(first, identity_of(Study(load_text(folder, STUDY, others))))
 
 
-def test_the_file_and_all_that_reads_it(folder, monkeypatch):
+def test_the_file_and_all_that_reads_it(folder, in_tmp):
     """Run, extended, described, drawn, compared, run again: as a study of types."""
-    monkeypatch.chdir(folder)
     (folder / "study.toml").write_text(STUDY)
     words = ["ensemble", "study.toml", "--quiet", "--set", "shapes.vertices=[1]"]
     assert main([*words, "--replicates", "4"]) == 0

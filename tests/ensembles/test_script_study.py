@@ -12,7 +12,6 @@ import flocsim
 from flocsim.ensembles import run
 from flocsim.ensembles.config.toml_text import settings_of
 from flocsim.errors import ConfigError, PlausibilityWarning, UsageError
-from tests.helpers import parts_here
 from tests.helpers.small_study import SMALL, command, run_command, write_small
 from tests.helpers.waiting import PATIENCE
 
@@ -96,8 +95,7 @@ def test_rows_are_those_of_the_config(finished):
     assert results.config.shapes.vertices == (1,)
 
 
-def test_a_file_in_the_way_is_left_alone(finished, monkeypatch):
-    parts_here.use(monkeypatch)
+def test_a_file_in_the_way_is_left_alone(finished, one_process):
     folder = finished.folder
     study = flocsim.Study(folder / "small.toml").with_({"shapes.vertices": [1]})
     before = (folder / "small.h5").read_bytes()
@@ -110,19 +108,17 @@ def test_a_file_in_the_way_is_left_alone(finished, monkeypatch):
     assert again.count == 3
 
 
-def test_without_an_output_results_are_in_memory(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    parts_here.use(monkeypatch)
+def test_without_an_output_results_are_in_memory(in_tmp, one_process):
     study = flocsim.Study(TABLES)
     first, second = study.run(), study.run()
-    assert not list(tmp_path.iterdir())
+    assert not list(in_tmp.iterdir())
     assert first.table() == second.table() and first.count == 3
     assert first.replicates["outcome"].shape == (1, 1, 2, 3)
     assert second.replicate(1).row["outcome"]
     assert "in memory" in str(first.path)
     study.with_({"output.file": "named.h5"}).run()
     study.run(mode="resume")
-    assert {path.name for path in tmp_path.iterdir()} == {"named.h5", "study.h5"}
+    assert {path.name for path in in_tmp.iterdir()} == {"named.h5", "study.h5"}
     with pytest.raises(UsageError, match=r"already exists.*overwrite=True"):
         study.run(output="study.h5")
 
@@ -138,8 +134,8 @@ def test_what_the_command_refuses_is_an_error_here(tmp_path):
         flocsim.Study(TABLES, folder=tmp_path / "nowhere")
 
 
-def test_ranks_are_told_to_use_the_command(tmp_path, monkeypatch):
-    monkeypatch.setenv("PMI_SIZE", "2")
+def test_ranks_are_told_to_use_the_command(tmp_path, environment):
+    environment["PMI_SIZE"] = "2"
     with pytest.raises(UsageError, match="mpirun"):
         flocsim.Study(TABLES, folder=tmp_path).run(output=tmp_path / "x.h5")
 
@@ -173,9 +169,8 @@ def test_a_stopped_run_is_an_error_of_its_own():
 
 
 @pytest.mark.slow
-def test_a_quiet_run_still_warns(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    study = flocsim.Study(write_small(tmp_path)).with_(
+def test_a_quiet_run_still_warns(in_tmp):
+    study = flocsim.Study(write_small(in_tmp)).with_(
         {"shapes.vertices": [1], "fluid.viscosity": "0.5 Pa s", "replicates": 1}
     )
     with pytest.warns(PlausibilityWarning, match="viscosity") as found:

@@ -31,19 +31,18 @@ def test_flocs_in_words(keys, count, words):
     assert ShapesConfig(**keys).described(count) == words
 
 
-def test_run_info_report_and_comparison_name_the_source(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    write_star_library(tmp_path / "stars.h5")
-    write_small(tmp_path, vertices="[4]", delta="[0.0]", types='["I"]', pool=POOL)
-    done = run_command(tmp_path, "small.toml")
+def test_run_info_report_and_comparison_name_the_source(in_tmp, capsys):
+    write_star_library(in_tmp / "stars.h5")
+    write_small(in_tmp, vertices="[4]", delta="[0.0]", types='["I"]', pool=POOL)
+    done = run_command(in_tmp, "small.toml")
     assert done.returncode == 0, done.stderr
     first, *table = done.stdout.splitlines()
     assert first.endswith(f"; {SOURCE}") and SOURCE in table
-    (tmp_path / "stars.h5").unlink()
+    (in_tmp / "stars.h5").unlink()
     assert main(["info", "small.h5"]) == 0
     assert capsys.readouterr().out.splitlines()[1] == SOURCE
     assert main(["report", "small.h5", "--no-motion"]) == 0
-    assert f"<p>{SOURCE}</p>" in (tmp_path / "small.html").read_text("utf-8")
+    assert f"<p>{SOURCE}</p>" in (in_tmp / "small.html").read_text("utf-8")
     assert main(["compare", "small.h5", "small.h5"]) == 0
     assert capsys.readouterr().out.count(f"small.h5: {SOURCE}\n") == 2
     drawn = flocsim.open("small.h5").plot("4")

@@ -66,14 +66,13 @@ def stopped(command, journal, number):
     "name", [name if name == "pairs" else pytest.param(name, marks=pytest.mark.slow)
              for name in RUNS],
 )  # fmt: skip
-def test_the_last_line_of_a_stopped_job_finishes_it(tmp_path, monkeypatch, name):
+def test_the_last_line_of_a_stopped_job_finishes_it(in_tmp, environment, name):
     text, start, words, number = RUNS[name]
     start = [mpirun(), "-n", "2", *start[1:]] if start[0] is None else start
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PATH", str(BESIDE_PYTHON) + os.pathsep + os.environ["PATH"])
-    (tmp_path / "my study.toml").write_text(text, "utf-8")
+    environment["PATH"] = str(BESIDE_PYTHON) + os.pathsep + environment["PATH"]
+    (in_tmp / "my study.toml").write_text(text, "utf-8")
     code, errors = stopped(
-        [*start, *words, "-o", "new.h5"], tmp_path / JOURNALS.get(name, "new.h5.journal"), number
+        [*start, *words, "-o", "new.h5"], in_tmp / JOURNALS.get(name, "new.h5.journal"), number
     )
     assert code == 75, errors
     *_, why, last = errors
@@ -84,12 +83,12 @@ def test_the_last_line_of_a_stopped_job_finishes_it(tmp_path, monkeypatch, name)
     }.get(name, "flocsim ")
     assert last.startswith(begun) and last.endswith(" -o new.h5 --resume")
     assert "--restart" not in last
-    assert not (tmp_path / "new.h5").exists()
+    assert not (in_tmp / "new.h5").exists()
     subprocess.run(last, shell=True, check=True, stdout=subprocess.DEVNULL, timeout=600)
     whole = [each for each in words if each != "--restart"]
     undisturbed = [*(FLOCSIM if start[0] != sys.executable else start), *whole, "-o", "whole.h5"]
     subprocess.run(undisturbed, check=True, stdout=subprocess.DEVNULL, timeout=600)
-    assert rows(tmp_path / "new.h5") == rows(tmp_path / "whole.h5")
+    assert rows(in_tmp / "new.h5") == rows(in_tmp / "whole.h5")
 
 
 def test_a_sweep_under_a_launcher_is_refused_before_it_begins(tmp_path):

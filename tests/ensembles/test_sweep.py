@@ -29,8 +29,7 @@ def swept(tmp_path_factory):
                  "-o", str(folder / "same.h5"), "--dry-run"])  # fmt: skip
     assert code == 0
     before = (folder / "all.parts" / "0000.h5").stat()
-    with pytest.MonkeyPatch.context() as patch:
-        parts_here.use(patch)
+    with parts_here.used():
         code = main(["sweep", str(study.path), *words, "--over", f"{HAMAKER}=1e-18,'10 zJ'",
                      "-o", str(folder / "all.h5"), "--resume"])  # fmt: skip
     assert code == 0

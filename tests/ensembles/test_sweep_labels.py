@@ -59,11 +59,11 @@ def write_study(folder, factor=1.0, ratios=None):
 
 
 @pytest.fixture
-def edits(tmp_path, monkeypatch):
+def edits(tmp_path):
     """(folder, {number of a part: what is done before it is run}) of sweeps in this process."""
     done, count = {}, iter(range(100))
-    parts_here.use(monkeypatch, lambda words: done.get(next(count), lambda: None)())
-    return tmp_path, done
+    with parts_here.used(lambda: done.get(next(count), lambda: None)()):
+        yield tmp_path, done
 
 
 def edit_module(folder):
@@ -140,9 +140,7 @@ BETWEEN = ("nothing", "parts gone", "one replaced", "one gone")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("examples", [60])
-def test_two_sweeps_one_upon_the_other_have_right_labels(monkeypatch, examples):
-    parts_here.use(monkeypatch)
-
+def test_two_sweeps_one_upon_the_other_have_right_labels(one_process, examples):
     @settings(max_examples=examples, deadline=None, derandomize=True,
               suppress_health_check=list(HealthCheck))  # fmt: skip
     @given(ASKED, ASKED, st.sampled_from(BETWEEN), st.booleans())
@@ -203,8 +201,7 @@ def change(folder, what):
          {"scene": {"kind": "kernel", "sizes": ["10 um", "20 um"]}}, "types are settling"),
     ],
 )  # fmt: skip
-def test_parts_that_have_other_axes_are_not_begun(tmp_path, monkeypatch, over, changes, text):
-    parts_here.use(monkeypatch, lambda words: pytest.fail("begun"))
+def test_parts_that_have_other_axes_are_not_begun(tmp_path, over, changes, text):
     source = {"preset": "tang2014", "shapes": {"vertices": [1]}, **changes}
     with pytest.raises(UsageError, match=text):
         flocsim.sweep(flocsim.Study(source, tmp_path), over, tmp_path / "x.h5")

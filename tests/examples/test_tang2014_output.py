@@ -1,8 +1,6 @@
 """The study's scripts write into their folder without destroying what lies there."""
 
 import csv
-import importlib
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,17 +9,6 @@ from flocsim.io.plots.collision import draw_distance
 from tests.helpers.paper_like import paper_fits, paper_results, relabelled
 
 FOLDER = Path(__file__).parents[2] / "examples" / "tang2014"
-
-
-@pytest.fixture
-def example(monkeypatch):
-    """Import a script of the example by its name."""
-    before = set(sys.modules)
-    monkeypatch.syspath_prepend(str(FOLDER))
-    yield importlib.import_module
-    for name in set(sys.modules) - before:
-        if str(FOLDER) in str(getattr(sys.modules[name], "__file__", "")):
-            del sys.modules[name]
 
 
 def test_pages_and_figures_that_differ_are_kept(example, tmp_path):

@@ -1,23 +1,10 @@
 """The parts of examples/tang2014 that compute: transitions, and filling the page."""
 
-import sys
-
 import numpy as np
-import pytest
 
 from tests.helpers.small_study import ROOT
 
 FOLDER = ROOT / "examples" / "tang2014"
-
-
-@pytest.fixture
-def example(monkeypatch):
-    """A function that imports a module of the example."""
-    monkeypatch.syspath_prepend(str(FOLDER))
-    names = {path.stem for path in FOLDER.glob("*.py")}
-    yield __import__
-    for name in names:
-        sys.modules.pop(name, None)
 
 
 def step_sweep(sweeps, values, thresholds):

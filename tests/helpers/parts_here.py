@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+from unittest import mock
 
 from flocsim.__main__ import main
 from flocsim.ensembles import script_study as studies
@@ -34,11 +35,13 @@ def input_of(text):
         sys.stdin = before
 
 
-def use(monkeypatch, between=lambda words: None):
-    """Let Study.run use it; ``between(words)`` is called before each run."""
+@contextlib.contextmanager
+def used(between=lambda: None):
+    """Let Study.run use it; ``between()`` is called before each run."""
 
-    def run(words, text, folder, quiet):
-        between(words)
-        run_here(words, text, folder, quiet)
+    def run(*given):
+        between()
+        run_here(*given)
 
-    monkeypatch.setattr(studies, "run_command", run)
+    with mock.patch.object(studies, "run_command", run):
+        yield

@@ -1,5 +1,7 @@
 """The state of a made-up study of one condition, and results of its chunks."""
 
+import contextlib
+import itertools
 import shutil
 import tempfile
 import weakref
@@ -7,12 +9,32 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from flocsim.ensembles.kind import ROW, Condition
+from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import ChunkResult
 from flocsim.ensembles.parallel.schedule import Schedule, StudyState
 from flocsim.ensembles.storage.row_store import RowStore
 from flocsim.io.journal import Journal
+
+
+@contextlib.contextmanager
+def after_chunks(number, happen=StudyState.interrupt):
+    """Let ``happen(state)`` once a run has taken in so many chunks, each of one replicate: a signal
+    comes."""
+    counts = itertools.count(1)
+
+    def take_in(state, result, original=StudyState.take_in):
+        original(state, result)
+        if next(counts) == number:
+            happen(state)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
+        patch.setattr(StudyState, "take_in", take_in)
+        yield
+
 
 CONDITION = Condition("I", 1, 0.0)
 NOTE = {"why": "stalled", "type": "I", "vertices": 1, "delta": 0.0, "replicate": 0}

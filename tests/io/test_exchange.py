@@ -148,16 +148,15 @@ def test_ovito_reads_places_and_shapes(tmp_path):
         assert 2.0 * types[1].radius == pytest.approx(4.0)
 
 
-def test_without_gsd_one_line_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "gsd", None)
+def test_without_gsd_one_line_says_what_to_install(tmp_path, uninstalled):
+    uninstalled("gsd")
     with pytest.raises(UsageError, match=r"gsd is not installed: pip install 'flocsim\[formats\]'"):
         write_gsd(tmp_path / "m.gsd", *motion(), SHAPES)
     assert not list(tmp_path.iterdir())
 
 
-def test_the_command_writes_what_a_file_of_motion_holds(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_what_a_file_of_motion_holds(in_tmp, capsys):
     hoomd = pytest.importorskip("gsd.hoomd", reason="needs flocsim[formats]")
-    monkeypatch.chdir(tmp_path)
     times, position, velocity = motion()
     write_trajectory("m.h5", times, position, velocity, SHAPES, {"steps": 6})
     assert main(["export", "gsd", "m.h5"]) == 0

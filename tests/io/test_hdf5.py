@@ -173,9 +173,9 @@ except FileError as error:
 
 
 @pytest.fixture
-def mpi(monkeypatch):
+def mpi(environment):
     """Look like a rank of an MPI job."""
-    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", "0")
+    environment["OMPI_COMM_WORLD_RANK"] = "0"
     return contextlib.nullcontext()
 
 
@@ -209,11 +209,10 @@ def test_a_process_started_anew_says_the_same(request, results, library, why):
         refused(results, LAYOUT)
 
 
-def test_the_modules_of_the_current_folder_are_not_run(results, tmp_path, monkeypatch, mpi):
+def test_the_modules_of_the_current_folder_are_not_run(results, in_tmp, mpi):
     """A process that is started anew takes its libraries from where this one has them."""
-    (tmp_path / "json.py").write_text("raise SystemExit(3)\n", "utf-8")
-    (tmp_path / "h5py.py").write_text("raise SystemExit(3)\n", "utf-8")
-    monkeypatch.chdir(tmp_path)
+    (in_tmp / "json.py").write_text("raise SystemExit(3)\n", "utf-8")
+    (in_tmp / "h5py.py").write_text("raise SystemExit(3)\n", "utf-8")
     assert open_hdf5(results).kind == "flocsim results"
 
 
@@ -262,13 +261,13 @@ READERS = {
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_all_that_flocsim_writes_is_read(tmp_path, name, monkeypatch):
+def test_all_that_flocsim_writes_is_read(tmp_path, name, environment):
     """By a forked process, and by one that is started anew."""
     valid = getattr(hostile_files, f"valid_{name}")(tmp_path)
     path = hostile_files.written(tmp_path, "v.h5", seal(valid))
     read = READERS.get(name, read_results)
     forked = read(path)
-    monkeypatch.setenv("PMI_RANK", "0")
+    environment["PMI_RANK"] = "0"
     started = read(path)
     assert type(forked) is type(started)
     assert open_hdf5(path).kind.startswith("flocsim")

@@ -11,7 +11,6 @@ from flocsim.__main__ import main
 from flocsim.ensembles.collision.flocs import read_flocs
 from flocsim.errors import FileError
 from flocsim.io import seals
-from flocsim.io.plots import results as contents
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import write_results
 from tests.helpers.small_study import SMALL, load_text, write_star_library
@@ -38,10 +37,9 @@ def written(tmp_path_factory):
 
 
 @pytest.fixture
-def two(written, tmp_path, monkeypatch):
+def two(written, in_tmp):
     """Copies of them in the current folder, of which the first is to be replaced by the other."""
-    monkeypatch.chdir(tmp_path)
-    return tuple(shutil.copy(path, tmp_path / path.name) for path in written)
+    return tuple(shutil.copy(path, in_tmp / path.name) for path in written)
 
 
 @pytest.mark.parametrize("name", LATER)
@@ -76,10 +74,9 @@ def test_a_file_that_is_copied_over_an_opened_one_is_told(two, name):
         lambda words: words.startswith("info"),
     ),
 )
-def test_a_command_reads_one_file(two, words, look, monkeypatch, capsys):
+def test_a_command_reads_one_file(two, words, look, one_figure, monkeypatch, capsys):
     """Another takes its place between two looks: all is of the one, of the other, or refused."""
     path, other = two
-    monkeypatch.setattr(contents, "FIGURES", {"4": contents.FIGURES["4"]})
     shutil.copyfile(path, "kept.h5")
 
     def outcome():

@@ -95,13 +95,12 @@ def test_a_killed_writer_loses_no_acknowledged_record(path):
         journal.release()
 
 
-def test_one_job_writes_and_others_read(path, monkeypatch):
+def test_one_job_writes_and_others_read(path, at_once):
     journal = filled(path)
     with read_journal(path) as reader:
         add(journal, 99)  # after the reader began
         journal.sync()
         assert firsts(reader) == list(range(20))
-    monkeypatch.setattr(module, "LOCK_SECONDS", 0.1)
     with pytest.raises(FileError, match=r"r.h5.journal is being written by another job"):
         Journal(path)
     journal.release()

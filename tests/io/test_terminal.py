@@ -1,8 +1,10 @@
 """Progress: whole lines where nobody watches, one line that renews itself where somebody does."""
 
+import contextlib
 import errno
 import io
 import os
+import sys
 
 import pytest
 
@@ -101,12 +103,13 @@ def test_what_runs_is_said_and_a_line_on_a_terminal_stays_one(clock):
     assert bar.getvalue().startswith(f"\r 50%  500 of 1000 snapshots, 60 s left; {going}")
 
 
-def in_memory(monkeypatch):
-    """Standard output and error as text in memory; pytest puts its own back between fixtures."""
-    out, err = io.StringIO(), io.StringIO()
-    monkeypatch.setattr(terminal.sys, "stdout", out)
-    monkeypatch.setattr(terminal.sys, "stderr", err)
-    return out, err
+@contextlib.contextmanager
+def streams(out, err):
+    """Standard output and error, made plain."""
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        with terminal.plain_streams():
+            yield
+        assert sys.stdout is out or None in (out, err)
 
 
 @pytest.mark.parametrize(
@@ -120,24 +123,22 @@ def in_memory(monkeypatch):
         ("line\u2028more\udcff", "line\\u2028more\\udcff"),
     ],
 )
-def test_letters_that_steer_a_terminal_are_written_out(monkeypatch, text, shown):
-    streams = in_memory(monkeypatch)
-    with terminal.plain_streams():
+def test_letters_that_steer_a_terminal_are_written_out(text, shown):
+    out, err = io.StringIO(), io.StringIO()
+    with streams(out, err):
         print(text)
-        print(text, file=terminal.sys.stderr)
-    assert streams[0].getvalue() == shown + "\n"
-    assert streams[1].getvalue() == shown + "\n"
-    assert terminal.sys.stdout is streams[0]
+        print(text, file=sys.stderr)
+    assert out.getvalue() == shown + "\n"
+    assert err.getvalue() == shown + "\n"
 
 
-def test_progress_still_renews_its_line(monkeypatch, clock):
-    streams = in_memory(monkeypatch)
-    streams[0].isatty = lambda: True
-    with terminal.plain_streams():
+def test_progress_still_renews_its_line(clock):
+    out = Terminal()
+    with streams(out, io.StringIO()):
         report = Progress(10, False)
         clock[0] = 1.0
         report.report(5)
-    assert streams[0].getvalue().startswith("\r 50%  5 of 10")
+    assert out.getvalue().startswith("\r 50%  5 of 10")
 
 
 class Broken(io.StringIO):
@@ -153,32 +154,27 @@ class Broken(io.StringIO):
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC, errno.EBADF])
-def test_an_output_that_fails_is_noted_once(monkeypatch, number):
-    in_memory(monkeypatch)
-    monkeypatch.setattr(terminal.sys, "stdout", Broken(number))
-    with terminal.plain_streams():
+def test_an_output_that_fails_is_noted_once(number):
+    with streams(Broken(number), io.StringIO()):
         print("lost")
         print("lost too")
         assert os.strerror(number) in terminal.output_problem()
 
 
-def test_a_reader_that_has_gone_is_no_problem(monkeypatch):
-    in_memory(monkeypatch)
-    monkeypatch.setattr(terminal.sys, "stdout", Broken(errno.EPIPE))
-    with terminal.plain_streams():
+def test_a_reader_that_has_gone_is_no_problem():
+    with streams(Broken(errno.EPIPE), io.StringIO()):
         print("lost")
         assert terminal.output_problem() == ""
 
 
 @pytest.mark.parametrize("name", ["stdout", "stderr"])
-def test_a_closed_stream_takes_what_it_is_given(monkeypatch, name):
-    streams = in_memory(monkeypatch)
-    monkeypatch.setattr(terminal.sys, name, None)
-    with terminal.plain_streams():
+def test_a_closed_stream_takes_what_it_is_given(name):
+    open_one = io.StringIO()
+    with streams(*((None, open_one) if name == "stdout" else (open_one, None))):
         print("hello")
         Progress(3, False).warn("careful")
         assert bool(terminal.output_problem()) == (name == "stdout")
-    shown = "".join(each.getvalue() for each in streams)
+    shown = open_one.getvalue()
     assert ("hello" in shown) == (name == "stderr")
     assert ("careful" in shown) == (name == "stdout")
 

@@ -70,9 +70,8 @@ def test_what_was_written_is_read_back(tmp_path):
     assert found.facts == {"replicate": 17, "status": "FINISHED"}
 
 
-def test_info_and_plot_read_it(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    written(tmp_path / "m.h5", replicate=17)
+def test_info_and_plot_read_it(in_tmp, capsys):
+    written(in_tmp / "m.h5", replicate=17)
     assert main(["info", "m.h5"]) == 0
     told = capsys.readouterr().out
     assert "a trajectory" in told and "5 states" in told and "replicate        17" in told

@@ -35,12 +35,11 @@ PROOF = 10
 
 
 @pytest.mark.slow
-def test_swarms_aggregate_at_the_rate_of_their_kernel(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_swarms_aggregate_at_the_rate_of_their_kernel(in_tmp):
     write_star_library("stars.h5", (8,), np.linspace(6.0, 20.0, 24).tolist())
     for kind, scene, replicates in (("kernel", KERNEL, 1024), ("swarm", SWARM, 8)):
         text = STUDY.format(kind=kind, scene=scene, replicates=replicates)
-        (tmp_path / f"{kind}.toml").write_text(text, "utf-8")
+        (in_tmp / f"{kind}.toml").write_text(text, "utf-8")
         assert main([kind, f"{kind}.toml", "--quiet"]) == 0
     example = example_script("kernel_against_swarm")
     kernel, swarm = flocsim.open("kernel.h5").kernel, flocsim.open("swarm.h5")

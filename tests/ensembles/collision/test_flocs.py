@@ -158,9 +158,11 @@ def test_pairs_alike_in_their_error_may_have_any_fit_of_the_library(library):
     assert all(list(floc.shapes) == list(floc.errors) == [4, 8] for floc in load_flocs(shapes, 1))
 
 
-def test_a_floc_that_is_kept_is_the_one_that_was_grown_bit_by_bit(tmp_path, monkeypatch):
+def test_a_floc_that_is_kept_is_the_one_that_was_grown_bit_by_bit(
+    environment, tmp_path, monkeypatch
+):
     load_flocs(ShapesConfig(vertices=(1, 4, 9), pool=1), 4)  # compiles what the suite has anyway
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path))
+    environment["FLOCSIM_CACHE"] = str(tmp_path)
     tmp_path.chmod(0o700)
     shapes = ShapesConfig(vertices=(1, 4, 9), pool=2)
     grown = load_flocs(shapes, 3)

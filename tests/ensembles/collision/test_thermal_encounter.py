@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from flocsim.ensembles.collision.outcomes import OBSERVER
 from flocsim.forces.body_forces import random_key
 from flocsim.run import Run
 from flocsim.state.work import NOW, motion_of
@@ -18,20 +17,15 @@ WARM = {
 
 
 @pytest.fixture
-def study(tmp_path, monkeypatch):
-    """A study of spheres whose scenes are not compiled."""
-    from flocsim.system import System
-
-    plain = System.scene
-    monkeypatch.setattr(System, "scene", lambda self, **_: plain(self, jit=False))
+def study(tmp_path):
+    """A study of spheres."""
     return small_study(tmp_path, WARM)
 
 
 def end_of(study, replicate, share, until=0.0015):
-    """Where the bodies of a replicate are after some kicks, uncompiled."""
+    """Where the bodies of a replicate are after some kicks."""
     draw = study.draw(0, 1, share, replicate)
-    driver = draw.encounter.system.compose(observer=OBSERVER, jit=False)
-    run = draw.begin(driver, 10**6, until)
+    run = draw.begin(study.driver(draw.encounter), 10**6, until)
     assert isinstance(run, Run)
     run.to_end()
     return motion_of(run.work, NOW)

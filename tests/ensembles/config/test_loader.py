@@ -90,14 +90,13 @@ def test_wrong_overrides_are_told_apart(tmp_path):
     ]
 
 
-def test_a_library_is_found_beside_the_config(tmp_path, monkeypatch):
+def test_a_library_is_found_beside_the_config(tmp_path):
     text = 'preset = "si"\n[shapes]\nsource = "library"\nfile = "shapes.h5"\n'
     assert problem_lines(tmp_path, text) == [
         "study.toml:4: shapes.file: shapes.h5 is not a file: name a library "
         'written by `flocsim fit`, or "synthetic", the one included in flocsim'
     ]
     (tmp_path / "shapes.h5").touch()
-    monkeypatch.chdir("/")
     assert Path(load_text(tmp_path, text).shapes.file) == tmp_path / "shapes.h5"
 
 
@@ -147,9 +146,8 @@ def test_settings_lie_over_the_file_and_are_kept(tmp_path):
         ("stop.half_width=0.7", "stop.half_width must be a finite number above 0 and at most 0.5"),
     ],
 )
-def test_a_wrong_setting_is_one_line(tmp_path, monkeypatch, capsys, setting, said):
-    monkeypatch.chdir(tmp_path)
-    write_small(tmp_path)
+def test_a_wrong_setting_is_one_line(in_tmp, capsys, setting, said):
+    write_small(in_tmp)
     assert main(["ensemble", "small.toml", "--set", setting]) == 2
     [line] = capsys.readouterr().err.splitlines()
     assert said in line

@@ -53,9 +53,8 @@ def test_tables_for_pairs_are_refused(tmp_path, table):
 
 
 @pytest.mark.parametrize("command", ["check", "trajectory", "work-precision"])
-def test_commands_for_pairs_say_who_runs_it(tmp_path, command, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    path = write_swarm_study(tmp_path)
+def test_commands_for_pairs_say_who_runs_it(in_tmp, command, capsys):
+    path = write_swarm_study(in_tmp)
     with pytest.raises(ConfigError, match="run it with `flocsim ensemble`"):
         load_config(path)
     assert main([command, str(path)]) == ConfigError.exit_code

@@ -136,14 +136,13 @@ def test_a_law_that_gives_no_number_is_refused_as_that(tmp_path):
         check_study(with_law(small_config(tmp_path, HEAVY), Singular()))
 
 
-def test_the_command_refuses_before_it_runs(tmp_path, monkeypatch, capsys):
-    write_small(tmp_path)
-    monkeypatch.chdir(tmp_path)
+def test_the_command_refuses_before_it_runs(in_tmp, capsys):
+    write_small(in_tmp)
     for words in ((), ("--dry-run",)):
         assert main(["ensemble", "small.toml", "--set", "bodies.surface_density=20", *words]) == 2
         said = capsys.readouterr()
         assert said.out == "" and "forces.contact.k_n 90 N/m or more" in said.err
-    assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+    assert [path.name for path in in_tmp.iterdir()] == ["small.toml"]
 
 
 USUAL = {

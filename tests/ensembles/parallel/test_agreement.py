@@ -11,7 +11,7 @@ from flocsim.ensembles import runner
 from flocsim.ensembles.config.loader import load_config
 from flocsim.ensembles.parallel.communicator import Communicator, SharedError
 from flocsim.ensembles.runner import first_difference, run_to_file
-from flocsim.errors import KernelError, UsageError
+from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.own_force import write_own
 from tests.helpers.results_files import same_data
@@ -76,14 +76,11 @@ def test_a_disagreement_ends_rank_0_with_one_line_and_the_others_with_its_code(t
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
 
 
-def test_a_kernel_that_cannot_be_hashed_ends_all_ranks(tmp_path, monkeypatch):
-    def refuse(study):
-        raise KernelError("mine.py:3: no")
-
-    monkeypatch.setattr(runner, "identity_of", refuse)
+def test_a_kernel_that_cannot_be_hashed_ends_all_ranks(tmp_path):
+    config = load_config(write_own(tmp_path, factor="[-1.0]"))
     comm = Pair(lambda own: own)
-    with pytest.raises(SharedError, match=r"mine.py:3: no"):
-        run_to_file(small_config(tmp_path), comm, tmp_path / "r.h5", "new")
+    with pytest.raises(SharedError, match=r"own_pull.py:\d+\) reads the global 'FACTOR', a list"):
+        run_to_file(config, comm, tmp_path / "r.h5", "new")
     assert comm.heard[-1].exit_code == 2
 
 
@@ -155,13 +152,13 @@ def test_ranks_with_other_versions_are_refused_by_all(tmp_path):
     assert not list(tmp_path.glob("small.h5*"))
 
 
-def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path, monkeypatch):
+def test_a_library_that_is_replaced_during_the_start_is_read_once(tmp_path):
     library = tmp_path / "stars.h5"
     write_star_library(library)
     text = SMALL.replace("[shapes]", '[shapes]\nsource = "library"\nfile = "stars.h5"')
     config = load_config(write_small(tmp_path, text, vertices="[4]", replicates="2"))
     comm = Pair(lambda own: own)
-    monkeypatch.setattr(comm, "send", lambda to, message: library.unlink(missing_ok=True))
+    comm.send = lambda to, message: library.unlink(missing_ok=True)
     study, *_ = runner.join(config, comm)
     assert len(study.flocs) == 3
     assert not library.exists()

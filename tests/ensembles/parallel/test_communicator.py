@@ -216,7 +216,7 @@ sends SIGTERM on, Intel's is a shell script, which the signal ends once its job 
 
 
 @pytest.mark.parametrize("ranks", rest_slow([None, 2], bool))
-def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, monkeypatch, capsys, ranks):
+def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, in_tmp, capsys, ranks):
     words = ["small.toml", "--replicates", "100000", "--output", f"late{ranks}.h5"]
     job = subprocess.Popen(
         command(*words, ranks=ranks),
@@ -237,7 +237,7 @@ def test_ctrl_c_saves_what_is_done_and_a_resumed_run_goes_on(serial, monkeypatch
     assert "Traceback" not in errors
     assert not (serial / f"late{ranks}.h5").exists()
     again = ["small.toml", "--output", f"late{ranks}.h5"]
-    monkeypatch.chdir(serial)
+    os.chdir(serial)
     assert main(["ensemble", *again]) == 2
     assert "holds an unfinished run: continue it with --resume" in capsys.readouterr().err
     assert main(["ensemble", *again, "--resume"]) == 0
@@ -265,7 +265,7 @@ def test_a_force_of_ones_own_runs_on_all_ranks_and_is_never_stale(tmp_path):
     assert classes == [(3, 0), (0, 3)]
 
 
-def test_a_launcher_of_another_kind_is_found_out(tmp_path, monkeypatch):
+def test_a_launcher_of_another_kind_is_found_out(tmp_path):
     mpirun()
     write_small(tmp_path)
     env = os.environ | {"PMI_SIZE": "2", "PMI_RANK": "0", "PMI_CONTROL_PORT": "9"}
@@ -310,26 +310,26 @@ def test_mpi_that_cannot_be_loaded_says_what_to_install(tmp_path):
 
 
 @pytest.fixture
-def no_launcher(monkeypatch):
+def no_launcher(environment):
     """An environment without any launcher's variables."""
     for name in (*LAUNCHER, "SLURM_PROCID"):
-        monkeypatch.delenv(name, raising=False)
-    return monkeypatch
+        environment.pop(name, None)
+    return environment
 
 
 def test_who_launched_this_process(no_launcher):
     assert (launched_size(), launched_rank()) == (0, 0)
-    no_launcher.setenv("PMI_RANK", "3")
+    no_launcher["PMI_RANK"] = "3"
     assert (launched_size(), launched_rank()) == (None, 3)
-    no_launcher.setenv("SLURM_STEP_NUM_TASKS", "2")
+    no_launcher["SLURM_STEP_NUM_TASKS"] = "2"
     assert launched_size() == 2
-    no_launcher.setenv("PMI_SIZE", "4")
+    no_launcher["PMI_SIZE"] = "4"
     assert launched_size() == 4
 
 
 def test_one_rank_works_alone(no_launcher):
     assert type(find_communicator()) is Communicator
-    no_launcher.setenv("PMI_SIZE", "1")
+    no_launcher["PMI_SIZE"] = "1"
     assert type(find_communicator()) is Communicator
 
 

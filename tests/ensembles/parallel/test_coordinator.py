@@ -3,7 +3,6 @@
 import pytest
 
 from flocsim.ensembles.kind import Chunk
-from flocsim.ensembles.parallel import communicator
 from flocsim.ensembles.parallel.communicator import Communicator, Halt, Request, StopRequested
 from flocsim.ensembles.parallel.coordinator import Coordinator, RemoteCoordinator
 from flocsim.ensembles.parallel.schedule import TooManyFailures
@@ -110,8 +109,7 @@ def test_who_does_not_come_back_is_not_waited_for_long(monkeypatch):
     assert rank0.comm.new() == [(1, Halt())]
 
 
-def test_on_a_signal_rank_0_waits_no_longer_and_the_others_wait_for_it(monkeypatch):
-    monkeypatch.setattr(communicator, "stop_requested", lambda: True)
+def test_on_a_signal_rank_0_waits_no_longer_and_the_others_wait_for_it(stopping):
     with pytest.raises(StopRequested):
         Wire(0, 2).receive(1)
     other, looks = Wire(1, 2), iter([[], [], [(0, "a word")]])

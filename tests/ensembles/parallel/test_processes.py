@@ -11,7 +11,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from flocsim.compiler import composer
 from flocsim.ensembles import runner
 from flocsim.ensembles.kind import flocs_of, study_of
 from flocsim.ensembles.parallel.processes import in_copies
@@ -70,38 +69,36 @@ def test_they_end_with_a_killed_parent():
     assert has_ended(number)
 
 
-def test_a_study_knows_which_engines_the_disk_has(tmp_path, monkeypatch):
+def test_a_study_knows_which_engines_the_disk_has(tmp_path, environment):
     config = small_config(tmp_path, {"shapes": {"vertices": [1, 4]}})
     study = study_of(config, flocs_of(config))
     study.compile(study.kinds)
     assert study.uncompiled(study.kinds) == []
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
+    environment["FLOCSIM_CACHE"] = str(tmp_path / "cache")
     assert study.uncompiled(study.kinds) == study.kinds
     (tmp_path / "cache").mkdir()
     name = study.driver(study.draw(*study.kinds[0], 0.0, 0).encounter).name
     (tmp_path / "cache" / f"{name}-1234.code").touch()
     assert study.uncompiled(study.kinds) == study.kinds[1:]
-    monkeypatch.setattr(composer.disk_cache, "is_writable", lambda folder: False)
+    environment["FLOCSIM_CACHE"] = str(tmp_path / "small.toml" / "no folder")
     assert study.uncompiled(study.kinds) == []
 
 
-def test_a_study_of_swarms_knows_whether_the_disk_has_its_engine(tmp_path, monkeypatch):
+def test_a_study_of_swarms_knows_whether_the_disk_has_its_engine(tmp_path, own_cache):
     study = study_of(swarm_config(tmp_path))
-    monkeypatch.setenv("FLOCSIM_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "cache").mkdir()
+    own_cache.mkdir()
     assert study.uncompiled(study.kinds) == study.kinds
     name = study.first.begin(1.0).runner.driver.name
-    (tmp_path / "cache" / f"{name}-1234.code").touch()
+    (own_cache / f"{name}-1234.code").touch()
     assert study.uncompiled(study.kinds) == []
 
 
 @pytest.mark.parametrize("rank", [0, 1])
-def test_each_rank_compiles_its_own_kinds_in_a_copy(tmp_path, monkeypatch, rank):
-    config = small_config(tmp_path, {"shapes": {"vertices": [1, 4]}})
-    study = study_of(config, flocs_of(config))
+def test_each_rank_compiles_its_own_kinds_in_a_copy(tmp_path, rank):
     compiled = tmp_path / "compiled"
-    monkeypatch.setattr(type(study), "uncompiled", lambda self, kinds: list(kinds))
-    monkeypatch.setattr(type(study), "compile", lambda self, kinds: note(compiled, kinds))
+    study = SimpleNamespace(
+        kinds=[(0, 1), (0, 4)], uncompiled=list, compile=partial(note, compiled)
+    )
     comm = SimpleNamespace(
         rank=rank,
         size=2,

@@ -5,14 +5,14 @@ import shutil
 import pytest
 
 from flocsim.__main__ import main
-from flocsim.ensembles.pairs import study as pairs
 from flocsim.ensembles.parallel.communicator import Communicator, SharedError
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
-from flocsim.errors import FileError, UsageError
+from flocsim.errors import UsageError
 from flocsim.io.results.file import read_results
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import small_config, write_small
+from tests.helpers.study_state import after_chunks
 from tests.helpers.tiers import rest_slow
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 4}
@@ -55,9 +55,10 @@ def test_finished_results_are_in_the_way(finished, mode, seed):
     assert results_in(finished) == before
 
 
-def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished, monkeypatch):
+def test_restart_throws_no_journal_away_where_results_are_in_the_way(finished):
     (finished / "other").mkdir()
-    stop_at_the_end(monkeypatch, finished / "other")
+    with after_chunks(15):
+        go(finished / "other")
     (finished / "other" / "r.h5.journal").rename(finished / "r.h5.journal")
     before = results_in(finished)
     assert len(before["r.h5.journal"]) > 1000
@@ -88,49 +89,33 @@ def test_resume_and_overwrite_extends_what_is_of_this_study(finished):
     assert results_in(finished).keys() == {"r.h5", "r.1.h5"}
 
 
-def test_an_unfinished_run_does_not_replace_results_of_another_study(tmp_path, monkeypatch):
+def test_an_unfinished_run_does_not_replace_results_of_another_study(tmp_path):
     go(tmp_path, seed=2)
     other = (tmp_path / "r.h5").read_bytes()
     (tmp_path / "r.h5").unlink()
-    stop_at_the_end(monkeypatch, tmp_path)
+    with after_chunks(15):
+        go(tmp_path)
     (tmp_path / "r.h5").write_bytes(other)
     with pytest.raises(SharedError, match=r"belongs to another study.*--overwrite"):
         go(tmp_path, RESUME)
     assert (tmp_path / "r.h5").read_bytes() == other
-    assert go(tmp_path, RESUME, overwrite=True).computed == 0
+    assert go(tmp_path, RESUME, overwrite=True).computed == 1
     assert (tmp_path / "r.1.h5").read_bytes() == other
 
 
-def stop_at_the_end(monkeypatch, folder):
-    """Run all of a study, and fail where the results would be written."""
-
-    def fail(*_, **__):
-        raise FileError("no space left")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(pairs, "write_results", fail)
-        with pytest.raises(SharedError):
-            go(folder)
-
-
 @pytest.mark.parametrize("mode", rest_slow([NEW, RESUME], lambda mode: mode == RESUME))
-def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(
-    ready, tmp_path, monkeypatch, mode
-):
+def test_what_appears_during_the_run_is_spared_and_nothing_computed_lost(ready, tmp_path, mode):
     if mode == RESUME:
         shutil.copy(ready, tmp_path)
-    original = pairs.write_results
 
-    def appear(path, *more):
+    def appear(state):
         (tmp_path / "moving").write_bytes(b"of another program")
-        (tmp_path / "moving").replace(path)
-        return original(path, *more)
+        (tmp_path / "moving").replace(tmp_path / "r.h5")
 
-    monkeypatch.setattr(pairs, "write_results", appear)
-    with pytest.raises(SharedError, match=r"r\.h5 .*(already exists|has meanwhile been written)"):
+    said = r"r\.h5 .*(already exists|has meanwhile been written)"
+    with after_chunks(1, appear), pytest.raises(SharedError, match=said):
         go(tmp_path, mode, replicates=5)
     assert (tmp_path / "r.h5").read_bytes() == b"of another program"
-    monkeypatch.undo()
     (tmp_path / "r.h5").unlink()
     assert go(tmp_path, RESUME, replicates=5).computed == 0
 
@@ -148,14 +133,13 @@ def test_damaged_results_are_set_aside_on_request(finished, capsys):
     assert same_data(finished / "r.h5", finished / "whole.h5") == []
 
 
-def test_the_results_have_the_name_of_the_config(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    path = write_small(tmp_path, vertices="[1]", name="weather.toml")
+def test_the_results_have_the_name_of_the_config(in_tmp, capsys):
+    path = write_small(in_tmp, vertices="[1]", name="weather.toml")
     path.write_text(path.read_text().partition("[output]")[0])
     for folder in ("", "sub/"):
-        (tmp_path / folder).mkdir(exist_ok=True)
-        path = path.replace(tmp_path / folder / "weather.toml")
+        (in_tmp / folder).mkdir(exist_ok=True)
+        path = path.replace(in_tmp / folder / "weather.toml")
         assert main(["ensemble", f"{folder}weather.toml", "--quiet", "--overwrite"]) == 0
-    assert {each.name for each in tmp_path.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
+    assert {each.name for each in in_tmp.glob("*.h5")} == {"weather.h5", "weather.1.h5"}
     assert main(["ensemble", "sub/weather.toml", "-o", "sub/other.h5", "--quiet"]) == 0
-    assert (tmp_path / "sub/other.h5").exists()
+    assert (in_tmp / "sub/other.h5").exists()

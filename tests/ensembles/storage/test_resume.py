@@ -1,27 +1,26 @@
 """Stopped, damaged, extended: what exists is used, what is missing is run, nothing else is."""
 
+import contextlib
 import json
 import shutil
 
-import attrs
 import numpy as np
 import pytest
 
-from flocsim.ensembles import runner
-from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import Communicator, SharedError
-from flocsim.ensembles.parallel.schedule import StudyState, TooManyFailures
+from flocsim.ensembles.parallel.schedule import TooManyFailures
 from flocsim.ensembles.runner import run_to_file
 from flocsim.ensembles.storage import identity
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME
 from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
-from flocsim.io.journal import DAMAGED, ROWS, Journal
+from flocsim.io.journal import DAMAGED, ROWS, SESSION
 from flocsim.io.results.file import read_results
 from flocsim.process import INTERRUPTION, STOPPED
-from tests.helpers.journals import change, leave, records_in
+from tests.helpers.journals import change, records_in
 from tests.helpers.results_files import same_data
-from tests.helpers.small_study import small_config
+from tests.helpers.small_study import small_config, write_star_library
+from tests.helpers.study_state import after_chunks
 from tests.helpers.tiers import rest_slow
 
 SPHERES = {"shapes": {"vertices": [1]}, "replicates": 20}
@@ -33,26 +32,11 @@ def go_on(folder, mode=RESUME, overrides=None, **more):
     return run_to_file(config, Communicator(), folder / "r.h5", mode)
 
 
-def stop_after(monkeypatch, chunks):
-    """Let a signal come after so many chunks."""
-    seen = []
-
-    def take_in(state, result, original=StudyState.take_in):
-        original(state, result)
-        seen.append(result)
-        if len(seen) == chunks:
-            state.interrupt()
-
-    monkeypatch.setattr(StudyState, "take_in", take_in)
-
-
 @pytest.fixture(scope="module")
 def left(tmp_path_factory):
     """The journal of a study that was stopped after 30 of its 80 replicates."""
     folder = tmp_path_factory.mktemp("left")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
-        stop_after(patch, 30)
+    with after_chunks(30):
         ended = go_on(folder, NEW)
     kept = f"30 finished replicates are in {folder / 'r.h5.journal'}"
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
@@ -76,10 +60,9 @@ def test_a_stopped_run_goes_on_to_the_same_bytes(stopped, whole):
     assert (run["sessions"], run["computed"]) == (2, 50)
 
 
-def test_it_may_be_stopped_as_often_as_one_likes(tmp_path, monkeypatch, whole):
+def test_it_may_be_stopped_as_often_as_one_likes(tmp_path, whole):
     for _ in range(3):
-        with monkeypatch.context() as patch:
-            stop_after(patch, 26)
+        with after_chunks(26):
             go_on(tmp_path)
     assert go_on(tmp_path).computed == 2
     assert same_data(tmp_path / "r.h5", whole) == []
@@ -124,15 +107,21 @@ def test_another_study_is_refused(request, tmp_path, whole, change, said, finish
     assert {path: path.read_bytes() for path in folder.glob("r.h5*")} == before
 
 
-def test_other_physics_are_refused(stopped, monkeypatch):
-    monkeypatch.setattr(identity, "physics_digest", lambda **names: "edited")
-    with pytest.raises(SharedError, match="flocsim's own code has changed"):
-        go_on(stopped)
-
-
-def test_another_kind_of_processor_is_refused_and_said(stopped, monkeypatch):
-    monkeypatch.setattr(identity, "arithmetic_digest", lambda: "other")
-    with pytest.raises(SharedError, match="rounds sin, exp and similar functions differently"):
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("code", "flocsim's own code has changed"),
+        ("arithmetic", "rounds sin, exp and similar functions differently"),
+        ("kernels", "the compiled code for .* has changed"),
+    ],
+)
+def test_rows_of_other_physics_or_another_processor_are_refused(stopped, name, said):
+    path = stopped / "r.h5.journal"
+    about = json.loads(records_in(path, SESSION)[0]["about"])
+    changed = {each: "other" for each in about["identity"] if each.startswith(name)}
+    about["identity"].update(changed)
+    change(path, SESSION, 1, about=json.dumps(about))
+    with pytest.raises(SharedError, match=said):
         go_on(stopped)
 
 
@@ -150,18 +139,16 @@ def test_the_digest_of_the_arithmetic_sees_last_digits(monkeypatch):
     assert digest() != before
 
 
-def test_other_flocs_are_refused(tmp_path, monkeypatch):
-    config = small_config(tmp_path, {"shapes": {"vertices": [4]}, "replicates": 1})
-    run_to_file(config, Communicator(), tmp_path / "r.h5", NEW)
-    original = runner.flocs_of
-
-    def grown(config):
-        first, *others = original(config)
-        return [attrs.evolve(first, ratio=first.ratio * 1.01), *others]
-
-    monkeypatch.setattr(runner, "flocs_of", grown)
+def test_other_flocs_are_refused(tmp_path):
+    shapes = {"vertices": [4], "source": "library", "file": "stars.h5"}
+    for mode, ratio in ((NEW, 8.0), (RESUME, 8.1)):
+        (tmp_path / "stars.h5").unlink(missing_ok=True)
+        write_star_library(tmp_path / "stars.h5", ratios=(ratio, 16.0, 24.0))
+        config = small_config(tmp_path, {"shapes": shapes, "replicates": 1})
+        if mode == NEW:
+            run_to_file(config, Communicator(), tmp_path / "r.h5", mode)
     with pytest.raises(SharedError, match=r"the flocs with .* have changed"):
-        run_to_file(config, Communicator(), tmp_path / "r.h5", RESUME)
+        run_to_file(config, Communicator(), tmp_path / "r.h5", mode)
 
 
 def test_a_damaged_chunk_is_told_and_run_again(stopped, whole, capsys):
@@ -192,16 +179,15 @@ def test_a_journal_that_was_cut_is_kept_and_the_study_begins_anew(stopped, whole
     assert (kept.read_bytes() == data) if share > 0.0 else not kept.exists()
 
 
-def test_a_lost_log_is_reported_and_what_it_had_is_run_again(tmp_path, monkeypatch, whole, capsys):
-    with monkeypatch.context() as patch:
-        patch.setattr(Journal, "release", leave)
-        patch.setattr(Journal, "sync", lambda journal: None)
-        stop_after(patch, 30)
-        go_on(tmp_path, NEW)
-    (tmp_path / "r.h5.journal-wal").unlink()
-    assert go_on(tmp_path).computed > 50
+def test_a_lost_log_is_reported_and_what_it_had_is_run_again(tmp_path, whole, capsys):
+    running, killed = tmp_path / "running", tmp_path / "killed"
+    running.mkdir()
+    with after_chunks(30, lambda state: shutil.copytree(running, killed)):
+        go_on(running, NEW)
+    (killed / "r.h5.journal-wal").unlink()
+    assert go_on(killed).computed > 50
     assert "missing record" in capsys.readouterr().err
-    assert same_data(tmp_path / "r.h5", whole) == []
+    assert same_data(killed / "r.h5", whole) == []
 
 
 def test_rows_of_another_study_in_the_journal_are_computed_again(stopped, whole, capsys):
@@ -272,7 +258,8 @@ def test_a_results_file_tells_of_all_runs_that_it_took(tmp_path, whole):
     assert first == {name: before[name] for name in ("date", "command", "processor")}
 
 
-def failing(monkeypatch, *replicates):
+@contextlib.contextmanager
+def failing(*replicates):
     """Let these replicates raise."""
     original = Study.run
 
@@ -281,14 +268,14 @@ def failing(monkeypatch, *replicates):
             raise ZeroDivisionError("in a force of one's own")
         return original(study, condition, vertices, share, replicate, *more)
 
-    monkeypatch.setattr(Study, "run", run)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Study, "run", run)
+        yield
 
 
-def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(
-    tmp_path, monkeypatch, whole
-):
-    failing(monkeypatch, 7)
-    go_on(tmp_path, NEW)
+def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(tmp_path, whole):
+    with failing(7):
+        go_on(tmp_path, NEW)
     results = read_results(tmp_path / "r.h5")
     assert np.all(results.probabilities["n_failed"] == 1)
     assert np.all(results.replicates["outcome"][..., 7] == 6)
@@ -300,9 +287,8 @@ def test_an_exception_costs_one_replicate_and_says_how_to_run_it_again(
     assert '"why": "ZeroDivisionError: in a force of one\'s own"' in results.run["failed"]
 
 
-def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path, monkeypatch):
-    failing(monkeypatch, *range(3, 20))
-    with pytest.raises(SharedError, match="ZeroDivisionError") as caught:
+def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path):
+    with failing(*range(3, 20)), pytest.raises(SharedError, match="ZeroDiv") as caught:
         go_on(tmp_path, NEW)
     assert isinstance(caught.value.args[0], TooManyFailures)
     assert "flocsim trajectory CONFIG --type I --vertices 1 --delta 0.0 --replicate 3" in str(
@@ -310,5 +296,4 @@ def test_too_many_failures_end_the_study_with_a_command_to_look_at_one(tmp_path,
     )
     assert caught.value.args[0].exit_code == 70
     # What was computed is still there, and a larger share may be allowed.
-    monkeypatch.undo()
     assert go_on(tmp_path, overrides={"stop": {"failed": 0.5}}).computed < 77

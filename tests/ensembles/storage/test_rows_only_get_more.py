@@ -7,20 +7,18 @@ import time
 
 import pytest
 
-from flocsim.ensembles import runner
-from flocsim.ensembles.parallel import coordinator
 from flocsim.ensembles.parallel.communicator import SharedError
 from flocsim.ensembles.storage.resume import NEW, RESTART, RESUME, claim
-from flocsim.ensembles.study import Study
 from flocsim.errors import FileError, UsageError
 from flocsim.io import journal as locked_file
-from flocsim.io.journal import Journal
+from flocsim.io.journal import SESSION, Journal
 from flocsim.io.results.file import read_results
 from flocsim.process import INTERRUPTION, STOPPED
-from tests.ensembles.storage.test_resume import go_on, stop_after
+from tests.ensembles.storage.test_resume import go_on
 from tests.helpers.journals import leave, records_in, rows_in
 from tests.helpers.results_files import same_data
 from tests.helpers.small_study import problems
+from tests.helpers.study_state import after_chunks
 from tests.helpers.tiers import rest_slow
 
 FEWER = [
@@ -41,9 +39,7 @@ def finished(tmp_path, whole):
 def left(tmp_path_factory):
     """The journal of a study that was stopped after 50 of its 80 replicates."""
     folder = tmp_path_factory.mktemp("left")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(coordinator, "chunk_seconds", lambda size: 1e-9)
-        stop_after(patch, 50)
+    with after_chunks(50):
         assert go_on(folder, NEW).code == STOPPED
     return folder / "r.h5.journal"
 
@@ -132,12 +128,9 @@ def test_a_journal_that_was_begun_without_the_rule_stays(stopped):
     assert rows_in(stopped / "r.h5.journal") == before + ended.computed
 
 
-def test_what_was_computed_beyond_the_end_of_the_same_rule_goes_with_the_journal(
-    tmp_path, monkeypatch
-):
+def test_what_was_computed_beyond_the_end_of_the_same_rule_goes_with_the_journal(tmp_path):
     config = {"replicates": 100, "stop": RULE}
-    with monkeypatch.context() as patch:
-        stop_after(patch, 10)
+    with after_chunks(10):
         go_on(tmp_path, NEW, **config)
     ended = go_on(tmp_path, **config)
     assert ended.results.count < 20
@@ -155,29 +148,27 @@ def test_a_journal_beside_results_of_another_study_replaces_them_not(stopped, wh
 
 
 @pytest.mark.parametrize("mode", rest_slow([NEW, RESUME, RESTART], lambda mode: mode == RESUME))
-def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, whole, monkeypatch, mode):
-    with monkeypatch.context() as patch:
-        # As a kill leaves it while the kernels are compiled, of another study even.
-        patch.setattr(Journal, "release", leave)
-        patch.setattr(Study, "compile", lambda *words: 1 / 0)
-        with pytest.raises(ZeroDivisionError):
-            go_on(tmp_path, NEW, seed=7)
+def test_a_journal_without_rows_is_in_nobodys_way(tmp_path, left, whole, mode):
+    # As a kill leaves it while the kernels are compiled, of another study even.
+    journal = Journal(tmp_path / "r.h5.journal")
+    about = records_in(left, SESSION)[0]["about"]
+    journal.add(SESSION, about.replace('"seed": 1', '"seed": 7'))
+    leave(journal)
     assert "r.h5.journal" in names(tmp_path)
     assert go_on(tmp_path, mode).computed == 80
     assert same_data(tmp_path / "r.h5", whole) == []
     assert names(tmp_path) == ["r.h5"]
 
 
-def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, monkeypatch):
-    monkeypatch.setattr("flocsim.ensembles.parallel.coordinator.stop_requested", lambda: True)
+def test_a_run_stopped_before_its_first_replicate_promises_none(tmp_path, stopping):
     ended = go_on(tmp_path, NEW)
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, "no replicate was finished")
     assert names(tmp_path) == []
 
 
-def test_what_is_promised_counts_the_journal_and_not_the_results(finished, monkeypatch):
-    stop_after(monkeypatch, 5)
-    ended = go_on(finished, replicates=30)
+def test_what_is_promised_counts_the_journal_and_not_the_results(finished):
+    with after_chunks(5):
+        ended = go_on(finished, replicates=30)
     journal = finished / "r.h5.journal"
     kept = f"5 finished replicates are in {journal}"
     assert (ended.code, INTERRUPTION.kept()) == (STOPPED, kept)
@@ -185,9 +176,7 @@ def test_what_is_promised_counts_the_journal_and_not_the_results(finished, monke
 
 
 @pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
-def test_a_job_that_waited_for_another_looks_at_its_results_anew(
-    finished, whole, monkeypatch, mode
-):
+def test_a_job_that_waited_for_another_looks_at_its_results_anew(finished, whole, mode):
     path = finished / "r.h5"
     path.rename(finished / "ready.h5")
     first = Journal(finished / "r.h5.journal")
@@ -213,8 +202,7 @@ def test_a_job_that_waited_for_another_looks_at_its_results_anew(
 
 
 @pytest.mark.parametrize("mode", [NEW, RESUME, RESTART])
-def test_a_running_job_is_not_disturbed(stopped, monkeypatch, mode):
-    monkeypatch.setattr(locked_file, "LOCK_SECONDS", 0.1)
+def test_a_running_job_is_not_disturbed(stopped, at_once, mode):
     path = stopped / "r.h5.journal"
     before = records_in(path)
     running = Journal(path)
@@ -224,21 +212,17 @@ def test_a_running_job_is_not_disturbed(stopped, monkeypatch, mode):
     assert records_in(path) == before
 
 
-def test_the_lock_is_held_before_anything_is_grown_and_to_the_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(locked_file, "LOCK_SECONDS", 0.0)
+def test_the_lock_is_held_to_the_end(tmp_path, at_once):
     busy = []
 
-    def probe(*words, original):
+    def probe(state):
         with pytest.raises(FileError, match="another job"):
             claim(tmp_path / "r.h5", RESUME)
         busy.append(True)
-        return original(*words)
 
-    for name in ("flocs_of", "identity_of", "make_results"):
-        original = getattr(runner, name)
-        monkeypatch.setattr(runner, name, lambda *words, o=original: probe(*words, original=o))
-    go_on(tmp_path, NEW)
-    assert len(busy) == 3
+    with after_chunks(80, probe):
+        go_on(tmp_path, NEW)
+    assert busy
 
 
 def test_a_file_system_without_locks_is_told(tmp_path, monkeypatch, capsys):

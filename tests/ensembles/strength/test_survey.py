@@ -150,10 +150,9 @@ def test_the_figure_shows_the_share_that_has_opened():
 
 
 @pytest.fixture
-def command(fake, tmp_path, monkeypatch):
+def command(fake, in_tmp):
     """Runs the command in a folder where study.h5 is the fake one."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.h5").write_bytes(b"never read here")
+    (in_tmp / "study.h5").write_bytes(b"never read here")
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
     yield lambda *words: program.main(["strength", "study.h5", *map(str, words)])
     for each, action in before.items():

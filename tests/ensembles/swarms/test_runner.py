@@ -2,6 +2,7 @@
 the file."""
 
 import json
+import os
 import re
 import shutil
 import signal
@@ -108,10 +109,16 @@ def moments_in(parts):
     return [data for name, data in parts if name.startswith("moment")]
 
 
-def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, monkeypatch):
+@pytest.fixture
+def often(monkeypatch):
+    """A swarm is looked at, and said to be where it is, all the time."""
+    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
+    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
+
+
+def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_path, often):
     config = swarm_config(tmp_path)
     whole, _ = run_parts(config)
-    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
     parts, left, times = [], None, 0
     while True:
         found, ended = run_parts(config, halts=range(2, 10**9) if times < 6 else (), left=left)
@@ -124,10 +131,8 @@ def test_a_replicate_is_left_within_a_window_and_goes_on_to_the_same_bytes(tmp_p
     assert moments_in(whole) == moments_in(parts)
 
 
-def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, monkeypatch, capsys):
+def test_how_far_a_swarm_is_is_told_while_it_runs(tmp_path, often, capsys):
     """In whole lines where no terminal is; within windows, too."""
-    monkeypatch.setattr(runner, "LOOK_SECONDS", 1e-5)
-    monkeypatch.setattr(terminal, "LINE_SECONDS", 0.0)
     path = write_swarm_study(tmp_path)
     assert main(["swarm", str(path), "-o", str(tmp_path / "told.h5")]) == 0
     output = capsys.readouterr().out
@@ -173,13 +178,11 @@ def start(folder, *words):
     ("number", "jobs"),
     [pytest.param(signal.SIGKILL, 2, marks=pytest.mark.slow), (signal.SIGTERM, 1)],
 )
-def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
-    finished, tmp_path, monkeypatch, capsys, number, jobs
-):
-    write_swarm_study(tmp_path)
-    with start(tmp_path, "--set", "scene.checkpoint=1e-3") as process:
+def test_a_run_that_is_ended_goes_on_to_the_same_bytes(finished, in_tmp, capsys, number, jobs):
+    write_swarm_study(in_tmp)
+    with start(in_tmp, "--set", "scene.checkpoint=1e-3") as process:
         until = time.monotonic() + PATIENCE
-        journal = tmp_path / "swarm.h5.journal"
+        journal = in_tmp / "swarm.h5.journal"
         while time.monotonic() < until and process.poll() is None:
             if any(each["name"] == "state" for each in records_in(journal, PART)):
                 process.send_signal(number)
@@ -189,13 +192,12 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(
     assert journal.exists(), said
     if number == signal.SIGTERM:
         assert process.returncode == 75 and said.endswith(" --resume\n")
-    monkeypatch.chdir(tmp_path)
     assert main(["info", "swarm.h5"]) == 0
     assert re.search(r"unfinished: \d of 8 snapshots so far", capsys.readouterr().out)
     assert main(["swarm", "swarm.toml", "--resume", "--jobs", str(jobs)]) == 0
     said = capsys.readouterr()
     assert "left out" not in said.out + said.err
-    assert same(finished / "swarm.h5", tmp_path / "swarm.h5")
+    assert same(finished / "swarm.h5", in_tmp / "swarm.h5")
     assert not journal.exists()
 
 
@@ -212,8 +214,8 @@ def test_a_bed_at_rest_leaves_a_state_to_go_on_from(tmp_path):
         assert moments_in([*first, *rest]) == moments_in(whole)
 
 
-def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
-    monkeypatch.chdir(finished)
+def test_what_is_there_is_left_alone(finished, in_tmp, capsys):
+    os.chdir(finished)
     before = (finished / "swarm.h5").read_bytes()
     assert main(["swarm", "swarm.toml"]) == UsageError.exit_code
     assert main(["swarm", "swarm.toml", "--resume", "--seed", "9"]) == UsageError.exit_code
@@ -227,38 +229,35 @@ def test_what_is_there_is_left_alone(finished, monkeypatch, capsys):
     assert (finished / "swarm.h5").read_bytes() == before
 
 
-def test_more_replicates_leave_the_first_ones_as_they_are(finished, tmp_path, monkeypatch):
+def test_more_replicates_leave_the_first_ones_as_they_are(finished, in_tmp):
     """And are those of a study of as many from the start; of flocs with other numbers of points."""
-    monkeypatch.chdir(tmp_path)
-    write_swarm_study(tmp_path)
-    shutil.copy(finished / "swarm.h5", tmp_path / "swarm.h5")
+    write_swarm_study(in_tmp)
+    shutil.copy(finished / "swarm.h5", in_tmp / "swarm.h5")
     more = ["--replicates", "3", "--quiet"]
     assert main(["swarm", "swarm.toml", "--resume", *more]) == 0
     assert main(["swarm", "swarm.toml", "-o", "fresh.h5", *more]) == 0
-    assert same(tmp_path / "swarm.h5", tmp_path / "fresh.h5")
-    before, after = (columns_of(each / "swarm.h5") for each in (finished, tmp_path))
+    assert same(in_tmp / "swarm.h5", in_tmp / "fresh.h5")
+    before, after = (columns_of(each / "swarm.h5") for each in (finished, in_tmp))
     for name, values in before.items():
         assert after[name][: len(values)].tobytes() == values.tobytes()
-    assert SWARMS.read(tmp_path / "swarm.h5").run["sessions"] == 2
+    assert SWARMS.read(in_tmp / "swarm.h5").run["sessions"] == 2
 
 
-def test_all_that_reads_the_file(finished, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_all_that_reads_the_file(finished, in_tmp, capsys):
     file = str(finished / "swarm.h5")
     assert main(["info", file]) == 0
     said = capsys.readouterr().out
     assert "2 of 12 bodies, 2 were completed" in said and "means over 2 swarms" in said
     assert main(["plot", file, "--animation", "s.gif"]) == 0
-    names = {path.name for path in tmp_path.iterdir()}
+    names = {path.name for path in in_tmp.iterdir()}
     assert names == {
         "swarm-snapshots.png", "swarm-clusters.png", "swarm-sizes.png", "swarm-speed.png", "s.gif",
     }  # fmt: skip
 
 
-def test_a_dry_run_runs_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    write_swarm_study(tmp_path)
+def test_a_dry_run_runs_nothing(in_tmp, capsys):
+    write_swarm_study(in_tmp)
     assert main(["swarm", "swarm.toml", "--dry-run"]) == 0
     said = capsys.readouterr().out
     assert "2 swarms of 12 bodies" in said and "bodies cover 0.2000" in said
-    assert [path.name for path in tmp_path.iterdir()] == ["swarm.toml"]
+    assert [path.name for path in in_tmp.iterdir()] == ["swarm.toml"]

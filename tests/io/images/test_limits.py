@@ -62,9 +62,9 @@ def test_numbers_that_are_not_finite_are_refused(tmp_path, value):
     refused(saved(tmp_path / "m.npy", values), "not finite")
 
 
-def test_too_many_labels_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(masks, "MOST_LABELS", 100)
-    refused(saved(tmp_path / "m.npy", np.arange(400).reshape(20, 20)), "more than 100")
+def test_too_many_labels_are_refused(tmp_path):
+    labels = np.arange(masks.MOST_LABELS + 2, dtype="i4").reshape(2, -1)
+    refused(saved(tmp_path / "m.npy", labels), "more than 100000")
 
 
 def head(shape, descr="'|u1'"):
@@ -145,10 +145,14 @@ def test_a_part_of_a_picture_needs_less_memory(tmp_path):
         b"P5 2 2 255\n\0\1\2\3", b"GIF89a\1\0\1\0\0\0\0;", b"RIFF\0\0\0\0WEBPVP8 ", b"", b"\0" * 99,
     ],
 )  # fmt: skip
-def test_only_the_four_formats_are_opened(tmp_path, monkeypatch, ending, data):
-    monkeypatch.setattr("subprocess.Popen", None)  # no decoder runs a program
+def test_only_the_four_formats_are_opened(tmp_path, environment, ending, data):
+    ghostscript = tmp_path / "gs"
+    ghostscript.write_text(f"#!/bin/sh\ntouch {tmp_path}/was-run\n")
+    ghostscript.chmod(0o755)
+    environment["PATH"] = str(tmp_path) + os.pathsep + environment["PATH"]
     (tmp_path / f"p.{ending}").write_bytes(data)
     refused(tmp_path / f"p.{ending}", "cannot be read", read_grey)
+    assert not (tmp_path / "was-run").exists()
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
@@ -160,7 +164,7 @@ def test_what_is_no_ordinary_file_is_refused_at_once(tmp_path, name):
     refused(tmp_path / "folder.png", "not an ordinary file")
 
 
-def test_a_very_large_file_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(reading, "LARGEST_FILE", 100)
-    Image.fromarray(SQUARE).resize((200, 200)).save(tmp_path / "p.bmp")
+def test_a_very_large_file_is_refused(tmp_path):
+    Image.fromarray(SQUARE).save(tmp_path / "p.bmp")
+    os.truncate(tmp_path / "p.bmp", reading.LARGEST_FILE + 1)  # of which the disk has the beginning
     refused(tmp_path / "p.bmp", "larger than", read_grey)
