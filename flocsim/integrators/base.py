@@ -102,6 +102,7 @@ class Integrator(ABC):
     largest_step = math.inf
     estimate_share = 1.0
     across = False
+    hands_over = False
 
     @staticmethod
     @abstractmethod
@@ -159,4 +160,5 @@ class Integrator(ABC):
 
     def fresh_counts(self, max_steps: int) -> Counts:
         """Return the counters of a run with a budget of steps, tried ones included."""
-        return Counts.one(max_steps=max_steps, pause_at=NEVER)
+        next_check = 0 if self.hands_over else NEVER
+        return Counts.one(max_steps=max_steps, pause_at=NEVER, next_check=next_check)

@@ -15,44 +15,16 @@ from collections.abc import Callable
 import attrs
 
 from flocsim.fields import quantity
-from flocsim.hooks import (
-    choose_method,
-    cut,
-    end_within,
-    first_step,
-    note_step,
-    resolving_step,
-    skip_cycles,
-    step_across,
-    step_to_switch,
-)
-from flocsim.integrators.backward_euler.method import hand_over, step_or_give_back
-from flocsim.integrators.backward_euler.step import next_across, note_rates
+from flocsim.integrators.backward_euler.method import step_or_give_back
+from flocsim.integrators.backward_euler.step import next_across
 from flocsim.integrators.base import Integrator
-from flocsim.integrators.events.crossings import interpolate
-from flocsim.integrators.events.cycles import skip_equal_cycles as leave_out
-from flocsim.integrators.events.first_event import end_grazing_at_once, update_grazing
-from flocsim.integrators.events.grazes import end_grazing_early, update_grazing_pairs
 from flocsim.integrators.exponential.collocation import (
     estimate_series_error,
-    nothing_swings,
-    propagate_with_series,
+    may_be_series,
     solve_series,
 )
-from flocsim.integrators.exponential.samples import cut as cut_series
-from flocsim.integrators.exponential.series import evaluate_at
-from flocsim.integrators.loop.step_size import (
-    SMALLEST_FACTOR,
-    adaptive_factor,
-    fastest_vibration,
-)
-from flocsim.integrators.radau.carried_error import (
-    add_step_error,
-    propagate_error,
-    release_uncertainty,
-)
-from flocsim.integrators.radau.carried_error import overlap_error as step_overlap_error
-from flocsim.integrators.radau.collocation import end_on_cubic, interpolate_stages
+from flocsim.integrators.loop.step_size import SMALLEST_FACTOR, adaptive_factor
+from flocsim.integrators.radau.carried_error import release_uncertainty
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.estimate import estimate_error
 from flocsim.integrators.radau.grazing import (
@@ -61,17 +33,12 @@ from flocsim.integrators.radau.grazing import (
     set_grazing_resistances,
 )
 from flocsim.integrators.radau.stages import evaluate_states, solve_stages
-from flocsim.integrators.radau.systems import factorise_systems, is_dense
+from flocsim.integrators.radau.systems import factorise_systems
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
-from flocsim.integrators.rhs.stated_error import (
-    amplify_sums,
-    bound_propagated,
-    overlap_error,
-    propagate_vector,
-)
 from flocsim.integrators.rhs.views import inertia
-from flocsim.state.work import NEW, NOW, START, TRIAL
+from flocsim.state.clock import PLAIN, RADAU, SERIES
+from flocsim.state.work import NOW
 
 ESTIMATE_ORDER = 4.0
 """The error estimates of both kinds of step scale as this power of the step size."""
@@ -93,82 +60,6 @@ def is_retry(scene, clock):
     return staged and scene.listed_reach <= 0.0
 
 
-TOUCH_ERROR_FACTOR = 0.1
-"""Tolerance factor of the first series step after a touch. Its error is taken as (v/ω0) (h ω0)⁵
-over this number: the overlap v/ω0 of the impact, times the order-5 effect of the rotation of the
-contact normal, which the series does not contain."""
-
-
-def step_after_touch(work, clock, frequency, speed, later):
-    """Return the size [s] of the first step after a touch at a speed [m/s]; see
-    flocsim.hooks.first_step."""
-    if is_dense(work):
-        # Solve (v/ω0) (h ω0)⁵/TOUCH_ERROR_FACTOR = tolerance for h.
-        fraction = TOUCH_ERROR_FACTOR * clock.tolerance * frequency / speed
-        return fraction**0.2 / frequency
-    return resolving_step(clock, frequency, later)
-
-
-def propagate_over_step(scene, work, clock, step):
-    """Propagate the error vector over an accepted step; return its largest norm over the bodies
-    [m]."""
-    # Radau: a rational approximation of the exponential, with the factors of the step.
-    if work.tally.series_terms == 0:
-        return propagate_error(scene, work, clock, step)
-    # Series: the derivatives of the power series are known exactly. The step may have been cut, so
-    # propagate over the fraction of the series that was used.
-    bound_propagated(scene, work)
-    full = clock.series_step
-    propagate_with_series(work, clock, full, step / full)
-    # Let the scalar sums grow at the rate of the vector, for example towards an attraction.
-    if nothing_swings(clock):
-        amplify_sums(scene, work, step)
-    add_step_error(work)
-    return bound_propagated(scene, work)
-
-
-def interpolate_step(work, step, fraction, body):
-    """Write the motion of a body at a fraction of the step into TRIAL (dense output)."""
-    terms = work.tally.series_terms
-    if terms > 0:
-        evaluate_at(work, START, terms, step, fraction, TRIAL, body, body + 1)
-    else:
-        interpolate_stages(work, step, fraction, body)
-
-
-def end_early(scene, work, step, ratio, fraction):
-    """Make the motion at a fraction of the step the new state; return False where it is too
-    inexact."""
-    terms = work.tally.series_terms
-    if terms > 0:
-        evaluate_at(work, START, terms, step, fraction, NEW, 0, work.place.shape[1])
-        # A series is as accurate inside the step as at its end.
-        return True
-    return end_on_cubic(scene, work, step, ratio, fraction)
-
-
-MAX_PHASE = 4.0
-"""Phase ω h [rad], ω being the fastest vibration, up to which the events inside a series are found
-reliably. A Radau step with an event in it is repeated as a series of this length."""
-
-
-def may_be_series(scene, work):
-    """Return True if steps of these bodies can be series: few bodies, and inertia."""
-    return is_dense(work) and inertia(scene, 0, 0) != 0.0
-
-
-def resolve_switch(scene, work, step, fraction):
-    """Return the step [s] to be tried after one that passed an event at a fraction of it.
-
-    A Radau step damps vibrations, and the event may be an artefact of that. Then a series is tried
-    instead, as long as MAX_PHASE allows, but at most half of the step.
-    """
-    fastest = fastest_vibration(scene, work)
-    if work.tally.series_terms > 0 or not may_be_series(scene, work) or fastest == 0.0:
-        return fraction * step
-    return max(fraction * step, min(0.5 * step, MAX_PHASE / fastest))
-
-
 def solve_as_series(scene, work, clock, step, known):
     """Take a step as a series; return its error over the tolerance, or −1 where no series is
     possible.
@@ -180,6 +71,7 @@ def solve_as_series(scene, work, clock, step, known):
     work.tally.series_terms = solve_series(scene, work, clock, step, known)
     if work.tally.series_terms == 0:
         return -1.0
+    work.tally.kind = SERIES
     estimate_series_error(scene, work, clock, step)
     return error_ratio(scene, work, clock, step)
 
@@ -220,6 +112,7 @@ class Implicit(Integrator):
     """
 
     estimate_share = 0.5
+    hands_over = True
 
     tolerance: float = quantity("m", above=0.0, default=1e-9)
     first_step: float = quantity("s", above=0.0, default=1e-6)
@@ -229,11 +122,11 @@ class Implicit(Integrator):
         """Take one step; return its error over the tolerance, or −1 where Newton's method
         failed."""
         # The last step's series, if it was one, gives the first guess of this step's remainder.
-        known = work.tally.series_terms > 0
-        work.tally.series_terms, clock.longest_series = 0, math.inf
+        known = work.tally.kind == SERIES
+        work.tally.kind, clock.longest_series = PLAIN, math.inf
         # Beds: backward Euler across events, where the hand-over rule has chosen it.
         if clock.across == 1.0:
-            return step_across(scene, work, clock, step)
+            return step_or_give_back(scene, work, clock, step)
         time = clock.time
         remaining = max(end_of_run(clock) - time, step)
         # Forces and derivatives at the start. The dashpots of grazing contacts are left out first:
@@ -248,8 +141,9 @@ class Implicit(Integrator):
         # Try a series. It has no grazing contacts, whose dashpots are too stiff to resolve.
         if not grazes:
             ratio = solve_as_series(scene, work, clock, step, known)
-            if work.tally.series_terms > 0:
+            if work.tally.kind == SERIES:
                 return ratio
+        work.tally.kind = RADAU
         forget_series(work, clock, known)
         # Radau with grazing contacts: set their dashpots by the system without them, then assemble
         # anew. A contact that is released leaves the forces, too.
@@ -291,26 +185,6 @@ class Implicit(Integrator):
             return max(min(step * factor, clock.longest_series), min(step, step * factor))
         return step * factor
 
-    @property
-    def replaces(self) -> dict[Callable, Callable]:
-        """{hook: function}: dense output, early ends, error propagation and hand-over of this
-        method."""
-        return {
-            interpolate: interpolate_step,
-            end_within: end_early,
-            step_to_switch: resolve_switch,
-            cut: cut_series,
-            first_step: step_after_touch,
-            update_grazing: update_grazing_pairs,
-            end_grazing_at_once: end_grazing_early,
-            choose_method: hand_over,
-            step_across: step_or_give_back,
-            note_step: note_rates,
-            skip_cycles: leave_out,
-            propagate_vector: propagate_over_step,
-            overlap_error: step_overlap_error,
-        }
-
 
 def massless(scene, body, axis):
     """Return no inertia: forces balance at every instant."""
@@ -340,5 +214,5 @@ class Overdamped(Implicit):
 
     @property
     def replaces(self) -> dict[Callable, Callable]:
-        """{hook: function} of Implicit, and no inertia."""
-        return {**super().replaces, inertia: massless}
+        """{hook: function}: no inertia."""
+        return {inertia: massless}

@@ -11,8 +11,13 @@ import math
 from collections.abc import Callable
 
 from flocsim.geometry.contact import body_pairs
-from flocsim.hooks import choose_method, step_across
-from flocsim.integrators.backward_euler.method import FEWEST
+from flocsim.integrators.backward_euler.method import (
+    FEWEST,
+    hand_over,
+    keep_method,
+    no_step_across,
+    step_or_give_back,
+)
 from flocsim.integrators.radau import elimination
 from flocsim.integrators.rhs import (
     charge_sum,
@@ -87,10 +92,9 @@ def left_out(
         replaced |= {charge_sum.sum_charges: charge_sum.no_charges}
     if not water:
         replaced |= pair_resistance.LEFT_OUT
-    # By the number of bodies. A hook replaced by itself stays empty, whatever the method fills it
-    # with.
+    # By the number of bodies.
     if bodies < FEWEST:
-        replaced |= {choose_method: choose_method, step_across: step_across}
+        replaced |= {hand_over: keep_method, step_or_give_back: no_step_across}
     if bodies <= DENSE:
         replaced |= {
             body_pairs.list_near: list_none,

@@ -105,7 +105,7 @@ class Disc(Record):
 
 
 class BodyErrors(Record):
-    """Errors of a body's outline, accumulated over a run: see rhs.stated_error."""
+    """Errors of a body's outline, accumulated over a run: see loop.stated_error."""
 
     velocity_lifetime: float  # time for which a velocity error goes on displacing it [s]
     relaxation_time: float  # of its slowest velocity component under drag [s]

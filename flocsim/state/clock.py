@@ -13,8 +13,17 @@ class Tally(Record):
     solves: int  # linear systems solved so far
     kept: int  # 1 + displacements set aside while a list had no room; 0: none are set aside
     full: int  # which array has no room left, see NOTHING_FULL
-    series_terms: int  # terms of the last step's series in ``Work.series``; 0: it was not a series
+    kind: int  # of the last step tried: PLAIN, SERIES or RADAU
+    series_terms: int  # terms of its series in ``Work.series``, if it was one
     smooth_gap: float  # last smooth gap evaluated (rhs.surface_gap) [m]
+
+
+# Kinds of step (Tally.kind): what is known of the motion inside of it.
+(
+    PLAIN,  # both ends
+    SERIES,  # its power series (integrators.exponential)
+    RADAU,  # its stages (integrators.radau)
+) = range(3)
 
 
 # Values of Tally.full.
@@ -86,7 +95,7 @@ class Counts(Record):
     code: int  # last return value of the observer
     located: int  # trials spent on locating events
     stationary_steps: int  # steps in a row that were too short to count as motion
-    next_check: int  # number of steps after which to check the progress of the method
+    next_check: int  # number of steps after which to check the progress of the method, or NEVER
     trials_at_check: int  # steps and trials made by the last check
     cycle_modes: int  # hash of the contact modes at which a cycle begins; 0: no cycle
     cycle_code: int  # hash of the switches since

@@ -138,7 +138,8 @@ def put_state(swarm, work, members, first):
         work.cluster[body] = body
     work.kick.start = work.kick.duration = 0.0
     work.tally.candidates = work.tally.pairs = work.tally.kept = work.tally.full = 0
-    work.tally.evaluations = work.tally.rebuilds = work.tally.solves = work.tally.series_terms = 0
+    work.tally.evaluations = work.tally.rebuilds = work.tally.solves = 0
+    work.tally.kind = work.tally.series_terms = 0
     for place in range(work.elimination.found.shape[0]):
         work.elimination.found[place] = 0
 

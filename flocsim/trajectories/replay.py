@@ -29,7 +29,7 @@ from flocsim.integrators.rhs.forces import sum_forces
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.run import Run
-from flocsim.state.clock import NEVER
+from flocsim.state.clock import NEVER, RADAU, SERIES
 from flocsim.state.scene import NO_WATER, Scene
 from flocsim.state.work import (
     FIRST_STAGE,
@@ -225,9 +225,9 @@ def step_motion(
     of others, and where the stages are no longer those of the step, Hermite's through both ends.
     """
     work, clock = run.work, run.clock
-    terms = int(work.tally.series_terms)
-    if terms > 0 and np.array_equal(motion_of(work, START), start):
+    if work.tally.kind == SERIES and np.array_equal(motion_of(work, START), start):
         whole = float(clock.series_step)
+        terms = int(work.tally.series_terms)
         evaluate_at(work, START, terms, whole, (time - begin) / whole, TRIAL, 0, len(start))
         return motion_of(work, TRIAL)
     stages = np.array(
@@ -236,7 +236,7 @@ def step_motion(
     whole = float(clock.stages_step)
     if whole == 0.0 and np.array_equal(stages[3], motion_of(work, NOW)):
         whole = end - begin
-    own = origin.has_stages and clock.stages_time == begin and whole > 0.0
+    own = work.tally.kind == RADAU and clock.stages_time == begin and whole > 0.0
     if not own or not np.array_equal(stages[0], start):
         return hermite(begin, end, start, motion_of(work, NOW), time)
     return interpolate(stage_weights((time - begin) / whole), *stages)

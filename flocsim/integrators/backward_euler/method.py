@@ -13,24 +13,22 @@ The rule depends on counts of steps alone. Measured times would differ between m
 """
 
 import math
-from collections.abc import Callable
 
 import attrs
 
-from flocsim.compiler.linker import postponed
+from flocsim.compiler.linker import apart, postponed
 from flocsim.fields import quantity
 from flocsim.geometry.contact.points import least_listed_gap
-from flocsim.hooks import CONTACT_FORCE, has, note_step
+from flocsim.hooks import CONTACT_FORCE, has, hook
 from flocsim.integrators.backward_euler.step import (
     end_at_switches,
     euler_step,
     next_across,
-    note_rates,
     start_across,
 )
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.rhs.views import lever
-from flocsim.state.clock import NOT_COMPILED
+from flocsim.state.clock import NEVER, NOT_COMPILED
 from flocsim.state.work import AT_LAST_CHECK, NOW
 
 RESOLVED_BOUNCE = 0.003
@@ -72,11 +70,6 @@ class BackwardEuler(Integrator):
     def next_step(clock, step, ratio):
         """Return the size [s] of the next step: errors scale as h², and as h at events."""
         return next_across(clock, step, ratio)
-
-    @property
-    def replaces(self) -> dict[Callable, Callable]:
-        """{hook: function}: stores the rates of each step for the estimate of the next."""
-        return {note_step: note_rates}
 
 
 FEWEST = 3
@@ -124,9 +117,14 @@ def crowding(work):
     return max(1.0, work.poses.shape[0] / MANY)
 
 
+def keep_method(scene, work, clock, counts):
+    """Never hand over: among two bodies steps that end at events are as good."""
+
+
+@hook
 def hand_over(scene, work, clock, counts):
     """Hand over to backward Euler, or take back, where that is due."""
-    if not has(scene, CONTACT_FORCE) and clock.across == 0.0:
+    if counts.next_check == NEVER or not (has(scene, CONTACT_FORCE) or clock.across == 1.0):
         return
     tried = counts.steps + counts.rejected + counts.located
     trials = tried - counts.trials_at_check
@@ -161,6 +159,13 @@ def across_not_compiled(scene, work, clock, step):
     return -1.0
 
 
+def no_step_across(scene, work, clock, step):
+    """Fail: the method never hands over."""
+    return -1.0
+
+
+@hook
+@apart
 @postponed(across_not_compiled)
 def step_or_give_back(scene, work, clock, step):
     """Take one step across events; return −1 where it fails, or where bodies would rebound."""

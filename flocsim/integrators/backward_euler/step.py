@@ -29,8 +29,8 @@ from flocsim.integrators.events.resolution import bounces
 from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
+from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.stated_error import secant_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, velocity_lifetime_of
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import CHANGE, LAST_RATES, NOW, START, STEP_ERROR, STIFFNESS, TRIAL
@@ -113,7 +113,7 @@ def euler_step(scene, work, clock, step, all_contacts):
     return (error_ratio(scene, work, clock, step) if converged else -1.0), bounce
 
 
-def note_rates(scene, work, clock, step):
+def note_rates(work, clock, step):
     """Store the rates of an accepted step for the error estimate of the next one; count its
     events."""
     # A short one, in which a pair has landed, says nothing of how rates go on.

@@ -17,12 +17,13 @@ import math
 
 from flocsim.constants import DEEPEST_OVERLAP
 from flocsim.geometry.contact.points import contact_radii, locate_polygons, update_rotation
-from flocsim.hooks import hook
+from flocsim.integrators.events.interpolation import interpolate
 from flocsim.integrators.events.resolution import release_resolution, touch_resolution
-from flocsim.integrators.rhs.stated_error import secant_stiffness
+from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.surface_gap import least_row, pair_end
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.clock import SERIES
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import NEW, NOW, TRIAL
 
@@ -32,24 +33,6 @@ NEVER = 2.0
 
 MOST_ITERATIONS = 60
 """Evaluations in the search for one switch."""
-
-
-@hook
-def interpolate(work, step, share, body):
-    """Write a body's motion at a fraction of the step to TRIAL: the cubic through both ends
-    (Hermite)."""
-    rest = 1.0 - share
-    for axis in range(3):
-        change = work.place[NEW, body, axis] - work.place[NOW, body, axis]
-        # p(s) = p0 + s Δ + s (1 − s) ((1 − s) (h v0 − Δ) + s (Δ − h v1)).
-        start = step * work.velocity[NOW, body, axis] - change
-        end = change - step * work.velocity[NEW, body, axis]
-        bend = rest * start + share * end
-        work.place[TRIAL, body, axis] = (
-            work.place[NOW, body, axis] + share * change + share * rest * bend
-        )
-        slope = change + (rest - share) * bend + share * rest * (end - start)
-        work.velocity[TRIAL, body, axis] = slope / step
 
 
 def margin(work, state, row):
@@ -203,7 +186,7 @@ def earlier_switch(scene, work, step, row, earliest, resolution, depth):
         if lowest > high:
             return earliest
         high = lowest
-        if work.tally.series_terms > 0 and work.geometry[NOW, row].gap < 0.0:
+        if work.tally.kind == SERIES and work.geometry[NOW, row].gap < 0.0:
             # It opened in between; a law that ends there pulled it shut again.
             limit = resolution
     # The switch lies before ``high``, where the margin must be negative.

@@ -15,11 +15,12 @@ at its end scatter for the same reason; if they do no more than that, they are l
 
 import math
 
+from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
 from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.grazes import chatters, touched_recently
-from flocsim.integrators.events.resolution import at_least_rounding
+from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import CYCLE_BEFORE, CYCLE_LAST, NOW, PROPAGATED
 
@@ -379,6 +380,7 @@ def extrapolate_errors(work, clock, many, more):
         clock.error *= factor
 
 
+@apart
 def skip_equal_cycles(scene, work, clock, counts, until):
     """Follow the switches of two bodies; at the end of a cycle skip many, if the last ones were
     equal.

@@ -10,11 +10,10 @@ past a kink is wrong by the square of that only.
 import math
 
 from flocsim.constants import SHALLOWEST_TOUCH
-from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has, hook
+from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
 from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.grazes import first_grazing_end
-from flocsim.integrators.events.resolution import largest_coordinate
-from flocsim.integrators.rhs.error import step_tolerance
+from flocsim.integrators.rhs.error import largest_coordinate, step_tolerance
 from flocsim.integrators.rhs.friction import set_sliding, slip_transition
 from flocsim.integrators.rhs.views import contact_view, view_without_slip
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
@@ -152,20 +151,6 @@ def set_closed(work, state=NOW):
         changed = changed or candidate.contact_mode != closed
         candidate.contact_mode = closed
     return changed
-
-
-@hook
-def end_grazing_at_once(scene, work, clock, step):
-    """Let pairs cease to graze whose grazing ends right after the start of a step; return True if
-    any has."""
-    return False
-
-
-@hook
-def update_grazing(scene, work, clock, step):
-    """Let pairs begin and cease to graze after a step, if the method supports that; return True if
-    any has."""
-    return False
 
 
 def set_modes(scene, work):

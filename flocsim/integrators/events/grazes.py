@@ -15,7 +15,7 @@ from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import contact_derivatives, contact_force
 from flocsim.integrators.events.crossings import NEVER
-from flocsim.integrators.events.resolution import at_least_rounding
+from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,
     grazing_force,

@@ -7,7 +7,8 @@ damping until g past its end is wrong by that force's acceleration times g/speed
 import math
 
 from flocsim.constants import TINY
-from flocsim.integrators.rhs.stated_error import normal_force_at, secant_stiffness
+from flocsim.integrators.rhs.contact_stiffness import normal_force_at, secant_stiffness
+from flocsim.integrators.rhs.error import at_least_rounding
 from flocsim.integrators.rhs.views import contact_view, normal_rate, velocity_lifetime_of
 
 SHARE_OF_DEPTH = 0.02
@@ -28,10 +29,6 @@ MOST_AFTER_RELEASE = 1e3
 NEARLY = 0.99
 """Margin that tells critical damping from less in spite of rounding."""
 
-COARSEST_ROUNDING = 2e-15
-"""Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
-numbers."""
-
 
 def bounces(scene, view, speed, frequency):
     """Return True if bodies rebound: damping is below critical, or it does not pull."""
@@ -40,20 +37,6 @@ def bounces(scene, view, speed, frequency):
     return normal_force_at(scene, view, 0.0, speed) < drag or (
         normal_force_at(scene, view, 0.0, -speed) >= 0.0
     )
-
-
-def largest_coordinate(work, state):
-    """Return the largest coordinate of a body [m]."""
-    furthest = 0.0
-    for body in range(work.place.shape[1]):
-        for axis in range(2):
-            furthest = max(furthest, abs(work.place[state, body, axis]))
-    return furthest
-
-
-def at_least_rounding(work, state, length):
-    """Return a length [m], but not less than what coordinates can resolve."""
-    return max(length, COARSEST_ROUNDING * largest_coordinate(work, state))
 
 
 def touch_resolution(scene, work, state, row, resolution):

@@ -32,6 +32,7 @@ from flocsim.integrators.radau.stages import (
     locate_state,
     update_stage_slips,
 )
+from flocsim.integrators.radau.systems import is_dense
 from flocsim.integrators.radau.tableau import EIGENVALUES, ESTIMATE, REAL
 from flocsim.integrators.radau.tableau import NODES as RADAU
 from flocsim.integrators.rhs.blocks import lower_block, upper_block
@@ -233,6 +234,11 @@ def finish_step(scene, work, terms, step):
     locate_state(scene, work, last)
     update_stage_slips(scene, work, step, 2, MATRIX)
     adopt_stage(work, last)
+
+
+def may_be_series(scene, work):
+    """Return True if steps of these bodies can be series: few bodies, and inertia."""
+    return is_dense(work) and inertia(scene, 0, 0) != 0.0
 
 
 @apart

@@ -27,19 +27,9 @@ from flocsim.geometry.contact.candidates import (
     transfer_slips,
 )
 from flocsim.geometry.contact.points import locate_contacts
-from flocsim.hooks import (
-    CENTRE_FORCE,
-    CONTACT_FORCE,
-    attempt,
-    choose_method,
-    cut,
-    end_within,
-    has,
-    note_step,
-    observe,
-    skip_cycles,
-    step_to_switch,
-)
+from flocsim.hooks import CENTRE_FORCE, CONTACT_FORCE, attempt, has, observe
+from flocsim.integrators.backward_euler.method import hand_over
+from flocsim.integrators.backward_euler.step import note_rates
 from flocsim.integrators.events.crossings import (
     any_overtakes,
     any_touching,
@@ -48,18 +38,25 @@ from flocsim.integrators.events.crossings import (
     may_switch,
     passes_through_reach,
 )
+from flocsim.integrators.events.cycles import skip_equal_cycles
 from flocsim.integrators.events.first_event import (
     CONTACTS_CHANGED,
     FRICTION_CHANGED,
     UNCHANGED,
-    end_grazing_at_once,
     first_law_share,
     set_modes,
     switch_resolutions,
     switch_share,
-    update_grazing,
 )
+from flocsim.integrators.events.grazes import end_grazing_early, update_grazing_pairs
+from flocsim.integrators.events.interpolation import end_within
+from flocsim.integrators.events.samples import cut
 from flocsim.integrators.loop.kicks import kick_end, renew_kicks, snap_to_kick_end
+from flocsim.integrators.loop.stated_error import (
+    add_switch_errors,
+    propagate_errors,
+    reset_slip_offsets,
+)
 from flocsim.integrators.loop.step_size import (
     choose_step,
     moves,
@@ -67,17 +64,13 @@ from flocsim.integrators.loop.step_size import (
     reject,
     representable_step,
     step_behind_touch,
+    step_to_switch,
     vibration_step,
 )
 from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
-from flocsim.integrators.rhs.stated_error import (
-    add_switch_errors,
-    propagate_errors,
-    reset_slip_offsets,
-)
 from flocsim.integrators.rhs.surface_gap import flag_near, missed_sharing
 from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
-from flocsim.state.clock import NOTHING_FULL
+from flocsim.state.clock import NOTHING_FULL, PLAIN, SERIES
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NEW, NOW
 
@@ -128,7 +121,7 @@ def accept(scene, work, clock, counts, step, lists):
     if controlled:
         propagate_errors(scene, work, clock, step)
     if across:
-        note_step(scene, work, clock, step)
+        note_rates(work, clock, step)
     if not lists:
         return UNCHANGED
     if controlled and has(scene, CONTACT_FORCE):
@@ -138,7 +131,7 @@ def accept(scene, work, clock, counts, step, lists):
             add_switch_errors(scene, work, clock, step, depth)
         reset_slip_offsets(work)
     # Grazing first: set_modes leaves grazing pairs as they are.
-    grazes = controlled and not across and update_grazing(scene, work, clock, step)
+    grazes = work.tally.kind != PLAIN and update_grazing_pairs(scene, work, clock, step)
     # A contact that rolls from one edge to the next hands its tangential displacement on.
     transfer_slips(scene, work)
     switched = set_modes(scene, work)
@@ -283,7 +276,7 @@ def advance(scene, work, observed, clock, counts, record):
         if lists and trials == 0 and not keep_lists(scene, work, counts, clock.step):
             return NO_ROOM
         # 2. Attempt a step.
-        choose_method(scene, work, clock, counts)
+        hand_over(scene, work, clock, counts)
         renew_kicks(scene, work, clock)
         step = representable_step(clock, min(choose_step(scene, work, clock, lists), limit))
         # Pairs that may share a surface force are fixed for the step, so that it stays smooth.
@@ -302,13 +295,13 @@ def advance(scene, work, observed, clock, counts, record):
                 return STALLED
             continue
         # 3. Events. Grazing that ends right at the start: begin again in the other mode.
-        if lists and trials < MOST_TRIALS and end_grazing_at_once(scene, work, clock, step):
+        if lists and trials < MOST_TRIALS and end_grazing_early(scene, work, clock, step):
             counts.located += 1
             trials += 1
             clock.stages_step = 0.0
             continue
         # A series may span several swings of a contact: cut it at the first switch seen.
-        if lists and trials < MOST_TRIALS and work.tally.series_terms > 0:
+        if lists and trials < MOST_TRIALS and work.tally.kind == SERIES:
             resolution, depth = switch_resolutions(work, clock)
             remaining = cut(scene, work, clock, step, resolution, depth)
             if remaining < 1.0:
@@ -326,16 +319,16 @@ def advance(scene, work, observed, clock, counts, record):
                 continue
             step *= share
         # 4. Accept.
-        was_flying = work.tally.series_terms > 0 and not any_touching(work)
+        was_flying = work.tally.kind == SERIES and not any_touching(work)
         planned = clock.step
         switched = accept(scene, work, clock, counts, step, lists)
         # A doublet that chatters in equal cycles for ever: skip many of them at once.
         if switched == CONTACTS_CHANGED:
             until = min(clock.until, kick_end(scene, work))
-            skip_cycles(scene, work, clock, counts, until)
+            skip_equal_cycles(scene, work, clock, counts, until)
         # 5. Plan the next step.
         plan(clock, step, ratio, trials > 0, switched)
-        if switched == CONTACTS_CHANGED and work.tally.series_terms > 0:
+        if switched == CONTACTS_CHANGED and work.tally.kind == SERIES:
             plan_flight(work, clock, planned, was_flying)
         if trials > 0 and switched == UNCHANGED:
             # After a kink the Jacobian may be that from before it.

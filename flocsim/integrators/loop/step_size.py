@@ -13,16 +13,19 @@ import math
 
 from flocsim.constants import TINY
 from flocsim.geometry.contact.candidates import spendable_share, time_to_spend
-from flocsim.hooks import first_step, next_step
+from flocsim.hooks import next_step
 from flocsim.integrators.events.first_event import (
     CONTACTS_CHANGED,
     FRICTION_CHANGED,
     switch_resolutions,
 )
 from flocsim.integrators.events.resolution import touch_resolution
+from flocsim.integrators.exponential.collocation import may_be_series
 from flocsim.integrators.loop.kicks import kick_end
-from flocsim.integrators.rhs.stated_error import secant_stiffness
+from flocsim.integrators.radau.systems import is_dense
+from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
+from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import NOW, STIFFNESS
 
@@ -95,6 +98,15 @@ GROWTH_AFTER_SWITCH = 3.0
 
 LONGEST_SWITCH_STREAK = 4.0
 """Steps in a row that end at a switch before they may grow all the same."""
+
+TOUCH_ERROR_FRACTION = 0.1
+"""The error of the first step after a touch is taken as (h ω0)⁴ over this times the displacement
+that the impact leads to; that of a series as (h ω0)⁵ over this times the overlap v/ω0 of the
+impact, for the rotation of the contact normal, which the series does not contain."""
+
+MAX_PHASE = 4.0
+"""Phase ω h [rad], ω being the fastest vibration, up to which the events inside a series are found
+reliably. A Radau step with an event in it is repeated as a series of this length."""
 
 
 def step_to_imminent_touch(scene, work, clock, step):
@@ -226,7 +238,23 @@ def step_behind_touch(scene, work, clock):
             displacement = max(displacement, speed * velocity_lifetime_of(work, row))
     if not (frequency_squared > 0.0 and displacement > 0.0):
         return math.inf
-    return first_step(work, clock, math.sqrt(frequency_squared), top_speed, displacement)
+    frequency, allowed = math.sqrt(frequency_squared), TOUCH_ERROR_FRACTION * clock.tolerance
+    # Solve the error of the step = tolerance for h; see TOUCH_ERROR_FRACTION.
+    if work.tally.kind == PLAIN or not is_dense(work):
+        return (allowed / displacement) ** 0.25 / frequency
+    return (allowed * frequency / top_speed) ** 0.2 / frequency
+
+
+def step_to_switch(scene, work, step, share):
+    """Return the step [s] to try after one that passed an event at a fraction of it.
+
+    A Radau step damps vibrations, and the event may be an artefact of that. Then a series is tried
+    instead, as long as MAX_PHASE allows, but at most half of the step.
+    """
+    fastest = fastest_vibration(scene, work)
+    if work.tally.kind != RADAU or not may_be_series(scene, work) or fastest == 0.0:
+        return share * step
+    return max(share * step, min(0.5 * step, MAX_PHASE / fastest))
 
 
 def plan(clock, step, ratio, was_cut, switched):

@@ -16,7 +16,7 @@ springs pull by k_t e less: the source term f (FORCING), constant over a step, e
 
 The vector shows that contacts resist an error, that a doublet which tips over amplifies it, and
 that errors of opposite sign cancel. After each step its own estimated error is added;
-rhs/stated_error.py adds the errors of events.
+loop/stated_error.py adds the errors of events.
 
 The second subject is the overlap of a pressed contact at the end of a long step. Where a step does
 not resolve the vibration of a contact, its overlap is an algebraic variable: k_n times the overlap
@@ -26,12 +26,14 @@ is small, is wrong by several times itself, which decides when the contact opens
 this: their overlaps do not lie on a line.
 """
 
-from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.systems import solve_prepared
 from flocsim.integrators.radau.tableau import EIGENVALUES, NODES, REAL, SECOND_STAGE, THIRD_STAGE
 from flocsim.integrators.rhs.blocks import subtract_product
-from flocsim.integrators.rhs.stated_error import bound_propagated, unresolved_fraction
+from flocsim.integrators.rhs.contact_stiffness import unresolved_fraction
+from flocsim.integrators.rhs.error import at_least_rounding
+from flocsim.integrators.rhs.propagated_error import bound_propagated
 from flocsim.integrators.rhs.views import inertia
+from flocsim.state.clock import RADAU
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import CHANGE, FIRST_STAGE, FORCING, NOW, PROPAGATED, STEP_ERROR, STIFFNESS
 
@@ -117,10 +119,10 @@ ROUNDING_FACTOR = 30.0
 def overlap_scatter(scene, work, clock, step, row):
     """Return how far the overlap at the end of a step is off the line through the other stages [m].
 
-    Weighted by the fraction to which the step does not resolve the contact's vibration; 0 for a
-    series.
+    Weighted by the fraction to which the step does not resolve the contact's vibration; 0 for other
+    kinds of step.
     """
-    if work.tally.series_terms > 0:
+    if work.tally.kind != RADAU:
         return 0.0
     g, span = work.geometry, NODES[1] - NODES[0]
     slope = (g[SECOND_STAGE, row].gap - g[FIRST_STAGE, row].gap) / span

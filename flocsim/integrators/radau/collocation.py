@@ -70,7 +70,7 @@ def write_interpolated(work, weights, state, body):
         work.velocity[state, body, axis] = interpolate_axis(work.velocity, body, axis, weights)
 
 
-def interpolate_stages(work, step, fraction, body):
+def interpolate_stages(work, fraction, body):
     """Write a body's motion at a fraction of the step into TRIAL."""
     write_interpolated(work, stage_weights(fraction), TRIAL, body)
 

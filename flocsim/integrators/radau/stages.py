@@ -13,12 +13,11 @@ import math
 
 from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
-from flocsim.integrators.events.resolution import at_least_rounding
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import update_frames
 from flocsim.integrators.radau.systems import solve_both, write_residuals, write_stage_changes
 from flocsim.integrators.radau.tableau import MATRIX, NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.error import rounding_error, step_tolerance
+from flocsim.integrators.rhs.error import at_least_rounding, rounding_error, step_tolerance
 from flocsim.integrators.rhs.forces import adopt_stage, locate_for_forces, sum_forces
 from flocsim.integrators.rhs.friction import (
     GRAZING_STIFFNESS_RATIO,

@@ -21,6 +21,10 @@ from flocsim.state.work import DAMPING, NEW, NOW, STEP_ERROR
 ROUNDING = 1e-15
 """Relative rounding of a coordinate: a few units in the last place."""
 
+COARSEST_ROUNDING = 2e-15
+"""Limit of any resolution, as a fraction of the coordinates: ten neighbouring floating-point
+numbers."""
+
 FREE_MOTION_FRACTION = 0.01
 """Fraction of the tolerance allowed while no gap is below it. Free motion is cheap to follow, and
 the outcome of the encounter that it leads to depends on nanometres."""
@@ -130,3 +134,17 @@ def rounding_error(scene, work, state, step):
             size = place * (1.0 + velocity_lifetime / step) + speed * (step + velocity_lifetime)
             largest = max(largest, lever(scene, body, axis) * size)
     return ROUNDING * largest
+
+
+def largest_coordinate(work, state):
+    """Return the largest coordinate of a body [m]."""
+    furthest = 0.0
+    for body in range(work.place.shape[1]):
+        for axis in range(2):
+            furthest = max(furthest, abs(work.place[state, body, axis]))
+    return furthest
+
+
+def at_least_rounding(work, state, length):
+    """Return a length [m], but not less than what coordinates can resolve."""
+    return max(length, COARSEST_ROUNDING * largest_coordinate(work, state))

@@ -39,7 +39,7 @@ from flocsim.integrators.rhs.error import set_velocity_lifetimes
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_forces_at, outline_reach
 from flocsim.integrators.rhs.pair_resistance import add_pair_damping
-from flocsim.integrators.rhs.stated_error import grazing_error_source
+from flocsim.integrators.rhs.propagated_error import grazing_error_source
 from flocsim.integrators.rhs.surface_gap import (
     pair_end,
     share_sensitivity,

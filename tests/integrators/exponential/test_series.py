@@ -15,7 +15,7 @@ from flocsim.hooks import attempt
 from flocsim.integrators import Implicit
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.loop.driver import adopt_new_state
-from flocsim.integrators.rhs.stated_error import propagate_vector
+from flocsim.integrators.loop.stated_error import propagate_vector
 from flocsim.state.bodies import ANGLE, X
 from flocsim.state.work import DAMPING, NEW, NOW, PROPAGATED, STEP_ERROR, motion_of, work_of
 from tests.helpers.trial_scenes import Trap

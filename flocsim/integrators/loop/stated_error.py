@@ -28,33 +28,25 @@ import math
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.candidates import slip_error
 from flocsim.geometry.contact.points import length_of
-from flocsim.hooks import CONTACT_FORCE, contact_force, has, hook
-from flocsim.integrators.rhs.friction import grazing_force, normal_mobility, tangential_coupling
-from flocsim.integrators.rhs.views import (
-    contact_view,
-    lever,
-    normal_component,
-    normal_rate,
-    velocity_lifetime_of,
-    view_without_slip,
+from flocsim.hooks import contact_force
+from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
+from flocsim.integrators.radau.carried_error import add_step_error, overlap_error, propagate_error
+from flocsim.integrators.rhs.contact_stiffness import unresolved_fraction
+from flocsim.integrators.rhs.friction import grazing_force
+from flocsim.integrators.rhs.propagated_error import (
+    GRAZING_AMPLIFICATION,
+    GRAZING_IN_VECTOR,
+    SWITCH_AMPLIFICATION,
+    VECTOR_SAFETY,
+    bound_propagated,
+    lifted_load,
+    propagated_size,
 )
+from flocsim.integrators.rhs.views import contact_view, lever, normal_component, normal_rate
 from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
 from flocsim.state.work import CHANGE, FORCING, NOW, PROPAGATED, STEP_ERROR
-
-SWITCH_AMPLIFICATION = 1.5
-"""Factor by which motion may have amplified the errors of switches."""
-
-VECTOR_SAFETY = 13.0
-"""Safety factor on the size of the propagated vector: the true error may be larger by this."""
-
-GRAZING_AMPLIFICATION = 2.5
-"""Factor by which motion may have amplified the error due to grazing: the propagated error does not
-know that contacts end sooner or later because of it."""
-
-GRAZING_IN_VECTOR = GRAZING_AMPLIFICATION / VECTOR_SAFETY
-"""Fraction of that error that enters the propagated vector. It is a bound already, so VECTOR_SAFETY
-must not multiply it."""
 
 LEAST_VECTOR, SWITCH_FLOOR = 0.006, 0.15 / VECTOR_SAFETY
 """Lower bounds of the vector's size, since its parts may cancel by chance: LEAST_VECTOR tolerances,
@@ -62,9 +54,6 @@ and SWITCH_FLOOR of the sum of switching errors (a dozen grazes push it to and f
 
 UNCERTAIN_OVERLAP = 2.0
 """A contact may be open if its overlap is below this multiple of its gap's error."""
-
-UNRESOLVED_PHASE = 50.0
-"""ω0 h from which a step leaves a contact's vibration out; shorter steps do so partly."""
 
 LONG_RELAXATION = 1e6
 """A relaxation time of more than this number of steps counts as infinite."""
@@ -121,11 +110,24 @@ def amplify_sums(scene, work, step):
         errors.uncertain_velocity += rate * errors.uncertain_displacement
 
 
-@hook
 def propagate_vector(scene, work, clock, step):
-    """Propagate the error as a vector if the method has the forces' derivatives. Return the largest
-    displacement of an outline [m], inf without such a vector."""
-    return math.inf
+    """Propagate the error as a vector over an accepted step; return its largest displacement of an
+    outline [m], inf where nothing is known of the motion inside the step."""
+    if work.tally.kind == PLAIN:
+        return math.inf
+    # Radau: a rational approximation of the exponential, with the factors of the step.
+    if work.tally.kind == RADAU:
+        return propagate_error(scene, work, clock, step)
+    # Series: the derivatives of the power series are known exactly. The step may have been cut, so
+    # propagate over the fraction of the series that was used.
+    bound_propagated(scene, work)
+    full = clock.series_step
+    propagate_with_series(work, clock, full, step / full)
+    # Let the scalar sums grow at the rate of the vector, for example towards an attraction.
+    if nothing_swings(clock):
+        amplify_sums(scene, work, step)
+    add_step_error(work)
+    return bound_propagated(scene, work)
 
 
 @apart
@@ -162,7 +164,7 @@ def propagate_errors(scene, work, clock, step):
                 work.place[PROPAGATED, body, axis] += work.place[STEP_ERROR, body, axis]
                 work.velocity[PROPAGATED, body, axis] += work.velocity[STEP_ERROR, body, axis]
     # State the vector instead where it is smaller, with its safety factor and lower bounds.
-    vector = math.inf if across else propagate_vector(scene, work, clock, step)
+    vector = propagate_vector(scene, work, clock, step)
     clock.error = 0.0
     for body in range(work.poses.shape[0]):
         errors = work.errors[body]
@@ -176,90 +178,6 @@ def propagate_errors(scene, work, clock, step):
             stated = min(stated, VECTOR_SAFETY * own)
         errors.stated = stated
         clock.error = max(clock.error, stated)
-
-
-@hook
-def overlap_error(scene, work, clock, row):
-    """Return the error of a contact's overlap apart from that of the motion [m], if the method has
-    any."""
-    return 0.0
-
-
-def propagated_size(scene, work, body):
-    """Return the displacement of a body's outline by its propagated error [m]."""
-    turn = scene.bodies[body].bounding_radius * abs(work.place[PROPAGATED, body, ANGLE])
-    return length_of(work.place[PROPAGATED, body, X], work.place[PROPAGATED, body, Y]) + turn
-
-
-def certain_bound(work, body):
-    """Return the bound of a body's displacement error by steps and switches alone [m]."""
-    errors = work.errors[body]
-    return errors.displacement + SWITCH_AMPLIFICATION * errors.switch_displacement
-
-
-def displacement_bound(work, body):
-    """Return the bound of a body's displacement error by all its sums, uncertain contacts included
-    [m]."""
-    return (
-        certain_bound(work, body) + SWITCH_AMPLIFICATION * work.errors[body].uncertain_displacement
-    )
-
-
-def take_over_excess(work, body, size):
-    """Add to a body's own error whatever its propagated error ``size`` [m] exceeds its bound by: an
-    error that other bodies have handed on."""
-    more = size - displacement_bound(work, body)
-    if more > 0.0:
-        work.errors[body].displacement += more
-
-
-def scale_down_clusters(scene, work):
-    """Scale the propagated error of every cluster of contacting bodies down to its bound.
-
-    The bound of a body is its own, or the largest certain one in its cluster, as bodies in contact
-    hand errors on. Uncertain contacts count for their own bodies only. One factor scales
-    displacements and velocities of the whole cluster: anything else would give it a momentum that
-    no error has caused, and velocities of vibrations belong to their displacements.
-    """
-    for body in range(work.poses.shape[0]):
-        work.clusters[body].scale, work.clusters[body].largest_displacement = 1.0, 0.0
-    # The largest certain bound in each cluster.
-    for body in range(work.poses.shape[0]):
-        leader = work.cluster[body]
-        bound = max(work.clusters[leader].largest_displacement, certain_bound(work, body))
-        work.clusters[leader].largest_displacement = bound
-    # The smallest factor that its bodies need.
-    for body in range(work.poses.shape[0]):
-        leader, size = work.cluster[body], propagated_size(scene, work, body)
-        bound = max(work.clusters[leader].largest_displacement, displacement_bound(work, body))
-        if size > bound:
-            work.clusters[leader].scale = min(work.clusters[leader].scale, bound / size)
-    # Scale displacements, velocities, and offsets of tangential displacements.
-    for body in range(work.poses.shape[0]):
-        share = work.clusters[work.cluster[body]].scale
-        if share < 1.0:
-            for axis in range(3):
-                work.place[PROPAGATED, body, axis] *= share
-                work.velocity[PROPAGATED, body, axis] *= share
-    for row in range(work.tally.candidates):
-        share = work.clusters[work.cluster[work.candidates[row].vertex_body]].scale
-        if share < 1.0:
-            work.contacts[row].slip_offset *= share
-
-
-def bound_propagated(scene, work):
-    """Keep the propagated vector within the sums; return its largest displacement of an outline
-    [m].
-
-    A contact mode that switches again and again would otherwise pump the vector up.
-    """
-    largest = 0.0
-    scale_down_clusters(scene, work)
-    for body in range(work.poses.shape[0]):
-        size = propagated_size(scene, work, body)
-        take_over_excess(work, body, size)
-        largest = max(largest, size)
-    return largest
 
 
 def add_impulse_error(scene, work, body, impulse, switched):
@@ -297,11 +215,6 @@ def add_pair_impulse(scene, work, row, normal, tangential):
     add_propagated_impulse(scene, work, candidate.edge_body, -x, -y, -edge_torque)
 
 
-def is_closed(work, row):
-    """Return True if a pair is flagged as touching with the whole contact law."""
-    return work.candidates[row].contact_mode == CLOSED
-
-
 def has_switched(work, row):
     """Return True if the gap of a pair says otherwise than its flag."""
     closed = CLOSED if work.geometry[NOW, row].gap < 0.0 else OPEN
@@ -325,36 +238,6 @@ def uncertain_time(work, row, step, overlap_uncertainty, resolved):
         UNCERTAIN_OVERLAP * abs(normal_component(work, row, work.place, STEP_ERROR)) * resolved,
     )
     return step if -deepest < gap < 0.0 else 0.0
-
-
-def normal_force_at(scene, view, overlap, overlap_rate):
-    """Return the normal force of a contact at an overlap [m] and rate [m/s], 0 without a contact
-    law [N]."""
-    if not has(scene, CONTACT_FORCE):
-        return 0.0
-    force, _ = contact_force(scene, view_without_slip(view, overlap, overlap_rate))
-    return force
-
-
-def secant_stiffness(scene, view, overlap):
-    """Return the normal force of a static contact over its overlap [N/m]."""
-    return normal_force_at(scene, view, overlap, 0.0) / overlap
-
-
-def unresolved_fraction(scene, work, clock, step, row):
-    """Return min(1, (ω0 h/UNRESOLVED_PHASE)²): 1 if a step leaves the contact's vibration out.
-
-    Such a contact only balances its load, which then decides whether it touches.
-    """
-    # A series resolves every vibration.
-    if work.tally.series_terms > 0:
-        return 0.0
-    view = contact_view(scene, work, NOW, row)
-    stiffness = secant_stiffness(scene, view, clock.tolerance)
-    if not stiffness > 0.0:
-        return 0.0
-    phase = step * math.sqrt(stiffness / view.effective_mass) / UNRESOLVED_PHASE
-    return min(1.0, phase * phase)
 
 
 def signed_excess_time(work, row, step, depth, overlap_uncertainty):
@@ -381,30 +264,6 @@ def signed_excess_time(work, row, step, depth, overlap_uncertainty):
     )
 
 
-def lifted_load(scene, work, row, tangential):
-    """Return the load [N] that a tangential force lifts, and that presses where the force is
-    absent."""
-    return tangential * tangential_coupling(scene, work, row) / normal_mobility(scene, work, row)
-
-
-def grazing_error_source(scene, work, row, tangential):
-    """Return the source (normal, tangential) of the propagated error by a grazing pair [N].
-
-    Its tangential force may not have existed, its load pressing instead. The sign is chosen so that
-    the error grows: the losses of different contacts and times must not cancel. An impulse [N s]
-    may be given instead of a force.
-    """
-    normal, memory = -lifted_load(scene, work, row, tangential), velocity_lifetime_of(work, row)
-    # Work of the source on the present error, velocities included over their lifetime.
-    opening = normal_component(work, row, work.place, PROPAGATED)
-    opening += memory * normal_component(work, row, work.velocity, PROPAGATED)
-    slipping = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
-    share = (
-        -GRAZING_IN_VECTOR if normal * opening + tangential * slipping < 0.0 else GRAZING_IN_VECTOR
-    )
-    return share * normal, share * tangential
-
-
 def add_grazing_uncertainty(scene, work, row, step):
     """Count all that the tangential force of a grazing pair did in a step as an error: by the law
     the pair loses it whenever it parts, and what it lifted presses instead."""
@@ -421,7 +280,7 @@ def reset_slip_offsets(work):
     and so knows nothing of the present error. A grazing pair has lost its ξ by the law."""
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]
-        if candidate.slide_direction != 0 or not is_closed(work, row):
+        if candidate.slide_direction != 0 or candidate.contact_mode != CLOSED:
             grazes = candidate.contact_mode == GRAZING
             lost = GRAZING_IN_VECTOR * work.slip[NOW, row] if grazes else 0.0
             work.contacts[row].slip_offset = lost - slip_error(work, row, work.place)
@@ -438,9 +297,8 @@ def add_switch_errors(scene, work, clock, step, depth):
             continue
         # Times for which the contact force is uncertain: without sign for the sums, signed for the
         # vector.
-        overlap_uncertainty = (
-            overlap_error(scene, work, clock, row) if is_closed(work, row) else 0.0
-        )
+        closed = candidate.contact_mode == CLOSED
+        overlap_uncertainty = overlap_error(scene, work, clock, row) if closed else 0.0
         resolved = 1.0 - unresolved_fraction(scene, work, clock, clock.stages_step, row)
         delay = uncertain_time(work, row, step, overlap_uncertainty, resolved)
         signed = signed_excess_time(work, row, step, depth, overlap_uncertainty)

@@ -8,10 +8,10 @@ from flocsim import Body, Sphere, System
 from flocsim.forces import BodyForce, Contact, Gravity, StokesDrag
 from flocsim.integrators import Implicit
 from flocsim.integrators.amplification import end_distance
+from flocsim.integrators.loop import stated_error
 from flocsim.integrators.radau.carried_error import propagate_error
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_systems
-from flocsim.integrators.rhs import stated_error
 from flocsim.integrators.rhs.jacobian import assemble_jacobian
 from flocsim.state.bodies import Y
 from flocsim.state.work import DAMPING, PROPAGATED, work_of
