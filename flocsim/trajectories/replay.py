@@ -185,7 +185,7 @@ class Replay:
             key: (1.0 - share) * before.get(key, 0.0) + share * after.get(key, 0.0)
             for key in before.keys() | after.keys()
         }
-        return step_motion(self.origin, ahead.run, start, begin, end, time), slips
+        return step_motion(ahead.run, start, begin, end, time), slips
 
     def slips(self) -> Slips:
         """The tangential displacements of all listed pairs now."""
@@ -216,9 +216,7 @@ def key_of(work, row):
     return pair.vertex_body, pair.vertex, pair.edge_body, pair.edge_start
 
 
-def step_motion(
-    origin: Origin, run: Run, start: np.ndarray, begin: float, end: float, time: float
-) -> np.ndarray:
+def step_motion(run: Run, start: np.ndarray, begin: float, end: float, time: float) -> np.ndarray:
     """The motion (n, 6) at a time inside of the step that a run has just taken.
 
     Of implicit methods the series or the cubic through the stages, which the engine itself goes by;

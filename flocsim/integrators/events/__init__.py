@@ -1,5 +1,5 @@
 """Events that end a step early: a pair touches, parts or becomes the deepest contact, a law has a
-kink.
+kink; and the motion inside a step, by which they are located.
 
-May import ``rhs``.
+May import ``exponential``, ``radau`` and ``rhs``.
 """

@@ -1,4 +1,5 @@
-"""The one loop around every integrator: the driver, and how it chooses the size of a step.
+"""The one loop around every integrator: the driver, how it chooses the size of a step, the stated
+error of a run, and thermal kicks.
 
-May import ``events`` and ``rhs``; integrators do not import it.
+May import all rooms of steps: ``backward_euler``, ``events``, ``exponential``, ``radau`` and ``rhs``.
 """
