@@ -54,7 +54,7 @@ INNER_ROWS = {
     "state": [
         ["work"],
         ["scene"],
-        ["bodies", "clock", "contacts", "outlines", "views"],
+        ["declared", "bodies", "clock", "contacts", "outlines", "views"],
         ["records"],
     ],
     "swarms": [

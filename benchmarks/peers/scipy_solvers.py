@@ -16,7 +16,7 @@ from benchmarks.peers.compiled import inspect, list_anew, rate_state
 from benchmarks.speed.measure import Measured
 from flocsim.constants import WATER_VISCOSITY
 from flocsim.integrators import VelocityVerlet
-from flocsim.state.work import NOW, motion_of, with_capacity, work_of
+from flocsim.state.work import NOW, motion_of, with_room, work_of
 
 SOLVERS = {"LSODA": LSODA, "BDF": BDF, "Radau": Radau}
 
@@ -69,7 +69,7 @@ class SciPyRun:
     def make_list(self):
         """(state vector, longest step) with the pairs listed anew."""
         while (longest := self.pieces[1](self.scene, self.work)) < 0.0:
-            self.work = with_capacity(self.work, 2 * len(self.work.candidates))
+            self.work = with_room(self.work)
         slips = self.work.slip[NOW, : self.work.tally.candidates]
         return np.concatenate([motion_of(self.work, NOW).ravel(), slips]), longest
 

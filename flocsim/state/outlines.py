@@ -24,13 +24,16 @@ class Piece(Record):
     core_depth: float  # distance from the piece back to the core that it is the offset of [m]
 
 
+PieceRows = Annotated[np.ndarray, ("pieces",), np.int64]
+
+
 class NearPieces(NamedTuple):
     """Lists of rows of relevant pieces of two bodies; element 0 of each is its length."""
 
-    first: np.ndarray  # of the body integrated over: pieces that may be near the other body
-    second: np.ndarray  # pieces of the other body that may be near this one
-    around: np.ndarray  # of these, pieces that may be near the piece being integrated over
-    seen: np.ndarray  # of these, pieces that may be near any piece integrated over so far
+    first: PieceRows  # of the body integrated over: pieces that may be near the other body
+    second: PieceRows  # pieces of the other body that may be near this one
+    around: PieceRows  # of these, pieces that may be near the piece being integrated over
+    seen: PieceRows  # of these, pieces that may be near any piece integrated over so far
 
 
 class Listed(Record):
@@ -56,36 +59,30 @@ MOST_FEET = 16
 are less dense there."""
 
 
+NodeArray = Annotated[np.ndarray, (MOST_NODES,)]
+
+
 class Nodes(NamedTuple):
     """Quadrature nodes of an outline, or charges behind it, in arrays of MOST_NODES."""
 
-    x: np.ndarray  # position [m]
-    y: np.ndarray
-    normal_x: np.ndarray  # outward normal; of a charge, the force on it
-    normal_y: np.ndarray
-    weight: np.ndarray  # length of outline that a node represents [m]; strength of a charge
-    gap: np.ndarray  # distance of the other outline [m]
-    attraction: np.ndarray  # S of geometry.contact.attraction [1/m³]
-    plate_gap: np.ndarray  # gap of plates with equal attraction [m]
-    log_share: np.ndarray  # scratch of S: coefficient of a logarithm
-    log_of: np.ndarray  # scratch of S: its argument; negative without one
-    cell_x: (
-        np.ndarray
-    )  # of a charge, where it lies in a cell of a field: from its corner, of a step
-    cell_y: np.ndarray
+    x: NodeArray  # position [m]
+    y: NodeArray
+    normal_x: NodeArray  # outward normal; of a charge, the force on it
+    normal_y: NodeArray
+    weight: NodeArray  # length of outline that a node represents [m]; strength of a charge
+    gap: NodeArray  # distance of the other outline [m]
+    attraction: NodeArray  # S of geometry.contact.attraction [1/m³]
+    plate_gap: NodeArray  # gap of plates with equal attraction [m]
+    log_share: NodeArray  # scratch of S: coefficient of a logarithm
+    log_of: NodeArray  # scratch of S: its argument; negative without one
+    # Of a charge, where it lies in a cell of a field: from its corner, in steps of the grid.
+    cell_x: NodeArray
+    cell_y: NodeArray
     # Field values at all four corners of that cell (4, MOST_NODES), see FieldNode.
     potential: Annotated[np.ndarray, (4, MOST_NODES)]
     by_x: Annotated[np.ndarray, (4, MOST_NODES)]
     by_y: Annotated[np.ndarray, (4, MOST_NODES)]
     by_xy: Annotated[np.ndarray, (4, MOST_NODES)]
-
-
-def nodes_of() -> Nodes:
-    """Return Nodes of zeros."""
-    corners = ("potential", "by_x", "by_y", "by_xy")
-    return Nodes(
-        *(np.zeros((4, MOST_NODES) if name in corners else MOST_NODES) for name in Nodes._fields)
-    )
 
 
 GROUP = 8

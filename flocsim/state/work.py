@@ -5,7 +5,7 @@ NOW, NEW (the end of the step), a trial state and the stages of the method. More
 velocity hold errors and other vectors of the same shape.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from flocsim.state.contacts import (
     SavedContact,
     VertexAtEdge,
 )
+from flocsim.state.declared import enlarged, zeros_of
 from flocsim.state.outlines import (
     MOST_FEET,
     MOST_ORDER,
@@ -27,7 +28,6 @@ from flocsim.state.outlines import (
     NearPieces,
     Nodes,
     gauss_rules,
-    nodes_of,
 )
 from flocsim.state.records import copied
 from flocsim.state.scene import Scene
@@ -97,65 +97,68 @@ holds the tension that a strain exerts on both."""
 class Elimination(NamedTuple):
     """Sparse linear systems of a step of many bodies: flocsim.integrators.radau.elimination."""
 
-    place: np.ndarray  # (n,): index of a body in the elimination order; −1 if fixed
-    body: np.ndarray  # (n,): body at an index, the inverse of ``place``
-    lower: np.ndarray  # (n + 1,): first entry in ``column`` of a row's blocks left of the diagonal
-    upper: np.ndarray  # (n,): first entry of those right of it
-    column: np.ndarray  # (room,): column indices of the blocks
-    blocks: Annotated[np.ndarray, (3, "n + room", 3, 4)]  # see elimination.REAL_PART
-    where: np.ndarray  # (n,): block of the row being eliminated, by column
-    pairs: np.ndarray  # (pairs,): 1 if a pair of bodies is in the pattern
-    graph: np.ndarray  # (room,): scratch of the ordering
-    nodes: np.ndarray  # (8, n + 1): scratch of the ordering
-    found: np.ndarray  # (3,): see elimination.PATTERN
+    place: Annotated[np.ndarray, ("many",), np.int64]  # index in the elimination order; −1: fixed
+    body: Annotated[np.ndarray, ("many",), np.int64]  # body at an index, the inverse of ``place``
+    # First entry in ``column`` of a row's blocks left of the diagonal, and of those right of it.
+    lower: Annotated[np.ndarray, ("ends",), np.int64]
+    upper: Annotated[np.ndarray, ("many",), np.int64]
+    column: Annotated[np.ndarray, ("room",), np.int64]  # column indices of the blocks
+    blocks: Annotated[np.ndarray, (3, "sparse", 3, 4)]  # see elimination.REAL_PART
+    where: Annotated[np.ndarray, ("many",), np.int64]  # block of the current row, by column
+    pairs: Annotated[np.ndarray, ("joined",), np.int64]  # 1: a pair is in the pattern
+    graph: Annotated[np.ndarray, ("room",), np.int64]  # scratch of the ordering
+    nodes: Annotated[np.ndarray, (8, "ends"), np.int64]  # scratch of the ordering
+    found: Annotated[np.ndarray, (3,), np.int64]  # see elimination.PATTERN
 
 
 class Work(NamedTuple):
-    """All that changes in a run of n bodies, and scratch space; every array is reused."""
+    """All that changes in a run of n bodies, and scratch space; every array is reused.
 
-    place: Annotated[np.ndarray, ("rows", "n", 3)]  # positions and angles in all states [m, m, rad]
-    velocity: Annotated[np.ndarray, ("rows", "n", 3)]  # velocities and spins [m/s, m/s, rad/s]
-    force: Annotated[np.ndarray, ("states", "n", 3)]  # forces and torques [N, N, N m]
-    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # terms of a motion, see MOTION [m, m, rad]
-    remainder: Annotated[
-        np.ndarray, (2, 4, "few", 3)
-    ]  # R₀, r₁, r₂, r₃ of its nonlinear force [N, N m]
+    Sizes: ``n`` bodies; ``few``: those of dense systems, 0 for more than DENSE; ``rows``:
+    candidate pairs of features; ``pairs``: pairs of bodies.
+    """
+
+    place: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # positions, angles in all states [m, rad]
+    velocity: Annotated[np.ndarray, (ALL_STATES, "n", 3)]  # velocities and spins [m/s, rad/s]
+    force: Annotated[np.ndarray, (STATES, "n", 3)]  # forces and torques [N, N m]
+    series: Annotated[np.ndarray, (2, TERMS, "few", 3)]  # terms of a motion, see MOTION [m, rad]
+    remainder: Annotated[np.ndarray, (2, 4, "few", 3)]  # R₀, r₁, r₂, r₃ of its force [N, N m]
     weights: Annotated[np.ndarray, (2, "few", 3)]  # see MOVED
     linear: Annotated[np.ndarray, (2, "few", "few", 3, 3)]  # h²K/M and h D/M, see DAMPING
-    slip: np.ndarray  # (states, capacity): tangential displacements ξ [m]
-    slip_rate: np.ndarray  # (states, capacity): their rates [m/s]
-    contacts: np.ndarray  # (capacity,) of ContactState
-    interior: np.ndarray  # (capacity,) of InteriorPoint
-    poses: np.ndarray  # (n,) of Pose
-    frames: np.ndarray  # (n, MOST_FRAMES) of Frame
-    errors: np.ndarray  # (n,) of BodyErrors
-    clusters: np.ndarray  # (n,) of Cluster
-    kicks: np.ndarray  # (n,) of Kick
+    slip: Annotated[np.ndarray, (STATES, "rows")]  # tangential displacements ξ [m]
+    slip_rate: Annotated[np.ndarray, (STATES, "rows")]  # their rates [m/s]
+    contacts: Annotated[np.ndarray, ("rows",), ContactState]
+    interior: Annotated[np.ndarray, ("rows",), InteriorPoint]
+    poses: Annotated[np.ndarray, ("n",), Pose]
+    frames: Annotated[np.ndarray, ("n", MOST_FRAMES), Frame]
+    errors: Annotated[np.ndarray, ("n",), BodyErrors]
+    clusters: Annotated[np.ndarray, ("n",), Cluster]
+    kicks: Annotated[np.ndarray, ("n",), Kick]
     kick: KickTime
-    cluster: np.ndarray  # (n,): first body of the cluster of bodies that act on each other
+    cluster: Annotated[np.ndarray, ("n",), np.int64]  # first body of those that act on each other
     jacobian: Annotated[np.ndarray, (2, "blocks", 3, 3)]  # 3 × 3 blocks, see rhs.blocks
-    loads: np.ndarray  # (2, 3 n), complex: right-hand sides, then solutions
-    system: np.ndarray  # (2, 3 n, 3 n), complex: dense systems of few bodies, factorised
-    pivots: np.ndarray  # (2, 3 n): row exchanges of these
+    loads: Annotated[np.ndarray, (2, "unknowns"), complex]  # right-hand sides, then solutions
+    system: Annotated[np.ndarray, (2, "dense", "dense"), complex]  # of few bodies, factorised
+    pivots: Annotated[np.ndarray, (2, "dense"), np.int64]  # row exchanges of these
     elimination: Elimination  # sparse systems of many bodies
-    candidates: np.ndarray  # (capacity,) of Candidate
-    geometry: np.ndarray  # (states, capacity) of VertexAtEdge
-    kept: np.ndarray  # (capacity,) of SavedContact
+    candidates: Annotated[np.ndarray, ("rows",), Candidate]
+    geometry: Annotated[np.ndarray, (STATES, "rows"), VertexAtEdge]
+    kept: Annotated[np.ndarray, ("rows",), SavedContact]
     near: NearPieces
     listed: Listed
-    feet: np.ndarray  # (MOST_FEET,): parameters of the feet on a piece: rhs.outline_nodes
+    feet: Annotated[np.ndarray, (MOST_FEET,)]  # parameters of those on a piece: rhs.outline_nodes
     nodes: Nodes
     rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss rules: nodes, weights
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # rows q of rhs.pair_resistance
-    pairs: np.ndarray  # (pairs,) of BodyPair
+    pairs: Annotated[np.ndarray, ("pairs",), BodyPair]
     cycle_coordinates: Annotated[np.ndarray, (12,)]  # of two bodies, see events.cycles
-    budget: np.ndarray  # (pairs,): relative motion for which a pair's list is valid [m]
+    budget: Annotated[np.ndarray, ("pairs",)]  # relative motion while a pair's list is valid [m]
     # Forces along outlines and oriented forces now: F_x, F_y on the later body [N], torques on the
     # later and on the earlier body [N m].
     outline_forces: Annotated[np.ndarray, ("pairs", 4)]
-    discs: np.ndarray  # (n,) of Disc
-    order: np.ndarray  # (n,): discs in the order of their left ends
-    starts: np.ndarray  # (n + 1,): index of a disc's first pair in ``pairs``
+    discs: Annotated[np.ndarray, ("n",), Disc]
+    order: Annotated[np.ndarray, ("n",), np.int64]  # discs in the order of their left ends
+    starts: Annotated[np.ndarray, ("after",), np.int64]  # first pair of a disc in ``pairs``
     tally: Tally
 
 
@@ -187,25 +190,6 @@ def all_counting(bodies: np.ndarray, pairs: np.ndarray) -> int:
     return count
 
 
-def elimination_of(n: int, pairs: int, room: int) -> Elimination:
-    """Return arrays for the sparse systems of n bodies, empty ones for up to DENSE."""
-    if n <= DENSE:
-        n = pairs = room = 0
-    return Elimination(
-        place=np.zeros(n, dtype=np.int64),
-        body=np.zeros(n, dtype=np.int64),
-        lower=np.zeros(n + 1, dtype=np.int64),
-        upper=np.zeros(n, dtype=np.int64),
-        column=np.zeros(room, dtype=np.int64),
-        blocks=np.zeros((3, n + room, 3, 4)),
-        where=np.zeros(n, dtype=np.int64),
-        pairs=np.zeros(pairs, dtype=np.int64),
-        graph=np.zeros(room, dtype=np.int64),
-        nodes=np.zeros((8, n + 1), dtype=np.int64),
-        found=np.zeros(3, dtype=np.int64),
-    )
-
-
 def work_of(
     scene: Scene,
     position: np.ndarray,
@@ -221,55 +205,29 @@ def work_of(
     blocks of sparse systems; ``all_pairs`` is True if all pairs of few bodies are watched.
     """
     n = len(scene.bodies)
-    dense = n if n <= DENSE else 0
+    few, many = (n, 0) if n <= DENSE else (0, n)
     if n <= ALL_PAIRS and all_pairs:
         pairs = n * (n - 1) // 2
     elif pairs is None:
         pairs = PAIRS_A_BODY * n
-    work = Work(
-        place=np.zeros((ALL_STATES, n, 3)),
-        velocity=np.zeros((ALL_STATES, n, 3)),
-        force=np.zeros((STATES, n, 3)),
-        series=np.zeros((2, TERMS, dense, 3)),
-        remainder=np.zeros((2, 4, dense, 3)),
-        weights=np.zeros((2, dense, 3)),
-        linear=np.zeros((2, dense, dense, 3, 3)),
-        slip=np.zeros((STATES, capacity)),
-        slip_rate=np.zeros((STATES, capacity)),
-        contacts=ContactState.rows(capacity),
-        interior=InteriorPoint.rows(capacity),
-        poses=Pose.rows(n),
-        frames=Frame.rows(n, MOST_FRAMES),
-        errors=BodyErrors.rows(n),
-        clusters=Cluster.rows(n),
-        kicks=Kick.rows(n),
-        kick=KickTime.one(),
-        cluster=np.zeros(n, dtype=np.int64),
-        jacobian=np.zeros((2, 2 * n + 2 * pairs, 3, 3)),
-        loads=np.zeros((2, 3 * n), dtype=complex),
-        system=np.zeros((2, 3 * dense, 3 * dense), dtype=complex),
-        pivots=np.zeros((2, 3 * dense), dtype=np.int64),
-        elimination=elimination_of(n, pairs, BLOCKS_A_BODY * n if blocks is None else blocks),
-        candidates=Candidate.rows(capacity),
-        geometry=VertexAtEdge.rows(STATES, capacity),
-        kept=SavedContact.rows(capacity),
-        near=NearPieces(*np.zeros((4, len(scene.pieces) + 1), dtype=np.int64)),
-        listed=Listed.one(),
-        feet=np.zeros(MOST_FEET),
-        nodes=nodes_of(),
-        rules=gauss_rules(),
-        squares=np.zeros((SQUARES + 1, 7)),
-        pairs=BodyPair.rows(pairs),
-        cycle_coordinates=np.zeros(12),
-        budget=np.zeros(pairs),
-        outline_forces=np.zeros((pairs, 4)),
-        discs=Disc.rows(n),
-        order=np.zeros(n, dtype=np.int64),
-        starts=np.zeros(n + 1, dtype=np.int64),
-        tally=Tally.one(),
-    )
+    room = (BLOCKS_A_BODY * n if blocks is None else blocks) if many else 0
+    work: Work = zeros_of(
+        Work,
+        n=n, after=n + 1, unknowns=3 * n, few=few, dense=3 * few, rows=capacity,
+        many=many, ends=many + 1, room=room, pieces=len(scene.pieces) + 1,
+        **sizes_of_pairs(n, pairs, room),
+    )._replace(rules=gauss_rules())  # fmt: skip
     begin(work, scene, position, velocity, all_pairs)
     return work
+
+
+def sizes_of_pairs(n: int, pairs: int, room: int) -> dict[str, int]:
+    """Return the sizes that follow from the room for pairs of bodies, and for sparse blocks."""
+    many = n if n > DENSE else 0
+    return {
+        "pairs": pairs, "blocks": 2 * n + 2 * pairs,
+        "joined": pairs if many else 0, "sparse": many + room,
+    }  # fmt: skip
 
 
 def begin(
@@ -307,39 +265,16 @@ def copy_of(work: Work) -> Work:
     return copies
 
 
-def grown(array: np.ndarray, axis: int, size: int) -> np.ndarray:
-    """Return the array enlarged to ``size`` along an axis, with zeros at the end."""
-    shape = list(array.shape)
-    shape[axis] = size
-    larger = np.zeros(shape, dtype=array.dtype)
-    larger[tuple(slice(each) for each in array.shape)] = array
-    return larger
-
-
-def wider(arrays: Any, size: int, **axes: int) -> Any:
-    """Return a NamedTuple of arrays in which those of {name: axis} are enlarged to ``size``."""
-    return arrays._replace(
-        **{name: grown(getattr(arrays, name), axis, size) for name, axis in axes.items()}
-    )
-
-
 def with_room(work: Work) -> Work:
     """Return the same work with twice the room in the arrays that were full (Tally.full)."""
-    full, elimination = work.tally.full, work.elimination
+    full, n, pairs = work.tally.full, len(work.poses), len(work.pairs)
+    room = len(work.elimination.column)
     work.tally.full = NOTHING_FULL
+    larger: Work
     if full == PAIRS_FULL:
-        pairs = 2 * len(work.pairs)
-        work = wider(work, pairs, pairs=0, budget=0, outline_forces=0)
-        work = wider(work, 2 * len(work.poses) + 2 * pairs, jacobian=1)
-        return work._replace(elimination=wider(elimination, pairs, pairs=0))
-    if full == BLOCKS_FULL:
-        room = 2 * len(elimination.column)
-        elimination = wider(elimination, len(elimination.body) + room, blocks=1)
-        return work._replace(elimination=wider(elimination, room, column=0, graph=0))
-    return with_capacity(work, 2 * len(work.candidates))
-
-
-def with_capacity(work: Work, capacity: int) -> Work:
-    """Return the same work with room for more candidate pairs of features."""
-    by_row = dict.fromkeys(("candidates", "contacts", "interior", "kept"), 0)
-    return wider(work, capacity, slip=1, slip_rate=1, geometry=1, **by_row)
+        larger = enlarged(work, **sizes_of_pairs(n, 2 * pairs, room))
+    elif full == BLOCKS_FULL:
+        larger = enlarged(work, room=2 * room, **sizes_of_pairs(n, pairs, 2 * room))
+    else:
+        larger = enlarged(work, rows=2 * len(work.candidates))
+    return larger

@@ -4,8 +4,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from flocsim.state.bodies import MOTION_COLUMNS, Disc
+from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, Disc
 from flocsim.state.clock import Clock
+from flocsim.state.declared import zeros_of
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
@@ -74,83 +75,53 @@ TRACK_COLUMNS = BOXES + STRETCHES * BOX_COLUMNS
 class Swarm(NamedTuple):
     """n bodies at a common time, and at the window's end."""
 
-    bodies: np.ndarray  # this and the next three as in a Scene
-    first: np.ndarray
-    vertices: np.ndarray
-    tree: np.ndarray
+    bodies: Annotated[np.ndarray, ("n",), BodyConstants]  # this and the next three as in a Scene
+    first: Annotated[np.ndarray, ("after",), np.int64]
+    vertices: Annotated[np.ndarray, (0, 0)]
+    tree: Annotated[np.ndarray, (0, 3)]
     motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
     errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to
-    steps: np.ndarray  # (n,): size of the next step [s]
-    methods: np.ndarray  # (n,): 1 where steps of its island went on across switches, as ACROSS
-    wander: np.ndarray  # (n,): how far a body may stray from a straight path in a window [m]
-    first_link: np.ndarray  # (n + 1,): where the contacts of a later body begin
-    links: Annotated[np.ndarray, ("k", LINK_COLUMNS)]
+    steps: Annotated[np.ndarray, ("n",)]  # size of the next step [s]
+    methods: Annotated[np.ndarray, ("n",)]  # 1: its island's steps went on across switches
+    wander: Annotated[np.ndarray, ("n",)]  # how far it may stray from a straight path [m]
+    first_link: Annotated[np.ndarray, ("after",), np.int64]  # where contacts of a later body begin
+    links: Annotated[np.ndarray, ("k", LINK_COLUMNS), np.int64]
     slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
     new_motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # from here on: at the window's end
     new_carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     new_errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]
-    new_steps: np.ndarray
-    new_methods: np.ndarray
-    stated: np.ndarray  # (n,): the stated error of every body [m]
-    strayed: np.ndarray  # (n,): how far it strayed [m]
+    new_steps: Annotated[np.ndarray, ("n",)]
+    new_methods: Annotated[np.ndarray, ("n",)]
+    stated: Annotated[np.ndarray, ("n",)]  # the stated error of every body [m]
+    strayed: Annotated[np.ndarray, ("n",)]  # how far it strayed [m]
     ways: Annotated[np.ndarray, ("n", STRETCHES, BOX_COLUMNS)]  # where it has been
-    discs: np.ndarray  # (n,) of Disc: what the sweep for neighbours works on
-    order: np.ndarray  # (n,): the same
-    starts: np.ndarray  # (n + 1,): the same
-    times: np.ndarray  # see BEGIN
+    discs: Annotated[np.ndarray, ("n",), Disc]  # what the sweep for neighbours works on
+    order: Annotated[np.ndarray, ("n",), np.int64]  # the same
+    starts: Annotated[np.ndarray, ("after",), np.int64]  # the same
+    times: Annotated[np.ndarray, (TIME_COUNT,)]  # see BEGIN
 
 
 def swarm_of(scene: Scene, position: np.ndarray, velocity: np.ndarray, clock: Clock) -> Swarm:
     """The arrays of a swarm at its start: places and velocities (n, 3), nothing touching yet; the
     ``clock`` that its method begins with."""
     n = len(scene.bodies)
-    motion = np.ascontiguousarray(np.hstack([position, velocity]))
-    return Swarm(
-        bodies=scene.bodies,
-        first=scene.first,
-        vertices=scene.vertices,
-        tree=scene.tree,
-        motion=motion,
-        carried=np.zeros((n, MOTION_COLUMNS)),
-        errors=np.zeros((n, ERROR_COLUMNS)),
-        steps=np.full(n, clock.step),
-        methods=np.full(n, clock.across),
-        wander=np.zeros(n),
-        first_link=np.zeros(n + 1, dtype=np.int64),
-        links=np.zeros((0, LINK_COLUMNS), dtype=np.int64),
-        slips=np.zeros((0, SLIP_COLUMNS)),
-        new_motion=motion.copy(),
-        new_carried=np.zeros((n, MOTION_COLUMNS)),
-        new_errors=np.zeros((n, ERROR_COLUMNS)),
-        new_steps=np.full(n, clock.step),
-        new_methods=np.full(n, clock.across),
-        stated=np.zeros(n),
-        strayed=np.zeros(n),
-        ways=np.zeros((n, STRETCHES, BOX_COLUMNS)),
-        discs=Disc.rows(n),
-        order=np.arange(n, dtype=np.int64),
-        starts=np.zeros(n + 1, dtype=np.int64),
-        times=np.zeros(TIME_COUNT),
+    swarm: Swarm = zeros_of(Swarm, n=n, after=n + 1, k=0)._replace(
+        bodies=scene.bodies, first=scene.first, vertices=scene.vertices, tree=scene.tree
     )
+    swarm.motion[:] = swarm.new_motion[:] = np.hstack([position, velocity])
+    swarm.steps[:] = swarm.new_steps[:] = clock.step
+    swarm.methods[:] = swarm.new_methods[:] = clock.across
+    swarm.order[:] = range(n)
+    return swarm
 
 
 class Found(NamedTuple):
-    """What islands have left behind: ``links`` (room, 5) and ``slips`` (room, 5), filled up to
-    ``filled[0]``."""
+    """What islands have left behind, filled up to ``filled[0]``."""
 
-    links: np.ndarray
-    slips: np.ndarray
-    filled: np.ndarray
-
-
-def found_of(room: int) -> Found:
-    """Room for so many contacts."""
-    return Found(
-        np.zeros((room, LINK_COLUMNS), dtype=np.int64),
-        np.zeros((room, SLIP_COLUMNS)),
-        np.zeros(1, dtype=np.int64),
-    )
+    links: Annotated[np.ndarray, ("k", LINK_COLUMNS), np.int64]
+    slips: Annotated[np.ndarray, ("k", SLIP_COLUMNS)]
+    filled: Annotated[np.ndarray, (1,), np.int64]
 
 
 def with_links(swarm: Swarm, links: np.ndarray, slips: np.ndarray) -> Swarm:

@@ -17,9 +17,10 @@ from flocsim.integrators.base import Integrator
 from flocsim.run import extended
 from flocsim.state.clock import NOTHING_FULL, Clock, Counts
 from flocsim.state.contacts import BodyPair
+from flocsim.state.declared import enlarged, zeros_of
 from flocsim.state.scene import Scene
-from flocsim.state.work import Work, wider, work_of
-from flocsim.swarms.arrays import Found, Swarm, found_of
+from flocsim.state.work import Work, work_of
+from flocsim.swarms.arrays import Found, Swarm
 
 FEW, ROOM_OF_FEW, ROOM_OF_MANY = 12, 24, 6
 """Room at first for pairs of features, for every body of so few, and of more."""
@@ -65,7 +66,7 @@ class ThreadArrays:
         self.template, self.most_points = template, int(np.diff(template.first).max())
         self.by_size: dict[int, IslandArrays] = {}
         self.room_of_many: tuple[int, ...] = (ROOM_OF_MANY, PAIRS, BLOCKS)
-        self.found: Found = found_of(256)
+        self.found: Found = zeros_of(Found, k=256)
         self.running: IslandArrays | None = None
         self.halted = False
 
@@ -109,7 +110,7 @@ class ThreadArrays:
         room = int(self.found.filled[0]) + more
         if room > len(self.found.links):
             larger = max(room, 2 * len(self.found.links))
-            self.found = wider(self.found, larger, links=0, slips=0)
+            self.found = enlarged(self.found, k=larger)
 
     def enlarge(self, size: int, work: Work) -> None:
         """Use arrays with more room for islands of so many bodies, and of more than a few at once
