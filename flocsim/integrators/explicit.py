@@ -9,12 +9,18 @@ import attrs
 from flocsim.fields import quantity
 from flocsim.integrators.base import Integrator
 from flocsim.integrators.loop.step_size import adaptive_factor
-from flocsim.integrators.parts import FixedStep, all_finite, evaluate, limit_slips, move_slips
+from flocsim.integrators.parts import (
+    FixedStep,
+    acceleration,
+    all_finite,
+    evaluate,
+    limit_slips,
+    move_slips,
+)
 from flocsim.integrators.rhs.error import end_of_run, error_ratio
 from flocsim.integrators.rhs.forces import adopt_stage, locate_with_slip_rates, sum_forces
 from flocsim.integrators.rhs.friction import slip_in
 from flocsim.integrators.rhs.jacobian import weigh_velocities
-from flocsim.integrators.rhs.views import inertia
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import FIRST_STAGE, NEW, NOW, STEP_ERROR
 
@@ -45,12 +51,6 @@ def state_of(stage):
     return NOW if stage == 0 else FIRST_STAGE + stage - 1
 
 
-def acceleration_of(scene, work, state, body, axis):
-    """Return the rate of a velocity in a state [m/s² or rad/s²]."""
-    rate = work.force[state, body, axis]
-    return rate * scene.bodies[body].free / inertia(scene, body, axis)
-
-
 def combine(scene, work, weights, stages, base, end):
     """Write ``base`` times the motion of NOW, plus the weighted rates of the first stages, to
     ``end``."""
@@ -62,7 +62,7 @@ def combine(scene, work, weights, stages, base, end):
                 if weights[stage] != 0.0:
                     state = state_of(stage)
                     displacement += weights[stage] * work.velocity[state, body, axis]
-                    speed_change += weights[stage] * acceleration_of(scene, work, state, body, axis)
+                    speed_change += weights[stage] * acceleration(scene, work, state, body, axis)
             work.place[end, body, axis] = base * work.place[NOW, body, axis] + displacement
             work.velocity[end, body, axis] = base * work.velocity[NOW, body, axis] + speed_change
 
@@ -155,7 +155,7 @@ def kick_and_drift(scene, work, step):
     for body in range(work.place.shape[1]):
         for axis in range(3):
             speed = work.velocity[NOW, body, axis]
-            kick = velocity_increment(scene, work, NOW, body, axis, step)
+            kick = step * acceleration(scene, work, NOW, body, axis)
             work.velocity[HALFWAY, body, axis] = speed + 0.5 * kick
             work.place[NEW, body, axis] = work.place[NOW, body, axis] + step * (speed + 0.5 * kick)
             # Drag at the velocity of HALFWAY would lag by half a step: predict the velocity of the
@@ -167,14 +167,8 @@ def finish_kick(scene, work, step):
     """Write the final velocity of NEW: HALFWAY plus half a step at the force of NEW."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            kick = velocity_increment(scene, work, NEW, body, axis, 0.5 * step)
+            kick = 0.5 * step * acceleration(scene, work, NEW, body, axis)
             work.velocity[NEW, body, axis] = work.velocity[HALFWAY, body, axis] + kick
-
-
-def velocity_increment(scene, work, state, body, axis, step):
-    """Return the change of a velocity in a step at the force of a state."""
-    force = work.force[state, body, axis]
-    return step * scene.bodies[body].free * force / inertia(scene, body, axis)
 
 
 @attrs.frozen

@@ -17,7 +17,12 @@ from flocsim.geometry.contact.body_pairs import (
     travelled_share,
 )
 from flocsim.geometry.contact.near_pairs import gap_between, list_polygons
-from flocsim.geometry.contact.points import contact_point, length_of, separation
+from flocsim.geometry.contact.points import (
+    contact_point,
+    length_of,
+    separation,
+    tangential_component,
+)
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.contacts import GRAZING
@@ -445,24 +450,10 @@ def transfer_slips(scene, work):
                 total = own + given * cosine
                 work.slip[NOW, successor] = min(max(total, -largest), largest)
                 # The propagated error of ξ is passed on in the same proportion.
-                error = slip_error(work, row, work.place) + work.contacts[row].slip_offset
+                error = tangential_component(work, row, work.place, PROPAGATED, NOW)
+                error += work.contacts[row].slip_offset
                 work.contacts[successor].slip_offset += error * cosine
             work.slip[NOW, row] = 0.0
-
-
-def slip_error(work, row, of):
-    """Return the propagated error of a pair's tangential displacement, from the errors of both
-    bodies.
-
-    ``of`` = work.place: error of the displacement [m]; ``of`` = work.velocity: of its rate [m/s].
-    """
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
-    along = g[NOW, row].normal_x * (of[PROPAGATED, a, Y] - of[PROPAGATED, b, Y])
-    along -= g[NOW, row].normal_y * (of[PROPAGATED, a, X] - of[PROPAGATED, b, X])
-    along += g[NOW, row].vertex_arm_t * of[PROPAGATED, a, ANGLE]
-    return along - g[NOW, row].edge_arm_t * of[PROPAGATED, b, ANGLE]
 
 
 def tangent_cosine(work, row, other):

@@ -258,6 +258,31 @@ def contact_point(work, row, body):
     return along * nx + across * ny, along * ny - across * nx
 
 
+def normal_component(work, row, vectors, state, at):
+    """Return the relative displacement or velocity of a pair's contact point along its normal.
+
+    ``vectors`` is work.place (result [m]) or work.velocity (result [m/s]), read at ``state``; the
+    geometry is that of the state ``at``. The value is that of the vertex's body minus the edge's.
+    """
+    candidate, geometry = work.candidates[row], work.geometry[at, row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    # Translation along n, then rotation with the arms of the contact point.
+    change = geometry.normal_x * (vectors[state, a, X] - vectors[state, b, X])
+    change += geometry.normal_y * (vectors[state, a, Y] - vectors[state, b, Y])
+    change += geometry.vertex_arm_n * vectors[state, a, ANGLE]
+    return change - geometry.edge_arm_n * vectors[state, b, ANGLE]
+
+
+def tangential_component(work, row, vectors, state, at):
+    """Return the same along the tangent t = (−n_y, n_x)."""
+    candidate, geometry = work.candidates[row], work.geometry[at, row]
+    a, b = candidate.vertex_body, candidate.edge_body
+    change = geometry.normal_x * (vectors[state, a, Y] - vectors[state, b, Y])
+    change -= geometry.normal_y * (vectors[state, a, X] - vectors[state, b, X])
+    change += geometry.vertex_arm_t * vectors[state, a, ANGLE]
+    return change - geometry.edge_arm_t * vectors[state, b, ANGLE]
+
+
 def overlap_fault(
     a: Sequence[Part], b: Sequence[Part], along_outlines: float = math.inf
 ) -> str | None:

@@ -40,6 +40,7 @@ vanish nearly everywhere.
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.points import normal_component, tangential_component
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
 from flocsim.integrators.backward_euler.contact_mean import (
     add_contact_slopes,
@@ -49,7 +50,7 @@ from flocsim.integrators.backward_euler.contact_mean import (
     step_view,
     sticking_slopes,
 )
-from flocsim.integrators.rhs.jacobian import add_geometric_stiffness, normal_rows, tangent_rows
+from flocsim.integrators.rhs.jacobian import add_geometric_stiffness
 from flocsim.integrators.rhs.views import add_pair_force, tangential_rate, view_without_slip
 from flocsim.state.contacts import CLOSED
 from flocsim.state.work import CHANGE, NOW, TRIAL
@@ -75,17 +76,6 @@ DECIDED_RATIO = 0.01
 def is_included(work, row):
     # Pairs marked by flag_close take part in the iteration.
     return work.candidates[row].contact_mode == CLOSED
-
-
-def relative_rate(work, row, kind, entries):
-    """Return the relative velocity, or its change, of both bodies of a pair along a direction."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    total = 0.0
-    for axis in range(3):
-        total += entries[0][axis] * work.velocity[kind, a, axis]
-        total += entries[1][axis] * work.velocity[kind, b, axis]
-    return total
 
 
 def closed_part_slopes(work, row, limited):
@@ -274,7 +264,7 @@ def change_friction(work, row, target, d_limit, fraction, apply):
     limit = contact.friction_limit
     weight, change, by_limit = friction_correction(work, row, target)
     # Add the part of df by the new v_t, and by the change of the limit.
-    rate = relative_rate(work, row, CHANGE, tangent_rows(work, row))
+    rate = tangential_component(work, row, work.velocity, CHANGE, NOW)
     sticking_change = contact.sticking_slope * rate
     change += weight * sticking_change + by_limit * d_limit
     forward, backward, force = (
@@ -311,7 +301,7 @@ def change_pair(work, row, step, target, fraction, apply):
     """
     contact = work.interior[row]
     overlap, slack = contact.overlap, contact.slack
-    d_gap = step * relative_rate(work, row, CHANGE, normal_rows(work, row))
+    d_gap = step * normal_component(work, row, work.velocity, CHANGE, NOW)
     # dδ follows the change of the gap, and ds keeps s = g + δ.
     d_overlap = overlap_correction(work, row, target) - overlap / (overlap + slack) * d_gap
     d_slack = d_gap + d_overlap - (slack - work.geometry[NOW, row].gap - overlap)

@@ -28,7 +28,7 @@ from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler, solve_real
 from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.error import end_of_run, rounding_error
-from flocsim.integrators.rhs.forces import save_start, sum_other_forces
+from flocsim.integrators.rhs.forces import copy_motion, sum_other_forces
 from flocsim.integrators.rhs.jacobian import assemble_without_contacts
 from flocsim.integrators.rhs.surface_gap import flag_near
 from flocsim.integrators.rhs.views import inertia, lever
@@ -45,7 +45,7 @@ MAX_ITERATIONS = 8
 
 def begin_step(work, clock):
     """Store the start of the step, and unmark all contacts."""
-    save_start(work)
+    copy_motion(work, NOW, START)
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
         work.candidates[row].contact_mode, work.interior[row].frozen_overlap = OPEN, 0.0
@@ -53,21 +53,10 @@ def begin_step(work, clock):
         work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 
 
-def restore_start(work):
-    """Restore the motion at the start of the step."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[NOW, body, axis] = work.place[START, body, axis]
-            work.velocity[NOW, body, axis] = work.velocity[START, body, axis]
-
-
 def end_step(work):
     """Move the iterate to NEW, mark the contacts that took part, and restore the start in NOW."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[NEW, body, axis] = work.place[NOW, body, axis]
-            work.velocity[NEW, body, axis] = work.velocity[NOW, body, axis]
-    restore_start(work)
+    copy_motion(work, NOW, NEW)
+    copy_motion(work, START, NOW)
     for row in range(work.tally.candidates):
         work.candidates[row].contact_mode = CLOSED if takes_part(work, row) else OPEN
         work.geometry[NOW, row] = work.geometry[TRIAL, row]

@@ -13,6 +13,7 @@ predictor-corrector method (Mehrotra: a fifth fewer systems, but each is solved 
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.points import normal_component
 from flocsim.hooks import SLIP_LIMIT, has
 from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_stiffness
 from flocsim.integrators.backward_euler.interior import (
@@ -22,7 +23,6 @@ from flocsim.integrators.backward_euler.interior import (
     is_decided,
     is_included,
     mean_product,
-    relative_rate,
     set_friction,
     widen_slacks,
     write_forces,
@@ -34,15 +34,13 @@ from flocsim.integrators.backward_euler.newton import (
     evaluate_included,
     evaluate_other_forces,
     final_tolerance,
-    restore_start,
     solve_change,
     solve_end,
     update_positions,
 )
 from flocsim.integrators.radau.contact_frames import gather_clusters
 from flocsim.integrators.radau.systems import factorise_euler
-from flocsim.integrators.rhs.forces import sum_other_forces
-from flocsim.integrators.rhs.jacobian import normal_rows
+from flocsim.integrators.rhs.forces import copy_motion, sum_other_forces
 from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import CHANGE, NOW, START, TRIAL
@@ -116,7 +114,7 @@ def typical_sizes(scene, work, step):
             a, b = candidate.vertex_body, candidate.edge_body
             # Force that would stop the approach in this step, path in the step, and stiffness,
             # summed.
-            speed = abs(relative_rate(work, row, START, normal_rows(work, row)))
+            speed = abs(normal_component(work, row, work.velocity, START, NOW))
             stopped += effective_mass(scene, a, b) * speed / step
             slack_scale += step * speed
             deepest = max(deepest, -work.geometry[NOW, row].gap)
@@ -184,7 +182,7 @@ def start_warm(scene, work, step, overlap_scale):
 def advance_gaps(work, fraction, step):
     """Change the gaps by a fraction of the velocity change, along frozen directions."""
     for row in range(work.tally.candidates):
-        opening = relative_rate(work, row, CHANGE, normal_rows(work, row))
+        opening = normal_component(work, row, work.velocity, CHANGE, NOW)
         work.geometry[NOW, row].gap += fraction * step * opening
 
 
@@ -282,7 +280,7 @@ def follow_true_gaps(scene, work, clock, step, overlap_scale, most, own):
 def follow_frozen_gaps(scene, work, clock, step, overlap_scale, slack_scale, careful):
     """Search for the end of the step without knowledge of its contacts; return the outcome."""
     # Freeze gaps and directions where the step would end without contacts.
-    restore_start(work)
+    copy_motion(work, START, NOW)
     evaluate_other_forces(scene, work, clock.time, step)
     start_cold(scene, work, step, overlap_scale, slack_scale)
     fraction, stalled, standing = 0.0, 0, SIGMA_CAREFUL if careful else SIGMA_FROZEN

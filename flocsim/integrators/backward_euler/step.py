@@ -20,6 +20,7 @@ Sources: Moreau (1988), Jean (1999), for contacts that are springs.
 import math
 
 from flocsim.compiler.linker import apart
+from flocsim.geometry.contact.points import normal_component
 from flocsim.hooks import CONTACT_FORCE, has
 from flocsim.integrators.backward_euler.contact_mean import add_frozen_friction_residual, takes_part
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
@@ -31,8 +32,7 @@ from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.blocks import subtract_product
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
 from flocsim.integrators.rhs.error import error_ratio
-from flocsim.integrators.rhs.views import contact_view, inertia, velocity_lifetime_of
-from flocsim.state.bodies import X, Y
+from flocsim.integrators.rhs.views import contact_view, inertia, normal_rate, velocity_lifetime_of
 from flocsim.state.work import CHANGE, LAST_RATES, NOW, START, STEP_ERROR, STIFFNESS, TRIAL
 
 SAFETY, MOST_GROWTH, LEAST_SHARE = 0.9, 3.0, 0.1
@@ -64,15 +64,6 @@ def solve_step(scene, work, clock, step):
     return solve_end(scene, work, clock, step)
 
 
-def approach_speed(work, row, state):
-    """Return the speed at which the bodies of a pair approach each other in a state [m/s]."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
-    speed = g[NOW, row].normal_x * (work.velocity[state, b, X] - work.velocity[state, a, X])
-    return speed + g[NOW, row].normal_y * (work.velocity[state, b, Y] - work.velocity[state, a, Y])
-
-
 @apart
 def fastest_bounce(scene, work, clock, all_contacts):
     """Return ω0 [1/s] of the stiffest contact from which bodies would rebound noticeably; 0 without
@@ -85,9 +76,9 @@ def fastest_bounce(scene, work, clock, all_contacts):
     for row in range(work.tally.candidates):
         closed = work.geometry[TRIAL, row].gap >= 0.0 > work.geometry[NOW, row].gap
         if closed or (all_contacts and takes_part(work, row)):
-            speed = approach_speed(work, row, START)
+            speed = -normal_component(work, row, work.velocity, START, NOW)
             if all_contacts:
-                speed = max(abs(speed), abs(approach_speed(work, row, NOW)))
+                speed = max(abs(speed), abs(normal_rate(work, NOW, row)))
             if speed * velocity_lifetime_of(work, row) > clock.tolerance:
                 view = contact_view(scene, work, NOW, row)
                 # The step stops these bodies. With damping below critical they would rebound

@@ -21,6 +21,7 @@ from flocsim.geometry.contact.points import locate_contacts
 from flocsim.integrators.events.first_event import set_modes
 from flocsim.integrators.events.grazes import chatters, touched_recently
 from flocsim.integrators.rhs.error import at_least_rounding
+from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import CYCLE_BEFORE, CYCLE_LAST, NOW, PROPAGATED
 
@@ -160,12 +161,8 @@ def restart_cycles(counts, modes):
 
 def end_cycle(work, clock, counts):
     """Store the state at the end of a cycle, next to that of the cycle before."""
-    for body in range(2):
-        for axis in range(3):
-            work.place[CYCLE_BEFORE, body, axis] = work.place[CYCLE_LAST, body, axis]
-            work.place[CYCLE_LAST, body, axis] = work.place[NOW, body, axis]
-            work.velocity[CYCLE_BEFORE, body, axis] = work.velocity[CYCLE_LAST, body, axis]
-            work.velocity[CYCLE_LAST, body, axis] = work.velocity[NOW, body, axis]
+    copy_motion(work, CYCLE_LAST, CYCLE_BEFORE)
+    copy_motion(work, NOW, CYCLE_LAST)
     for row in range(work.tally.candidates):
         contact = work.contacts[row]
         contact.cycle_slip_before = contact.cycle_slip

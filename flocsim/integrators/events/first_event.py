@@ -10,6 +10,7 @@ past a kink is wrong by the square of that only.
 import math
 
 from flocsim.constants import SHALLOWEST_TOUCH
+from flocsim.geometry.contact.points import least_listed_gap
 from flocsim.hooks import SLIP_LIMIT, awaits_touch, contact_event, has
 from flocsim.integrators.events.crossings import NEVER, first_switch
 from flocsim.integrators.events.grazes import first_grazing_end
@@ -36,14 +37,6 @@ KINK_ROUNDING = 1e-6
 its sign may be rounding, and steps would end there for ever."""
 
 
-def deepest_overlap(work):
-    """Return the largest overlap of a listed pair now [m], at least 0."""
-    deepest = 0.0
-    for row in range(work.tally.candidates):
-        deepest = max(deepest, -work.geometry[NOW, row].gap)
-    return deepest
-
-
 def switch_resolutions(work, clock):
     """Return (resolution, depth) [m] of switches.
 
@@ -52,7 +45,7 @@ def switch_resolutions(work, clock):
     """
     resolution = RESOLUTION * step_tolerance(work, clock) if clock.tolerance < math.inf else 1e-13
     # While contacts are pressed, resolve a fraction of the deepest overlap.
-    deepest = deepest_overlap(work)
+    deepest = -least_listed_gap(work)
     if deepest > 0.0:
         resolution = min(resolution, RESOLUTION_OF_OVERLAP * deepest)
     resolution = max(resolution, ROUNDING * largest_coordinate(work, NEW))

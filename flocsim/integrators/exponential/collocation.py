@@ -41,7 +41,7 @@ from flocsim.integrators.rhs.error import (
     rounding_error,
     step_tolerance,
 )
-from flocsim.integrators.rhs.forces import adopt_stage, save_start, sum_forces
+from flocsim.integrators.rhs.forces import adopt_stage, copy_motion, sum_forces
 from flocsim.integrators.rhs.views import inertia, lever
 from flocsim.state.work import (
     CHANGE,
@@ -228,7 +228,7 @@ def evaluate_all_at(work, terms, step, fraction, state):
 
 def finish_step(scene, work, terms, step):
     """Write the end of the step to NEW, with tangential displacements; store its start in START."""
-    save_start(work)
+    copy_motion(work, NOW, START)
     last = FIRST_STAGE + 2
     evaluate_all_at(work, terms, step, 1.0, last)
     locate_state(scene, work, last)

@@ -67,6 +67,7 @@ from flocsim.integrators.loop.step_size import (
     step_to_switch,
     vibration_step,
 )
+from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.integrators.rhs.friction import rolled, slip_in, slip_rate_of_gap_change
 from flocsim.integrators.rhs.surface_gap import flag_near, missed_sharing
 from flocsim.state.bodies import RECORD_MOTION, RECORD_TIME
@@ -97,10 +98,7 @@ def any_too_deep(scene, work):
 
 def adopt_new_state(work):
     """Make the new state the current one."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[NOW, body, axis] = work.place[NEW, body, axis]
-            work.velocity[NOW, body, axis] = work.velocity[NEW, body, axis]
+    copy_motion(work, NEW, NOW)
     for row in range(work.tally.candidates):
         work.geometry[NOW, row] = work.geometry[NEW, row]
         # Open pairs have no displacement; grazing ones keep that with which they parted.

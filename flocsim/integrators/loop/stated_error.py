@@ -26,8 +26,7 @@ tips over one way or the other, is detected only by a perturbed companion run (a
 import math
 
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.candidates import slip_error
-from flocsim.geometry.contact.points import length_of
+from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
 from flocsim.hooks import contact_force
 from flocsim.integrators.exponential.collocation import nothing_swings, propagate_with_series
 from flocsim.integrators.radau.carried_error import add_step_error, overlap_error, propagate_error
@@ -42,7 +41,7 @@ from flocsim.integrators.rhs.propagated_error import (
     lifted_load,
     propagated_size,
 )
-from flocsim.integrators.rhs.views import contact_view, lever, normal_component, normal_rate
+from flocsim.integrators.rhs.views import contact_view, lever, normal_rate, pair_loads
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.clock import PLAIN, RADAU
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
@@ -205,14 +204,10 @@ def add_propagated_impulse(scene, work, body, x, y, turn):
 
 def add_pair_impulse(scene, work, row, normal, tangential):
     """Add the impulses of a contact [N s] to the propagated errors of its bodies."""
+    x, y, turn_a, turn_b = pair_loads(work, NOW, row, normal, tangential)
     candidate = work.candidates[row]
-    g = work.geometry
-    nx, ny = g[NOW, row].normal_x, g[NOW, row].normal_y
-    x, y = nx * normal - ny * tangential, ny * normal + nx * tangential
-    turn = g[NOW, row].vertex_arm_n * normal + g[NOW, row].vertex_arm_t * tangential
-    edge_torque = g[NOW, row].edge_arm_n * normal + g[NOW, row].edge_arm_t * tangential
-    add_propagated_impulse(scene, work, candidate.vertex_body, x, y, turn)
-    add_propagated_impulse(scene, work, candidate.edge_body, -x, -y, -edge_torque)
+    add_propagated_impulse(scene, work, candidate.vertex_body, x, y, turn_a)
+    add_propagated_impulse(scene, work, candidate.edge_body, -x, -y, -turn_b)
 
 
 def has_switched(work, row):
@@ -235,7 +230,9 @@ def uncertain_time(work, row, step, overlap_uncertainty, resolved):
     # It did not: uncertain all along if the overlap is within its error.
     deepest = max(
         overlap_uncertainty,
-        UNCERTAIN_OVERLAP * abs(normal_component(work, row, work.place, STEP_ERROR)) * resolved,
+        UNCERTAIN_OVERLAP
+        * abs(normal_component(work, row, work.place, STEP_ERROR, NOW))
+        * resolved,
     )
     return step if -deepest < gap < 0.0 else 0.0
 
@@ -247,7 +244,7 @@ def signed_excess_time(work, row, step, depth, overlap_uncertainty):
     """
     gap, gap_error = (
         work.geometry[NOW, row].gap,
-        normal_component(work, row, work.place, PROPAGATED),
+        normal_component(work, row, work.place, PROPAGATED, NOW),
     )
     if has_switched(work, row):
         rate = normal_rate(work, NOW, row)
@@ -283,7 +280,9 @@ def reset_slip_offsets(work):
         if candidate.slide_direction != 0 or candidate.contact_mode != CLOSED:
             grazes = candidate.contact_mode == GRAZING
             lost = GRAZING_IN_VECTOR * work.slip[NOW, row] if grazes else 0.0
-            work.contacts[row].slip_offset = lost - slip_error(work, row, work.place)
+            work.contacts[row].slip_offset = lost - tangential_component(
+                work, row, work.place, PROPAGATED, NOW
+            )
 
 
 def add_switch_errors(scene, work, clock, step, depth):

@@ -9,7 +9,7 @@ import math
 from flocsim.constants import TINY
 from flocsim.integrators.radau.grazing import any_grazes
 from flocsim.integrators.radau.tableau import NODES, SECOND_STAGE, THIRD_STAGE
-from flocsim.integrators.rhs.forces import save_start
+from flocsim.integrators.rhs.forces import copy_motion
 from flocsim.integrators.rhs.views import inertia
 from flocsim.state.work import DAMPING, FIRST_STAGE, NEW, NOW, START, STIFFNESS, TRIAL
 
@@ -188,5 +188,5 @@ def guess_stages(scene, work, clock, step):
     else:
         guess_constant_velocities(work)
     # From here on the stages belong to this step.
-    save_start(work)
+    copy_motion(work, NOW, START)
     clock.stages_step, clock.stages_time = step, clock.time

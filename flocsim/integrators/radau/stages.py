@@ -13,6 +13,7 @@ import math
 
 from flocsim.compiler.linker import apart
 from flocsim.constants import TINY
+from flocsim.geometry.contact.points import normal_component
 from flocsim.integrators.radau.collocation import guess_stages
 from flocsim.integrators.radau.contact_frames import update_frames
 from flocsim.integrators.radau.systems import solve_both, write_residuals, write_stage_changes
@@ -27,7 +28,7 @@ from flocsim.integrators.rhs.friction import (
     slip_rate_of_gap_change,
 )
 from flocsim.integrators.rhs.surface_gap import locate_sharing, smoothing_length
-from flocsim.integrators.rhs.views import lever, normal_component, velocity_lifetime_of
+from flocsim.integrators.rhs.views import lever, velocity_lifetime_of
 from flocsim.state.contacts import CLOSED, GRAZING
 from flocsim.state.work import CHANGE, FIRST_STAGE, NOW
 
@@ -139,7 +140,7 @@ def change_of_contacts(scene, work, step, stage, goal):
         geometry = work.geometry[state, row]
         # Pressed contact: relative tolerance of the overlap, but not below rounding.
         if candidate.contact_mode == CLOSED:
-            change = step * abs(normal_component(work, row, work.velocity, CHANGE))
+            change = step * abs(normal_component(work, row, work.velocity, CHANGE, NOW))
             overlap = abs(geometry.gap)
             allowed = max(OVERLAP_TOLERANCE * overlap, 0.1 * least)
             largest = max(largest, goal * change / allowed)
@@ -149,7 +150,7 @@ def change_of_contacts(scene, work, step, stage, goal):
                 work.contacts[row].grazing_resistance,
                 velocity_lifetime_of(work, row),
             )
-            change = abs(resistance * normal_component(work, row, work.velocity, CHANGE))
+            change = abs(resistance * normal_component(work, row, work.velocity, CHANGE, NOW))
             force = abs(grazing_force(work, state, row))
             # A force that moves nothing by more than a share of the goal does not count.
             lever = GRAZING_STIFFNESS_RATIO / max(abs(resistance), TINY) * (step + memory)
@@ -157,7 +158,7 @@ def change_of_contacts(scene, work, step, stage, goal):
             largest = max(largest, goal * change / allowed)
         elif candidate.surface_active == 1 and geometry.force_share > 0.0:
             # Surface force: fraction of its smoothing length.
-            change = step * abs(normal_component(work, row, work.velocity, CHANGE))
+            change = step * abs(normal_component(work, row, work.velocity, CHANGE, NOW))
             length = smoothing_length(scene, geometry.gap)
             allowed = max(SURFACE_GAP_TOLERANCE * length, 0.1 * least)
             largest = max(largest, goal * change / allowed)

@@ -37,24 +37,21 @@ from flocsim.integrators.rhs.views import (
     tangential_rate,
 )
 from flocsim.state.contacts import CLOSED, GRAZING, OPEN
-from flocsim.state.work import NEW, NOW, START
+from flocsim.state.work import NEW, NOW
 
 
-def save_start(work):
-    """Copy the motion at the start of the step to START."""
+def copy_motion(work, source, target):
+    """Copy the motion of all bodies from one state to another."""
     for body in range(work.place.shape[1]):
         for axis in range(3):
-            work.place[START, body, axis] = work.place[NOW, body, axis]
-            work.velocity[START, body, axis] = work.velocity[NOW, body, axis]
+            work.place[target, body, axis] = work.place[source, body, axis]
+            work.velocity[target, body, axis] = work.velocity[source, body, axis]
 
 
 def adopt_stage(work, stage):
     """Make a stage the new state: its motion, and the geometry and displacements of closed
     pairs."""
-    for body in range(work.place.shape[1]):
-        for axis in range(3):
-            work.place[NEW, body, axis] = work.place[stage, body, axis]
-            work.velocity[NEW, body, axis] = work.velocity[stage, body, axis]
+    copy_motion(work, stage, NEW)
     # Geometry of open pairs is located only when the step is accepted.
     for row in range(work.tally.candidates):
         candidate = work.candidates[row]

@@ -3,12 +3,11 @@
 The vector stays within the sums of the same errors (loop/stated_error.py), body by body.
 """
 
-from flocsim.geometry.contact.candidates import slip_error
-from flocsim.geometry.contact.points import length_of
+from flocsim.geometry.contact.points import length_of, normal_component, tangential_component
 from flocsim.integrators.rhs.friction import normal_mobility, tangential_coupling
-from flocsim.integrators.rhs.views import normal_component, velocity_lifetime_of
+from flocsim.integrators.rhs.views import velocity_lifetime_of
 from flocsim.state.bodies import ANGLE, X, Y
-from flocsim.state.work import PROPAGATED
+from flocsim.state.work import NOW, PROPAGATED
 
 SWITCH_AMPLIFICATION = 1.5
 """Factor by which motion may have amplified the errors of switches."""
@@ -117,9 +116,10 @@ def grazing_error_source(scene, work, row, tangential):
     """
     normal, memory = -lifted_load(scene, work, row, tangential), velocity_lifetime_of(work, row)
     # Work of the source on the present error, velocities included over their lifetime.
-    opening = normal_component(work, row, work.place, PROPAGATED)
-    opening += memory * normal_component(work, row, work.velocity, PROPAGATED)
-    slipping = slip_error(work, row, work.place) + memory * slip_error(work, row, work.velocity)
+    opening = normal_component(work, row, work.place, PROPAGATED, NOW)
+    opening += memory * normal_component(work, row, work.velocity, PROPAGATED, NOW)
+    slipping = tangential_component(work, row, work.place, PROPAGATED, NOW)
+    slipping += memory * tangential_component(work, row, work.velocity, PROPAGATED, NOW)
     share = (
         -GRAZING_IN_VECTOR if normal * opening + tangential * slipping < 0.0 else GRAZING_IN_VECTOR
     )

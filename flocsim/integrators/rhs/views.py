@@ -12,11 +12,16 @@ of the slip are the transposed relations, n·(v_a − v_b) + ω_a a_n − ω_b b
 import math
 
 from flocsim.constants import CENTRE_SOFTENING
-from flocsim.geometry.contact.points import contact_radii, length_of, separation
+from flocsim.geometry.contact.points import (
+    contact_radii,
+    length_of,
+    normal_component,
+    separation,
+    tangential_component,
+)
 from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.views import BodyView, ContactView, PairView, PlainBodyView, moved_contact
-from flocsim.state.work import NOW
 
 
 @hook
@@ -76,52 +81,16 @@ def pair_view(scene, time, a, b, gap, gap_rate, centre_distance):
     )  # fmt: skip
 
 
-def normal_component(work, row, vectors, state):
-    """Return the relative displacement or velocity of a pair's contact point along its present
-    normal.
-
-    ``vectors`` is an array like work.place (result [m]) or work.velocity (result [m/s]), read at
-    ``state``; the value is that of the vertex's body minus that of the edge's.
-    """
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
-    change = g[NOW, row].normal_x * (vectors[state, a, X] - vectors[state, b, X])
-    change += g[NOW, row].normal_y * (vectors[state, a, Y] - vectors[state, b, Y])
-    change += g[NOW, row].vertex_arm_n * vectors[state, a, ANGLE]
-    return change - g[NOW, row].edge_arm_n * vectors[state, b, ANGLE]
-
-
 def normal_rate(work, state, row):
     """Return the rate of the gap of a pair in a state [m/s]: n · (v_a − v_b) at the contact
     point."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
-    # Translation along n, then rotation with the arms of the contact point.
-    rate = g[state, row].normal_x * (work.velocity[state, a, X] - work.velocity[state, b, X])
-    rate += g[state, row].normal_y * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
-    return (
-        rate
-        + work.velocity[state, a, ANGLE] * g[state, row].vertex_arm_n
-        - work.velocity[state, b, ANGLE] * g[state, row].edge_arm_n
-    )
+    return normal_component(work, row, work.velocity, state, state)
 
 
 def tangential_rate(work, state, row):
     """Return the tangential velocity v_t of a pair in a state [m/s]: t · (v_a − v_b) at the contact
     point."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
-    # t = (−n_y, n_x).
-    rate = g[state, row].normal_x * (work.velocity[state, a, Y] - work.velocity[state, b, Y])
-    rate -= g[state, row].normal_y * (work.velocity[state, a, X] - work.velocity[state, b, X])
-    return (
-        rate
-        + work.velocity[state, a, ANGLE] * g[state, row].vertex_arm_t
-        - work.velocity[state, b, ANGLE] * g[state, row].edge_arm_t
-    )
+    return tangential_component(work, row, work.velocity, state, state)
 
 
 def velocity_lifetime_of(work, row):
@@ -168,19 +137,22 @@ def add_force(work, state, body, fx, fy, torque):
     work.force[state, body, ANGLE] += torque
 
 
-def add_pair_force(work, state, row, normal, tangential):
-    """Add a force (N along n, T along t) [N] to the vertex's body of a pair, its reverse to the
-    edge's."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    g = work.geometry
+def pair_loads(work, state, row, normal, tangential):
+    """Return (fx, fy, torque on a, torque on b) of a force (N along n, T along t) [N] on the
+    vertex's body a of a pair; its reverse acts on the edge's body b, and takes torque b off."""
+    geometry = work.geometry[state, row]
     # f = N n + T t; arms give the moments of n and t.
-    fx = normal * g[state, row].normal_x - tangential * g[state, row].normal_y
-    fy = normal * g[state, row].normal_y + tangential * g[state, row].normal_x
-    torque_a = normal * g[state, row].vertex_arm_n + tangential * g[state, row].vertex_arm_t
-    torque_b = normal * g[state, row].edge_arm_n + tangential * g[state, row].edge_arm_t
-    add_force(work, state, a, fx, fy, torque_a)
-    add_force(work, state, b, -fx, -fy, -torque_b)
+    fx = normal * geometry.normal_x - tangential * geometry.normal_y
+    fy = normal * geometry.normal_y + tangential * geometry.normal_x
+    torque_a = normal * geometry.vertex_arm_n + tangential * geometry.vertex_arm_t
+    return fx, fy, torque_a, normal * geometry.edge_arm_n + tangential * geometry.edge_arm_t
+
+
+def add_pair_force(work, state, row, normal, tangential):
+    """Add such a force to both bodies of a pair."""
+    fx, fy, torque_a, torque_b = pair_loads(work, state, row, normal, tangential)
+    add_force(work, state, work.candidates[row].vertex_body, fx, fy, torque_a)
+    add_force(work, state, work.candidates[row].edge_body, -fx, -fy, -torque_b)
 
 
 def centre_line(scene, work, state, a, b):
