@@ -28,7 +28,7 @@ from flocsim.fields import (
     word_or_quantity,
 )
 from flocsim.geometry.contact.charges import charges_of_bodies, field_of_bodies
-from flocsim.geometry.contact.compounds import outlines_of
+from flocsim.geometry.contact.core_points import outlines_of
 from flocsim.geometry.shapes.pieces import pieces_of_bodies
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.hooks import LAWS

@@ -23,7 +23,6 @@ from flocsim.forces.dlvo import refuse_unlike_potentials
 from flocsim.forces.drag import resistance_numbers, shields_clusters
 from flocsim.forces.outline import smoothing_of
 from flocsim.forces.pair_resistance import pair_resistance_tables, resistance_of_pairs
-from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import SPHERES_ONLY
 from flocsim.geometry.contact.points import overlap_fault
 from flocsim.hooks import HOOKS, compiled_calls, law_table
@@ -45,7 +44,6 @@ Fillings = dict[Callable, Callable]
 FAMILIES: dict[str, Fillings] = {
     "spheres": SPHERES_ONLY,
     "polygons": {},
-    "compounds": compounds.FILLINGS,
 }
 """{family of shapes: its replacements of hooks}."""
 
@@ -172,10 +170,7 @@ class System:
 
     @property
     def family(self) -> str:
-        """Family of shapes to compile for: "spheres", "polygons", or "compounds" (holes or
-        parts)."""
-        if any(body.shape.is_compound for body in self.bodies):
-            return "compounds"
+        """Family of shapes to compile for: "spheres" or "polygons"."""
         return "spheres" if self.spheres_only else "polygons"
 
     @property

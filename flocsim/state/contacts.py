@@ -55,6 +55,8 @@ class Candidate(Record):
     surface_active: int  # 1 if it may transmit part of a surface force in this step
     slide_direction: int  # ±1: slides in this step, in the direction of ξ; 0: sticks
     pair: int  # row of the two bodies in ``Work.pairs``
+    vertex_radius: float  # spheroradius of the part that the vertex belongs to [m]
+    edge_radius: float  # and of that of the edge [m]
 
 
 # Contact modes (Candidate.contact_mode). A mode is fixed during a step, in which forces are

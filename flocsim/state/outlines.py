@@ -1,5 +1,5 @@
-"""Records of outlines for distributed forces: pieces, quadrature nodes, charges and their
-fields."""
+"""Records of outlines: core points; for distributed forces pieces, quadrature nodes, charges and
+their fields."""
 
 from functools import cache
 from typing import Annotated, NamedTuple
@@ -7,6 +7,32 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from flocsim.state.records import Record
+
+
+class CorePoint(Record):
+    """A point of a core, in the frame of its body, and what begins there."""
+
+    x: float  # [m]
+    y: float
+    excess_radius: float  # spheroradius of its part, less the smallest of the body [m]
+    edge_offset: int  # rows to the end of the edge that begins here; 0 without one
+    feature: int  # kind of the feature that begins here, see NOTHING
+
+
+# Kinds of feature (CorePoint.feature).
+(
+    NOTHING,  # the second end of a segment
+    EDGE,
+    LONE,  # a point of its own: the core of a disk
+) = range(3)
+
+
+class Circle(Record):
+    """A circle around a run of core points and edges, in the frame of their body."""
+
+    x: float  # centre [m]
+    y: float
+    radius: float  # [m]
 
 
 class Piece(Record):

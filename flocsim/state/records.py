@@ -5,6 +5,7 @@ array of its ``rows``, or a record alone (``one``), is of that class, and its fi
 written by name: ``clock.time``, ``contacts[row].slip_offset``.
 """
 
+from collections.abc import Iterable
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, ClassVar, Self, get_type_hints
 
@@ -74,6 +75,12 @@ class Record(Element):
         for name, column in zip(found.dtype.names, values.T, strict=True):
             found[name] = column
         return found
+
+    @classmethod
+    def joined(cls, arrays: Iterable[np.ndarray]) -> Any:
+        """Return arrays of these records as one: np.concatenate makes plain ones of them where they
+        come from another concatenation."""
+        return np.concatenate([*arrays]).view(cls.dtype)
 
 
 def copied(value: Any) -> Any:

@@ -7,6 +7,7 @@ import numpy as np
 from flocsim.state.bodies import MOTION_COLUMNS, BodyConstants, Disc
 from flocsim.state.clock import Clock
 from flocsim.state.declared import zeros_of
+from flocsim.state.outlines import Circle, CorePoint
 from flocsim.state.scene import Scene
 
 ERROR_COLUMNS = 6
@@ -77,8 +78,8 @@ class Swarm(NamedTuple):
 
     bodies: Annotated[np.ndarray, ("n",), BodyConstants]  # this and the next three as in a Scene
     first: Annotated[np.ndarray, ("after",), np.int64]
-    vertices: Annotated[np.ndarray, (0, 0)]
-    tree: Annotated[np.ndarray, (0, 3)]
+    vertices: Annotated[np.ndarray, (0,), CorePoint]
+    tree: Annotated[np.ndarray, (0,), Circle]
     motion: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]
     carried: Annotated[np.ndarray, ("n", MOTION_COLUMNS)]  # the vector of the state's error
     errors: Annotated[np.ndarray, ("n", ERROR_COLUMNS)]  # what errors of steps have led to

@@ -16,9 +16,8 @@ import math
 
 import flocsim.swarms.arrays as sw
 from flocsim.geometry.contact.body_pairs import near_pairs
-from flocsim.geometry.contact.compounds import EDGE_OFFSET, EXCESS_RADIUS
 from flocsim.geometry.contact.points import nearest_displacement
-from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.integrators.radau.contact_frames import merge
 from flocsim.state.bodies import ANGLE, SPIN, VX, VY, X, Y
 
@@ -57,13 +56,9 @@ def core_distance2(swarm, wall, x, y):
     cosine, sine = math.cos(swarm.motion[wall, ANGLE]), math.sin(swarm.motion[wall, ANGLE])
     x, y = cosine * x + sine * y, cosine * y - sine * x
     first, v, least = swarm.first[wall], swarm.vertices, math.inf
-    points = swarm.first[wall + 1] - first
-    rings = v.shape[1] > EDGE_OFFSET
-    for start in range(first, first + (points if rings else max(edge_count(points), 1))):
-        end = edge_end(first, points, start) if points > 1 else start
-        if rings:
-            end = start + int(v[start, EDGE_OFFSET])
-        distance2 = segment_distance2(x, y, v[start, X], v[start, Y], v[end, X], v[end, Y])
+    for start in range(first, swarm.first[wall + 1]):
+        end = start + v[start].edge_offset
+        distance2 = segment_distance2(x, y, v[start].x, v[start].y, v[end].x, v[end].y)
         least = min(least, distance2)
     return least
 
@@ -71,9 +66,8 @@ def core_distance2(swarm, wall, x, y):
 def widest_swell(swarm, wall):
     """By how much the widest disk of a fixed body is wider than its narrowest [m]."""
     widest = 0.0
-    if swarm.vertices.shape[1] > EXCESS_RADIUS:
-        for point in range(swarm.first[wall], swarm.first[wall + 1]):
-            widest = max(widest, swarm.vertices[point, EXCESS_RADIUS])
+    for point in range(swarm.first[wall], swarm.first[wall + 1]):
+        widest = max(widest, swarm.vertices[point].excess_radius)
     return widest
 
 

@@ -74,11 +74,9 @@ def put_scene(swarm, scene, members, first):
         scene.first[body] = point
         begin, end = swarm.first[member], swarm.first[member + 1]
         for each in range(begin, end):
-            for axis in range(swarm.vertices.shape[1]):
-                scene.vertices[point + each - begin, axis] = swarm.vertices[each, axis]
+            scene.vertices[point + each - begin] = swarm.vertices[each]
         for row in range(2 * (end - begin)):
-            for column in range(3):
-                scene.tree[2 * point + row, column] = swarm.tree[2 * begin + row, column]
+            scene.tree[2 * point + row] = swarm.tree[2 * begin + row]
         point += end - begin
     scene.first[scene.bodies.shape[0]] = point
 

@@ -30,7 +30,7 @@ from flocsim.ensembles.config.pair_scene import PairScene
 from flocsim.forces.body_forces import random_key, thermal_forces
 from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
-from flocsim.geometry.contact.compounds import Outlines, outlines_of
+from flocsim.geometry.contact.core_points import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES

@@ -9,17 +9,15 @@ none above.
 
 import math
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 
-from flocsim.compiler.composer import compose
+from flocsim.compiler.composer import compiled
 from flocsim.ensembles.config.schema import ZoneConfig
 from flocsim.errors import ZoneError
 from flocsim.forces import DoubleLayer, VanDerWaals
 from flocsim.forces.base import Force
-from flocsim.geometry.contact import compounds
-from flocsim.geometry.contact.compounds import Outlines, outlines_of
+from flocsim.geometry.contact.core_points import Outlines, outlines_of
 from flocsim.geometry.contact.near_pairs import core_distance
 from flocsim.geometry.shapes.shape import Shape
 
@@ -84,11 +82,6 @@ def start_height(outlines, angle_i, angle_j, contact, reach, displacement, gap):
     return clear
 
 
-@cache
-def compiled_height(compound):
-    return compose(start_height, compounds.FILLINGS if compound else {})
-
-
 def place_pair(
     shapes: Sequence[Shape], angles: Sequence[float], displacement: float, gap: float,
     outlines: Outlines | None = None,
@@ -97,7 +90,7 @@ def place_pair(
     the shapes, where they are at hand."""
     contact = shapes[0].radius + shapes[1].radius
     reach = shapes[0].bounding_radius + shapes[1].bounding_radius
-    height = compiled_height(any(shape.is_compound for shape in shapes))(
+    height = compiled(start_height)(
         outlines or outlines_of(shapes), float(angles[0]), float(angles[1]),
         contact, reach, float(displacement), gap,
     )  # fmt: skip

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import attrs
 import numpy as np
+from numpy.lib.recfunctions import structured_to_unstructured
 
 from flocsim.ensembles.config.schema import Config
 from flocsim.ensembles.kind import PHYSICS, StudyKind
-from flocsim.geometry.contact.compounds import outlines_of, point_columns
+from flocsim.geometry.contact.core_points import circles_of, core_points
 from flocsim.geometry.shapes.shape import Shape
 from flocsim.geometry.shapes.spheropolygon import SpheroPolygon, resized
 
@@ -119,7 +120,7 @@ def shape_numbers(shape):
         shape.radius, shape.area, shape.second_moment, shape.equivalent_radius,
         shape.bounding_radius,
     )  # fmt: skip
-    rings = point_columns(shape) if shape.is_compound else ()
+    rings = structured_to_unstructured(core_points(shape)) if shape.is_compound else ()
     placed = [shape.placed_vertices(angle=angle) for angle in SAMPLE_ANGLES]
     return np.concatenate(
         [np.ravel(shape.vertices), *map(np.ravel, placed), numbers, np.ravel(rings)]
@@ -164,7 +165,9 @@ def star_numbers(points):
     rays = 5.0 + np.sin(3.0 * turn + 0.4)
     star = SpheroPolygon(np.column_stack([rays * np.cos(turn), rays * np.sin(turn)]), 0.3)
     body = resized(star, 1.641e-5, 1e-6)
-    return np.concatenate([shape_numbers(body), np.ravel(outlines_of([body]).tree)])
+    return np.concatenate(
+        [shape_numbers(body), np.ravel(structured_to_unstructured(circles_of(body)))]
+    )
 
 
 def physics_digest(root: Path = PACKAGE, names: Sequence[str] = PHYSICS) -> str:

@@ -23,7 +23,6 @@ from flocsim.geometry.contact.points import (
     separation,
     tangential_component,
 )
-from flocsim.hooks import hook
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.contacts import GRAZING
 from flocsim.state.work import NOW, PROPAGATED
@@ -371,12 +370,10 @@ def restore_contacts(work, count):
     work.tally.kept = 0
 
 
-@hook
-def are_adjacent(scene, body, point, other):
-    """Return True if two core points of a body coincide or are neighbours."""
-    count = scene.first[body + 1] - scene.first[body]
-    apart = abs(point - other)
-    return apart <= 1 or apart == count - 1
+def are_adjacent(scene, point, other):
+    """Return True if two core points of a body coincide or are the ends of one edge."""
+    apart, points = other - point, scene.vertices
+    return apart in (0, points[point].edge_offset, -points[other].edge_offset)
 
 
 def are_neighbours(scene, work, row, other):
@@ -388,7 +385,7 @@ def are_neighbours(scene, work, row, other):
     # Same roles: neighbouring vertices and edges with a common end. Swapped roles: each vertex is
     # an end of the other pair's edge.
     if pairs[row].vertex_body == pairs[other].vertex_body:
-        near = are_adjacent(scene, pairs[row].vertex_body, point, on)
+        near = are_adjacent(scene, point, on)
         return near and (start in (first, last) or end in (first, last))
     return on in (start, end) and point in (first, last)
 

@@ -235,12 +235,12 @@ def charges_of_bodies(shapes: Sequence[Shape], kappa: float) -> Charges:
     if not kappa > 0.0:
         return Charges(ChargeGroup.rows(0), np.zeros(len(shapes) + 1, np.int64), Charge.rows(0))
     found = [grouped_charges(shape, kappa) for shape in shapes]
-    groups = np.concatenate([each.groups for each in found])
+    groups = ChargeGroup.joined(each.groups for each in found)
     sizes = [len(each.groups) for each in found]
     before = np.cumsum([0, *[len(each.charges) for each in found[:-1]]])
     groups["first"] += np.repeat(before, sizes)
     first = np.cumsum([0, *sizes]).astype(np.int64)
-    return Charges(groups, first, np.concatenate([each.charges for each in found]))
+    return Charges(groups, first, Charge.joined(each.charges for each in found))
 
 
 def layer_energy(
@@ -406,7 +406,7 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     found = [
         field_of_shape(shape, kappa) if body in asked else none for body, shape in enumerate(shapes)
     ]
-    grids = np.concatenate([each.grids for each in found])
+    grids = Grid.joined(each.grids for each in found)
     known = [each for each in found if len(each.field)]
     if len(known) == 1:  # tables are large, and not copied where they need not be
         return Field(grids, known[0].tiles, known[0].field)
@@ -414,4 +414,4 @@ def field_of_bodies(shapes: Sequence[Shape], kappa: float) -> Field:
     before = np.cumsum([0, *[len(each.field) for each in found[:-1]]])
     tiles = [np.where(each.tiles < 0, -1, each.tiles + first)
              for each, first in zip(found, before, strict=True)]  # fmt: skip
-    return Field(grids, np.concatenate(tiles), np.concatenate([each.field for each in found]))
+    return Field(grids, np.concatenate(tiles), FieldNode.joined(each.field for each in found))

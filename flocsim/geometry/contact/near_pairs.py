@@ -1,81 +1,28 @@
-"""Broad phase for two outlines: near vertex–edge pairs and smallest distance, by trees of circles.
+"""Near vertex–edge pairs of two outlines, and their smallest distance, by trees of circles.
 
-Each outline has a binary tree of bounding circles. The core points of a body, each with the edge
-that starts at it, are halved by number until LEAF to 2 LEAF points remain: a full tree whose node i
-has the children 2i and 2i + 1. Every node stores a circle around its run of core points and edges,
-in the body's frame. Two trees are traversed against each other without a stack: which of the two is
+Two trees (core_points.py) are traversed against each other without a stack: which of the two is
 split next follows from the sizes of their pieces alone, so the way back up is known as well.
 
 Distances are computed in the frame of one body. A *pose* (c, s, x, y) rotates and shifts points of
 the other body into it, for visited nodes only. Inner functions receive scalars and single arrays
 instead of the whole scene, which would cost more to pass than they do to run.
+
+A lone point touches edges as a vertex, and other lone points. Two lone points form one pair, in
+which the later body provides the vertex.
 """
 
 import math
 from collections.abc import Callable
 
-import numpy as np
-
 from flocsim.geometry.contact import points as contacts
+from flocsim.geometry.contact.core_points import leaves_of
 from flocsim.geometry.contact.points import length_of, separation
-from flocsim.geometry.shapes.cores import edge_count, edge_end, segment_distance2
+from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.hooks import hook
-from flocsim.state.bodies import ANGLE, X, Y
+from flocsim.state.bodies import ANGLE
 from flocsim.state.clock import CANDIDATES_FULL
+from flocsim.state.outlines import EDGE, LONE
 from flocsim.state.work import NOW
-
-LEAF = 2
-"""Core points in a leaf: from this to twice as many."""
-
-ROUNDING = 1e-13
-"""Circles are enlarged by this share of the outline's size to cover rounding of distances."""
-
-
-CIRCLE_X, CIRCLE_Y, CIRCLE_RADIUS = range(3)
-"""Columns of a tree [m]."""
-
-
-def leaves_of(points):
-    """Return the number of leaves for that many core points: a power of two."""
-    leaves = 1
-    while 2 * leaves * LEAF <= points:
-        leaves *= 2
-    return leaves
-
-
-def level_runs(points, nodes):
-    """Return the core points (nodes, most) of the runs on one level; short rows repeat their last
-    point.
-
-    Each run includes the end of its last edge.
-    """
-    bounds = np.arange(nodes + 1) * points // nodes
-    steps = np.arange(np.diff(bounds).max() + 1)
-    return np.minimum(bounds[:-1, None] + steps, bounds[1:, None]) % points
-
-
-def tree_of(vertices: np.ndarray) -> np.ndarray:
-    """Return the tree (2N, 3) over core points (N, 2) [m]: row i is node i's circle (x, y, radius).
-
-    Unused rows, row 0 among them, are 0.
-    """
-    points = len(vertices)
-    tree = np.zeros((2 * points, 3))
-    margin = ROUNDING * np.abs(vertices).max()
-    nodes = 1
-    while nodes <= leaves_of(points):
-        runs = vertices[level_runs(points, nodes)]
-        middle, ends = runs.min(axis=1) + runs.max(axis=1), runs[:, 0] + runs[:, -1]
-        # Two candidate centres, the middle of the bounding box and of the chord: keep the smaller
-        # circle.
-        choices = []
-        for centre in (0.5 * middle, 0.5 * ends):
-            reach = np.hypot(*np.moveaxis(runs - centre[:, None], -1, 0)).max(axis=1)
-            choices.append(np.column_stack([centre, reach + margin]))
-        box, chord = choices
-        tree[nodes : 2 * nodes] = np.where(box[:, 2:] <= chord[:, 2:], box, chord)
-        nodes *= 2
-    return tree
 
 
 def tree_side(outlines, body):
@@ -88,7 +35,7 @@ def tree_side(outlines, body):
 def leaf_points(side, leaf):
     """Return (first, end) of the core points of a leaf."""
     first, points, _, leaves = side
-    # The same integer bounds as in `level_runs`: exact, since the divisor is a power of two.
+    # The same integer bounds as in `circles_of`: exact, since the divisor is a power of two.
     share = points / leaves
     place = leaf - leaves
     return first + int(place * share), first + int((place + 1) * share)
@@ -109,7 +56,7 @@ def in_other_frame(pose, x, y):
 def edge_distance2(vertices, x, y, start, end):
     """Return the squared distance of a point from the edge between two core points [m²]."""
     return segment_distance2(
-        x, y, vertices[start, X], vertices[start, Y], vertices[end, X], vertices[end, Y]
+        x, y, vertices[start].x, vertices[start].y, vertices[end].x, vertices[end].y
     )
 
 
@@ -117,7 +64,7 @@ def traversal_plan(tree, side_a, side_b):
     """Return the constants of a traversal: first rows, leaves and root radii of both trees."""
     _, _, row_a, leaves_a = side_a
     _, _, row_b, leaves_b = side_b
-    size_a, size_b = tree[row_a + 1, CIRCLE_RADIUS], tree[row_b + 1, CIRCLE_RADIUS]
+    size_a, size_b = tree[row_a + 1].radius, tree[row_b + 1].radius
     return row_a, row_b, leaves_a, leaves_b, size_a, size_b
 
 
@@ -139,15 +86,15 @@ def circle_distance(tree, pose, plan, walk):
     row_a, row_b, _, _, _, _ = plan
     one, other = row_a + i, row_b + j
     # Only the centre of a's circle is transformed, and only here.
-    x, y = in_other_frame(pose, tree[one, CIRCLE_X], tree[one, CIRCLE_Y])
-    dx, dy = x - tree[other, CIRCLE_X], y - tree[other, CIRCLE_Y]
-    return dx * dx + dy * dy, tree[one, CIRCLE_RADIUS] + tree[other, CIRCLE_RADIUS]
+    x, y = in_other_frame(pose, tree[one].x, tree[one].y)
+    dx, dy = x - tree[other].x, y - tree[other].y
+    return dx * dx + dy * dy, tree[one].radius + tree[other].radius
 
 
 def may_be_closer(tree, pose, plan, walk, distance):
     """Return True if the runs of the two nodes may be closer to each other than a distance [m].
 
-    The distance is negative where swollen cores overlap (compounds.py).
+    The distance is negative where cores of different spheroradii overlap.
     """
     distance2, radii = circle_distance(tree, pose, plan, walk)
     reach = radii + distance
@@ -189,20 +136,19 @@ def skip_subtree(plan, walk):
     return 0, 0, 1, 1
 
 
-@hook
 def leaf_distance_one_way(vertices, pose, side_a, leaf_a, side_b, leaf_b, least):
-    """Return the smaller of ``least`` and the distances from a's points to b's edges [m]."""
-    first_b, points_b, _, _ = side_b
-    edges = first_b + max(edge_count(points_b), 1)
+    """Return the smaller of ``least`` and the distances from a's points to b's edges [m], less what
+    their spheroradii exceed the smallest by."""
     start_a, end_a = leaf_points(side_a, leaf_a)
     start_b, end_b = leaf_points(side_b, leaf_b)
-    least2 = math.inf
     for point in range(start_a, end_a):
-        x, y = in_other_frame(pose, vertices[point, X], vertices[point, Y])
-        for start in range(start_b, min(end_b, edges)):
-            end = edge_end(first_b, points_b, start)
-            least2 = min(least2, edge_distance2(vertices, x, y, start, end))
-    return min(least, math.sqrt(least2))
+        x, y = in_other_frame(pose, vertices[point].x, vertices[point].y)
+        for start in range(start_b, end_b):
+            end = start + vertices[start].edge_offset
+            apart = math.sqrt(edge_distance2(vertices, x, y, start, end))
+            excess = vertices[point].excess_radius + vertices[start].excess_radius
+            least = min(least, apart - excess)
+    return least
 
 
 def leaf_distance(vertices, pose, side_a, side_b, walk, least):
@@ -229,7 +175,7 @@ def nearer_child(tree, pose, plan, walk):
 def core_distance(outlines, a, b, pose):
     """Return the smallest distance [m] between the cores of two bodies, from core points to edges.
 
-    ``pose`` maps a's points into b's frame. For swollen cores (compounds.py) it is negative where
+    ``pose`` maps a's points into b's frame. For cores of several spheroradii it is negative where
     they overlap. Branch and bound: descend directly to two close leaves for a first bound, then
     visit only pairs of nodes that can be closer.
     """
@@ -262,37 +208,46 @@ def pose_of(scene, work, a, b):
     return math.cos(turn), math.sin(turn), c * x + s * y, c * y - s * x
 
 
-def add_pair(work, pair, a, point, b, start, end):
+def add_pair(scene, work, pair, a, point, b, start, end):
     """Append a pair of features to the list; return False if there is no room."""
     row = work.tally.candidates
     if row == work.candidates.shape[0]:
         work.tally.full = CANDIDATES_FULL
         return False
-    new = work.candidates
-    new[row].vertex_body, new[row].vertex = a, point
-    new[row].edge_body, new[row].edge_start, new[row].edge_end = b, start, end
-    new[row].contact_mode, new[row].surface_active = 0, 0
-    new[row].slide_direction, new[row].pair = 0, pair
+    new, points = work.candidates[row], scene.vertices
+    new.vertex_body, new.vertex = a, point
+    new.edge_body, new.edge_start, new.edge_end = b, start, end
+    new.contact_mode = new.surface_active = new.slide_direction = 0
+    new.pair = pair
+    new.vertex_radius = scene.bodies[a].radius + points[point].excess_radius
+    new.edge_radius = scene.bodies[b].radius + points[start].excess_radius
     work.tally.candidates = row + 1
     return True
 
 
-@hook
+def begins_pair(vertices, point, start, is_later):
+    """Return True if a core point and the feature that begins at another one form a pair."""
+    # Two lone points form one pair only: the later body has the vertex.
+    if vertices[start].feature == LONE:
+        return is_later and vertices[point].feature == LONE
+    return vertices[start].feature == EDGE
+
+
 def list_one_way(scene, work, pair, pose, a, b, side_a, leaf_a, side_b, leaf_b, reach):
     """List pairs of one leaf's points and another leaf's edges closer than the reach; False if
     full."""
-    vertices = scene.vertices
-    first_b, points_b, _, _ = side_b
-    edges = first_b + edge_count(points_b)
+    vertices, is_later = scene.vertices, a == work.pairs[pair].later
     start_a, end_a = leaf_points(side_a, leaf_a)
     start_b, end_b = leaf_points(side_b, leaf_b)
     room = True
     for point in range(start_a, end_a):
-        x, y = in_other_frame(pose, vertices[point, X], vertices[point, Y])
-        for start in range(start_b, min(end_b, edges)):
-            end = edge_end(first_b, points_b, start)
-            if edge_distance2(vertices, x, y, start, end) < reach * reach:
-                room = add_pair(work, pair, a, point, b, start, end) and room
+        x, y = in_other_frame(pose, vertices[point].x, vertices[point].y)
+        for start in range(start_b, end_b):
+            end = start + vertices[start].edge_offset
+            limit = reach + vertices[point].excess_radius + vertices[start].excess_radius
+            near = edge_distance2(vertices, x, y, start, end) < limit * limit
+            if near and begins_pair(vertices, point, start, is_later):
+                room = add_pair(scene, work, pair, a, point, b, start, end) and room
     return room
 
 
@@ -331,7 +286,7 @@ def list_spheres(scene, work, pair, cutoff):
     if sphere_gap(scene, work, a, b) >= cutoff:
         return True
     point = scene.first[b]
-    return add_pair(work, pair, a, scene.first[a], b, point, point)
+    return add_pair(scene, work, pair, a, scene.first[a], b, point, point)
 
 
 def sphere_gap(scene, work, a, b):

@@ -120,8 +120,7 @@ def update_rotations(work, state):
 def rotated_point(scene, work, body, point):
     """Return a core point relative to its body's centroid, with the axes of the scene [m]."""
     pose = work.poses[body]
-    x = scene.vertices[point, X]
-    y = scene.vertices[point, Y]
+    x, y = scene.vertices[point].x, scene.vertices[point].y
     c = pose.cosine
     s = pose.sine
     return c * x - s * y, s * x + c * y
@@ -145,14 +144,6 @@ def store_geometry(work, state, row, nx, ny, gap, ax, ay, bx, by, turning, foot,
     geometry[state, row].turning = turning
     geometry[state, row].foot = foot
     geometry[state, row].side = side
-
-
-@hook
-def contact_radii(scene, work, row):
-    """Return the spheroradii (of the vertex, of the edge) of a pair [m]."""
-    candidate = work.candidates[row]
-    a, b = candidate.vertex_body, candidate.edge_body
-    return scene.bodies[a].radius, scene.bodies[b].radius
 
 
 @hook
@@ -184,7 +175,7 @@ def locate_polygons(scene, work, state, row):
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
     # The contact point lies on the normal, midway between the two outlines.
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = candidate.vertex_radius, candidate.edge_radius
     contact_distance = 0.5 * (distance + radius_b - radius_a)
     bx = fx + contact_distance * nx
     by = fy + contact_distance * ny

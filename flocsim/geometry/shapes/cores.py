@@ -64,23 +64,6 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     ) != (side(cx, cy, dx, dy, bx, by) > 0.0)
 
 
-def edge_count(points):
-    """Return the number of edges of a core with that many points: none, one, or as many as
-    points."""
-    return points - 1 if points < 3 else points
-
-
-def edge_end(first, points, start):
-    """Return the core point at which the edge that begins at ``start`` ends.
-
-    ``first`` is the first of the body's core points, ``points`` their number.
-    """
-    following = start + 1
-    if following == first + points:
-        return first
-    return following
-
-
 def edges_of(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (starts, ends) of a core's edges: none for a point, one for a segment, N for a
     polygon."""

@@ -81,7 +81,7 @@ def outline_pieces(parts: Sequence[Part]) -> np.ndarray:
     found = pieces_of(parts)
     origins, units, low, high, radius = exposed_chords(parts, found)
     segments = segment_rows(origins, units, low, high, radius)
-    return np.concatenate([segments, arc_rows(*exposed_arcs(parts, found))])
+    return Piece.joined([segments, arc_rows(*exposed_arcs(parts, found))])
 
 
 def polygon_pieces(vertices: np.ndarray) -> np.ndarray:
@@ -140,7 +140,7 @@ def pieces_of_bodies(shapes: Sequence[Shape], count: int) -> Pieces:
     pieces."""
     rows = [pieces_that_count(shape) for shape in shapes] or [Piece.rows(0)] * count
     first = np.concatenate([[0], np.cumsum([len(each) for each in rows])])
-    return Pieces(np.ascontiguousarray(np.concatenate(rows)), first.astype(np.int64))
+    return Pieces(Piece.joined(rows), first.astype(np.int64))
 
 
 class Pose(NamedTuple):

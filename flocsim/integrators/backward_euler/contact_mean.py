@@ -81,7 +81,7 @@ def step_view(scene, work, row, step, overlap_end, slip, rate):
     pressing = (overlap_end - max(-work.geometry[TRIAL, row].gap, 0.0)) / step
     return ContactView(
         overlap_end, pressing, slip, rate, effective_mass(scene, a, b),
-        scene.bodies[a].radius, scene.bodies[b].radius, smaller_radius(scene, a, b),
+        candidate.vertex_radius, candidate.edge_radius, smaller_radius(scene, a, b),
     )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ until it is short compared to the vibration, or the contacts change little.
 import math
 
 from flocsim.constants import DEEPEST_OVERLAP
-from flocsim.geometry.contact.points import contact_radii, locate_polygons, update_rotation
+from flocsim.geometry.contact.points import locate_polygons, update_rotation
 from flocsim.integrators.events.interpolation import interpolate
 from flocsim.integrators.events.resolution import release_resolution, touch_resolution
 from flocsim.integrators.rhs.contact_stiffness import secant_stiffness
@@ -56,7 +56,7 @@ def margin_rate(work, state, row):
 
 def is_too_deep(scene, work, state, row):
     """Return True if a listed pair overlaps past the limit of the contact law."""
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
     return -work.geometry[state, row].gap > DEEPEST_OVERLAP * (radius_a + radius_b)
 
 

@@ -41,7 +41,6 @@ passes through zero; when it ceases to slide it sticks again and its spring take
 
 import math
 
-from flocsim.geometry.contact.points import contact_radii
 from flocsim.hooks import SLIP_LIMIT, has, slip_limit
 from flocsim.integrators.rhs.views import (
     contact_view,
@@ -75,7 +74,7 @@ def rolled(scene, work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g = work.geometry
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
     gap = g[NOW, row].gap
     turn_a = work.place[state, a, ANGLE] - work.place[NOW, a, ANGLE]
     turn_b = work.place[state, b, ANGLE] - work.place[NOW, b, ANGLE]
@@ -93,7 +92,7 @@ def slip_rate_of_gap_change(scene, work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
     g, spin_b = work.geometry, work.velocity[state, b, ANGLE]
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
     gap, gap_change = g[state, row].gap, g[state, row].gap - g[NOW, row].gap
     relative_spin = spin_b - work.velocity[state, a, ANGLE]
     # (D − D_now) (dφ/dt − ω_b) + (r − r_now) (ω_b − ω_a), with D − D_now = gap change and r − r_now

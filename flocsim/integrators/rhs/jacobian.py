@@ -17,7 +17,7 @@ Newton's iteration, and its fixed point does not depend on it.
 """
 
 from flocsim.compiler.linker import apart
-from flocsim.geometry.contact.points import contact_radii, separation
+from flocsim.geometry.contact.points import separation
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,
@@ -124,7 +124,7 @@ def sliding_row(scene, work, row):
     ``arm_a`` leads from the vertex body's centroid to the vertex, ``arm_b`` from the edge body's to
     the foot.
     """
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
     g = work.geometry
     tx, ty = -g[NOW, row].normal_y, g[NOW, row].normal_x
     # Arms in the geometry end at the middle of the overlap; shift them to the vertex and the foot.

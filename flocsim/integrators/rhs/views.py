@@ -13,7 +13,6 @@ import math
 
 from flocsim.constants import CENTRE_SOFTENING
 from flocsim.geometry.contact.points import (
-    contact_radii,
     length_of,
     normal_component,
     separation,
@@ -104,7 +103,7 @@ def velocity_lifetime_of(work, row):
 def contact_view(scene, work, state, row):
     candidate = work.candidates[row]
     a, b = candidate.vertex_body, candidate.edge_body
-    radius_a, radius_b = contact_radii(scene, work, row)
+    radius_a, radius_b = work.candidates[row].vertex_radius, work.candidates[row].edge_radius
     # The law takes overlap and its rate, positive in compression: minus gap and its rate.
     return ContactView(
         -work.geometry[state, row].gap, -normal_rate(work, state, row),

@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 
 from flocsim import Body, Fluid, Sphere, SpheroPolygon
 from flocsim.body import scene_of
-from flocsim.compiler.composer import compose
-from flocsim.geometry.contact import compounds
 from flocsim.geometry.contact.near_pairs import (
     core_distance,
     list_polygons,
@@ -21,9 +19,6 @@ from flocsim.geometry.contact.points import overlap_fault, placed_contacts
 from flocsim.geometry.shapes.cores import segment_distance2
 from flocsim.state.work import work_of
 from tests.helpers.compound_shapes import MAKERS, SQUARE, beads, framed
-
-list_compounds = compose(list_polygons, compounds.FILLINGS, jit=False)
-swollen_distance = compose(core_distance, compounds.FILLINGS, jit=False)
 
 SHAPES = [*(make() for make in MAKERS), Sphere(0.8), SpheroPolygon(2.0 * SQUARE, 0.3)]
 
@@ -61,9 +56,6 @@ def pairs_between(a, b, place_a, place_b):
 def placed(a, b, x, y, turn_a, turn_b):
     """(scene, work) of two bodies, the later one at (x, y)."""
     scene = scene_of([Body(a, density=1.0), Body(b, density=1.0)], Fluid())
-    if scene.vertices.shape[1] == 2:
-        columns = [compounds.point_columns(each) for each in (a, b)]
-        scene = scene._replace(vertices=np.concatenate(columns))
     position = np.array([[0.0, 0.0, turn_a], [x, y, turn_b]])
     return scene, work_of(scene, position, np.zeros((2, 3)), 4096)
 
@@ -75,7 +67,7 @@ DRAWN = (st.sampled_from(SHAPES), st.sampled_from(SHAPES), st.floats(-14.0, 14.0
 @given(*DRAWN, st.floats(0.01, 6.0))
 def test_all_pairs_below_a_gap_are_listed(a, b, x, y, turn_a, turn_b, cutoff):
     scene, work = placed(a, b, x, y, turn_a, turn_b)
-    assert work.tally.pairs == 1 and list_compounds(scene, work, 0, cutoff)
+    assert work.tally.pairs == 1 and list_polygons(scene, work, 0, cutoff)
     rows = work.candidates[: work.tally.candidates]
     names = ["vertex_body", "vertex", "edge_start", "edge_end"]
     first = scene.first
@@ -96,7 +88,7 @@ def test_the_gap_is_the_least_of_all(a, b, x, y, turn_a, turn_b):
     both = [(0, 1), (1, 0)]
     for one, other in both:
         pose = pose_of(scene, work, one, other)
-        gap = swollen_distance(scene, one, other, pose) - contact
+        gap = core_distance(scene, one, other, pose) - contact
         assert gap == pytest.approx(min(gaps.values()), abs=1e-9)
 
 
