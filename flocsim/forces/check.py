@@ -143,14 +143,6 @@ def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
             raise kernel_error(
                 force, kernel, f"asks for {name!r}, which is {value!r}; a kernel takes numbers only"
             ) from None
-        # Parameters are evaluated anew for every pair of bodies: one that changes from call to call
-        # would make rows irreproducible.
-        if repr(repeated := parameter_value(force, fluid, name, kernel)) != repr(value):
-            raise kernel_error(
-                force, kernel,
-                f"asks for {name!r}, which is {value!r} once and {repeated!r} then; compute it "
-                "from the force's fields alone",
-            )  # fmt: skip
     return arguments
 
 
@@ -297,10 +289,5 @@ def check_kernel(force: Force, fluid: Fluid) -> None:
         check_results(force, fluid, kernel, "normal", "tangential")
         if force.slides:
             check_results(force, fluid, force.slip_limit, "largest slip [m]")
-        # The former name of ``events``: without this check such a method would be ignored.
-        if inspect.isfunction(kink := getattr(force, "kink", None)):
-            raise kernel_error(
-                force, kink, "is called kink: name it events and return a tuple, one a kink"
-            )
         if force.has_events:
             check_results(force, fluid, force.events)
