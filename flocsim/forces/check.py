@@ -143,6 +143,14 @@ def kernel_arguments(force: Force, fluid: Fluid, kernel: Callable) -> list:
             raise kernel_error(
                 force, kernel, f"asks for {name!r}, which is {value!r}; a kernel takes numbers only"
             ) from None
+        # Parameters are evaluated anew for every pair of bodies: one that changes from call to call
+        # would make rows irreproducible.
+        if repr(repeated := parameter_value(force, fluid, name, kernel)) != repr(value):
+            raise kernel_error(
+                force, kernel,
+                f"asks for {name!r}, which is {value!r} once and {repeated!r} then; compute it "
+                "from the force's fields alone",
+            )  # fmt: skip
     return arguments
 
 
