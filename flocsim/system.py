@@ -41,12 +41,6 @@ from flocsim.trajectories.trajectory import Trajectory, Watch, watched
 Fillings = dict[Callable, Callable]
 """{hook of flocsim.hooks.HOOKS: its replacement}."""
 
-FAMILIES: dict[str, Fillings] = {
-    "spheres": SPHERES_ONLY,
-    "polygons": {},
-}
-"""{family of shapes: its replacements of hooks}."""
-
 
 def as_tuple(values: Any, what: str) -> tuple:
     """Return a sequence as a tuple; raise UsageError for a single object."""
@@ -231,7 +225,7 @@ class System:
 
         ``grows``: whether the driver must serve any number of bodies.
         """
-        shapes = FAMILIES[self.family]
+        shapes = SPHERES_ONLY if self.spheres_only else {}
         needless = left_out(math.inf if grows else len(self.bodies), **self.reached)
         filled = {**self.integrator.fillings, **needless, **shapes, **(observer or {})}
         # Only registered hooks can be replaced.

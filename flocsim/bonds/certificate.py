@@ -24,21 +24,26 @@ run.
 import math
 from typing import NamedTuple
 
+from flocsim.bonds.escape import (
+    BARRIER,
+    CLIMB_STEP,
+    LEAST_CLIMB_STEP,
+    can_escape,
+    forces_at_rest,
+    variation_length,
+)
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point, least_listed_gap, separation
 from flocsim.hooks import (
     CENTRE_FORCE,
     CONTACT_FORCE,
     ORIENTED_ENERGY,
-    centre_force,
     contact_force,
     has,
-    surface_force,
 )
-from flocsim.integrators.rhs.climb import BARRIER, CLIMB_STEP, LEAST_CLIMB_STEP, can_escape
-from flocsim.integrators.rhs.outline_sum import has_outline_forces, outline_reach, outline_repulsion
+from flocsim.integrators.rhs.outline_sum import outline_reach
 from flocsim.integrators.rhs.surface_gap import flag_near, surface_view
-from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass, pair_view
+from flocsim.integrators.rhs.views import centre_line, contact_view, effective_mass
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.views import moved_contact
 from flocsim.state.work import NOW
@@ -200,22 +205,22 @@ REFINEMENT = 0.125
 def attraction_at(scene, work, time, bond, displacement):
     """Return the attraction (between centres, between outlines) [N] at rest, both gaps wider by
     ``displacement`` [m]."""
-    centres, surfaces = 0.0, 0.0
     distance, gap = bond.distance + displacement, bond.surface_gap + displacement
-    if has(scene, CENTRE_FORCE):
-        between = distance - radii_of(scene, bond)
-        view = pair_view(scene, time, bond.j, bond.i, between, 0.0, distance)
-        centres = -centre_force(scene, view)
-    if scene.surface_reach > gap:
-        surfaces = -surface_force(scene, pair_view(scene, time, bond.j, bond.i, gap, 0.0, distance))
-    if has_outline_forces(scene):
-        surfaces -= outline_repulsion(scene, work, time, bond.j, bond.i, displacement)
-    return centres, surfaces
+    known = scene, work, time, bond.j, bond.i
+    centres, outlines = forces_at_rest(*known, distance, gap, displacement)
+    return -centres, -outlines
 
 
 def is_enough(total, outline_part, centre_part, enough):
     """Return True if a capacity suffices: its total, and one of its two parts."""
     return total > enough[0] and (outline_part > enough[1] or centre_part > enough[2])
+
+
+def gaps_length(scene, bond, displacement, longest):
+    """Return variation_length of a bond whose gaps are wider by a displacement [m]."""
+    between = bond.distance + displacement - radii_of(scene, bond)
+    gaps = bond.surface_gap + displacement, bond.gap + displacement
+    return variation_length(scene, between, *gaps, longest)
 
 
 @apart
@@ -225,7 +230,7 @@ def largest_attraction(scene, work, time, bond, start, end, near, share, enough)
     ``start``, ``end``: range of displacements [m]; ``share``: step over the distance on which
     forces vary.
     """
-    radii, best = radii_of(scene, bond), start
+    best = start
     total, outline_part, centre_part = 0.0, 0.0, 0.0
     displacement = start
     while displacement < end:
@@ -238,16 +243,8 @@ def largest_attraction(scene, work, time, bond, start, end, near, share, enough)
             centre_part = max(centre_part, centres)
         if is_enough(total, outline_part, centre_part, enough):
             break
-        # Step in proportion to the smallest of the gaps that forces depend on: forces vary over
-        # such lengths.
-        length_scale = end
-        if has(scene, CENTRE_FORCE):
-            length_scale = min(length_scale, abs(bond.distance + displacement - radii))
-        if scene.surface_reach > 0.0:
-            length_scale = min(length_scale, abs(bond.surface_gap + displacement))
-        if bond.gap + displacement < outline_reach(scene):
-            length_scale = min(length_scale, max(bond.gap + displacement, scene.outlines[1]))
-        displacement += max(share * length_scale, LEAST_CLIMB_STEP)
+        length = gaps_length(scene, bond, displacement, end)
+        displacement += max(share * length, LEAST_CLIMB_STEP)
     return total, outline_part, centre_part, best
 
 
@@ -276,11 +273,7 @@ def capacity(scene, work, time, bond, near, enough):
     if is_enough(total, outline_part, centre_part, enough):
         return total, outline_part, centre_part
     # Refine around the maximum, which may be a cusp.
-    around = CLIMB_STEP * (abs(bond.surface_gap + best) if scene.surface_reach > 0.0 else radii)
-    if outline_reach(scene) > 0.0:
-        around = min(around, CLIMB_STEP * max(bond.gap + best, scene.outlines[1]))
-    if has(scene, CENTRE_FORCE):
-        around = min(around, CLIMB_STEP * abs(bond.distance + best - radii))
+    around = CLIMB_STEP * gaps_length(scene, bond, best, radii)
     start, end = max(best - around, 0.0), best + around
     known = scene, work, time, bond, start, end, near, REFINEMENT * CLIMB_STEP, enough
     finer_total, finer_outline_part, finer_centre_part, _ = largest_attraction(*known)

@@ -41,10 +41,10 @@ from flocsim.bonds.certificate import (
     resting_contact,
     smaller_bounding_radius,
 )
+from flocsim.bonds.escape import BARRIER
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import contact_point
 from flocsim.hooks import CONTACT_FORCE, SLIP_LIMIT, contact_force, has, slip_limit
-from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.integrators.rhs.views import contact_view
 from flocsim.state.bodies import ANGLE
 from flocsim.state.work import NOW

@@ -139,9 +139,8 @@ class Study(StudyKind):
         config, facts = self.config, {}
         meetings = {each.meeting: place for place, each in reversed([*enumerate(self.pairings)])}
         pairs = [pair for _, pair in sphere_pairs(config, self.flocs)]
-        several = [s for floc in self.flocs for s in floc.shapes.values() if s.is_compound]
         for pair in (pairs[place] for place in sorted(meetings.values())):
-            for shapes in (*kinds(config, pair.shapes), *((each, each) for each in several[:1])):
+            for shapes in kinds(config, pair.shapes):
                 system = placed_system(config, pair.system, shapes)
                 name = system.family + (f" in {pair.meeting}" * (pair.meeting != SETTLING))
                 laws = sorted(system.pieces.laws.items())

@@ -297,10 +297,5 @@ def check_kernel(force: Force, fluid: Fluid) -> None:
         check_results(force, fluid, kernel, "normal", "tangential")
         if force.slides:
             check_results(force, fluid, force.slip_limit, "largest slip [m]")
-        # The former name of ``events``: without this check such a method would be ignored.
-        if inspect.isfunction(kink := getattr(force, "kink", None)):
-            raise kernel_error(
-                force, kink, "is called kink: name it events and return a tuple, one a kink"
-            )
         if force.has_events:
             check_results(force, fluid, force.events)

@@ -100,14 +100,6 @@ def sphere_load(body, x, y, spin, viscosity, density, options):
     return -translation * x, -translation * y, -rotation * spin
 
 
-def load_in_flow(body, flow):
-    """Return (cosine, sine) of the body's angle and `resistance_load` for its motion in a flow."""
-    u, v, turning = flow_at(flow, body.x, body.y)
-    c, s = math.cos(body.angle), math.sin(body.angle)
-    x, y, turn = resistance_load(body, c, s, body.vx - u, body.vy - v, body.spin - turning)
-    return c, s, x, y, turn
-
-
 def strain_load(body, c, s, flow):
     """Return Γ (E_xx, E_xy) over the viscosity, the load of the strain, in the frame of the
     shape."""
@@ -220,22 +212,12 @@ class StokesDrag(BodyForce):
         return SCHILLER_NAUMANN_UP_TO if self.law == "schiller_naumann" else STOKES_UP_TO
 
     def kernel_in(self, fluid: Fluid) -> Callable:
-        """Return the cheapest kernel that is exact in this fluid.
-
-        Still water needs no flow and no derivatives with respect to position; a flow without strain
-        needs none with respect to the angle.
-        """
-        moves, strains = any(fluid.flow), any(strain_of(fluid.flow))
-        # Every kernel is exact for the cases in which it is chosen; they differ in cost.
+        """Return the kernel of this law; in still water one without derivatives by position."""
         if self.law == "shape":
-            if self.clusters:
-                return self.shielded_shape
-            return self.shape_strained if strains else self.shape
+            return self.shape
         if self.clusters:
-            return self.shielded if moves else self.shielded_still
-        if self.strain and strains:
-            return self.strained
-        return self.kernel if moves else self.still
+            return self.shielded
+        return self.kernel if any(fluid.flow) else self.still
 
     @property
     def options(self) -> tuple[bool, bool, float]:
@@ -256,19 +238,11 @@ class StokesDrag(BodyForce):
         return [words, *others]
 
     @staticmethod
-    def kernel(body, viscosity, density, flow, options):
-        """Return the load on the equivalent sphere in the flow."""
-        u, v, turning = flow_at(flow, body.x, body.y)
-        return sphere_load(
-            body, body.vx - u, body.vy - v, body.spin - turning, viscosity, density, options
-        )
-
-    @staticmethod
-    def strained(body, viscosity, density, flow, options):
-        """Return the same load with the torque of the flow's strain on the elongated shape."""
+    def kernel(body, viscosity, density, flow, strain, options):
+        """Return the load on the equivalent sphere in a flow, with or without strain torque."""
         u, v, turning = flow_at(flow, body.x, body.y)
         # Jeffery: the strain shifts the spin at which there is no torque.
-        spin = body.spin - turning - strain_spin(body, flow)
+        spin = body.spin - turning - strain * strain_spin(body, flow)
         return sphere_load(body, body.vx - u, body.vy - v, spin, viscosity, density, options)
 
     @staticmethod
@@ -278,8 +252,7 @@ class StokesDrag(BodyForce):
 
     @staticmethod
     def shielded(body, viscosity, density, flow, strain, options):
-        """Return the load on the equivalent sphere in a cluster, in a flow with or without strain
-        torque."""
+        """Return the load on the equivalent sphere in a cluster."""
         u, v, turning = flow_at(flow, body.x, body.y)
         spin = body.spin - turning - strain * strain_spin(body, flow)
         # The drag matrix is Q R Q: the velocity is shielded first, then the force.
@@ -289,37 +262,14 @@ class StokesDrag(BodyForce):
         return fx, fy, torque
 
     @staticmethod
-    def shielded_still(body, viscosity, density, options):
-        """Return the load on the equivalent sphere in a cluster in still water."""
-        x, y = apply_shielding(body, body.vx, body.vy)
-        fx, fy, torque = sphere_load(body, x, y, body.spin, viscosity, density, options)
-        fx, fy = apply_shielding(body, fx, fy)
-        return fx, fy, torque
-
-    @staticmethod
     def shape(body, viscosity, flow):
-        """Return the load on the shape in a flow without strain."""
-        c, s, x, y, turn = load_in_flow(body, flow)
-        # Back from the frame of the shape to that of the scene.
-        return -viscosity * (c * x - s * y), -viscosity * (s * x + c * y), -viscosity * turn
-
-    @staticmethod
-    def shape_strained(body, viscosity, flow):
-        """Return the load on the shape in any linear flow."""
-        c, s, x, y, turn = load_in_flow(body, flow)
-        more_x, more_y, more = strain_load(body, c, s, flow)
-        # Load of the strain minus resistance, then back to the frame of the scene.
-        x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
-        return c * x - s * y, s * x + c * y, turn
-
-    @staticmethod
-    def shielded_shape(body, viscosity, flow):
-        """Return the load on the shape in a cluster."""
+        """Return the load on the shape, shielded by its cluster if it is in one."""
         u, v, turning = flow_at(flow, body.x, body.y)
         c, s = math.cos(body.angle), math.sin(body.angle)
         x, y = apply_shielding(body, body.vx - u, body.vy - v)
         x, y, turn = resistance_load(body, c, s, x, y, body.spin - turning)
         more_x, more_y, more = strain_load(body, c, s, flow)
+        # Load of the strain less resistance, then back to the frame of the scene.
         x, y, turn = viscosity * (more_x - x), viscosity * (more_y - y), viscosity * (more - turn)
         x, y = apply_shielding(body, c * x - s * y, s * x + c * y)
         return x, y, turn

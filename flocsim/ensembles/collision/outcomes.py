@@ -49,6 +49,7 @@ from flocsim.bonds.certificate import (
     pose_change,
     radii_of,
 )
+from flocsim.bonds.escape import forces_at_rest
 from flocsim.bonds.rest import NESTED_REST_TIMES, STABLE_POSE, is_swinging, kind_at_rest
 from flocsim.geometry.contact.near_pairs import core_distance, gap_between, pose_of
 from flocsim.geometry.contact.points import least_listed_gap
@@ -60,7 +61,6 @@ from flocsim.hooks import (
     has,
     velocity_derivatives,
 )
-from flocsim.integrators.rhs.climb import repulsion_at
 from flocsim.integrators.rhs.views import body_view, centre_line, centre_view
 from flocsim.state.bodies import ANGLE, X, Y
 from flocsim.state.work import NOW
@@ -335,7 +335,8 @@ def return_bound(scene, work, observed, time):
         return 1.0
     half = 0.5 * (along - outer)
     mobility = observed[MOBILITY_I] + observed[MOBILITY_J]
-    repulsion = repulsion_at(scene, work, time, BODY_J, BODY_I, outer + half, half, -half)
+    between, outlines = forces_at_rest(scene, work, time, BODY_J, BODY_I, outer + half, half, -half)
+    repulsion = between + outlines
     drift += mobility * min(repulsion, 0.0)
     # By Einstein's relation D = k_B T µ.
     way = half - left_over(scene, work, observed)

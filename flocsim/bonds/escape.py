@@ -15,24 +15,44 @@ BARRIER = 20.0
 relaxation times."""
 
 CLIMB_STEP, LEAST_CLIMB_STEP = 0.125, 1e-11
-"""Integration step as a fraction of the gap that the force depends on, and its lower bound [m]."""
+"""Step along the path as a fraction of the length over which forces vary, and its lower bound
+[m]."""
 
 
-def repulsion_at(scene, work, time, a, b, distance, gap, displacement):
-    """Return the repulsion of bodies a and b at rest [N], a being moved out along the line of
-    centres.
+def forces_at_rest(scene, work, time, a, b, distance, gap, displacement):
+    """Return the repulsion of two bodies at rest (between centres, between outlines) [N], a being
+    moved out along the line of centres.
 
-    ``distance`` and ``gap`` [m] are the values there, ``displacement`` [m] is how far a was moved.
+    ``distance`` of the centres and ``gap`` of the outlines [m] are the values there,
+    ``displacement`` [m] is how far a was moved.
     """
-    force = 0.0
+    centres, outlines = 0.0, 0.0
     sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
     if has(scene, CENTRE_FORCE):
-        force += centre_force(scene, pair_view(scene, time, a, b, distance - sizes, 0.0, distance))
+        view = pair_view(scene, time, a, b, distance - sizes, 0.0, distance)
+        centres = centre_force(scene, view)
     if scene.surface_reach > gap:
-        force += surface_force(scene, pair_view(scene, time, a, b, gap, 0.0, distance))
+        outlines = surface_force(scene, pair_view(scene, time, a, b, gap, 0.0, distance))
     if has_outline_forces(scene):
-        force += outline_repulsion(scene, work, time, a, b, displacement)
-    return force
+        outlines += outline_repulsion(scene, work, time, a, b, displacement)
+    return centres, outlines
+
+
+def variation_length(scene, between, gap, feature_gap, longest):
+    """Return the length over which such forces vary [m]: the smallest of the gaps that they depend
+    on.
+
+    ``between``: gap of the equivalent spheres; ``gap``: that of surface forces; ``feature_gap``:
+    that of the outlines' features.
+    """
+    length = longest
+    if has(scene, CENTRE_FORCE):
+        length = min(length, abs(between))
+    if scene.surface_reach > 0.0:
+        length = min(length, abs(gap))
+    if feature_gap < outline_reach(scene):
+        length = min(length, max(feature_gap, scene.outlines[1]))
+    return length
 
 
 def can_escape(scene, work, time, a, b, distance, gap, load, needed):
@@ -46,24 +66,18 @@ def can_escape(scene, work, time, a, b, distance, gap, load, needed):
     if not load < math.inf or has(scene, ORIENTED_ENERGY):
         return True
     sizes = scene.bodies[a].equivalent_radius + scene.bodies[b].equivalent_radius
-    centres = has(scene, CENTRE_FORCE)
     # The path ends 2 (r_a + r_b) beyond the touch.
     energy, displacement = 0.0, 0.0
     end = 2.0 * sizes + max(-gap, sizes - distance, 0.0)
     while displacement < end:
-        # Forces vary on the scale of the gap that they depend on.
-        increment = end
-        if centres:
-            increment = min(increment, CLIMB_STEP * abs(distance + displacement - sizes))
-        if scene.surface_reach > 0.0:
-            increment = min(increment, CLIMB_STEP * abs(gap + displacement))
-        if gap + displacement < outline_reach(scene):
-            increment = min(increment, CLIMB_STEP * max(gap + displacement, scene.outlines[1]))
+        between, apart = distance + displacement - sizes, gap + displacement
+        increment = CLIMB_STEP * variation_length(scene, between, apart, apart, end)
         increment = max(increment, LEAST_CLIMB_STEP)
         # Midpoint rule.
         middle = displacement + 0.5 * increment
         point = distance + middle, gap + middle, middle
-        energy -= (repulsion_at(scene, work, time, a, b, *point) + load) * increment
+        centres, outlines = forces_at_rest(scene, work, time, a, b, *point)
+        energy -= (centres + outlines + load) * increment
         if energy > needed:
             return False
         displacement += increment
