@@ -15,7 +15,7 @@ these two bodies only. There are three certificates.
 - In kicks (thermal motion): the energy needed to climb out, against the load times its leverage
   where it pries, exceeds the present energy plus BARRIER k_B T. By Kramers' rate escape then takes
   e^20 = 5e8 relaxation times. However shapes roll, they have to climb their potential
-  (integrators/rhs/climb.py).
+  (escape.py).
 
 Only forces at rest count: resistance to opening, such as lubrication, carries no load in the long
 run.

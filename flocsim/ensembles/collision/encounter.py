@@ -16,6 +16,7 @@ import numpy as np
 
 from flocsim.body import Body
 from flocsim.bonds.certificate import SAFETY
+from flocsim.bonds.escape import BARRIER
 from flocsim.bonds.rest import REST_TURNS
 from flocsim.compiler.by_pointer import keep
 from flocsim.ensembles.collision import outcomes
@@ -32,7 +33,6 @@ from flocsim.forces.pair_resistance import PairResistance, resistance_of_pairs
 from flocsim.forces.settling import largest_mobility, terminal_motion
 from flocsim.geometry.contact.core_points import Outlines, outlines_of
 from flocsim.geometry.shapes.shape import Shape
-from flocsim.integrators.rhs.climb import BARRIER
 from flocsim.io.results.schema import SHAPE_MEASURES
 from flocsim.state.scene import Scene
 from flocsim.state.work import Work, begin_anew, work_of
