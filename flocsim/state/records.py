@@ -78,9 +78,12 @@ class Record(Element):
 
     @classmethod
     def joined(cls, arrays: Iterable[np.ndarray]) -> Any:
-        """Return arrays of these records as one: np.concatenate makes plain ones of them where they
-        come from another concatenation."""
-        return np.concatenate([*arrays]).view(cls.dtype)
+        """Return arrays of these records as one.
+
+        np.concatenate compares the fields of records one by one, and forgets their class where two
+        arrays do not share one dtype object: it is given their bytes.
+        """
+        return np.concatenate([each.view(np.uint8) for each in arrays]).view(cls.dtype)
 
 
 def copied(value: Any) -> Any:
