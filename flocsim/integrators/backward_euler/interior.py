@@ -62,9 +62,6 @@ iteration (the usual fraction-to-the-boundary rule)."""
 RESTART_RATIO = 0.9
 """Largest |f/L| with which a contact that has blocked the iterations restarts."""
 
-NEGLIGIBLE_FRACTION = 1e-14
-"""Fraction δ/(δ + s) of a contact's stiffness below which it is left out of the system."""
-
 MIN_LIMIT = 1e-3
 """Least friction limit, over that of the spring alone: L must stay positive where the dashpot
 pulls."""
@@ -242,11 +239,10 @@ def write_forces(scene, work, step, target, turns):
                 tangential, slope, coupled = unlimited_friction(scene, work, row, step, target)
             add_pair_force(work, NOW, row, normal, tangential)
             # Only the fraction δ/(δ + s) of the stiffness resists a change of the gap.
-            active_fraction = overlap / (overlap + slack)
-            if active_fraction > NEGLIGIBLE_FRACTION:
-                add_contact_slopes(scene, work, row, active_fraction * stiffness, slope, coupled)
-                if turns:
-                    add_geometric_stiffness(scene, work, row, normal, tangential)
+            stiffness *= overlap / (overlap + slack)
+            add_contact_slopes(scene, work, row, stiffness, slope, coupled)
+            if turns:
+                add_geometric_stiffness(scene, work, row, normal, tangential)
 
 
 def keep_positive(fraction, size, change):
@@ -411,10 +407,10 @@ def is_infeasible(work, row, least):
 
 
 @apart
-def is_decided(work, least, fitting):
-    """Return True if all contacts are decided and, with ``fitting``, feasible."""
+def is_decided(work, least):
+    """Return True if all contacts are decided and feasible."""
     for row in range(work.tally.candidates):
-        undecided = is_undecided(work, row, least) or (fitting and is_infeasible(work, row, least))
+        undecided = is_undecided(work, row, least) or is_infeasible(work, row, least)
         if undecided and is_included(work, row):
             return False
     return True

@@ -30,7 +30,6 @@ from flocsim.integrators.backward_euler.interior import (
 from flocsim.integrators.backward_euler.newton import (
     apply_change,
     assemble_other_derivatives,
-    evaluate_end,
     evaluate_included,
     evaluate_other_forces,
     final_tolerance,
@@ -45,17 +44,12 @@ from flocsim.integrators.rhs.views import effective_mass
 from flocsim.state.bodies import X, Y
 from flocsim.state.work import CHANGE, NOW, START, TRIAL
 
-MAX_FROZEN, MAX_TRUE, MAX_WARM = 70, 45, 24
-"""Most iterations along frozen gaps, along true gaps after that, and along true gaps from a warm
-start."""
+MAX_ITERATIONS = 50
+"""Most iterations along frozen gaps, and along true gaps."""
 
-SIGMA_FAST, FULL_STEP = 0.01, 0.7
-"""Centring parameter: τ over the mean product, after an iteration that made at least FULL_STEP of
-its change."""
-
-SIGMA_FROZEN, SIGMA_CAREFUL, SIGMA_TRUE, SIGMA_OWN = 0.03, 0.5, 0.2, 0.05
-"""Centring parameters after shorter iterations: along frozen gaps, there in the second search,
-along true gaps, and where each contact makes a step of its own."""
+SIGMA, SIGMA_FAST, FULL_STEP = 0.05, 0.01, 0.7
+"""Centring parameter: τ over the mean product; SIGMA_FAST after an iteration that made at least
+FULL_STEP of its change."""
 
 UNFREEZE, MIN_PRODUCT = 0.1, 1e-10
 """Mean product, over the square of a typical overlap, below which gaps are no longer frozen; and
@@ -69,29 +63,15 @@ NEWTON_RADIUS = 10.0
 """Largest last change, over Newton's own tolerance, from which Newton's method finds the end once
 all contacts are decided."""
 
-CONVERGED_CHANGE, CONVERGED_STEP, CONVERGED_PRODUCT = 0.1, 0.9, 1e-4
-"""The end is reached without Newton's method at a change below this multiple of its tolerance,
-after an iteration of at least this fraction, and at a mean product below this multiple of the
-square of a typical overlap: contacts that are still undecided then move nothing."""
-
 START_SIZE = 0.1
 """Least initial value of δ, s and slips in a cold start, over their typical size."""
-
-START_LIMIT = 1e-3
-"""Least friction limit in a cold start, over a typical overlap."""
 
 WARM_FRACTION = 0.03
 """Square root of the initial products of a warm start, over a typical overlap."""
 
-DIVERGED_RATIO = 30.0
-"""A search with individual steps has diverged at a change this many times the first one."""
-
 STALLED_STEP, MAX_STALLED = 0.05, 2
 """Iterations that make less than this fraction of their change are stalled; after this many in a
 row friction is frozen, or the search given up."""
-
-FAILED, NEAR_END, AT_END = range(3)
-"""Outcome of a search: no end; near enough for Newton's method; at the end."""
 
 
 def typical_force(scene, work):
@@ -143,7 +123,7 @@ def start_cold(scene, work, step, overlap_scale, slack_scale):
                 * overlap_scale
                 * START_SIZE
                 * slack_scale
-                / max(contact.friction_limit, START_LIMIT * overlap_scale)
+                / max(contact.friction_limit, START_SIZE * overlap_scale)
             )
             contact.slip_forward = max(contact.sticking_force, slides)
             contact.slip_backward = max(-contact.sticking_force, slides)
@@ -245,87 +225,50 @@ def count_stalls(work, stalled, fraction, first):
 
 
 @apart
-def follow_true_gaps(scene, work, clock, step, overlap_scale, most, own):
-    """Iterate along true gaps, with τ near its final size; return the outcome.
-
-    A search with ``own`` steps is given up where its changes grow.
-    """
-    fraction, stalled, first_change = 1.0, 0, math.inf
-    for _ in range(most):
+def follow_true_gaps(scene, work, clock, step, overlap_scale, own):
+    """Iterate along true gaps, with τ near its final size, and end by Newton's method; return False
+    where that fails."""
+    fraction, stalled = 1.0, 0
+    for _ in range(MAX_ITERATIONS):
         # Choose τ by the success of the last iteration.
-        mean = mean_product(work)
-        target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA_OWN if own else SIGMA_TRUE) * mean
+        target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA) * mean_product(work)
         target = max(target, MIN_PRODUCT * overlap_scale * overlap_scale)
         fraction, first, change = iterate_once(scene, work, clock, step, target, True, own)
-        if fraction < 0.0 or (own and change > DIVERGED_RATIO * first_change):
-            return FAILED
-        first_change = change if first_change == math.inf else first_change
+        if fraction < 0.0:
+            return False
         if not own:
             stalled, goes_on = count_stalls(work, stalled, fraction, first)
             if not goes_on:
-                return FAILED
-        goal = final_tolerance(scene, work, clock, step)
+                return False
         # All decided and feasible: Newton's method can finish.
-        near = fraction > FULL_STEP and change <= NEWTON_RADIUS * goal
-        if near and is_decided(work, DECIDED_FRACTION * overlap_scale, True):
-            return NEAR_END
-        # Nothing that is undecided moves a body.
-        converged = fraction > CONVERGED_STEP and change <= CONVERGED_CHANGE * goal
-        if converged and mean <= CONVERGED_PRODUCT * overlap_scale * overlap_scale:
-            return AT_END
-    return FAILED
-
-
-@apart
-def follow_frozen_gaps(scene, work, clock, step, overlap_scale, slack_scale, careful):
-    """Search for the end of the step without knowledge of its contacts; return the outcome."""
-    # Freeze gaps and directions where the step would end without contacts.
-    copy_motion(work, START, NOW)
-    evaluate_other_forces(scene, work, clock.time, step)
-    start_cold(scene, work, step, overlap_scale, slack_scale)
-    fraction, stalled, standing = 0.0, 0, SIGMA_CAREFUL if careful else SIGMA_FROZEN
-    for _ in range(MAX_FROZEN):
-        # Products are small: locate the contacts, and follow true gaps.
-        target = (SIGMA_FAST if fraction >= FULL_STEP else standing) * mean_product(work)
-        fraction, first, _ = iterate_once(scene, work, clock, step, target, False, False)
-        if fraction < 0.0:
-            return FAILED
-        stalled, goes_on = count_stalls(work, stalled, fraction, first)
-        if not goes_on:
-            return FAILED
-        if fraction > FULL_STEP and mean_product(work) <= UNFREEZE * overlap_scale * overlap_scale:
-            evaluate_other_forces(scene, work, clock.time, step)
-            own = not careful and allows_own_steps(scene, work)
-            return follow_true_gaps(scene, work, clock, step, overlap_scale, MAX_TRUE, own)
-    return FAILED
-
-
-def misses_contact(work):
-    """Return True if a pair has closed that was not included."""
-    for row in range(work.tally.candidates):
-        if work.geometry[NOW, row].gap < 0.0 and not is_included(work, row):
-            return True
+        near = change <= NEWTON_RADIUS * final_tolerance(scene, work, clock, step)
+        if near and fraction > FULL_STEP and is_decided(work, DECIDED_FRACTION * overlap_scale):
+            return solve_end(scene, work, clock, step)
     return False
-
-
-def reaches_end(scene, work, clock, step, outcome):
-    """Return True if the end of the step has been reached, or Newton's method reaches it from
-    here."""
-    if outcome == AT_END:
-        if not evaluate_end(scene, work, clock.time, step):
-            return False
-        if not misses_contact(work):
-            return True
-    return outcome != FAILED and solve_end(scene, work, clock, step)
 
 
 @apart
 def search_cold(scene, work, clock, step, overlap_scale, slack_scale):
-    """Search for the end of the step from a cold start, a second time more carefully."""
-    for careful in (False, True):
-        outcome = follow_frozen_gaps(scene, work, clock, step, overlap_scale, slack_scale, careful)
-        if reaches_end(scene, work, clock, step, outcome):
-            return True
+    """Search for the end of the step without knowledge of its contacts; return False where that
+    fails."""
+    # Freeze gaps and directions where the step would end without contacts.
+    copy_motion(work, START, NOW)
+    evaluate_other_forces(scene, work, clock.time, step)
+    start_cold(scene, work, step, overlap_scale, slack_scale)
+    fraction, stalled = 0.0, 0
+    for _ in range(MAX_ITERATIONS):
+        target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA) * mean_product(work)
+        fraction, first, _ = iterate_once(scene, work, clock, step, target, False, False)
+        if fraction < 0.0:
+            return False
+        stalled, goes_on = count_stalls(work, stalled, fraction, first)
+        if not goes_on:
+            return False
+        # Products are small: locate the contacts, and follow true gaps.
+        if fraction > FULL_STEP and mean_product(work) <= UNFREEZE * overlap_scale * overlap_scale:
+            evaluate_other_forces(scene, work, clock.time, step)
+            own = allows_own_steps(scene, work)
+            return follow_true_gaps(scene, work, clock, step, overlap_scale, own)
     return False
 
 
@@ -341,8 +284,7 @@ def find_end(scene, work, clock, step):
         return solve_end(scene, work, clock, step)
     # Warm start first: in a bed at rest most contacts stay as they are.
     start_warm(scene, work, step, overlap_scale)
-    if allows_own_steps(scene, work):
-        outcome = follow_true_gaps(scene, work, clock, step, overlap_scale, MAX_WARM, True)
-        if reaches_end(scene, work, clock, step, outcome):
-            return True
+    own = allows_own_steps(scene, work)
+    if own and follow_true_gaps(scene, work, clock, step, overlap_scale, True):
+        return True
     return search_cold(scene, work, clock, step, overlap_scale, slack_scale)
