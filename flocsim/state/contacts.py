@@ -38,7 +38,6 @@ class InteriorPoint(Record):
     friction_limit: float  # L, largest friction; 0: there is no limit, or no friction [m]
     sticking_force: float  # e, friction of a sticking contact [m]
     sticking_slope: float  # derivative of e with respect to the tangential velocity [s]
-    frozen_overlap: float  # overlap that decides friction; 0: δ does [m]
     closed_fraction: float  # fraction of the step in which the contact is closed
     fade_length: float  # gap in which that fraction falls to half as the contact opens [m]
 

@@ -19,7 +19,6 @@ import math
 
 from flocsim.compiler.linker import apart
 from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, slip_limit
-from flocsim.integrators.radau.tableau import REAL
 from flocsim.integrators.rhs.friction import limit_slope
 from flocsim.integrators.rhs.jacobian import (
     add_geometric_stiffness,
@@ -98,27 +97,21 @@ def sticking_slopes(scene, view, limit, step):
     return by_slip, -contact_force(scene, dragged)[1] / rate
 
 
-def friction_overlap(work, row):
-    """Return the overlap that decides the friction of a pair [m]: its own, or a frozen one."""
-    frozen = work.interior[row].frozen_overlap
-    return frozen if frozen > 0.0 else work.interior[row].overlap
-
-
 def friction_view(scene, work, row, step):
     """Return the ContactView of a pair over the step for its friction.
 
     Writes ξ₁ to ``work.slip[NEW]`` and the direction of sliding to the candidate.
     """
-    loading_overlap, rate = friction_overlap(work, row), tangential_rate(work, NOW, row)
+    overlap, rate = work.interior[row].overlap, tangential_rate(work, NOW, row)
     slip, direction = work.slip[NOW, row] + work.interior[row].closed_fraction * step * rate, 0
     # Return mapping: cut the sticking displacement to its limit.
     if has(scene, SLIP_LIMIT):
-        limit = slip_limit(scene, step_view(scene, work, row, step, loading_overlap, 0.0, 0.0))
+        limit = slip_limit(scene, step_view(scene, work, row, step, overlap, 0.0, 0.0))
         if abs(slip) > limit:
             direction = 1 if slip > 0.0 else -1
             slip = direction * limit
     work.slip[NEW, row], work.candidates[row].slide_direction = slip, direction
-    return step_view(scene, work, row, step, loading_overlap, slip, rate)
+    return step_view(scene, work, row, step, overlap, slip, rate)
 
 
 def normal_force(scene, work, row, step, overlap_end):
@@ -144,42 +137,14 @@ def friction_force(scene, work, row, step):
 def add_mean_forces(scene, work, step):
     """Add the forces of all contacts over the step to those of NOW."""
     for row in range(work.tally.candidates):
-        # Friction depends on the overlap at the end, and on s. With frozen friction s stays as it
-        # is.
+        # Friction depends on the overlap at the end, and on s.
         work.interior[row].overlap = end_overlap(work, row)
-        if work.interior[row].frozen_overlap == 0.0:
-            work.interior[row].closed_fraction = closed_part(work, row)
+        work.interior[row].closed_fraction = closed_part(work, row)
         if takes_part(work, row):
             normal = normal_force(scene, work, row, step, work.interior[row].overlap)
             add_pair_force(work, NOW, row, normal, friction_force(scene, work, row, step))
         else:
             work.slip[NEW, row], work.candidates[row].slide_direction = 0.0, 0
-
-
-@apart
-def add_frozen_friction_residual(scene, work, step):
-    """Add to the loads the friction at the end minus the frozen friction that the step was solved
-    with.
-
-    The result enters the error estimate of the step.
-    """
-    for row in range(work.tally.candidates):
-        candidate = work.candidates[row]
-        frozen, fraction = work.interior[row].frozen_overlap, work.interior[row].closed_fraction
-        # Evaluate friction twice: with the overlap at the end, and with the frozen one.
-        if frozen > 0.0 and takes_part(work, row):
-            work.interior[row].frozen_overlap, work.interior[row].closed_fraction = (
-                0.0,
-                closed_part(work, row),
-            )
-            missing = friction_force(scene, work, row, step)
-            work.interior[row].frozen_overlap, work.interior[row].closed_fraction = frozen, fraction
-            missing -= friction_force(scene, work, row, step)
-            a, b = candidate.vertex_body, candidate.edge_body
-            of_a, of_b = tangent_rows(work, row)
-            for axis in range(3):
-                work.loads[REAL, 3 * a + axis] += missing * of_a[axis]
-                work.loads[REAL, 3 * b + axis] += missing * of_b[axis]
 
 
 def add_contact_slopes(scene, work, row, normal, tangential, coupled):
@@ -235,8 +200,6 @@ def add_all_derivatives(scene, work, step):
             if overlap_end > 0.0:
                 stiffness = normal_stiffness(scene, work, row, step, overlap_end)
                 coupled += by_overlap
-            if work.interior[row].frozen_overlap > 0.0:
-                coupled = 0.0
             add_contact_slopes(scene, work, row, stiffness, slope, coupled)
             force = normal_force(scene, work, row, step, overlap_end)
             add_geometric_stiffness(scene, work, row, force, friction_force(scene, work, row, step))

@@ -22,9 +22,8 @@ p and q follow L. Where L was changed between iterations only, half of the searc
 polygons failed.
 
 With L(δ) the systems are not symmetric, and may lead to no solution (a contact wedged between
-sliding ones): the iterations then make ever shorter steps. In that case overlap and closed fraction
-that decide the friction are frozen (``frozen_overlap``, ``closed_fraction``): the problem is convex
-then, and has one solution. The difference to the true friction counts as an error of the step.
+sliding ones): the iterations then make ever shorter steps, the search is given up, and the step
+repeated with a smaller size.
 
 The length of an iteration is limited by the contact that would first leave its domain, and among
 hundreds there is always one. So near a solution each contact makes a step of its own, and the
@@ -45,7 +44,6 @@ from flocsim.hooks import SLIP_LIMIT, contact_derivatives, contact_force, has, s
 from flocsim.integrators.backward_euler.contact_mean import (
     add_contact_slopes,
     friction_force,
-    friction_overlap,
     friction_slopes,
     step_view,
     sticking_slopes,
@@ -58,9 +56,6 @@ from flocsim.state.work import CHANGE, NOW, TRIAL
 BOUNDARY_FRACTION = 0.99
 """Largest fraction of the distance to the boundary of its domain that a quantity may go in an
 iteration (the usual fraction-to-the-boundary rule)."""
-
-RESTART_RATIO = 0.9
-"""Largest |f/L| with which a contact that has blocked the iterations restarts."""
 
 MIN_LIMIT = 1e-3
 """Least friction limit, over that of the spring alone: L must stay positive where the dashpot
@@ -111,24 +106,22 @@ def evaluate_law(scene, work, row, step, turns):
     stiffness = hardness = values[2] + values[4] / step
     spring, dashpot = -values[7], -values[9]
     if has(scene, SLIP_LIMIT):
-        loading_overlap = friction_overlap(work, row)
         if not hardness > 0.0:
             # A law without tension clips a pull: take the stiffness of the same overlap at rest.
             pressed = contact_derivatives(scene, view_without_slip(view, overlap, 0.0))
             hardness = pressed[2] + pressed[4] / step
         # Stiffness while sticking, and the limit L over the normal stiffness.
-        friction_view = step_view(scene, work, row, step, loading_overlap, 0.0, 0.0)
+        friction_view = step_view(scene, work, row, step, overlap, 0.0, 0.0)
         slip_cut = slip_limit(scene, friction_view)
         if 0.0 < slip_cut < math.inf:
             spring, dashpot = sticking_slopes(scene, friction_view, slip_cut, step)
             limit = spring * slip_cut
             if turns:
-                limit_view = step_view(scene, work, row, step, loading_overlap, slip_cut, abs(rate))
+                limit_view = step_view(scene, work, row, step, overlap, slip_cut, abs(rate))
                 limit = max(-contact_force(scene, limit_view)[1], MIN_LIMIT * limit)
             limit /= hardness
     # e = k_t (ξ₀ + s h v_t) + damping, over the normal stiffness.
-    if contact.frozen_overlap == 0.0:
-        contact.closed_fraction, _, _ = closed_part_slopes(work, row, limit > 0.0)
+    contact.closed_fraction, _, _ = closed_part_slopes(work, row, limit > 0.0)
     part = contact.closed_fraction
     contact.normal_stiffness, contact.friction_limit = hardness, limit
     contact.sticking_slope = (spring * part * step + dashpot) / hardness
@@ -174,14 +167,6 @@ def friction_correction(work, row, target):
     return weight, change, weight * (forward - backward)
 
 
-def limit_per_overlap(work, row):
-    """Return dL/dδ; 0 where friction is frozen."""
-    contact = work.interior[row]
-    if contact.frozen_overlap > 0.0:
-        return 0.0
-    return contact.friction_limit / contact.overlap
-
-
 def limited_friction(work, row, target):
     """Return s T, minus its derivative by v_t, and that by the gap, of a contact with a friction
     limit."""
@@ -189,7 +174,7 @@ def limited_friction(work, row, target):
     total_size = contact.overlap + contact.slack
     weight, change, by_limit = friction_correction(work, row, target)
     scale = contact.closed_fraction * contact.normal_stiffness
-    by_limit *= limit_per_overlap(work, row)
+    by_limit *= contact.friction_limit / contact.overlap
     # The linearised friction after this iteration, at the present gap and v_t.
     force = contact.friction_ratio * contact.friction_limit + change
     force += by_limit * overlap_correction(work, row, target)
@@ -204,8 +189,6 @@ def unlimited_friction(scene, work, row, step, target):
     total_size = contact.overlap + contact.slack
     force = friction_force(scene, work, row, step)
     slope, _, by_part = friction_slopes(scene, work, row, step)
-    if contact.frozen_overlap > 0.0:
-        return force, slope, 0.0
     # Without a limit, friction depends on δ and s through the closed fraction.
     _, grows, falls = closed_part_slopes(work, row, False)
     d_overlap = overlap_correction(work, row, target)
@@ -302,7 +285,7 @@ def change_pair(work, row, step, target, fraction, apply):
     d_overlap = overlap_correction(work, row, target) - overlap / (overlap + slack) * d_gap
     d_slack = d_gap + d_overlap - (slack - work.geometry[NOW, row].gap - overlap)
     if contact.friction_limit > 0.0:
-        d_limit = d_overlap * limit_per_overlap(work, row)
+        d_limit = d_overlap * contact.friction_limit / overlap
         fraction = change_friction(work, row, target, d_limit, fraction, apply)
     if apply:
         contact.overlap += fraction * d_overlap
@@ -313,26 +296,23 @@ def change_pair(work, row, step, target, fraction, apply):
 
 @apart
 def change_pairs(work, step, target, own):
-    """Change all contacts along with the velocities in CHANGE; return (smallest fraction, its
-    pair).
+    """Change all contacts along with the velocities in CHANGE; return the smallest fraction.
 
-    All contacts go the smallest fraction, or each its ``own`` one. The pair is −1 where all may go
-    the full way.
+    All contacts go the smallest fraction, or each its ``own`` one.
     """
-    fraction, first = 1.0, -1
+    fraction = 1.0
     for row in range(work.tally.candidates):
         if is_included(work, row):
             fraction_own = change_pair(work, row, step, target, 1.0, False)
             if own:
                 change_pair(work, row, step, target, fraction_own, True)
-            if fraction_own < fraction:
-                fraction, first = fraction_own, row
+            fraction = min(fraction, fraction_own)
     if not own:
         # A common fraction keeps contacts and gaps consistent.
         for row in range(work.tally.candidates):
             if is_included(work, row):
                 change_pair(work, row, step, target, fraction, True)
-    return fraction, first
+    return fraction
 
 
 @apart
@@ -353,25 +333,6 @@ def set_friction(work, row, fraction, target):
     contact.friction_ratio = fraction
     contact.slip_forward = target / (limit * (1.0 - fraction))
     contact.slip_backward = target / (limit * (1.0 + fraction))
-
-
-@apart
-def freeze_friction(work, first):
-    """Freeze the overlap that decides friction in all contacts; return False if all are frozen
-    already.
-
-    The pair ``first``, which has blocked the iterations, restarts away from its limit.
-    """
-    newly = False
-    for row in range(work.tally.candidates):
-        contact = work.interior[row]
-        rubs = contact.sticking_slope > 0.0 and contact.frozen_overlap == 0.0
-        if is_included(work, row) and rubs:
-            contact.frozen_overlap, newly = contact.overlap, True
-    if newly and work.interior[first].friction_limit > 0.0:
-        fraction = min(max(work.interior[first].friction_ratio, -RESTART_RATIO), RESTART_RATIO)
-        set_friction(work, first, fraction, mean_product(work))
-    return newly
 
 
 def is_undecided(work, row, least):

@@ -48,7 +48,7 @@ def begin_step(work, clock):
     copy_motion(work, NOW, START)
     for row in range(work.tally.candidates):
         work.geometry[TRIAL, row] = work.geometry[NOW, row]
-        work.candidates[row].contact_mode, work.interior[row].frozen_overlap = OPEN, 0.0
+        work.candidates[row].contact_mode = OPEN
         least = FADE_FRACTION * clock.tolerance
         work.interior[row].fade_length = max(-work.geometry[NOW, row].gap, least)
 

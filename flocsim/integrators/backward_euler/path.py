@@ -19,7 +19,6 @@ from flocsim.integrators.backward_euler.contact_mean import flag_close, normal_s
 from flocsim.integrators.backward_euler.interior import (
     change_pairs,
     evaluate_law,
-    freeze_friction,
     is_decided,
     is_included,
     mean_product,
@@ -71,7 +70,7 @@ WARM_FRACTION = 0.03
 
 STALLED_STEP, MAX_STALLED = 0.05, 2
 """Iterations that make less than this fraction of their change are stalled; after this many in a
-row friction is frozen, or the search given up."""
+row the search is given up."""
 
 
 def typical_force(scene, work):
@@ -115,7 +114,6 @@ def start_cold(scene, work, step, overlap_scale, slack_scale):
             # Well inside the domain, and consistent with the gaps.
             contact.overlap = max(-work.geometry[TRIAL, row].gap, START_SIZE * overlap_scale)
             contact.slack = max(gap + contact.overlap, START_SIZE * slack_scale, -gap)
-            contact.frozen_overlap = 0.0
             evaluate_law(scene, work, row, step, False)
             contact.friction_ratio = 0.0
             slides = (
@@ -168,8 +166,7 @@ def advance_gaps(work, fraction, step):
 
 @apart
 def iterate_once(scene, work, clock, step, target, turns, own):
-    """Make one iteration towards products τ = ``target``; return (fraction made, blocking pair,
-    change [m]).
+    """Make one iteration towards products τ = ``target``; return (fraction made, change [m]).
 
     The fraction is −1 where the iteration fails. With ``own`` steps each contact goes its own
     fraction, bodies go all the way, and the smallest fraction is returned.
@@ -178,11 +175,11 @@ def iterate_once(scene, work, clock, step, target, turns, own):
     assemble_other_derivatives(scene, work, clock, step)
     write_forces(scene, work, step, target, turns)
     if not factorise_euler(scene, work, step):
-        return -1.0, -1, math.inf
+        return -1.0, math.inf
     change = solve_change(scene, work, step)
     if not change < math.inf:
-        return -1.0, -1, math.inf
-    fraction, first = change_pairs(work, step, target, own)
+        return -1.0, math.inf
+    fraction = change_pairs(work, step, target, own)
     apply_change(work, 1.0 if own else fraction)
     # Follow true gaps by locating the contacts, or frozen ones by their linear change.
     if turns:
@@ -193,7 +190,7 @@ def iterate_once(scene, work, clock, step, target, turns, own):
         advance_gaps(work, fraction, step)
         update_positions(work, step)
         sum_other_forces(scene, work, clock.time + step, NOW)
-    return fraction, first, change
+    return fraction, change
 
 
 def allows_own_steps(scene, work):
@@ -211,19 +208,6 @@ def allows_own_steps(scene, work):
     return True
 
 
-def count_stalls(work, stalled, fraction, first):
-    """Return (number of consecutive stalled iterations, whether to continue).
-
-    After MAX_STALLED of them friction is frozen, if it is not yet; see freeze_friction.
-    """
-    if fraction >= STALLED_STEP:
-        return 0, True
-    if stalled + 1 < MAX_STALLED:
-        return stalled + 1, True
-    # The frozen problem gets twice as many.
-    return -MAX_STALLED, freeze_friction(work, first)
-
-
 @apart
 def follow_true_gaps(scene, work, clock, step, overlap_scale, own):
     """Iterate along true gaps, with τ near its final size, and end by Newton's method; return False
@@ -233,13 +217,12 @@ def follow_true_gaps(scene, work, clock, step, overlap_scale, own):
         # Choose τ by the success of the last iteration.
         target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA) * mean_product(work)
         target = max(target, MIN_PRODUCT * overlap_scale * overlap_scale)
-        fraction, first, change = iterate_once(scene, work, clock, step, target, True, own)
+        fraction, change = iterate_once(scene, work, clock, step, target, True, own)
         if fraction < 0.0:
             return False
-        if not own:
-            stalled, goes_on = count_stalls(work, stalled, fraction, first)
-            if not goes_on:
-                return False
+        stalled = stalled + 1 if fraction < STALLED_STEP and not own else 0
+        if stalled == MAX_STALLED:
+            return False
         # All decided and feasible: Newton's method can finish.
         near = change <= NEWTON_RADIUS * final_tolerance(scene, work, clock, step)
         if near and fraction > FULL_STEP and is_decided(work, DECIDED_FRACTION * overlap_scale):
@@ -258,11 +241,11 @@ def search_cold(scene, work, clock, step, overlap_scale, slack_scale):
     fraction, stalled = 0.0, 0
     for _ in range(MAX_ITERATIONS):
         target = (SIGMA_FAST if fraction >= FULL_STEP else SIGMA) * mean_product(work)
-        fraction, first, _ = iterate_once(scene, work, clock, step, target, False, False)
+        fraction, _ = iterate_once(scene, work, clock, step, target, False, False)
         if fraction < 0.0:
             return False
-        stalled, goes_on = count_stalls(work, stalled, fraction, first)
-        if not goes_on:
+        stalled = stalled + 1 if fraction < STALLED_STEP else 0
+        if stalled == MAX_STALLED:
             return False
         # Products are small: locate the contacts, and follow true gaps.
         if fraction > FULL_STEP and mean_product(work) <= UNFREEZE * overlap_scale * overlap_scale:

@@ -22,7 +22,7 @@ import math
 from flocsim.compiler.linker import apart
 from flocsim.geometry.contact.points import normal_component
 from flocsim.hooks import CONTACT_FORCE, has
-from flocsim.integrators.backward_euler.contact_mean import add_frozen_friction_residual, takes_part
+from flocsim.integrators.backward_euler.contact_mean import takes_part
 from flocsim.integrators.backward_euler.newton import begin_step, end_step, solve_end
 from flocsim.integrators.backward_euler.path import find_end
 from flocsim.integrators.events.first_event import set_modes
@@ -169,8 +169,6 @@ def estimate_euler_error(scene, work, clock, step):
             slower = work.velocity[LAST_RATES, body, axis] + velocity_drop / step
             loads[REAL, 3 * body + axis] = 0.5 * inertia(scene, body, axis) * slower
             work.place[CHANGE, body, axis] = velocity_drop
-    if has(scene, CONTACT_FORCE):
-        add_frozen_friction_residual(scene, work, step)
     solve_loads(scene, work, 0.5 * step)
     # Error of the positions; load of the second filter.
     for body in range(work.place.shape[1]):
