@@ -74,10 +74,6 @@ class Clock(Record):
     rates_known: float  # 1 if the accelerations of the last such step (LAST_RATES) are stored
     switches_since_check: float  # switches since progress was last checked
     checked_at: float  # time of that check [s]; inf: no check yet
-    # Cycles of switches that are skipped (events.cycles).
-    cycle_end: float  # end of the last cycle [s]
-    previous_cycle_end: float  # end of the one before [s]
-    cycle_error: float  # stated error at the end of the last cycle [m]
 
 
 NEVER = 2**63 - 1
@@ -97,9 +93,3 @@ class Counts(Record):
     stationary_steps: int  # steps in a row that were too short to count as motion
     next_check: int  # number of steps after which to check the progress of the method, or NEVER
     trials_at_check: int  # steps and trials made by the last check
-    cycle_modes: int  # hash of the contact modes at which a cycle begins; 0: no cycle
-    cycle_code: int  # hash of the switches since
-    previous_cycle_code: int  # hash of the switches of the cycle before
-    cycle_switches: int  # switches since the cycle began
-    cycles_seen: int  # cycles completed
-    cycle_returns: int  # times the modes of its beginning have recurred since

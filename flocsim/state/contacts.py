@@ -13,10 +13,6 @@ class ContactState(Record):
     gap_offset: float  # gap at which a grazing pair is pinned; gaps count from it [m]
     flight_gap: float  # largest gap since the pair last opened [m]
     short_flights: float  # successive flights far below the tolerance (events.grazes)
-    cycle_slip: float  # ξ at the end of the last cycle of switches (events.cycles) [m]
-    cycle_slip_before: float  # ξ at the end of the previous cycle [m]
-    cycle_gap: float  # gap at the end of the last cycle [m]
-    cycle_gap_before: float  # gap at the end of the previous cycle [m]
     landing_time: float  # time of touching after the last such flight [s]
     sampled_margin: float  # margin (events.crossings) at the last sample in a step [m]
     sampled_margin_rate: float  # its rate of change [m/s]

@@ -58,10 +58,8 @@ STATES = FIRST_STAGE + MOST_STAGES
     FORCING,  # velocity rows: source term of the error-propagation equation [N, N, N m]
     LAST_RATES,  # velocity rows: accelerations of the last step across switches [m/s², 1/s²]
     AT_LAST_CHECK,  # velocity rows: velocities at the last check of progress
-    CYCLE_LAST,  # end of the last cycle of switches
-    CYCLE_BEFORE,  # end of the cycle before
     ALL_STATES,
-) = range(STATES, STATES + 10)
+) = range(STATES, STATES + 8)
 
 
 TERMS = 44
@@ -151,7 +149,6 @@ class Work(NamedTuple):
     rules: Annotated[np.ndarray, (MOST_ORDER + 1, 2, MOST_ORDER)]  # Gauss rules: nodes, weights
     squares: Annotated[np.ndarray, (SQUARES + 1, 7)]  # rows q of rhs.pair_resistance
     pairs: Annotated[np.ndarray, ("pairs",), BodyPair]
-    cycle_coordinates: Annotated[np.ndarray, (12,)]  # of two bodies, see events.cycles
     budget: Annotated[np.ndarray, ("pairs",)]  # relative motion while a pair's list is valid [m]
     # Forces along outlines and oriented forces now: F_x, F_y on the later body [N], torques on the
     # later and on the earlier body [N m].

@@ -49,7 +49,7 @@ class Stage:
         self.work = work_of(self.scene, *system.motion())
         self.clock, self.counts = integrator.fresh_clock(), integrator.fresh_counts(10**6)
         self.clock.until = 1.0
-        assert self.linked(keep_lists)(self.scene, self.work, self.counts, 0.0)
+        assert self.linked(keep_lists)(self.scene, self.work, 0.0)
 
     def linked(self, function):
         """The function with this family's others in the place of hooks."""

@@ -26,7 +26,7 @@ EXACT = 1e-18
 
 def even_steps(scene, work, clock, counts, step, count):
     """Take equal steps whatever their error; False where one fails."""
-    keep_lists(scene, work, counts, 0.0)
+    keep_lists(scene, work, 0.0)
     for _ in range(count):
         if attempt(scene, work, clock, step) < 0.0:
             return False

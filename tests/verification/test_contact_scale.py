@@ -49,8 +49,7 @@ def study_of(name, k_n, seed=12):
         # Two contacts throw each other open in turn, thousands of times.
         ("III", 16, 0.0, 2000.0, 29, "B", 1500),
         ("III", 64, 0.0, 2000.0, 46, "B", 8000),
-        # Their cycles are not alike, so that it is chance how many of them can be left out.
-        ("III", 64, 0.0, 2e5, 44, "B", 60_000),
+        ("III", 64, 0.0, 2e5, 44, "B", 20_000),
     ],
 )
 def test_what_decides_is_decided_at_its_own_scale(
@@ -96,15 +95,15 @@ def test_where_overlaps_are_at_rounding_contacts_let_go_when_they_do(
 
 
 @pytest.mark.slow
-def test_rattles_are_rare_and_mostly_cut_short():
-    """Single ones are chance; in the mean it was 5,200 steps while every cycle was followed."""
+def test_rattles_are_rare_and_mostly_short():
+    """Single ones are chance."""
     study = study_of("III", 2e5)
     steps = [study.run(0, 64, 0.0, replicate)["steps"] for replicate in range(60)]
     assert np.mean(steps) < 1500
     assert np.median(steps) < 500
 
 
-def test_cycles_that_are_left_out_change_no_end():
-    """A doublet parts within .02 s of when it does by every cycle, and no sooner: 31,858 steps."""
+def test_a_rattling_doublet_parts_when_it_should():
+    """As at finer tolerances."""
     row = study_of("III", 2000.0).run(0, 64, 0.0, 46)
     assert row["t_end"] == pytest.approx(0.1228, abs=2e-3)

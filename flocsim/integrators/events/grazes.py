@@ -5,8 +5,8 @@ tangential force has lifted it and the consequences are far below the tolerance:
 fly, and the displacement that its tangential spring would lose. The force that the spring releases
 must be negligible, too, unless the pair chatters, having parted and touched again several times
 like that: a first graze in an impact caused errors of fifty tolerances. Two contacts that throw
-each other open in turn do not graze; their cycles are followed, and skipped (cycles.py). Where the
-tolerance resolves all this, the contact law itself is followed.
+each other open in turn do not graze: they are followed, as is the contact law itself where the
+tolerance resolves all this.
 """
 
 import math
@@ -255,11 +255,6 @@ def chatters_in_turn(work, row):
         if same and later and chatters(work, other) and not same_point(work, row, other):
             return True
     return False
-
-
-def touched_recently(work, row):
-    """Return True if a pair is in contact, or has touched after its last long flight."""
-    return work.candidates[row].contact_mode != OPEN or work.contacts[row].short_flights > 0.0
 
 
 def count_short_flight(work, clock, step, row):

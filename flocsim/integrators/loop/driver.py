@@ -38,7 +38,6 @@ from flocsim.integrators.events.crossings import (
     may_switch,
     passes_through_reach,
 )
-from flocsim.integrators.events.cycles import skip_equal_cycles
 from flocsim.integrators.events.first_event import (
     CONTACTS_CHANGED,
     FRICTION_CHANGED,
@@ -51,7 +50,7 @@ from flocsim.integrators.events.first_event import (
 from flocsim.integrators.events.grazes import end_grazing_early, update_grazing_pairs
 from flocsim.integrators.events.interpolation import end_within
 from flocsim.integrators.events.samples import cut
-from flocsim.integrators.loop.kicks import kick_end, renew_kicks, snap_to_kick_end
+from flocsim.integrators.loop.kicks import renew_kicks, snap_to_kick_end
 from flocsim.integrators.loop.stated_error import (
     add_switch_errors,
     propagate_errors,
@@ -182,16 +181,15 @@ def pause_reason(counts, record):
 
 
 @apart
-def keep_lists(scene, work, counts, ahead):
+def keep_lists(scene, work, ahead):
     """Renew the candidate lists for steps of ``ahead`` [s] if half of their motion budget is spent
     or if they are too wide; return False if an array is full."""
     if needs_rebuild(scene, work, ahead) or is_too_wide(scene, work, ahead):
         if not rebuild_list_ahead(scene, work, ahead):
             return False
-        # New rows have no geometry and no mode yet, and cycles are described by rows.
+        # New rows have no geometry and no mode yet.
         locate_contacts(scene, work, NOW)
         set_modes(scene, work)
-        counts.cycle_modes = 0
     return True
 
 
@@ -271,7 +269,7 @@ def advance(scene, work, observed, clock, counts, record):
         if status != 0:
             return status
         # 1. Lists. A repeated trial starts from the same state: its lists are valid.
-        if lists and trials == 0 and not keep_lists(scene, work, counts, clock.step):
+        if lists and trials == 0 and not keep_lists(scene, work, clock.step):
             return NO_ROOM
         # 2. Attempt a step.
         hand_over(scene, work, clock, counts)
@@ -320,10 +318,6 @@ def advance(scene, work, observed, clock, counts, record):
         was_flying = work.tally.kind == SERIES and not any_touching(work)
         planned = clock.step
         switched = accept(scene, work, clock, counts, step, lists)
-        # A doublet that chatters in equal cycles for ever: skip many of them at once.
-        if switched == CONTACTS_CHANGED:
-            until = min(clock.until, kick_end(scene, work))
-            skip_equal_cycles(scene, work, clock, counts, until)
         # 5. Plan the next step.
         plan(clock, step, ratio, trials > 0, switched)
         if switched == CONTACTS_CHANGED and work.tally.kind == SERIES:

@@ -1,4 +1,4 @@
-"""Cycles of switches may be left out where a contact hums, but no bounce that is to be seen."""
+"""No bounce that is to be seen is left out."""
 
 import math
 
