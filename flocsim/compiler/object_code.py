@@ -3,13 +3,12 @@
 Loading numba, and all that it registers, takes longer than a short run; a function that allocates
 nothing needs no more of it than an object file and the name of its entry.
 
-A compiled function is called as a C function that is given the address at which its answer goes,
-then its arguments; it returns 0, or 1 where it has raised an exception.
+A compiled function is called as a C function of two addresses: that at which its answer goes, and
+that of its arguments. It returns 0, or 1 where it has raised an exception.
 """
 
 import ctypes
 import hashlib
-import json
 import struct
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -27,12 +26,13 @@ _loaded: dict[tuple[Any, ...], int] = {}
 
 
 class Called(NamedTuple):
-    """A unit that another one calls: its ``symbol``, the name of its ``function``, the ``types`` of
-    its arguments as text, and the letters (struct) of what it is to have ``returned``."""
+    """A unit that another one calls: its ``symbol``, the name of its ``function``, the pickled
+    numba ``types`` of its arguments, and the letters (struct) of what it is to have
+    ``returned``."""
 
     symbol: str
     function: str
-    types: tuple[str, ...]
+    types: bytes
     returned: str
 
 
@@ -45,18 +45,6 @@ class ObjectCode(NamedTuple):
     returned: str
     borrows: bool
     calls: tuple[Called, ...] = ()
-
-    def packed(self) -> bytes:
-        """Return it as bytes."""
-        return json.dumps(self[1:]).encode() + b"\n" + self.code
-
-    @classmethod
-    def unpacked(cls, data: bytes) -> "ObjectCode":
-        """Return what was packed."""
-        head, code = data.split(b"\n", 1)
-        entry, returned, borrows, calls = json.loads(head)
-        called = (Called(symbol, name, tuple(types), was) for symbol, name, types, was in calls)
-        return cls(code, entry, returned, borrows, tuple(called))
 
 
 def compiler(machine: Any) -> Any:
