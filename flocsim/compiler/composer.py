@@ -33,7 +33,7 @@ def compose(
     jit: bool = True,
     allocates: bool = False,
     what: str = "",
-) -> Callable:
+) -> Any:
     """Return the driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
@@ -73,12 +73,7 @@ def compile_law(law: Callable, told: str, given: Callable[[], Any]) -> int:
     Raises KernelError for what captures variables, reads globals that may change, or cannot be
     compiled. The compiled function lives as long as the process.
     """
-    linked = Linker({}).link(law)
-    refuse_no_compiler()
-    key = (fingerprint(law, {}, options_text(False), linked), told)
-    if key not in _composed:
-        _composed[key], _ = Engine(linked, f"flocsim_law_{key[0]}").load(told, given)
-    return _composed[key]
+    return compose(law, {}).load(told, given)[0]
 
 
 def refuse_no_compiler():

@@ -134,7 +134,6 @@ def describe(entry: Any) -> Description:
     """
     lines: list[str] = []
     functions, calls = [entry], {}
-    numbers = {entry: 0}
     for function in functions:  # grows
         if not isinstance(function, types.FunctionType):
             raise KernelError(
@@ -147,11 +146,10 @@ def describe(entry: Any) -> Description:
                 lines.append(f"{name}->{value.apart}")
                 calls[value.apart] = value
                 continue
-            if value not in numbers:
-                numbers[value] = len(functions)
+            if value not in functions:
                 functions.append(value)
             # Two functions may share a name, so that a number has to tell which is called.
-            lines.append(f"{name}->{numbers[value]}")
+            lines.append(f"{name}->{functions.index(value)}")
     return Description(lines, functions, calls)
 
 

@@ -6,10 +6,9 @@ Inside compiled code ``work`` is a pointer into the table, ``work.place`` anothe
 of a record. No word of a table changes while compiled code runs, and LLVM is told so: it reads each
 of them once.
 
-Arrays lie in C order; indices are whole numbers from 0 on, neither checked nor counted from the
-end. Fewer indices than axes give a part of an array; there are no slices. Sizes that never change
-are declared with the field, as ``motion: Annotated[np.ndarray, ("rows", "n", 6)]``, and become
-constants.
+Arrays lie in C order; indices are whole numbers from 0 on, one for each axis, neither checked nor
+counted from the end; there are no slices. Sizes that never change are declared with the field, as
+``motion: Annotated[np.ndarray, ("rows", "n", 6)]``, and become constants.
 """
 
 import operator
@@ -87,15 +86,6 @@ class Elements(Addressed):
         super().__init__(f"elements_{dtype}_{'_'.join(map(str, sizes))}", fields)
 
 
-class Part(types.Type):
-    """The part of an array at the first ``taken`` indices, all whole numbers: the array, and how
-    many such parts lie before."""
-
-    def __init__(self, of, taken):
-        self.of, self.taken, self.dtype, self.ndim = of, taken, of.dtype, of.ndim - taken
-        super().__init__(f"part_{taken}_{of}")
-
-
 class PointerModel(models.PrimitiveModel):
     """An address, of words in the table or of a record."""
 
@@ -105,14 +95,6 @@ class PointerModel(models.PrimitiveModel):
 
 for each in (Table, Elements, Row):
     register_model(each)(PointerModel)
-
-
-@register_model(Part)
-class PartModel(models.StructModel):
-    """The array, and a number."""
-
-    def __init__(self, manager, kind):
-        super().__init__(manager, kind, [("of", kind.of), ("before", types.intp)])
 
 
 def parts_of(kind: Any) -> list[Any]:
@@ -230,24 +212,18 @@ def whole_array(place, shape):
 
 
 def place_of_element(context, builder, kind, value, index, given):
-    """Return the address of an element of an array or of a part of one, or of a part, as the model
-    of parts has it; ``index`` is the type of the numbers ``given``."""
+    """Return the address of an element of an array; ``index`` is the type of the numbers
+    ``given``."""
     parts, numbers = parts_of(index), [given]
     if isinstance(index, types.BaseTuple):
         numbers = [builder.extract_value(given, each) for each in range(len(parts))]
-    of, taken, offset = kind, 0, None
-    if isinstance(kind, Part):
-        of, taken = kind.of, kind.taken
-        value, offset = (builder.extract_value(value, each) for each in range(2))
-    for axis, (part, number) in enumerate(zip(parts, numbers, strict=True), taken):
+    offset = WORD(0)
+    for axis, (part, number) in enumerate(zip(parts, numbers, strict=True)):
         number = context.cast(builder, number, part, types.intp)
-        if offset is not None:
-            offset = builder.mul(offset, size(builder, of, value, axis), flags=["nsw"])
+        if axis:
+            offset = builder.mul(offset, size(builder, kind, value, axis), flags=["nsw"])
             number = builder.add(offset, number, flags=["nsw"])
         offset = number
-    if len(parts) < kind.ndim:
-        found = context.get_value_type(Part(of, taken + len(parts)))(ir.Undefined)
-        return builder.insert_value(builder.insert_value(found, value, 0), offset, 1)
     if isinstance(kind.dtype, Row):
         offset = builder.mul(offset, WORD(kind.dtype.size // 8), flags=["nsw"])
     return builder.gep(data_of(context, builder, kind, value), [offset], inbounds=True)
@@ -260,11 +236,11 @@ def place_of_field(context, builder, kind, value, name):
     return builder.bitcast(place, context.get_data_type(number).as_pointer())
 
 
-def indices_in(kind: Any, index: Any) -> int:
-    """Return how many whole numbers an index of an array or a part is; 0 where it is another."""
+def is_element(kind: Any, index: Any) -> bool:
+    """Return True if an index, whole numbers for all axes, is that of an element of an array."""
     parts = parts_of(index)
     whole = all(isinstance(each, types.Integer) for each in parts)
-    return len(parts) if isinstance(kind, Elements | Part) and whole else 0
+    return isinstance(kind, Elements) and whole and len(parts) == kind.ndim
 
 
 @infer_getattr
@@ -299,31 +275,19 @@ def set_field(context, builder, sig, args, name):
 @type_callable(len)
 def type_len(context):
     """Return the type of ``len`` of an array."""
-    return lambda value: types.intp if isinstance(value, Elements | Part) else None
+    return lambda value: types.intp if isinstance(value, Elements) else None
 
 
 @lower_builtin(len, Elements)
-@lower_builtin(len, Part)
 def length(context, builder, sig, args):
-    """Return the first size of an array or of a part."""
-    kind, value = sig.args[0], args[0]
-    if isinstance(kind, Part):
-        return size(builder, kind.of, builder.extract_value(value, 0), kind.taken)
-    return size(builder, kind, value, 0)
+    """Return the first size of an array."""
+    return size(builder, sig.args[0], args[0], 0)
 
 
 @type_callable(operator.getitem)
 def type_getitem(context):
-    """Return the type of an element or a part."""
-
-    def element(value, index):
-        count = indices_in(value, index)
-        if 0 < count < value.ndim:
-            of, taken = (value.of, value.taken) if isinstance(value, Part) else (value, 0)
-            return Part(of, taken + count)
-        return value.dtype if count else None
-
-    return element
+    """Return the type of an element."""
+    return lambda value, index: value.dtype if is_element(value, index) else None
 
 
 @type_callable(operator.setitem)
@@ -331,23 +295,20 @@ def type_setitem(context):
     """Return the type of an assignment to an element."""
 
     def element(value, index, given):
-        whole = 0 < indices_in(value, index) == value.ndim
-        return types.none(value, index, value.dtype) if whole else None
+        return types.none(value, index, value.dtype) if is_element(value, index) else None
 
     return element
 
 
 @lower_builtin(operator.getitem, Elements, types.Any)
-@lower_builtin(operator.getitem, Part, types.Any)
 def getitem(context, builder, sig, args):
-    """Read an element; a record, or a part, is read where its fields or elements are."""
+    """Read an element; a record is read where its fields are."""
     kind = sig.return_type
     place = place_of_element(context, builder, sig.args[0], args[0], sig.args[1], args[1])
-    return place if isinstance(kind, Row | Part) else load(context, builder, kind, place, str(kind))
+    return place if isinstance(kind, Row) else load(context, builder, kind, place, str(kind))
 
 
 @lower_builtin(operator.setitem, Elements, types.Any, types.Any)
-@lower_builtin(operator.setitem, Part, types.Any, types.Any)
 def setitem(context, builder, sig, args):
     """Write an element; a record is copied field by field."""
     kind = sig.args[2]

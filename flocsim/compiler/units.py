@@ -24,6 +24,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
+
 from flocsim.compiler import accelerator, disk_cache
 from flocsim.compiler.by_pointer import kinds_text, layout_of, table_of
 from flocsim.compiler.fingerprint import Intrinsic, describe, hashed
@@ -36,9 +38,6 @@ from flocsim.process import COMPILING, lacking
 # Functions of less bytecode [bytes] are always inlined; of the others LLVM decides. Up to 1,200
 # would gain 7 % of throughput for 1.5 times the compile time.
 INLINED_SIZE = 400
-
-# How names of functions begin that allocate memory.
-ALLOCATORS = "NRT_MemInfo", "NRT_Allocate"
 
 SCALARS_ONLY = "use plain arithmetic on scalars, without arrays and lists"
 
@@ -66,6 +65,7 @@ def symbol_of(function: Callable, types: str) -> str:
     return f"flocsim_{hashlib.blake2b(told.encode(), digest_size=12).hexdigest()}"
 
 
+@attrs.define(eq=False, slots=False)
 class Engine:
     """A linked function with all units that it calls: found on the disk or compiled at its first
     call, and once more for arguments of other types.
@@ -74,20 +74,16 @@ class Engine:
     for itself; ``what`` it is, for who waits; ``complete``: with what is postponed.
     """
 
-    def __init__(
-        self,
-        entry: Callable,
-        name: str,
-        allocates: bool = False,
-        what: str = "",
-        complete: bool = False,
-    ) -> None:
-        self.entry, self.name, self.allocates = entry, name, allocates
-        self.what, self.complete = what, complete
-        self.functions: dict[tuple[Any, ...], Callable] = {}
-        self.units: dict[str, ObjectCode] = {}
-        self.addresses: dict[str, int] = {}
-        self.calls: dict[str, Called] = {}
+    entry: Callable
+    name: str
+    allocates: bool = False
+    what: str = ""
+    complete: bool = False
+    functions: dict[tuple[Any, ...], Callable] = attrs.field(factory=dict, init=False)
+    units: dict[str, ObjectCode] = attrs.field(factory=dict, init=False)
+    addresses: dict[str, int] = attrs.field(factory=dict, init=False)
+    calls: dict[str, Called] = attrs.field(factory=dict, init=False)
+    parts: list[Any] = attrs.field(factory=list, init=False)
 
     @functools.cached_property
     def whole(self) -> "Engine":
@@ -113,8 +109,8 @@ class Engine:
         """Return the address of the machine code for ``given()`` numba types, of which ``told``
         tells all, and the letters (struct) of its answer; ``table``: it is given a table."""
         with _one_at_a_time, contextlib.ExitStack() as self.stack:
-            self.linker, self.table = Linker({}, self.inner, self.replace), table
-            self.parts: list[Any] = []
+            self.linker, self.parts = Linker({}, self.inner, self.replace), []
+            self.table = table
             symbol = symbol_of(self.entry, told)
             returned = self.unit(symbol, self.entry, given).returned
         return self.addresses[symbol], returned
@@ -182,9 +178,6 @@ class Engine:
             raise KernelError(f"a compiled function returns {returned}: let it return numbers")
         entry, loops = made.native_name, hasattr(function, "loops")
         code, missing = object_of(made.inspect_llvm(), entry, loops)
-        # Without the accelerator, numba compiles kernels that make arrays or lists.
-        if not self.allocates and any(x.startswith(ALLOCATORS) for x in missing):
-            raise KernelError(f"a kernel cannot be compiled: {SCALARS_ONLY}")
         calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
         return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in missing), calls)
 
@@ -206,7 +199,9 @@ class Engine:
         options = accelerator.options(False, self.allocates)
         # Dividing by zero gives what it does in numpy.
         made = numba.njit(clone, error_model="numpy", forceinline=small, **options)
-        self.parts.append(accelerator.inner(made))
+        if accelerator.is_on():
+            accelerator.typed_once(made)
+        self.parts.append(made)
         return made
 
     def replace(self, value: Any) -> Any:
@@ -214,7 +209,7 @@ class Engine:
         compiled apart; None for others."""
         if isinstance(value, Intrinsic):
             return self.inner(value.make())
-        if not hasattr(value, "apart") or self.allocates or not accelerator.by_units():
+        if not hasattr(value, "apart") or self.allocates or not accelerator.is_on():
             return None
         from flocsim.compiler.table_types import call_of
 

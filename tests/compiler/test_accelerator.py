@@ -73,13 +73,6 @@ def test_without_the_accelerator_everything_works(fresh, environment, new_proces
         compose(wrong, {})(3.0, parameters)
 
 
-@pytest.mark.parametrize("name", ["compilers", "typed_once", "quick_typing"])
-def test_each_part_can_be_left_out_and_the_same_is_computed(fresh, name):
-    fresh.setattr(accelerator, "WITHOUT", [name])
-    parameters = np.ones(2)
-    assert compose(root, {})(2.0, parameters) == root(2.0, parameters)
-
-
 def test_no_other_file_names_a_private_part_of_numba():
     package = Path(flocsim.__file__).parent
     private = re.compile(r"numba\.(core|experimental|np|cpython|typed|misc)\b.*|_nrt\b|fndesc")

@@ -297,8 +297,9 @@ def divide_real_load(e, loads, index, row):
     """Multiply the load of a row by its inverted diagonal block, in the real system."""
     x, y, z = loads[REAL, row].real, loads[REAL, row + 1].real, loads[REAL, row + 2].real
     for i in range(3):
-        m = e.blocks[REAL_PART, index]
-        loads[REAL, row + i] = m[i, 0] * x + m[i, 1] * y + m[i, 2] * z
+        total = e.blocks[REAL_PART, index, i, 0] * x
+        total += e.blocks[REAL_PART, index, i, 1] * y
+        loads[REAL, row + i] = total + e.blocks[REAL_PART, index, i, 2] * z
 
 
 def divide_complex_load(e, loads, index, row):
