@@ -16,7 +16,7 @@ import functools
 import gc
 import inspect
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -157,45 +157,29 @@ def forget(dispatchers: Sequence[Any]) -> None:
             ctypes.CDLL(None).malloc_trim(0)
 
 
-def remembering(real: Callable, case_of: Callable) -> Callable:
-    """Return a function that calls the real one once for each case of its arguments."""
-    known: dict[Any, Any] = {}
-
-    def remembered(*arguments):
-        case = case_of(*arguments)
-        if case not in known:
-            # The arguments are stored, too: nothing else takes their id while this memory lives.
-            known[case] = real(*arguments), arguments
-        return known[case][0]
-
-    return remembered
-
-
 @contextlib.contextmanager
 def replacements() -> Iterator[None]:
-    """Exchange functions of numba inside; garbage waits, as millions of objects live until the end,
-    through which the collector would walk again and again."""
-    from numba.core.base import BaseContext
-    from numba.core.types import Function
+    """Remember the types of every `+` and `sqrt` inside; garbage waits, as millions of objects live
+    until the end, through which the collector would walk again and again."""
+    from numba.core.types.functions import BaseFunction
 
-    # The types of every `+` and `sqrt`; sizes of LLVM's types, each asked for by parsing a text.
-    typed = remembering(
-        Function.get_call_type, lambda f, context, given, more: (id(f), given, *more.items())
-    )
-    sized = remembering(BaseContext.get_abi_sizeof, lambda context, kind: str(kind))
-    others: tuple[tuple[Any, str, Any], ...] = (
-        (Function, "get_call_type", typed),
-        (BaseContext, "get_abi_sizeof", sized),
-    )
-    collecting, before = gc.isenabled(), [vars(owner).get(name) for owner, name, _ in others]
+    owner: Any = BaseFunction
+    real, known = owner.get_call_type, dict[Any, Any]()
+
+    def remembered(function, context, given, more):
+        case = id(function), given, *more.items()
+        if case not in known:
+            # The function is stored, too: nothing else takes its id while this memory lives.
+            known[case] = real(function, context, given, more), function
+        return known[case][0]
+
+    collecting = gc.isenabled()
     gc.disable()
+    owner.get_call_type = remembered
     try:
-        for owner, name, other in others:
-            setattr(owner, name, other)
         yield
     finally:
-        for (owner, name, _), own in zip(others, before, strict=True):
-            setattr(owner, name, own) if own else delattr(owner, name)
+        owner.get_call_type = real
         if collecting:
             gc.enable()
 

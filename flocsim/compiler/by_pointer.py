@@ -24,7 +24,7 @@ class Kept(NamedTuple):
 
     value: tuple[Any, ...]
     words: list[Any]  # its part of a table
-    kinds: list[Any]  # the types of these
+    kinds: tuple[Any, ...]  # the types of these
     arrays: list[Any]  # those that `clear` clears
 
 
@@ -64,10 +64,7 @@ def keep(value: tuple[Any, ...], owner: Any) -> None:
     """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
     the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
-        words: list[Any] = []
-        kinds: list[Any] = []
-        flatten(value, words, kinds)
-        KEPT[id(value)] = Kept(value, words, kinds, written(value))
+        KEPT[id(value)] = Kept(value, *table_of(value), written(value))
         weakref.finalize(owner, KEPT.pop, id(value), None)
 
 
@@ -110,13 +107,12 @@ def flatten(value, words, kinds):
         kinds.append(letter)
 
 
-def table_of(arguments: Sequence[Any]) -> tuple[list[Any], tuple[Any, ...]]:
+def table_of(arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[Any, ...]]:
     """Return the arguments as the words of a table, and their types as a flat tuple: a tuple is
     (its class, its length) before its items, an array (its dtype, its dimensions)."""
     words: list[Any] = []
     kinds: list[Any] = []
-    for each in arguments:
-        flatten(each, words, kinds)
+    flatten(arguments, words, kinds)
     return words, tuple(kinds)
 
 

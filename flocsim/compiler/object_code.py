@@ -47,7 +47,7 @@ class ObjectCode(NamedTuple):
     calls: tuple[Called, ...] = ()
 
 
-def compiler(machine: Any) -> Any:
+def compiler(**machine: Any) -> Any:
     """Return LLVM's context of a process, ready to make and load object files."""
     import llvmlite.binding as llvm
 
@@ -62,10 +62,9 @@ def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
     import llvmlite.binding as llvm
 
     cpu, features = target(loops)
-    machine = compiler({
-        "cpu": cpu, "features": features, "opt": 3, "reloc": "static", "codemodel": "jitdefault",
-        "jit": True,
-    })  # fmt: skip
+    machine = compiler(
+        cpu=cpu, features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    )
     module = llvm.parse_assembly(text)
     # Nothing but the entry is called from outside: LLVM may do what it likes with the others, as
     # with a C program of one file.
@@ -79,11 +78,12 @@ def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
     return machine.emit_object(module), {x.name for x in module.functions if x.is_declaration}
 
 
-def load(code: ObjectCode, called: Mapping[str, int]) -> int:
-    """Return the address of an entry; ``called`` {symbol: address} of the units that it calls. The
-    code stays as long as the process lives, and is loaded once."""
+def load(code: ObjectCode, addresses: Mapping[str, int]) -> int:
+    """Return the address of an entry; ``addresses`` {symbol: address} of units, those that it calls
+    among them. The code stays as long as the process lives, and is loaded once."""
     import llvmlite.binding as llvm
 
+    called = {each.symbol: addresses[each.symbol] for each in code.calls}
     key = hashlib.blake2b(code.code, digest_size=16).digest(), *called.items()
     if code.borrows and key not in _loaded:
         import numba
@@ -92,7 +92,7 @@ def load(code: ObjectCode, called: Mapping[str, int]) -> int:
     with _lock:
         if key in _loaded:
             return _loaded[key]
-        machine = compiler({})
+        machine = compiler()
         # For the process as a whole, and yet for this file: those before are linked already.
         for symbol, address in called.items():
             llvm.add_symbol(symbol, address)

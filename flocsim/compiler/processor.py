@@ -1,5 +1,6 @@
 """What of the processor, of numba's settings and of the libraries decides what is computed."""
 
+import contextlib
 import functools
 import os
 import platform
@@ -52,13 +53,11 @@ def has_svml() -> bool:
     """Return True if loops over many numbers may call Intel's library."""
     import llvmlite.binding as llvm
 
-    if os.environ.get("NUMBA_DISABLE_INTEL_SVML", "0") != "0":
-        return False
-    try:
-        llvm.load_library_permanently(SVML.get(sys.platform, "svml_dispmd"))
-    except RuntimeError:
-        return False
-    return llvm.targets.has_svml()
+    if os.environ.get("NUMBA_DISABLE_INTEL_SVML", "0") == "0":
+        with contextlib.suppress(RuntimeError):
+            llvm.load_library_permanently(SVML.get(sys.platform, "svml_dispmd"))
+            return llvm.targets.has_svml()
+    return False
 
 
 @functools.cache

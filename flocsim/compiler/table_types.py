@@ -34,14 +34,12 @@ from numba.extending import (
 )
 
 from flocsim.compiler.by_pointer import letter_of, sizes_of
+from flocsim.errors import KernelError
 
 WORD = ir.IntType(64)
 
-# Letters of the struct module for what compiled functions are given and return.
-LETTERS = {
-    "": types.none, "?": types.boolean, "d": types.float64, "q": types.int64,
-    "Q": types.uint64, "f": types.float32, "i": types.int32,
-}  # fmt: skip
+# Numbers that compiled functions are given and return, by their letters in struct and numpy.
+LETTERS = {letter: from_dtype(np.dtype(letter)) for letter in "?dqQfi"}
 
 
 class Addressed(types.Type):
@@ -121,7 +119,7 @@ def type_of(value: Any, whole: bool = False, sizes: tuple[int, ...] = ()) -> Any
             return types.Array(dtype, value.ndim, "C")
         return Elements(dtype, sizes or (0,) * value.ndim)
     if not isinstance(value, tuple):
-        return LETTERS[letter_of(value)]
+        return type_of_letters(letter_of(value))
     named: Any = type(value)
     if not hasattr(named, "_fields"):
         return types.Tuple.from_types([type_of(each, whole) for each in value])
@@ -258,7 +256,10 @@ class Attributes(AttributeTemplate):
 def get_field(context, builder, kind, value, name):
     """Read a field of a table or a record, or the shape of an array."""
     number, at = kind.fields[name]
-    if not isinstance(kind, Row):
+    if isinstance(kind, Elements):
+        sizes = [size(builder, kind, value, axis) for axis in range(kind.ndim)]
+        return context.make_tuple(builder, number, sizes)
+    if isinstance(kind, Table):
         return value_at(context, builder, number, value, at)
     place = place_of_field(context, builder, kind, value, name)
     return load(context, builder, number, place, f"{kind}.{name}")
@@ -293,11 +294,9 @@ def type_getitem(context):
 @type_callable(operator.setitem)
 def type_setitem(context):
     """Return the type of an assignment to an element."""
-
-    def element(value, index, given):
-        return types.none(value, index, value.dtype) if is_element(value, index) else None
-
-    return element
+    return lambda value, index, given: (
+        types.none(value, index, value.dtype) if is_element(value, index) else None
+    )
 
 
 @lower_builtin(operator.getitem, Elements, types.Any)
@@ -324,19 +323,19 @@ def setitem(context, builder, sig, args):
 # goes, and that of its arguments. It returns 0, or 1 where it has raised an exception.
 
 
-def letters_of(kind: Any) -> str | None:
-    """Return the letters (struct) of numbers that are returned; None for what is neither a number
-    nor a tuple of numbers."""
-    known = {each: letter for letter, each in LETTERS.items()}
-    found = [known.get(types.unliteral(each)) for each in parts_of(kind)]
-    return None if None in found else "".join(map(str, found))
+def letters_of(kind: Any) -> str:
+    """Return the letters of what is returned: a number, a tuple of numbers, or None."""
+    known = {each: letter for letter, each in LETTERS.items()} | {types.none: ""}
+    try:
+        return "".join(known[types.unliteral(each)] for each in parts_of(kind))
+    except KeyError:
+        raise KernelError(f"a compiled function returns {kind}: let it return numbers") from None
 
 
 def type_of_letters(letters: str) -> Any:
-    """Return the numba type of numbers that are returned."""
-    if len(letters) < 2:
-        return LETTERS[letters]
-    return types.Tuple.from_types([LETTERS[each] for each in letters])
+    """Return the numba type of numbers of such letters; that of None for ""."""
+    kinds = [LETTERS[each] for each in letters] or [types.none]
+    return types.Tuple.from_types(kinds) if len(kinds) > 1 else kinds[0]
 
 
 def at_address(builder, address, kind):
@@ -392,8 +391,8 @@ def call_of(target: Callable[[list[Any]], tuple[str, str]]) -> Any:
             builder.store(packed, place)
             called = ir.FunctionType(WORD, [WORD, WORD])
             if symbol:
-                function = builder.module.globals.get(symbol)
-                function = function or ir.Function(builder.module, called, symbol)
+                known = builder.module.globals.get(symbol)
+                function = known or ir.Function(builder.module, called, symbol)
             else:
                 function = at_address(builder, values[0], called)
             failed = builder.call(function, [builder.ptrtoint(x, WORD) for x in (answer, place)])

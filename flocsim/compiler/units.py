@@ -97,7 +97,7 @@ class Engine:
             def given() -> list[Any]:
                 from flocsim.compiler.table_types import type_of
 
-                return [type_of(each, self.allocates) for each in arguments]
+                return type_of(arguments, self.allocates).types
 
             address, returned = self.load(kinds_text(kinds), given, table=True)
             self.functions[kinds] = function_at(address, returned, layout_of(words))
@@ -131,9 +131,7 @@ class Engine:
             code = self.compiled(function, given())
             disk_cache.write(*file, pickle.dumps(code))
         self.units[symbol] = code
-        self.addresses[symbol] = load(
-            code, {x.symbol: self.addresses[x.symbol] for x in code.calls}
-        )
+        self.addresses[symbol] = load(code, self.addresses)
         return code
 
     def from_disk(self, function: Callable, name: str, key: str) -> ObjectCode | None:
@@ -172,10 +170,7 @@ class Engine:
             made = numba.cfunc("i8(i8, i8)", error_model="numpy", **options)(run)
         except numba.errors.NumbaError as error:
             raise KernelError(compiler_complaint(str(error))) from None
-        returned = driver.nopython_signatures[-1].return_type
-        letters = letters_of(returned)
-        if letters is None:
-            raise KernelError(f"a compiled function returns {returned}: let it return numbers")
+        letters = letters_of(driver.nopython_signatures[-1].return_type)
         entry, loops = made.native_name, hasattr(function, "loops")
         code, missing = object_of(made.inspect_llvm(), entry, loops)
         calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
