@@ -4,7 +4,8 @@
    they are lowered; the whole is optimised once, as a program of one file is (units.object_of).
 
 2. ``typed_once``: a function is not compiled anew for every constant that it is called with.
-3. ``quick_typing``: while numba compiles, it remembers what it has inferred, and garbage waits.
+3. ``quick_typing``: while numba compiles, it remembers what it has inferred, garbage waits, and
+   nobody is notified of every call of LLVM.
 
 A numba without one of these parts, or FLOCSIM_ACCELERATOR=0, turns all of it off. Cold starts then
 take several times as long.
@@ -16,7 +17,7 @@ import functools
 import gc
 import inspect
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -44,8 +45,8 @@ def is_on() -> bool:
         import numba
 
         with replacements():
-            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False, True)))
-            whole = numba.cfunc("f8(f8)", **pipelines(True, True))
+            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False, False)))
+            whole = numba.cfunc("f8(f8)", **pipelines(True, False))
             text = whole(lambda x: twice(x) + twice(1.0)).inspect_llvm()
         forget([twice])
         return text.count("\ndefine") >= 3  # the unit, its wrapper and what it calls
@@ -56,15 +57,12 @@ def is_on() -> bool:
 def options(unit: bool, allocates: bool) -> dict[str, Any]:
     """Return options of numba.cfunc for the function that a unit begins with, else of numba.njit
     for those that are only linked into it."""
-    if not is_on():
-        return {}
-    # Where nothing is allocated no references are counted, which would take most of the time.
-    return {**pipelines(unit, not allocates), **({} if allocates else {"_nrt": False})}
+    return pipelines(unit, allocates) if is_on() else {}
 
 
 @functools.cache
-def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
-    """Return the options that `options` gives; ``scalar``: the function makes no arrays."""
+def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
+    """Return the options that `options` gives where the accelerator is on."""
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
@@ -104,7 +102,7 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
     class Lowering(NativeLowering):
         """numba's last pass, into a library of ours."""
 
-        _name = f"flocsim_lowering_{unit}_{scalar}"
+        _name = f"flocsim_lowering_{unit}_{allocates}"
 
         def run_pass(self, state):
             name = state.func_id.func_qualname
@@ -115,7 +113,9 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
         """numba's usual passes with another last one."""
 
         def define_pipelines(self):
-            plain = scalar and not any(map(inspect.iscode, self.state.func_id.code.co_consts))
+            plain = not allocates and not any(
+                map(inspect.iscode, self.state.func_id.code.co_consts)
+            )
             needless = (ANNOTATIONS, *(NEEDLESS_PASSES if plain else ()))
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
             passes.passes = [
@@ -127,7 +127,9 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
             return [passes]
 
     unwrapped = {} if unit else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return {"pipeline_class": Compiler, **unwrapped}
+    # Where nothing is allocated no references are counted, which would take most of the time.
+    uncounted = {} if allocates else {"_nrt": False}
+    return {"pipeline_class": Compiler, **unwrapped, **uncounted}
 
 
 def typed_once(dispatcher: Any) -> Any:
@@ -157,29 +159,49 @@ def forget(dispatchers: Sequence[Any]) -> None:
             ctypes.CDLL(None).malloc_trim(0)
 
 
-@contextlib.contextmanager
-def replacements() -> Iterator[None]:
-    """Remember the types of every `+` and `sqrt` inside; garbage waits, as millions of objects live
-    until the end, through which the collector would walk again and again."""
-    from numba.core.types.functions import BaseFunction
+def remembering(real: Callable, case_of: Callable) -> Callable:
+    """Return a function that calls the real one once for each case of its arguments."""
+    known: dict[Any, Any] = {}
 
-    owner: Any = BaseFunction
-    real, known = owner.get_call_type, dict[Any, Any]()
-
-    def remembered(function, context, given, more):
-        case = id(function), given, *more.items()
+    def remembered(*arguments):
+        case = case_of(*arguments)
         if case not in known:
-            # The function is stored, too: nothing else takes its id while this memory lives.
-            known[case] = real(function, context, given, more), function
+            # The arguments are stored, too: nothing else takes their id while this memory lives.
+            known[case] = real(*arguments), arguments
         return known[case][0]
 
-    collecting = gc.isenabled()
+    return remembered
+
+
+@contextlib.contextmanager
+def replacements() -> Iterator[None]:
+    """Exchange functions of numba inside; garbage waits, as millions of objects live until the end,
+    through which the collector would walk again and again."""
+    from numba.core import event
+    from numba.core.base import BaseContext
+    from numba.core.types import Function
+
+    # The types of every `+` and `sqrt`; sizes of LLVM's types, each asked for by parsing a text;
+    # listeners of two events for every call of LLVM.
+    typed = remembering(
+        Function.get_call_type, lambda f, context, given, more: (id(f), given, *more.items())
+    )
+    sized = remembering(BaseContext.get_abi_sizeof, lambda context, kind: str(kind))
+    others: tuple[tuple[Any, str, Any], ...] = (
+        (Function, "get_call_type", typed),
+        (BaseContext, "get_abi_sizeof", sized),
+        (event, "start_event", lambda *_, **__: None),
+        (event, "end_event", lambda *_, **__: None),
+    )
+    collecting, before = gc.isenabled(), [vars(owner).get(name) for owner, name, _ in others]
     gc.disable()
-    owner.get_call_type = remembered
     try:
+        for owner, name, other in others:
+            setattr(owner, name, other)
         yield
     finally:
-        owner.get_call_type = real
+        for (owner, name, _), own in zip(others, before, strict=True):
+            setattr(owner, name, own) if own else delattr(owner, name)
         if collecting:
             gc.enable()
 

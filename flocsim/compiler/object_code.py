@@ -10,7 +10,6 @@ that of its arguments. It returns 0, or 1 where it has raised an exception.
 import ctypes
 import hashlib
 import struct
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -20,9 +19,8 @@ from flocsim.errors import KernelError
 # How names begin of what numba lends to compiled code, once it is loaded itself.
 LENT = "numba_", "NRT_", "Py", "_Py", "__svml"
 
-_lock = threading.Lock()
-_engines: list[Any] = []
-_loaded: dict[tuple[Any, ...], int] = {}
+# LLVM's engines, by the object files that they have loaded.
+_loaded: dict[tuple[Any, ...], Any] = {}
 
 
 class Called(NamedTuple):
@@ -80,18 +78,17 @@ def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
 
 def load(code: ObjectCode, addresses: Mapping[str, int]) -> int:
     """Return the address of an entry; ``addresses`` {symbol: address} of units, those that it calls
-    among them. The code stays as long as the process lives, and is loaded once."""
+    among them. The code stays as long as the process lives, and is loaded once; by one thread at a
+    time."""
     import llvmlite.binding as llvm
 
     called = {each.symbol: addresses[each.symbol] for each in code.calls}
     key = hashlib.blake2b(code.code, digest_size=16).digest(), *called.items()
-    if code.borrows and key not in _loaded:
-        import numba
+    if key not in _loaded:
+        if code.borrows:
+            import numba
 
-        numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
-    with _lock:
-        if key in _loaded:
-            return _loaded[key]
+            numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
         machine = compiler()
         # For the process as a whole, and yet for this file: those before are linked already.
         for symbol, address in called.items():
@@ -100,9 +97,8 @@ def load(code: ObjectCode, addresses: Mapping[str, int]) -> int:
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code.code))
         engine.finalize_object()
-        _engines.append(engine)
-        _loaded[key] = engine.get_function_address(code.entry)
-        return _loaded[key]
+        _loaded[key] = engine
+    return _loaded[key].get_function_address(code.entry)
 
 
 def function_at(

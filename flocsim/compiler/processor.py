@@ -43,11 +43,6 @@ def versions() -> dict[str, str]:
     return found
 
 
-def settings() -> list[str]:
-    """Return what is set of all that changes machine code."""
-    return [f"{name}={os.environ[name]}" for name in SETTINGS if os.environ.get(name)]
-
-
 @functools.cache
 def has_svml() -> bool:
     """Return True if loops over many numbers may call Intel's library."""
@@ -79,7 +74,8 @@ def compiled_for(loops: bool = False) -> str:
     """Return what of the machine the machine code of a function depends on."""
     import llvmlite.binding as llvm
 
-    return repr((llvm.get_process_triple(), target(loops), settings(), loops and has_svml()))
+    settings = [os.environ.get(each) for each in SETTINGS]
+    return repr((llvm.get_process_triple(), target(loops), settings, loops and has_svml()))
 
 
 def cpu_kind() -> dict:

@@ -126,26 +126,24 @@ class Engine:
         if function is not self.entry:
             name = f"flocsim_unit_{hashed(describe(function).lines, options_text(self.allocates))}"
         file = name, repr((symbol, compiled_for(hasattr(function, "loops"))))
-        code = self.from_disk(function, *file)
-        if code is None:
+        # Nobody else can have written what is read (disk_cache).
+        data = disk_cache.read(*file)
+        code = pickle.loads(data) if data else None
+        if code is None or not self.calls_fit(code, function):
             code = self.compiled(function, given())
             disk_cache.write(*file, pickle.dumps(code))
         self.units[symbol] = code
         self.addresses[symbol] = load(code, self.addresses)
         return code
 
-    def from_disk(self, function: Callable, name: str, key: str) -> ObjectCode | None:
-        """Return a unit as the disk has it, if what it calls returns what it expects."""
-        if (data := disk_cache.read(name, key)) is None:
-            return None
-        # Nobody else can have written it (disk_cache).
-        code: ObjectCode = pickle.loads(data)
+    def calls_fit(self, code: ObjectCode, function: Callable) -> bool:
+        """Return True if all units that a unit calls return what it expects."""
         for each in code.calls:
             called = describe(function).calls[each.function]
             given = functools.partial(pickle.loads, each.types)
             if self.unit(each.symbol, called, given).returned != each.returned:
-                return None
-        return code
+                return False
+        return True
 
     def compiled(self, function: Callable, given: Sequence[Any]) -> ObjectCode:
         """Return the code of a unit, compiled."""
