@@ -216,10 +216,16 @@ def invert(blocks, block, both):
     """Replace a diagonal block by its inverse, in the real system or in both; return False if
     singular."""
     adj = adjugate(
-        blocks[REAL_PART, block, 0, 0], blocks[REAL_PART, block, 0, 1], blocks[REAL_PART, block, 0, 2],
-        blocks[REAL_PART, block, 1, 0], blocks[REAL_PART, block, 1, 1], blocks[REAL_PART, block, 1, 2],
-        blocks[REAL_PART, block, 2, 0], blocks[REAL_PART, block, 2, 1], blocks[REAL_PART, block, 2, 2],
-    )  # fmt: skip
+        blocks[REAL_PART, block, 0, 0],
+        blocks[REAL_PART, block, 0, 1],
+        blocks[REAL_PART, block, 0, 2],
+        blocks[REAL_PART, block, 1, 0],
+        blocks[REAL_PART, block, 1, 1],
+        blocks[REAL_PART, block, 1, 2],
+        blocks[REAL_PART, block, 2, 0],
+        blocks[REAL_PART, block, 2, 1],
+        blocks[REAL_PART, block, 2, 2],
+    )
     if not abs(adj[0]) > 0.0:
         return False
     reciprocal = 1.0 / adj[0]
