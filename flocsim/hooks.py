@@ -204,10 +204,12 @@ def argument_types(index: int, plain: bool) -> Any:
     """Return the numba types of a law's arguments."""
     from numba import types
 
+    from flocsim.compiler.table_types import Elements
+
     number, view = types.float64, view_of(index, plain)
     more = (types.int64,) if index == CONTACT_EVENT else ()
     given = types.NamedUniTuple(number, len(view._fields), view)
-    return given, types.CPointer(number), *more
+    return given, Elements(number, (0,)), *more
 
 
 def signature_text(index: int, plain: bool) -> str:
@@ -245,13 +247,12 @@ def call_of_law(index, plain):
     """Return the function by which compiled code calls a law by its address."""
     from flocsim.compiler.table_types import call_of
 
-    view, _, *more = argument_types(index, plain)
-
     def target(given):
-        assert given[1] == view and list(given[3:]) == more, f"{LAWS[index]} is given {given}"
+        expected = argument_types(index, plain)
+        assert tuple(given[1:]) == expected, f"{LAWS[index]} is given {given}"
         return "", "d" * NUMBERS[index]
 
-    return call_of(("address", "view", "parameters", "which")[: 3 + len(more)], target)
+    return call_of(target)
 
 
 def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False) -> Any:
@@ -265,7 +266,7 @@ def law_table(functions: dict[str, Callable], *, jit: bool, plain: bool = False)
     # Addresses of compiled laws; 0 where the scene has none.
     addresses = [
         compile_law(
-            functions[name], signature_text(index, plain), NUMBERS[index],
+            functions[name], signature_text(index, plain),
             functools.partial(argument_types, index, plain),
         )
         if name in functions

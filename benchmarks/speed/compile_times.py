@@ -1,13 +1,12 @@
 """How long a scene takes to start: cold, warm, and after an edit of a force.
 
-    python -m benchmarks.speed.compile_times [--quick] [--markdown] [--private] [--against COMMIT]
+    python -m benchmarks.speed.compile_times [--quick] [--markdown] [--against COMMIT]
 
 Each figure is of a process of its own that imports flocsim, makes two bodies with forces and takes
 its first steps; cold ones start with an empty cache folder, all others with what the ones before
-have compiled. ``--private`` also shows what a cold start costs without each private part of numba
-that flocsim leans on (flocsim.compiler.accelerator). ``--against`` starts the flocsim of
-another commit beside this one, each scene twice and in both orders: the smaller CPU time counts.
-It also runs commands that compile nothing, each six times, in turn: the least CPU time counts.
+have compiled. ``--against`` starts the flocsim of another commit beside this one, each scene twice
+and in both orders: the smaller CPU time counts. It also runs commands that compile nothing, each
+six times, in turn: the least CPU time counts.
 """
 
 import sys
@@ -50,7 +49,6 @@ METHODS = ("Implicit()", "Overdamped()", "DormandPrince54()", "VelocityVerlet(1e
 FEW = ("Gravity()", "StokesDrag()", "Contact()")
 ALL = (*FEW, "VanDerWaals()", "DoubleLayer()")
 OTHERS = ("Gravity()", "Contact(friction=0.3)", "VanDerWaals(gap='surface')")
-PRIVATE = ("compilers", "typed_once", "quick_typing")
 
 
 def script(spheres=False, method=METHODS[0], names=ALL, edit=None):
@@ -89,17 +87,6 @@ def starts(quick):
                 edited = min(start(cache, code).wall for code in edits)
                 others = start(cache, script(spheres, method, OTHERS)).wall
             table.add(name, method.split("(")[0], first.wall, first.cpu, warm, edited, others)
-    return table
-
-
-def private_parts():
-    """Return the table of what each private part of numba saves."""
-    table = Table("Cold start of two polygons without …", ("left out", "CPU [s]", "ratio"))
-    usual = cold(script()).cpu
-    table.add("nothing", usual, 1.0)
-    for without in (*PRIVATE, ",".join(PRIVATE)):
-        cpu = cold(script(), FLOCSIM_COMPILE_WITHOUT=without).cpu
-        table.add(without.replace(",", ", "), cpu, cpu / usual)
     return table
 
 
@@ -166,11 +153,9 @@ def commands_beside(there, commit):
 
 def main():
     """Print the tables."""
-    arguments = begin(__doc__, private=False, against="")
+    arguments = begin(__doc__, against="")
     if not arguments.against:
         starts(arguments.quick).print()
-        if arguments.private:
-            private_parts().print()
         return
     with tempfile.TemporaryDirectory() as folder:
         there = other_tree(arguments.against, Path(folder))

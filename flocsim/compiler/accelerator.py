@@ -4,12 +4,11 @@
    they are lowered; the whole is optimised once, as a program of one file is (units.object_of).
 
 2. ``typed_once``: a function is not compiled anew for every constant that it is called with.
-3. ``quick_typing``: while numba compiles, it remembers what it has inferred, garbage waits, nobody
-   is notified of every call of LLVM, and variables are listed by a shorter way.
+3. ``quick_typing``: while numba compiles, it remembers what it has inferred, garbage waits, and
+   nobody is notified of every call of LLVM.
 
 A numba without one of these parts, or FLOCSIM_ACCELERATOR=0, turns all of it off. Cold starts then
 take several times as long.
-Measured: benchmarks/speed/compile_times.py --private.
 """
 
 import contextlib
@@ -19,10 +18,8 @@ import gc
 import inspect
 import os
 from collections.abc import Callable, Iterator, Sequence
+from types import SimpleNamespace
 from typing import Any
-
-# Names of what to leave out, to measure what it gains: compilers, typed_once, quick_typing.
-WITHOUT = os.environ.get("FLOCSIM_COMPILE_WITHOUT", "").split(",")
 
 # Passes of numba's that find nothing in functions on scalars that define no others inside.
 NEEDLESS_PASSES = (
@@ -48,8 +45,8 @@ def is_on() -> bool:
         import numba
 
         with replacements():
-            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False, True)))
-            whole = numba.cfunc("f8(f8)", **pipelines(True, True))
+            twice = typed_once(numba.njit(lambda x: 2.0 * x, **pipelines(False, False)))
+            whole = numba.cfunc("f8(f8)", **pipelines(True, False))
             text = whole(lambda x: twice(x) + twice(1.0)).inspect_llvm()
         forget([twice])
         return text.count("\ndefine") >= 3  # the unit, its wrapper and what it calls
@@ -60,44 +57,22 @@ def is_on() -> bool:
 def options(unit: bool, allocates: bool) -> dict[str, Any]:
     """Return options of numba.cfunc for the function that a unit begins with, else of numba.njit
     for those that are only linked into it."""
-    if not is_on() or "compilers" in WITHOUT:
-        return {}
-    # Where nothing is allocated no references are counted, which would take most of the time.
-    return {**pipelines(unit, not allocates), **({} if allocates else {"_nrt": False})}
-
-
-def by_units() -> bool:
-    """Return True if units are compiled by themselves: numba alone cannot load one before those
-    that it calls."""
-    return is_on() and "compilers" not in WITHOUT
+    return pipelines(unit, allocates) if is_on() else {}
 
 
 @functools.cache
-def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
-    """Return the options that `options` gives; ``scalar``: the function makes no arrays."""
+def pipelines(unit: bool, allocates: bool) -> dict[str, Any]:
+    """Return the options that `options` gives where the accelerator is on."""
     from numba.core.codegen import JITCodeLibrary
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
     from numba.core.compiler_machinery import register_pass
     from numba.core.typed_passes import NativeLowering
 
-    class Codegen:
-        """numba's code generator, but that it sets no Python objects in code that is not loaded."""
-
-        def __init__(self, real):
-            self.real = real
-
-        def __getattr__(self, name):
-            return getattr(self.real, name)
-
-        def set_env(self, name, environment):
-            """Do nothing."""
-
     class Library(JITCodeLibrary):
         """Code as it was lowered, neither optimised nor loaded."""
 
-        @property
-        def codegen(self):
-            return Codegen(self._codegen)
+        # What is not loaded has no place for Python's objects.
+        codegen = SimpleNamespace(set_env=lambda name, environment: None)
 
         def get_pointer_to_function(self, name):
             """Return 0: there is no machine code of it in this process."""
@@ -116,13 +91,10 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
         """A function linked with all that it reaches."""
 
         def finalize(self):
-            found = dict.fromkeys(self._linking_libraries)
-            more = list(found)
-            for each in more:  # grows
-                new = dict.fromkeys(x for x in each._linking_libraries if x not in found)
-                found |= new
-                more += new
-            for each in more:
+            reached = list(dict.fromkeys(self._linking_libraries))
+            for each in reached:  # grows
+                new = dict.fromkeys(each._linking_libraries)
+                reached += [other for other in new if other not in reached]
                 self._final_module.link_in(each._get_module_for_linking(), preserve=True)
             super().finalize()
 
@@ -130,7 +102,7 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
     class Lowering(NativeLowering):
         """numba's last pass, into a library of ours."""
 
-        _name = f"flocsim_lowering_{unit}_{scalar}"
+        _name = f"flocsim_lowering_{unit}_{allocates}"
 
         def run_pass(self, state):
             name = state.func_id.func_qualname
@@ -141,7 +113,9 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
         """numba's usual passes with another last one."""
 
         def define_pipelines(self):
-            plain = scalar and not any(map(inspect.iscode, self.state.func_id.code.co_consts))
+            plain = not allocates and not any(
+                map(inspect.iscode, self.state.func_id.code.co_consts)
+            )
             needless = (ANNOTATIONS, *(NEEDLESS_PASSES if plain else ()))
             passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
             passes.passes = [
@@ -153,7 +127,9 @@ def pipelines(unit: bool, scalar: bool) -> dict[str, Any]:
             return [passes]
 
     unwrapped = {} if unit else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    return {"pipeline_class": Compiler, **unwrapped}
+    # Where nothing is allocated no references are counted, which would take most of the time.
+    uncounted = {} if allocates else {"_nrt": False}
+    return {"pipeline_class": Compiler, **unwrapped, **uncounted}
 
 
 def typed_once(dispatcher: Any) -> Any:
@@ -168,11 +144,6 @@ def typed_once(dispatcher: Any) -> Any:
 
     dispatcher.get_call_template = without_literals
     return dispatcher
-
-
-def inner(dispatcher: Any) -> Any:
-    """Return a function that is only linked into others, quicker to compile."""
-    return typed_once(dispatcher) if is_on() and "typed_once" not in WITHOUT else dispatcher
 
 
 def forget(dispatchers: Sequence[Any]) -> None:
@@ -208,24 +179,7 @@ def replacements() -> Iterator[None]:
     through which the collector would walk again and again."""
     from numba.core import event
     from numba.core.base import BaseContext
-    from numba.core.ir import Inst, Loc, Var
     from numba.core.types import Function
-
-    listed_by_numba, plain = Inst._rec_list_vars, {str, int, float, bool, type(None), Loc}
-
-    def listed(self, value):
-        """List the variables of an instruction: most of a million values are none."""
-        if type(value) is dict:
-            value = value.values()
-        elif type(value) not in (list, tuple):
-            return [] if type(value) in plain else listed_by_numba(self, value)
-        found = []
-        for each in value:
-            if type(each) is Var:
-                found.append(each)
-            elif type(each) not in plain:
-                found += listed(self, each)
-        return found
 
     # The types of every `+` and `sqrt`; sizes of LLVM's types, each asked for by parsing a text;
     # listeners of two events for every call of LLVM.
@@ -234,10 +188,11 @@ def replacements() -> Iterator[None]:
     )
     sized = remembering(BaseContext.get_abi_sizeof, lambda context, kind: str(kind))
     others: tuple[tuple[Any, str, Any], ...] = (
-        (Function, "get_call_type", typed), (BaseContext, "get_abi_sizeof", sized),
-        (Inst, "_rec_list_vars", listed),
-        (event, "start_event", lambda *_, **__: None), (event, "end_event", lambda *_, **__: None),
-    )  # fmt: skip
+        (Function, "get_call_type", typed),
+        (BaseContext, "get_abi_sizeof", sized),
+        (event, "start_event", lambda *_, **__: None),
+        (event, "end_event", lambda *_, **__: None),
+    )
     collecting, before = gc.isenabled(), [vars(owner).get(name) for owner, name, _ in others]
     gc.disable()
     try:
@@ -253,5 +208,4 @@ def replacements() -> Iterator[None]:
 
 def quick_typing() -> Any:
     """Return a context in which numba compiles quicker."""
-    on = is_on() and "quick_typing" not in WITHOUT
-    return replacements() if on else contextlib.nullcontext()
+    return replacements() if is_on() else contextlib.nullcontext()

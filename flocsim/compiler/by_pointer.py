@@ -12,22 +12,20 @@ import functools
 import struct
 import weakref
 from collections.abc import Sequence
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, get_type_hints
 
-import attrs
 import numpy as np
 
 from flocsim.errors import KernelError
 
 
-@attrs.define
-class Kept:
+class Kept(NamedTuple):
     """What is remembered of a tuple of arrays and records; see `keep`."""
 
     value: tuple[Any, ...]
     words: list[Any]  # its part of a table
-    kinds: list[Any]  # the types of these
-    arrays: list[Any] | None = None  # those that `clear` clears, once it has done so
+    kinds: tuple[Any, ...]  # the types of these
+    arrays: list[Any]  # those that `clear` clears
 
 
 KEPT: dict[int, Kept] = {}
@@ -66,20 +64,24 @@ def keep(value: tuple[Any, ...], owner: Any) -> None:
     """Remember what a tuple is in tables while its owner lives: they are then made in a fraction of
     the time. Its arrays may not be exchanged meanwhile."""
     if id(value) not in KEPT:
-        words: list[Any] = []
-        kinds: list[Any] = []
-        flatten(value, words, kinds)
-        KEPT[id(value)] = Kept(value, words, kinds)
+        KEPT[id(value)] = Kept(value, *table_of(value), written(value))
         weakref.finalize(owner, KEPT.pop, id(value), None)
 
 
 def clear(value: tuple[Any, ...]) -> None:
     """Set all records of a kept tuple, and all arrays that may be written, to zero."""
-    kept = KEPT[id(value)]
-    if kept.arrays is None:
-        kept.arrays = written(value)
-    for array in kept.arrays:
+    for array in KEPT[id(value)].arrays:
         array.fill(0)
+
+
+def letter_of(value: Any) -> str:
+    """Return the letter (struct) of a number; "" for a law of a scene that runs uncompiled, and for
+    None: nothing that compiled code could use."""
+    if isinstance(value, float):
+        return "d"
+    if isinstance(value, bool | np.bool_):
+        return "?"
+    return "" if value is None or callable(value) else "q"
 
 
 def flatten(value, words, kinds):
@@ -99,23 +101,18 @@ def flatten(value, words, kinds):
         kinds.append((type(value), len(value)))
         for each in value:
             flatten(each, words, kinds)
-    elif value is None or callable(value):
-        # A law of a scene that runs uncompiled: nothing that compiled code could use.
-        words.append(0)
-        kinds.append(None)
     else:
-        words.append(value)
-        kinds.append("d" if isinstance(value, float) else "?" if value is True or value is False
-                     or isinstance(value, np.bool_) else "q")  # fmt: skip
+        letter = letter_of(value)
+        words.append(value if letter else 0)
+        kinds.append(letter)
 
 
-def table_of(arguments: Sequence[Any]) -> tuple[list[Any], tuple[Any, ...]]:
+def table_of(arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[Any, ...]]:
     """Return the arguments as the words of a table, and their types as a flat tuple: a tuple is
     (its class, its length) before its items, an array (its dtype, its dimensions)."""
     words: list[Any] = []
     kinds: list[Any] = []
-    for each in arguments:
-        flatten(each, words, kinds)
+    flatten(arguments, words, kinds)
     return words, tuple(kinds)
 
 
@@ -138,9 +135,5 @@ def sizes_of(named: Any) -> dict[str, tuple[int, ...]]:
 def kinds_text(kinds: tuple[Any, ...]) -> str:
     """Return the types of arguments as text that differs where machine code may: with the names of
     fields in their order, and sizes that are declared."""
-    return " ".join(
-        f"{each[0].__name__}{each[0]._fields}{sizes_of(each[0])}"
-        if isinstance(each, tuple) and hasattr(each[0], "_fields")
-        else repr(each)
-        for each in kinds
-    )
+    named = [each[0] for each in kinds if isinstance(each, tuple) and hasattr(each[0], "_fields")]
+    return repr((kinds, [(each._fields, sizes_of(each)) for each in named]))

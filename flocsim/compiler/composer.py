@@ -18,60 +18,12 @@ from collections.abc import Callable
 from typing import Any
 
 from flocsim.compiler import disk_cache
-from flocsim.compiler.by_pointer import kinds_text, layout_of, table_of
 from flocsim.compiler.fingerprint import fingerprint
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.object_code import function_at
-from flocsim.compiler.units import Engine, argument_names, options_text
+from flocsim.compiler.units import Engine, options_text
 from flocsim.errors import KernelError
 
 _composed: dict = {}
-
-
-class Compiled:
-    """A linked function that is compiled at its first call, or loaded from the disk; once more for
-    arguments of other types. Without what is postponed, unless it is ``complete``."""
-
-    def __init__(self, linked, name, allocates, what, complete=False):
-        self.linked, self.name, self.allocates, self.what = linked, name, allocates, what
-        self.complete = complete
-        self.functions = {}
-
-    @functools.cached_property
-    def whole(self):
-        """The same with what is postponed."""
-        return Compiled(self.linked, self.name, self.allocates, self.what, True)
-
-    def __call__(self, *arguments):
-        words, kinds = table_of(arguments)
-        if kinds not in self.functions:
-            typed = functools.partial(self.typed, kinds)
-            engine = Engine(
-                self.linked, self.name, kinds_text(kinds), typed, self.allocates, self.complete,
-                self.what,
-            )  # fmt: skip
-            self.functions[kinds] = function_at(*engine.load(), layout_of(words))
-        return self.functions[kinds](words)
-
-    def typed(self, kinds):
-        """Return the numba type of a table's address, {argument: function that reads it there} and
-        {text: numba type} of all that is in it."""
-        from flocsim.compiler.table_types import (
-            Elements,
-            argument_at,
-            type_from,
-            types,
-            types_within,
-            words_in,
-        )
-
-        more, at, found, readers = iter(kinds), 0, [], {}
-        for name in argument_names(self.linked):
-            found.append(kind := type_from(more))
-            whole = self.allocates and isinstance(kind, Elements)
-            readers[name] = argument_at(kind, at, whole)
-            at += words_in(kind)
-        return (types.int64,), readers, types_within(found)
 
 
 def compose(
@@ -81,7 +33,7 @@ def compose(
     jit: bool = True,
     allocates: bool = False,
     what: str = "",
-) -> Callable:
+) -> Any:
     """Return the driver ``entry`` with its hooks filled, as one function.
 
     Parameters: ``entry``, a plain function; ``fillings``, {hook of flocsim.hooks.HOOKS: plain
@@ -97,7 +49,7 @@ def compose(
     refuse_no_compiler()
     name = f"flocsim_scene_{fingerprint(entry, fillings, options_text(allocates), linked)}"
     if name not in _composed:
-        _composed[name] = Compiled(linked, name, allocates, what)
+        _composed[name] = Engine(linked, name, allocates, what)
     return _composed[name]
 
 
@@ -114,25 +66,14 @@ def is_on_disk(driver: Any) -> bool:
     return disk_cache.has(driver.name)
 
 
-def compile_law(law: Callable, told: str, numbers: int, given: Callable[[], Any]) -> int:
-    """Return the address [int] at which an engine calls a plain function that returns so many
-    numbers, compiled for ``given()`` numba types, of which ``told`` tells all.
+def compile_law(law: Callable, told: str, given: Callable[[], Any]) -> int:
+    """Return the address [int] at which an engine calls a plain function that returns numbers,
+    compiled for ``given()`` numba types, of which ``told`` tells all.
 
     Raises KernelError for what captures variables, reads globals that may change, or cannot be
     compiled. The compiled function lives as long as the process.
     """
-    linked = Linker({}).link(law)
-    refuse_no_compiler()
-    key = (fingerprint(law, {}, options_text(False), linked), told)
-    if key not in _composed:
-        name = f"flocsim_law_{key[0]}"
-
-        def typed() -> tuple[Any, dict[str, Any], dict[str, Any]]:
-            return given(), {}, {}
-
-        engine = Engine(linked, name, told, typed, what="", returns="d" * numbers)
-        _composed[key], _ = engine.load()
-    return _composed[key]
+    return compose(law, {}).load(told, given)[0]
 
 
 def refuse_no_compiler():

@@ -21,7 +21,7 @@ SUFFIX = ".code"
 
 WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
-# Open no link, and wait for no pipe; systems without these flags ignore them.
+# Of os.open: open no link, and wait for no pipe; systems without these flags ignore them.
 SAFELY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
@@ -49,13 +49,15 @@ def checksum(name: str, key: str, data: bytes) -> bytes:
     return hashlib.blake2b(head + data, digest_size=DIGEST_SIZE).digest()
 
 
+def open_safely(path: str, flags: int) -> int:
+    """Open a file, but no link, and wait for no pipe."""
+    return os.open(path, flags | SAFELY)
+
+
 def read(name: str, key: str) -> bytes | None:
     """Return what was written under a name and a key, if it is unchanged; else None."""
     path = cache_folder() / file_name(name, key)
-    with (
-        contextlib.suppress(OSError),
-        open(path, "rb", opener=lambda path, flags: os.open(path, flags | SAFELY)) as file,
-    ):
+    with contextlib.suppress(OSError), open(path, "rb", opener=open_safely) as file:
         status = os.fstat(file.fileno())
         # Windows has no such owners: there, only the user can write to the user's folder.
         trusted = not hasattr(os, "getuid") or (

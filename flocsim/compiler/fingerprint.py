@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flocsim.compiler.linker import Linker, is_library, is_versioned, reads, refuse_closure, where
-from flocsim.compiler.processor import compilers
+from flocsim.compiler.processor import versions
 from flocsim.errors import KernelError
 
 
@@ -44,7 +44,7 @@ def value_text(value: Any) -> str:
     if isinstance(value, Intrinsic):
         return f"intrinsic {value.name}"
     if isinstance(value, np.number | np.bool_):
-        return f"{value.dtype.str} {value.tobytes().hex()}"
+        return f"{kind} {value!r}"
     if isinstance(value, enum.Enum):
         return f"{value.name} of {value_text(kind)}"
     if isinstance(value, type) and issubclass(value, enum.Enum):
@@ -134,7 +134,6 @@ def describe(entry: Any) -> Description:
     """
     lines: list[str] = []
     functions, calls = [entry], {}
-    numbers = {entry: 0}
     for function in functions:  # grows
         if not isinstance(function, types.FunctionType):
             raise KernelError(
@@ -147,17 +146,16 @@ def describe(entry: Any) -> Description:
                 lines.append(f"{name}->{value.apart}")
                 calls[value.apart] = value
                 continue
-            if value not in numbers:
-                numbers[value] = len(functions)
+            if value not in functions:
                 functions.append(value)
             # Two functions may share a name, so that a number has to tell which is called.
-            lines.append(f"{name}->{numbers[value]}")
+            lines.append(f"{name}->{functions.index(value)}")
     return Description(lines, functions, calls)
 
 
 def hashed(lines: Iterable[str], options: str) -> str:
-    """Return the hash of lines, of how they are compiled, and of the versions of compilers."""
-    text = "\n".join([compilers(), options, *lines])
+    """Return the hash of lines, of how they are compiled, and of all versions."""
+    text = "\n".join([repr(versions()), options, *lines])
     return hashlib.blake2b(text.encode(), digest_size=12).hexdigest()
 
 

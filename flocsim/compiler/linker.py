@@ -11,6 +11,8 @@ import types
 from collections.abc import Callable
 from typing import Any
 
+import attrs
+
 from flocsim.errors import KernelError
 
 ATTRIBUTE_LOADS = ("LOAD_ATTR", "LOAD_METHOD")
@@ -146,6 +148,7 @@ def postponed(stand_in: Callable) -> Callable:
     return mark
 
 
+@attrs.define
 class Linker:
     """Clones functions, with others in the place of hooks.
 
@@ -153,14 +156,10 @@ class Linker:
     ``replace(value)`` returns what stands for a value or a function; None: itself, or its clone.
     """
 
-    def __init__(
-        self,
-        fillings: dict[Callable, Callable],
-        finish: Callable[[Any], Any] = lambda clone: clone,
-        replace: Callable[[Any], Any] = lambda value: None,
-    ) -> None:
-        self.fillings, self.finish, self.replace = fillings, finish, replace
-        self.clones: dict[Callable, Any] = {}
+    fillings: dict[Callable, Callable]
+    finish: Callable[[Any], Any] = lambda clone: clone
+    replace: Callable[[Any], Any] = lambda value: None
+    clones: dict[Callable, Any] = attrs.field(factory=dict, init=False)
 
     def link(self, value: Any) -> Any:
         """Return the clone of a function, all that it calls linked as well; other values as they

@@ -3,15 +3,13 @@
 Loading numba, and all that it registers, takes longer than a short run; a function that allocates
 nothing needs no more of it than an object file and the name of its entry.
 
-A compiled function is called as a C function that is given the address at which its answer goes,
-then its arguments; it returns 0, or 1 where it has raised an exception.
+A compiled function is called as a C function of two addresses: that at which its answer goes, and
+that of its arguments. It returns 0, or 1 where it has raised an exception.
 """
 
 import ctypes
 import hashlib
-import json
 import struct
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -21,18 +19,18 @@ from flocsim.errors import KernelError
 # How names begin of what numba lends to compiled code, once it is loaded itself.
 LENT = "numba_", "NRT_", "Py", "_Py", "__svml"
 
-_lock = threading.Lock()
-_engines: list[Any] = []
-_loaded: dict[tuple[Any, ...], int] = {}
+# LLVM's engines, by the object files that they have loaded.
+_loaded: dict[tuple[Any, ...], Any] = {}
 
 
 class Called(NamedTuple):
-    """A unit that another one calls: its ``symbol``, the name of its ``function``, the ``types`` of
-    its arguments as text, and the letters (struct) of what it is to have ``returned``."""
+    """A unit that another one calls: its ``symbol``, the name of its ``function``, the pickled
+    numba ``types`` of its arguments, and the letters (struct) of what it is to have
+    ``returned``."""
 
     symbol: str
     function: str
-    types: tuple[str, ...]
+    types: bytes
     returned: str
 
 
@@ -46,20 +44,8 @@ class ObjectCode(NamedTuple):
     borrows: bool
     calls: tuple[Called, ...] = ()
 
-    def packed(self) -> bytes:
-        """Return it as bytes."""
-        return json.dumps(self[1:]).encode() + b"\n" + self.code
 
-    @classmethod
-    def unpacked(cls, data: bytes) -> "ObjectCode":
-        """Return what was packed."""
-        head, code = data.split(b"\n", 1)
-        entry, returned, borrows, calls = json.loads(head)
-        called = (Called(symbol, name, tuple(types), was) for symbol, name, types, was in calls)
-        return cls(code, entry, returned, borrows, tuple(called))
-
-
-def compiler(machine: Any) -> Any:
+def compiler(**machine: Any) -> Any:
     """Return LLVM's context of a process, ready to make and load object files."""
     import llvmlite.binding as llvm
 
@@ -74,10 +60,9 @@ def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
     import llvmlite.binding as llvm
 
     cpu, features = target(loops)
-    machine = compiler({
-        "cpu": cpu, "features": features, "opt": 3, "reloc": "static", "codemodel": "jitdefault",
-        "jit": True,
-    })  # fmt: skip
+    machine = compiler(
+        cpu=cpu, features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    )
     module = llvm.parse_assembly(text)
     # Nothing but the entry is called from outside: LLVM may do what it likes with the others, as
     # with a C program of one file.
@@ -91,20 +76,20 @@ def object_of(text: str, entry: str, loops: bool) -> tuple[bytes, set[str]]:
     return machine.emit_object(module), {x.name for x in module.functions if x.is_declaration}
 
 
-def load(code: ObjectCode, called: Mapping[str, int]) -> int:
-    """Return the address of an entry; ``called`` {symbol: address} of the units that it calls. The
-    code stays as long as the process lives, and is loaded once."""
+def load(code: ObjectCode, addresses: Mapping[str, int]) -> int:
+    """Return the address of an entry; ``addresses`` {symbol: address} of units, those that it calls
+    among them. The code stays as long as the process lives, and is loaded once; by one thread at a
+    time."""
     import llvmlite.binding as llvm
 
+    called = {each.symbol: addresses[each.symbol] for each in code.calls}
     key = hashlib.blake2b(code.code, digest_size=16).digest(), *called.items()
-    if code.borrows and key not in _loaded:
-        import numba
+    if key not in _loaded:
+        if code.borrows:
+            import numba
 
-        numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
-    with _lock:
-        if key in _loaded:
-            return _loaded[key]
-        machine = compiler({})
+            numba.njit("float64()")(lambda: 0.0)  # it lends once it has compiled something
+        machine = compiler()
         # For the process as a whole, and yet for this file: those before are linked already.
         for symbol, address in called.items():
             llvm.add_symbol(symbol, address)
@@ -112,9 +97,8 @@ def load(code: ObjectCode, called: Mapping[str, int]) -> int:
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         engine.add_object_file(llvm.ObjectFileRef.from_data(code.code))
         engine.finalize_object()
-        _engines.append(engine)
-        _loaded[key] = engine.get_function_address(code.entry)
-        return _loaded[key]
+        _loaded[key] = engine
+    return _loaded[key].get_function_address(code.entry)
 
 
 def function_at(

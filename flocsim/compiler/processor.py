@@ -1,5 +1,6 @@
 """What of the processor, of numba's settings and of the libraries decides what is computed."""
 
+import contextlib
 import functools
 import os
 import platform
@@ -9,19 +10,16 @@ from typing import Any
 
 PACKAGES = "numba", "llvmlite", "numpy", "scipy", "shapely", "flocsim"
 
-# Packages of which machine code depends on the version.
-COMPILERS = "numba", "llvmlite", "numpy", "flocsim"
-
 # The processor that engines are compiled for, where the one at hand can do all that it can: others
 # can then use the same code, and what is not a loop over many numbers is no slower
 # (benchmarks/speed/processors.py).
 BASELINE = "x86-64-v3"
 
-# What the baseline can do more than any x86-64, as LLVM calls it.
-OF_BASELINE = {
-    "avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "sse3",
-    "sse4.1", "sse4.2", "ssse3", "xsave",
-}  # fmt: skip
+# What the baseline can do more than any x86-64, as LLVM writes it.
+OF_BASELINE = (
+    "+avx,+avx2,+bmi,+bmi2,+cx16,+f16c,+fma,+lzcnt,+movbe,+popcnt,+sahf,+sse3,+sse4.1,+sse4.2,"
+    "+ssse3,+xsave"
+)
 
 # What may be set in the environment that changes machine code.
 SETTINGS = (
@@ -46,53 +44,38 @@ def versions() -> dict[str, str]:
 
 
 @functools.cache
-def compilers() -> str:
-    """Return the versions that machine code depends on; releases of Python that read the same
-    bytecode are one."""
-    return repr([sys.implementation.cache_tag, *(versions()[f"version of {x}"] for x in COMPILERS)])
-
-
-def settings() -> list[str]:
-    """Return what is set of all that changes machine code."""
-    return [f"{name}={os.environ[name]}" for name in SETTINGS if os.environ.get(name)]
-
-
-@functools.cache
 def has_svml() -> bool:
     """Return True if loops over many numbers may call Intel's library."""
     import llvmlite.binding as llvm
 
-    if os.environ.get("NUMBA_DISABLE_INTEL_SVML", "0") != "0":
-        return False
-    try:
-        llvm.load_library_permanently(SVML.get(sys.platform, "svml_dispmd"))
-    except RuntimeError:
-        return False
-    return llvm.targets.has_svml()
+    if os.environ.get("NUMBA_DISABLE_INTEL_SVML", "0") == "0":
+        with contextlib.suppress(RuntimeError):
+            llvm.load_library_permanently(SVML.get(sys.platform, "svml_dispmd"))
+            return llvm.targets.has_svml()
+    return False
 
 
 @functools.cache
-def host() -> tuple[str, str, Any]:
-    """Return LLVM's name of the system, of this processor, and what it can do."""
-    import llvmlite.binding as llvm
-
-    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features()
-
-
 def target(loops: bool = False) -> tuple[str, str]:
     """Return LLVM's name of the processor to compile for, and its features: what is set, the
     baseline, or this very processor; the latter also for ``loops`` over many numbers."""
-    _, name, known = host()
-    named = [os.environ.get(name, "") for name in SETTINGS[:2]]
-    if any(named) or loops or not all(known.get(name) for name in OF_BASELINE):
-        features = named[1] or (known.flatten() if not named[0] else "")
-        return named[0] or name, features
+    import llvmlite.binding as llvm
+
+    name, features = (os.environ.get(each, "") for each in SETTINGS[:2])
+    known = llvm.get_host_cpu_features().flatten()
+    if name or features:
+        return name or llvm.get_host_cpu_name(), features
+    if loops or not set(OF_BASELINE.split(",")) <= set(known.split(",")):
+        return llvm.get_host_cpu_name(), known
     return BASELINE, ""
 
 
 def compiled_for(loops: bool = False) -> str:
     """Return what of the machine the machine code of a function depends on."""
-    return repr((host()[0], target(loops), settings(), loops and has_svml()))
+    import llvmlite.binding as llvm
+
+    settings = [os.environ.get(each) for each in SETTINGS]
+    return repr((llvm.get_process_triple(), target(loops), settings, loops and has_svml()))
 
 
 def cpu_kind() -> dict:
@@ -103,6 +86,7 @@ def cpu_kind() -> dict:
     ``numpy``: the instructions that numpy uses, NPY_DISABLE_CPU_FEATURES heeded; ``libm``: the C
     library, which computes exp and log; what was set for it and for the linear algebra.
     """
+    import llvmlite.binding as llvm
     import numpy
 
     name, features = target(loops=True)
@@ -112,7 +96,7 @@ def cpu_kind() -> dict:
     for each in ("GLIBC_TUNABLES", "OPENBLAS_CORETYPE"):
         libm += [os.environ[each]] if os.environ.get(each) else []
     return {
-        "cpu": host()[1],
+        "cpu": llvm.get_host_cpu_name(),
         "compiled_for": name,
         "features": sorted(each[1:] for each in features.split(",") if each.startswith("+")),
         "numpy": [*simd.get("baseline", []), *simd.get("found", [])],

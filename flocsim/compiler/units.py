@@ -16,17 +16,21 @@ everything that the engine does.
 import contextlib
 import functools
 import hashlib
+import pickle
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
+
 from flocsim.compiler import accelerator, disk_cache
+from flocsim.compiler.by_pointer import kinds_text, layout_of, table_of
 from flocsim.compiler.fingerprint import Intrinsic, describe, hashed
 from flocsim.compiler.linker import Linker
-from flocsim.compiler.object_code import LENT, Called, ObjectCode, load, object_of
+from flocsim.compiler.object_code import LENT, Called, ObjectCode, function_at, load, object_of
 from flocsim.compiler.processor import compiled_for
 from flocsim.errors import FlocsimError, KernelError
 from flocsim.process import COMPILING, lacking
@@ -34,9 +38,6 @@ from flocsim.process import COMPILING, lacking
 # Functions of less bytecode [bytes] are always inlined; of the others LLVM decides. Up to 1,200
 # would gain 7 % of throughput for 1.5 times the compile time.
 INLINED_SIZE = 400
-
-# How names of functions begin that allocate memory.
-ALLOCATORS = "NRT_MemInfo", "NRT_Allocate"
 
 SCALARS_ONLY = "use plain arithmetic on scalars, without arrays and lists"
 
@@ -50,11 +51,6 @@ _said: set[str] = set()
 _one_at_a_time = threading.RLock()
 
 
-def argument_names(function: Any) -> tuple[str, ...]:
-    """Return the names of a function's arguments."""
-    return function.__code__.co_varnames[: function.__code__.co_argcount]
-
-
 @functools.cache
 def options_text(allocates: bool) -> str:
     """Return how functions are compiled, for the hash: the code that says how."""
@@ -63,129 +59,118 @@ def options_text(allocates: bool) -> str:
     return f"{allocates} {digest.hexdigest()}"
 
 
-class Engine:
-    """A linked function with all units that it calls, found on the disk or compiled.
+def symbol_of(function: Callable, types: str) -> str:
+    """Return the symbol of a unit for arguments of such types."""
+    told = repr((getattr(function, "apart", ""), types))
+    return f"flocsim_{hashlib.blake2b(told.encode(), digest_size=12).hexdigest()}"
 
-    Parameters: ``entry``, the function, in the file called ``name``; ``words``, which tell the
-    types of its arguments; ``typed()`` returns these: numba types, those of the words of a table at
-    an address, or of others where ``readers`` {argument: function of an address} is {}.
-    ``allocates``: it makes arrays for itself. ``whole``: with what is postponed. ``what`` it is,
-    for who waits. ``returns``: the letters (struct) of its answer, else as numba infers them.
+
+@attrs.define(eq=False, slots=False)
+class Engine:
+    """A linked function with all units that it calls: found on the disk or compiled at its first
+    call, and once more for arguments of other types.
+
+    Parameters: ``entry``, the function, in the file called ``name``; ``allocates``: it makes arrays
+    for itself; ``what`` it is, for who waits; ``complete``: with what is postponed.
     """
 
-    def __init__(
-        self,
-        entry: Callable,
-        name: str,
-        words: str,
-        typed: Callable[[], tuple[tuple[Any, ...], dict[str, Any], dict[str, Any]]],
-        allocates: bool = False,
-        whole: bool = False,
-        what: str = "",
-        returns: str | None = None,
-    ) -> None:
-        self.entry, self.name, self.words, self.typed = entry, name, words, typed
-        self.allocates, self.whole, self.what, self.returns = allocates, whole, what, returns
-        self.options = options_text(allocates)
-        self.linker = Linker({}, self.inner, self.replace)
-        self.units: dict[str, ObjectCode] = {}
-        self.addresses: dict[str, int] = {}
-        self.calls: dict[str, Called] = {}
-        self.parts: list[Any] = []
-        self.known: dict[str, Any] = {}
+    entry: Callable
+    name: str
+    allocates: bool = False
+    what: str = ""
+    complete: bool = False
+    functions: dict[tuple[Any, ...], Callable] = attrs.field(factory=dict, init=False)
+    units: dict[str, ObjectCode] = attrs.field(factory=dict, init=False)
+    addresses: dict[str, int] = attrs.field(factory=dict, init=False)
+    calls: dict[str, Called] = attrs.field(factory=dict, init=False)
+    parts: list[Any] = attrs.field(factory=list, init=False)
 
-    def load(self) -> tuple[int, str]:
-        """Return the address of the machine code, and the letters (struct) of its answer."""
+    @functools.cached_property
+    def whole(self) -> "Engine":
+        """The same with what is postponed."""
+        return Engine(self.entry, self.name, self.allocates, self.what, True)
+
+    def __call__(self, *arguments: Any) -> Any:
+        words, kinds = table_of(arguments)
+        if kinds not in self.functions:
+
+            def given() -> list[Any]:
+                from flocsim.compiler.table_types import type_of
+
+                return type_of(arguments, self.allocates).types
+
+            address, returned = self.load(kinds_text(kinds), given, table=True)
+            self.functions[kinds] = function_at(address, returned, layout_of(words))
+        return self.functions[kinds](words)
+
+    def load(
+        self, told: str, given: Callable[[], Sequence[Any]], table: bool = False
+    ) -> tuple[int, str]:
+        """Return the address of the machine code for ``given()`` numba types, of which ``told``
+        tells all, and the letters (struct) of its answer; ``table``: it is given a table."""
         with _one_at_a_time, contextlib.ExitStack() as self.stack:
-            symbol, code = self.unit(self.entry, (self.words,))
-        assert code is not None
-        return self.link(symbol), code.returned
+            self.linker, self.parts = Linker({}, self.inner, self.replace), []
+            self.table = table
+            symbol = symbol_of(self.entry, told)
+            returned = self.unit(symbol, self.entry, given).returned
+        return self.addresses[symbol], returned
 
-    def link(self, symbol: str) -> int:
-        """Return the address of a unit, loaded after those that it calls."""
-        if symbol not in self.addresses:
-            code = self.units[symbol]
-            called = {each.symbol: self.link(each.symbol) for each in code.calls}
-            self.addresses[symbol] = load(code, called)
-        return self.addresses[symbol]
-
-    def unit(
-        self, function: Callable, words: tuple[str, ...], given: Any = None
-    ) -> tuple[str, ObjectCode | None]:
-        """Return the symbol and the code of a unit for arguments of types of such names; None where
-        it has to be compiled, and the types are not known."""
-        name = getattr(function, "apart", "")
-        symbol = f"flocsim_{hashlib.blake2b(repr((name, words)).encode()).hexdigest()[:24]}"
+    def unit(self, symbol: str, function: Any, given: Callable[[], Sequence[Any]]) -> ObjectCode:
+        """Return the code of a unit for ``given()`` numba types, loaded after those that it
+        calls."""
         if symbol in self.units:
-            return symbol, self.units[symbol]
-        made = function if self.whole else getattr(function, "stand_in", function)
-        file_name = self.name
+            return self.units[symbol]
+        if not self.complete:
+            function = getattr(function, "stand_in", function)
+        name = self.name
         if function is not self.entry:
-            file_name = f"flocsim_unit_{hashed(describe(made).lines, self.options)}"
-        file = file_name, repr((words, compiled_for(hasattr(made, "loops"))))
-        code = self.from_disk(made, *file)
-        if code is None:
-            if function is not self.entry and given is None:
-                self.known = self.known or self.typed()[2]
-                if not self.known.keys() >= set(words):
-                    return symbol, None
-                given = [self.known[each] for each in words]
-            code = self.compiled(made, given)
-            disk_cache.write(*file, code.packed())
+            name = f"flocsim_unit_{hashed(describe(function).lines, options_text(self.allocates))}"
+        file = name, repr((symbol, compiled_for(hasattr(function, "loops"))))
+        # Nobody else can have written what is read (disk_cache).
+        data = disk_cache.read(*file)
+        code = pickle.loads(data) if data else None
+        if code is None or not self.calls_fit(code, function):
+            code = self.compiled(function, given())
+            disk_cache.write(*file, pickle.dumps(code))
         self.units[symbol] = code
-        return symbol, code
-
-    def from_disk(self, function: Callable, name: str, key: str) -> ObjectCode | None:
-        """Return a unit as the disk has it, if what it calls returns what it expects."""
-        if (data := disk_cache.read(name, key)) is None:
-            return None
-        code = ObjectCode.unpacked(data)
-        for each in code.calls:
-            _, found = self.unit(describe(function).calls[each.function], each.types)
-            if found is None or found.returned != each.returned:
-                return None
+        self.addresses[symbol] = load(code, self.addresses)
         return code
 
-    def compiled(self, function: Callable, given: Any) -> ObjectCode:
+    def calls_fit(self, code: ObjectCode, function: Callable) -> bool:
+        """Return True if all units that a unit calls return what it expects."""
+        for each in code.calls:
+            called = describe(function).calls[each.function]
+            given = functools.partial(pickle.loads, each.types)
+            if self.unit(each.symbol, called, given).returned != each.returned:
+                return False
+        return True
+
+    def compiled(self, function: Callable, given: Sequence[Any]) -> ObjectCode:
         """Return the code of a unit, compiled."""
         if not self.parts:
             self.begin()
         import numba
 
-        from flocsim.compiler.table_types import answer_to, letters_of, types_within
+        from flocsim.compiler.table_types import letters_of, put, reader
 
-        readers: dict[str, Any] = {}
-        if function is self.entry:
-            given, readers, within = self.typed()
-            self.known |= within
-        self.known |= types_within(given)
-        names = argument_names(function)
-        taken = "address" if readers else ", ".join(names)
-        handed = ", ".join(f"read_{name}(address)" if readers else name for name in names)
-        returned: list[Any] = []
+        read = reader(given, self.table and function is self.entry)
         driver = self.inner(self.linker.clone(function))
-        put = answer_to(returned.append, self.returns if function is self.entry else None)
-        known = {f"read_{name}": each for name, each in readers.items()}
-        known |= {"driver": driver, "put": put}
-        exec(
-            f"def run(answer, {taken}):\n    try:\n        put(answer, driver({handed}))\n"
-            "    except Exception:\n        return 1\n    return 0\n",
-            known,
-        )
+
+        def run(answer, arguments):
+            try:
+                put(answer, driver(*read(arguments)))
+            except Exception:
+                return 1
+            return 0
+
         options = accelerator.options(True, self.allocates)
-        kind = numba.types.int64(numba.types.int64, *given)
         try:
-            made = numba.cfunc(kind, error_model="numpy", **options)(known["run"])
+            made = numba.cfunc("i8(i8, i8)", error_model="numpy", **options)(run)
         except numba.errors.NumbaError as error:
             raise KernelError(compiler_complaint(str(error))) from None
-        letters = letters_of(returned[-1])
-        if letters is None:
-            raise KernelError(f"a compiled function returns {returned[-1]}: let it return numbers")
+        letters = letters_of(driver.nopython_signatures[-1].return_type)
         entry, loops = made.native_name, hasattr(function, "loops")
         code, missing = object_of(made.inspect_llvm(), entry, loops)
-        # Without the accelerator, numba compiles kernels that make arrays or lists.
-        if not self.allocates and any(x.startswith(ALLOCATORS) for x in missing):
-            raise KernelError(f"a kernel cannot be compiled: {SCALARS_ONLY}")
         calls = tuple(self.calls[each] for each in sorted(missing) if each in self.calls)
         return ObjectCode(code, entry, letters, any(x.startswith(LENT) for x in missing), calls)
 
@@ -207,7 +192,9 @@ class Engine:
         options = accelerator.options(False, self.allocates)
         # Dividing by zero gives what it does in numpy.
         made = numba.njit(clone, error_model="numpy", forceinline=small, **options)
-        self.parts.append(accelerator.inner(made))
+        if accelerator.is_on():
+            accelerator.typed_once(made)
+        self.parts.append(made)
         return made
 
     def replace(self, value: Any) -> Any:
@@ -215,17 +202,17 @@ class Engine:
         compiled apart; None for others."""
         if isinstance(value, Intrinsic):
             return self.inner(value.make())
-        if not hasattr(value, "apart") or self.allocates or not accelerator.by_units():
+        if not hasattr(value, "apart") or self.allocates or not accelerator.is_on():
             return None
         from flocsim.compiler.table_types import call_of
 
         def target(given):
-            words = tuple(map(str, given))
-            symbol, code = self.unit(value, words, given)
-            self.calls[symbol] = Called(symbol, value.apart, words, code.returned)
-            return symbol, code.returned
+            symbol = symbol_of(value, str(given))
+            returned = self.unit(symbol, value, lambda: given).returned
+            self.calls[symbol] = Called(symbol, value.apart, pickle.dumps(given), returned)
+            return symbol, returned
 
-        return self.inner(call_of(argument_names(value), target))
+        return self.inner(call_of(target))
 
 
 def say(what: str) -> None:

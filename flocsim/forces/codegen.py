@@ -307,10 +307,10 @@ def write_contact_laws(source, forces):
         view = "contact" if force.goes_on_apart else "pressed_contact(contact)"
         terms.append(("", source.call(force, force.kernel_in(source.fluid), view)))
         if force.slides:
-            limits.append(source.call(force, force.slip_limit, view))
+            limits.append(f"float({source.call(force, force.slip_limit, view)})")
         if force.has_events:
             call = source.call(force, force.events, view)
-            events += [f"{call}[{k}]" for k in range(event_count(force, source.fluid))]
+            events += [f"float({call}[{k}])" for k in range(event_count(force, source.fluid))]
     if terms:
         source.functions.append(sum_function("contact_force", "contact", terms, 2))
         fields = ("overlap", "overlap_rate", "slip", "slip_rate")

@@ -181,11 +181,17 @@ def gap_along(low, high, other_low, other_high, period):
 
 def have_met(swarm, a, b, reach, width, height):
     """Whether two bodies have been in each other's reach in any stretch of the window."""
+    ways = swarm.ways
     near = swarm.bodies[a].bounding_radius + swarm.bodies[b].bounding_radius + reach
     for stretch in range(sw.STRETCHES):
-        one, other = swarm.ways[a, stretch], swarm.ways[b, stretch]
-        x = gap_along(one[sw.LEFT], one[sw.RIGHT], other[sw.LEFT], other[sw.RIGHT], width)
-        y = gap_along(one[sw.LOW], one[sw.HIGH], other[sw.LOW], other[sw.HIGH], height)
+        x = gap_along(
+            ways[a, stretch, sw.LEFT], ways[a, stretch, sw.RIGHT],
+            ways[b, stretch, sw.LEFT], ways[b, stretch, sw.RIGHT], width,
+        )  # fmt: skip
+        y = gap_along(
+            ways[a, stretch, sw.LOW], ways[a, stretch, sw.HIGH],
+            ways[b, stretch, sw.LOW], ways[b, stretch, sw.HIGH], height,
+        )  # fmt: skip
         if x * x + y * y < near * near:
             return True
     return False

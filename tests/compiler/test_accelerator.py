@@ -16,6 +16,7 @@ import flocsim
 from flocsim.compiler import accelerator
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.linker import apart
+from flocsim.compiler.table_types import Elements
 from flocsim.errors import KernelError
 from tests.helpers.waiting import PATIENCE
 
@@ -37,7 +38,7 @@ def wrong(x, parameters):
     return x.colour
 
 
-GIVEN = types.float64, types.CPointer(types.float64)
+GIVEN = types.float64, Elements(types.float64, (0,))
 
 
 @pytest.fixture
@@ -67,16 +68,9 @@ def test_without_the_accelerator_everything_works(fresh, environment, new_proces
     for _ in range(2):  # compiled, then from the disk
         new_process()
         assert compose(root, {})(3.0, parameters) == expected == root(3.0, parameters)
-    assert compile_law(law, "law", 1, lambda: GIVEN) != 0
+    assert compile_law(law, "law", lambda: GIVEN) != 0
     with pytest.raises(KernelError, match=r"test_accelerator\.py:\d+: .*colour"):
         compose(wrong, {})(3.0, parameters)
-
-
-@pytest.mark.parametrize("name", ["compilers", "typed_once", "quick_typing"])
-def test_each_part_can_be_left_out_and_the_same_is_computed(fresh, name):
-    fresh.setattr(accelerator, "WITHOUT", [name])
-    parameters = np.ones(2)
-    assert compose(root, {})(2.0, parameters) == root(2.0, parameters)
 
 
 def test_no_other_file_names_a_private_part_of_numba():

@@ -75,14 +75,6 @@ def sizes(outer, k):
     return 100 * total + 10 * len(outer.counts) + len(outer.inner.numbers)
 
 
-def rows(outer, k):
-    part, row = outer.places[k], outer.inner.numbers[k]
-    part[1, 0] = outer.reach
-    row[2] = part[0, 1] + len(part) + part[2][1]
-    outer.places[0, 1][0] += 1.0
-    return row[2] + part[1, 0] + outer.places[k, 2][1]
-
-
 def mixed(flag, number, view, pair, array):
     array[0] = view.x
     return (number if flag else -number) + view[1] * pair[0] + pair[1] + array[1]
@@ -123,9 +115,9 @@ def test_what_stays_is_cleared_but_for_what_must_not_be_written():
     assert not any(each.any() for each in (state.places, state.waves, state.inner.numbers))
 
 
-@pytest.mark.parametrize("function", [reads, writes, rows, sizes])
+@pytest.mark.parametrize("function", [reads, writes, sizes])
 @pytest.mark.parametrize("k", [0, 2])
-def test_elements_and_rows_are_read_and_written_as_in_python(function, k):
+def test_elements_are_read_and_written_as_in_python(function, k):
     (value, state), (expected, plain) = both(function, k)
     assert value == pytest.approx(expected)
     for name in ("places", "counts", "waves", "short"):

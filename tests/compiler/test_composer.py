@@ -7,13 +7,15 @@ import pytest
 from flocsim import Body, Sphere, System
 from flocsim.compiler.composer import compile_law, compose
 from flocsim.compiler.fingerprint import fingerprint
-from flocsim.compiler.table_types import call_of
+from flocsim.compiler.table_types import Elements, call_of
 from flocsim.errors import KernelError
 from flocsim.forces import Contact, Gravity, StokesDrag, VanDerWaals
 from flocsim.integrators.loop.driver import advance
 
-GIVEN = numba.float64, numba.types.CPointer(numba.float64)
-scale_by_address = numba.njit(call_of(("address", "x", "parameters"), lambda given: ("", "d")))
+GIVEN = numba.float64, Elements(numba.float64, (0,))
+NOTHING = np.zeros(2, dtype=np.int64)
+"""A table of an array without numbers: its address, its size."""
+scale_by_address = numba.njit(call_of(lambda given: ("", "d")))
 
 
 SCALED = "SCALE = @\n\ndef scaled(x):\n    return SCALE * x\n"
@@ -57,8 +59,8 @@ def as_function(kernels):
 
 
 def as_law(kernels):
-    law = compile_law(kernels.scaled, "scaled", 1, lambda: GIVEN)
-    return scale_by_address(law, 3.0, np.ones(1).ctypes.data)
+    law = compile_law(kernels.scaled, "scaled", lambda: GIVEN)
+    return scale_by_address(law, 3.0, NOTHING.ctypes.data)
 
 
 @pytest.mark.parametrize("text, answer", [(SCALED, as_function), (SCALED_LAW, as_law)])
@@ -99,15 +101,15 @@ def test_parameter_values_leave_the_hashes_alone_and_other_forces_change_laws_on
 def test_a_law_that_cannot_be_compiled_is_named_by_file_and_line(load):
     with pytest.raises(KernelError, match=r"kernels\.py:\d+: .*use plain arithmetic on scalars"):
         kernels = load("def unknown(x, parameters):\n    return x.no_such_attribute\n", 2)
-        compile_law(kernels.unknown, "unknown", 1, lambda: GIVEN)
+        compile_law(kernels.unknown, "unknown", lambda: GIVEN)
 
 
 def test_a_law_that_raises_is_told_from_one_that_answers(load):
     text = "def f(x, p):\n    if x < 0:\n        raise ValueError('below zero')\n    return x\n"
-    law = compile_law(load(text, 2).f, "f", 1, lambda: GIVEN)
-    assert scale_by_address(law, 3.0, np.ones(1).ctypes.data) == 3.0
+    law = compile_law(load(text, 2).f, "f", lambda: GIVEN)
+    assert scale_by_address(law, 3.0, NOTHING.ctypes.data) == 3.0
     with pytest.raises(RuntimeError):
-        scale_by_address(law, -3.0, np.ones(1).ctypes.data)
+        scale_by_address(law, -3.0, NOTHING.ctypes.data)
 
 
 def hooked(x):

@@ -81,7 +81,7 @@ def test_a_call_of_python_is_refused_by_file_and_line(function, named, words):
 
 def test_a_law_and_what_stands_in_for_a_hook_are_looked_at_too():
     with pytest.raises(KernelError, match="calls print"):
-        compile_law(printing, "printing", 1, lambda: None)
+        compile_law(printing, "printing", lambda: None)
     compose(with_hook, {}, jit=False)
     with pytest.raises(KernelError, match="calls print"):
         compose(with_hook, {hooked: printing})

@@ -459,11 +459,8 @@ def tangent_cosine(work, row, other):
     A pair with swapped roles has the opposite tangent, but the sign of its displacement is the
     same.
     """
-    geometry = work.geometry[NOW]
-    cosine = (
-        geometry[row].normal_x * geometry[other].normal_x
-        + geometry[row].normal_y * geometry[other].normal_y
-    )
+    one, two = work.geometry[NOW, row], work.geometry[NOW, other]
+    cosine = one.normal_x * two.normal_x + one.normal_y * two.normal_y
     if work.candidates[row].vertex_body == work.candidates[other].vertex_body:
         return cosine
     return -cosine

@@ -239,12 +239,12 @@ def least_listed_gap(work):
 
 def contact_point(work, row, body):
     """Return the contact point of a pair relative to the centroid of one of its bodies [m]."""
-    geometry = work.geometry[NOW]
-    nx, ny = geometry[row].normal_x, geometry[row].normal_y
+    geometry = work.geometry[NOW, row]
+    nx, ny = geometry.normal_x, geometry.normal_y
     if work.candidates[row].vertex_body == body:
-        across, along = geometry[row].vertex_arm_n, geometry[row].vertex_arm_t
+        across, along = geometry.vertex_arm_n, geometry.vertex_arm_t
     else:
-        across, along = geometry[row].edge_arm_n, geometry[row].edge_arm_t
+        across, along = geometry.edge_arm_n, geometry.edge_arm_t
     # The point from its two arms: r = (r × t) n − (r × n) t.
     return along * nx + across * ny, along * ny - across * nx
 

@@ -215,13 +215,22 @@ def adjugate(a, b, c, d, e, f, g, h, i):
 def invert(blocks, block, both):
     """Replace a diagonal block by its inverse, in the real system or in both; return False if
     singular."""
-    m = blocks[REAL_PART, block]
-    adj = adjugate(m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2], m[2, 0], m[2, 1], m[2, 2])
+    adj = adjugate(
+        blocks[REAL_PART, block, 0, 0],
+        blocks[REAL_PART, block, 0, 1],
+        blocks[REAL_PART, block, 0, 2],
+        blocks[REAL_PART, block, 1, 0],
+        blocks[REAL_PART, block, 1, 1],
+        blocks[REAL_PART, block, 1, 2],
+        blocks[REAL_PART, block, 2, 0],
+        blocks[REAL_PART, block, 2, 1],
+        blocks[REAL_PART, block, 2, 2],
+    )
     if not abs(adj[0]) > 0.0:
         return False
     reciprocal = 1.0 / adj[0]
     for k in range(9):
-        m[k // 3, k % 3] = reciprocal * adj[1 + k]
+        blocks[REAL_PART, block, k // 3, k % 3] = reciprocal * adj[1 + k]
     if not both:
         return True
     pair = adjugate(
@@ -297,8 +306,9 @@ def divide_real_load(e, loads, index, row):
     """Multiply the load of a row by its inverted diagonal block, in the real system."""
     x, y, z = loads[REAL, row].real, loads[REAL, row + 1].real, loads[REAL, row + 2].real
     for i in range(3):
-        m = e.blocks[REAL_PART, index]
-        loads[REAL, row + i] = m[i, 0] * x + m[i, 1] * y + m[i, 2] * z
+        total = e.blocks[REAL_PART, index, i, 0] * x
+        total += e.blocks[REAL_PART, index, i, 1] * y
+        loads[REAL, row + i] = total + e.blocks[REAL_PART, index, i, 2] * z
 
 
 def divide_complex_load(e, loads, index, row):

@@ -243,24 +243,23 @@ def build_rows(work, end):
     """Turn the neighbour lists into rows: columns left, then right of the diagonal; False without
     room."""
     e, n = work.elimination, work.poses.shape[0]
-    # Reuse a row of scratch for the number of entries left of each diagonal. The pattern is
+    # Row BEGIN of the scratch is the number of entries left of each diagonal. The pattern is
     # symmetric, except that a leader's row holds one entry for each member of its cluster.
-    lower_counts = e.nodes[BEGIN]
     for index in range(n):
-        lower_counts[index] = 0
+        e.nodes[BEGIN, index] = 0
     for each in range(end):
         index = e.place[e.column[each]]
         e.column[each] = index
-        lower_counts[index] += 1
+        e.nodes[BEGIN, index] += 1
     for body in range(n):
         if e.place[body] != NONE and is_leader(work, body):
-            lower_counts[e.place[body]] = 0
+            e.nodes[BEGIN, e.place[body]] = 0
     for body in range(n):
         if e.place[body] != NONE and not is_leader(work, body):
-            lower_counts[e.place[work.cluster[body]]] += 1
+            e.nodes[BEGIN, e.place[work.cluster[body]]] += 1
     total = end
     for index in range(n):
-        total += lower_counts[index]
+        total += e.nodes[BEGIN, index]
     if total > e.column.shape[0]:
         return False
     # Shift from the end: nothing is overwritten before it has moved.
@@ -274,7 +273,7 @@ def build_rows(work, end):
         for each in range(last - first - 1, -1, -1):
             e.column[begin + each] = e.column[first + each]
         e.upper[index] = begin
-        begin -= lower_counts[index]
+        begin -= e.nodes[BEGIN, index]
         e.lower[index] = begin
     fill_lower(work)
     return True
@@ -283,10 +282,9 @@ def build_rows(work, end):
 def fill_lower(work):
     """Write the columns left of the diagonal in ascending order."""
     e, n = work.elimination, work.poses.shape[0]
-    filled = e.nodes[BEGIN]
     for index in range(n):
         sort_columns(e, e.upper[index], e.lower[index + 1])
-        filled[index] = e.lower[index]
+        e.nodes[BEGIN, index] = e.lower[index]
     # An entry right of the diagonal in one row is left of it in another.
     for index in range(n):
         if e.body[index] == NONE:
@@ -295,11 +293,11 @@ def fill_lower(work):
         for each in range(e.upper[index], e.lower[index + 1]):
             other = e.column[each]
             if other != leader:
-                e.column[filled[other]] = index
-                filled[other] += 1
+                e.column[e.nodes[BEGIN, other]] = index
+                e.nodes[BEGIN, other] += 1
         if leader != index:
-            e.column[filled[leader]] = index
-            filled[leader] += 1
+            e.column[e.nodes[BEGIN, leader]] = index
+            e.nodes[BEGIN, leader] += 1
 
 
 def find_pattern(scene, work):
